@@ -217,7 +217,7 @@ def test_the_package_itself_imports_nothing() -> None:
     ("walk", "most"),
     [
         ("a recording's column v to weights", 29),
-        ("a weight to its digit in float32 C", 25),
+        ("a weight to its digit in float32 C", 24),
         ("a sample through the bit reference", 5),
         ("a recording to a named effect", 59),
     ],

@@ -14,7 +14,6 @@ from typing import Any
 import jinja2
 import numpy as np
 
-from hystgen.basics.names import comment_text
 from hystgen.basics.problems import NotInvertibleError
 from hystgen.basics.version import __version__
 from hystgen.chain.chain import Chain
@@ -26,7 +25,7 @@ from hystgen.effects import own as own_effects
 from hystgen.effects.base import USER
 from hystgen.emission import chain, cost, numbers, own, runtime, selftest
 from hystgen.emission.options import OPTIONS, Options, seal
-from hystgen.emission.text import WIDTH, define, fit, literal
+from hystgen.emission.text import WIDTH, comment_text, define, fit, literal
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters, parameters_sha256
 

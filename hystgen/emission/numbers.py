@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics.names import comment_text
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables, float_tables
 from hystgen.compensator.bounds import error_bounds
@@ -20,7 +19,7 @@ from hystgen.compensator.chain.layout import ARRIVING_BITS, LEVEL_BITS, Compiled
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import chain
 from hystgen.emission.options import Options
-from hystgen.emission.text import WIDTH, constant, literal, operand, structure, table
+from hystgen.emission.text import WIDTH, comment_text, constant, literal, operand, structure, table
 from hystgen.front.curve import FORWARD, INVERSE
 from hystgen.front.stage import StageTables
 from hystgen.front.tanh.model import TanhEnvelope

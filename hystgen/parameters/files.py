@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from hystgen.basics.names import comment_text, name_problem
+from hystgen.basics.names import name_problem
 from hystgen.basics.problems import ParameterError, Path, Problem, path_text
 from hystgen.parameters.checks import EFFECT_NAMES, check
 from hystgen.parameters.schema import (
@@ -52,7 +52,6 @@ __all__ = [
     "TanhParameters",
     "Units",
     "canonical_json",
-    "comment_text",
     "dump_parameters",
     "load_parameters",
     "located",
