@@ -21,7 +21,7 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.names import MAX_NAME
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator.engines import ENGINES, choose
-from hystgen.emission import runtime
+from hystgen.emission import cost, runtime
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.emission.options import read_banner
 from hystgen.emission.text import literal
@@ -566,6 +566,39 @@ def test_templates_hold_no_algorithm() -> None:
     assert 0 < questions <= 40
 
 
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Path) -> None:
+    """Memory in the banner is counted from the declarations of `c_runtime/`; here by the compiler of this machine."""
+    family = runtime.FAMILIES[arithmetic]
+    variants = [
+        runtime.Variant(engine, family.fixed, fronts, branches)
+        for engine in ("corners", "loop")
+        for fronts, branches in ((False, False), (True, False), (True, True))
+    ]
+    names = {"hystgen_real_t": family.real, "hystgen_play_t": family.real, "hystgen_reach_t": family.real}
+    names |= {f"hystgen_{own}": kind for own, kind in family.types.items()}
+    lengths = {"HYSTGEN_N_PLAYS": 3, "HYSTGEN_CORNERS": 5}
+    shared = [*runtime.memory_pieces(family), *runtime.table_pieces(family)]
+    for number, variant in enumerate(variants):
+        pieces = [*shared, *runtime.state_pieces(variant, ["forward", "inverse"])]
+        sizes = cost.declared(pieces, ARITHMETICS[arithmetic], cost.Layout(4, 8, packed=False), lengths)
+        types = [each.name for each in pieces if "typedef struct" in each.code]
+        assert {"hystgen_corner_t", "hystgen_inverse_t", "hystgen_forward_t"} <= set(types)
+        lines = ["#include <stdbool.h>", "#include <stdint.h>", "#include <stdio.h>"]
+        lines += [f"typedef {kind} {own};" for own, kind in names.items()]
+        lines += [f"#define {macro} {length}" for macro, length in lengths.items()]
+        lines += [each.text for each in pieces]
+        printed = [f'    printf("%zu ", sizeof({each}));' for each in types]
+        lines += ["int main(void)", "{", *printed, "    return 0;", "}"]
+        source = tmp_path / f"sizes_{number}.c"
+        source.write_text("\n".join(lines) + "\n")
+        subprocess.run(["cc", "-std=c99", source, "-o", source.with_suffix("")], check=True)
+        found = subprocess.run([source.with_suffix("")], capture_output=True, text=True, check=True).stdout.split()
+        assert dict(zip(types, found, strict=True)) == {
+            each: str(sizes[each.removeprefix("hystgen_")][0]) for each in types
+        }
+
+
 def measured(name: str) -> dict[tuple[str, ...], dict[str, int]]:
     """A table of measured costs: rows by what stands before the two cores."""
     with (Path(hystgen.__file__).parent / "compensator" / name).open() as file:
@@ -593,8 +626,8 @@ def test_auto_takes_the_engine_that_was_measured_cheaper() -> None:
         stages = (DeadZone([-0.5, 0.0, 0.5], [0.1, 0.1, 0.1]),) if kind == "gpi" else ()
         for plays in (int(n), int(n) + 1) if int(n) + 1 not in counts else (int(n),):
             pi = PI(np.linspace(0, 0.5, plays + 1).tolist(), [1.0] * (plays + 1))
-            for optimize, cost in costs.items():
-                cheaper = "corners" if cost["corners"] < cost["loop"] else "loop"
+            for optimize, of in costs.items():
+                cheaper = "corners" if of["corners"] < of["loop"] else "loop"
                 assert choose("auto", optimize, Cascade(pi, stages, 0.0, (-1.0, 1.0)), operator, arithmetic) == cheaper
                 chosen.add((optimize, cheaper))
     assert {("speed", "loop"), ("speed", "corners"), ("auto", "loop"), ("auto", "corners"), ("size", "loop")} <= chosen

@@ -262,7 +262,8 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.macros = _macros(values)
     text = runtime.render(kernels, prefix, family, static=True)
     values.kernels = "" if shared else text
-    values.cost = _cost(cascade, options, values, text)
+    types = [*runtime.memory_pieces(family), *runtime.table_pieces(family), *([] if glue else states)]
+    values.cost = _cost(cascade, options, values, text, types)
     values.details = _details(parameters, cascade, options, values)
     return values
 
@@ -395,11 +396,13 @@ def cost_of(parameters: Parameters, cascade: StaticModel, options: Options) -> c
     return found
 
 
-def _cost(cascade: StaticModel, options: Options, values: SimpleNamespace, kernels: str) -> cost.Cost:
+def _cost(
+    cascade: StaticModel, options: Options, values: SimpleNamespace, kernels: str, types: Sequence[runtime.Piece]
+) -> cost.Cost:
     text = _implementation(values) + (kernels if values.shared else "")
     glue: chain.Glue | None = getattr(values, "glue", None)
     fields = glue.fields if glue else {}
-    return cost.estimate(cascade, options, values.numbers, text, "".join(values.arrays), fields)
+    return cost.estimate(cascade, options, values.numbers, text, "".join(values.arrays), types, fields)
 
 
 def _selftest_cost(options: Options, found: cost.Cost, samples: int) -> list[str]:

@@ -260,6 +260,11 @@ class Piece:
     text: str
     uses: frozenset[str]
 
+    @property
+    def code(self) -> str:
+        """Its text without comments."""
+        return _COMMENT.sub("", self.text)
+
 
 _COMMENT = re.compile(r"/\*.*?\*/", flags=re.DOTALL)
 _NAME = re.compile(r"\b(?:hystgen|HYSTGEN)_\w+")
@@ -324,6 +329,11 @@ def kernel_pieces(family: Family) -> list[Piece]:
 def table_pieces(family: Family) -> list[Piece]:
     """The types of an arithmetic's tables."""
     return _pieces(family.tables)
+
+
+def memory_pieces(family: Family) -> list[Piece]:
+    """The types that instances and tables of an arithmetic are made of."""
+    return _pieces(family.states)
 
 
 def operator_pieces(
