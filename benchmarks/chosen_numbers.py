@@ -2,9 +2,9 @@
 
     python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths]
 
-lag: `effects.lag.compensator.EXACT`; newton: `effects.thermal.compensator.MOST_CHANGE`; decades:
+lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.thermal.compensator.MOST_CHANGE`; decades:
 `effects.ageing.compensator.DECADES`; sweeps: `emission.worth.SWEEPS`; unknown: `tracking.MOST_UNKNOWN`; exact:
-`diagnosis.data.signals.EXACT`; lengths: `diagnosis.findings.content.LENGTHS`. All of them take some seconds; what is
+`diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`. All of them take some seconds; what is
 random has fixed seeds.
 """
 

@@ -1,4 +1,4 @@
-"""A model's name, which is the prefix of its C."""
+"""A model's name, which is the prefix of its C, and the length of names of units."""
 
 from __future__ import annotations
 
@@ -9,6 +9,10 @@ from hystgen.basics.problems import printable
 MAX_NAME = 40
 NAME_PATTERN = "^[A-Za-z](_?[A-Za-z0-9])*$"
 """Letters, digits and single underscores between them, starting with a letter."""
+
+MAX_UNIT = 40
+"""[characters] The longest name of a unit: a longer one in the header of a recording is not taken for a unit, since it
+would not fit a parameter file."""
 
 
 def _words(text: str) -> frozenset[str]:

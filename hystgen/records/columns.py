@@ -11,14 +11,12 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from hystgen.basics.names import MAX_UNIT
 from hystgen.basics.problems import printable
 from hystgen.records.record import Array, Record
 
 # Units: how headers write them, which ones are times, and what several records agree on ----------------------
 
-
-MAX_UNIT = 40
-"""Longest text in a header that is taken for a unit; longer ones do not fit a parameter file either."""
 
 SECONDS = ("s", "sec", "secs", "second", "seconds")
 
