@@ -4,8 +4,8 @@
 
 lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.thermal.compensator.MOST_CHANGE`; decades:
 `effects.ageing.compensator.DECADES`; sweeps: `emission.worth.SWEEPS`; unknown: `tracking.MOST_UNKNOWN`; exact:
-`diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`. All of them take some seconds; what is
-random has fixed seeds.
+`diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`. All of them take some seconds; what
+is random has fixed seeds.
 """
 
 from __future__ import annotations
