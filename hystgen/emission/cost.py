@@ -101,10 +101,11 @@ def declared(
         fields: list[tuple[int, int]] = []
         bits = 0
         for member in re.findall(r"[^;{}]+(?=;)", members.rpartition("}")[0]):
-            parts = None if "*" in member else _MEMBER.fullmatch(" ".join(member.split()))
-            if parts is None:
+            if "*" in member:
                 fields.append((layout.pointer, layout.pointer))
                 continue
+            parts = _MEMBER.fullmatch(" ".join(member.split()))
+            assert parts, f"{piece.name}: {member}"
             kind, sizes, width = parts.groups()
             bits += int(width or 0)
             if width:
@@ -149,8 +150,7 @@ def _constants(
     plays: int = 1,
 ) -> int:
     """Bytes of the constants that the C text defines, without padding between them; for constants with an entry for
-    each of `plays`, the bytes of one entry. `types`: as `declared`, `kinds`: of the blocks of a
-    chain."""
+    each of `plays`, the bytes of one entry. `types`: as `declared` gives them; `kinds`: of the blocks of a chain."""
     fixed = arithmetic.fixed
     real = arithmetic.reach_bytes if fixed else arithmetic.bytes
     reach = (real, real)
