@@ -489,7 +489,7 @@ def test_a_folder_in_place_of_an_output_file_stops_all_of_them() -> None:
         assert everything(folder) == before, "nothing half-written"
 
 
-def test_a_start_memory_that_has_to_be_moved_is_told_on_stderr() -> None:
+def test_a_projected_start_memory_is_reported_on_stderr() -> None:
     Path("listed.yaml").write_text(FILES["listed"])
     result = hyst("emit", "listed.yaml", "-o", "fw")
     assert "initial_state" in result.stderr
@@ -925,7 +925,7 @@ def test_simulate_names_the_missing_column_and_those_there(operator: str, missin
     assert all(name in result.stderr for name in ("t", "Steuerung", "Weg"))
 
 
-def test_simulate_repairs_are_told_on_stderr_only() -> None:
+def test_simulate_reports_repairs_on_stderr_only() -> None:
     lines = ["t,v,note", *(f"{k},{math.sin(k)},text" for k in range(40))]
     lines[7] = "6,,text"
     Path("drive.csv").write_text("\n".join(lines) + "\n")
@@ -939,7 +939,7 @@ def test_simulate_repairs_are_told_on_stderr_only() -> None:
 # show ----------------------------------------------------------------------------------------------------
 
 
-def test_show_tells_ranges_width_and_slopes() -> None:
+def test_show_prints_ranges_width_and_slopes() -> None:
     result = hyst("show", "stage.yaml")
     low, high = reachable()
     text = result.stdout

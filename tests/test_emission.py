@@ -51,7 +51,7 @@ def required_compilers() -> list[compilers.Compiler]:
 
 
 LENGTH = 20_000
-"""Calls of each record, a fifth of what `verify` takes by default; all mutants of `test_mutants.py` show in so many."""
+"""Calls of each record, a fifth of the default of `verify`; this number shows all mutants of `test_mutants.py`."""
 
 
 def check_codegen(name: str, **options: str) -> None:
@@ -352,10 +352,10 @@ def test_flags_that_change_answers_are_refused(flags: str, layout: str, tmp_path
         for compiler in required_compilers():
             if compiler.name == "zig":  # clang, for which -Ofast is another name of -O3
                 continue
-            told = compiler.name == "gcc" or not flags.startswith(("-funsafe", "-fassociative"))
+            reported = compiler.name == "gcc" or not flags.startswith(("-funsafe", "-fassociative"))
             for source in folder.glob("*.c"):
                 run = functools.partial(compiler.run, ["-c", *flags.split(), "-o", tmp_path / "one.o", source])
-                if arithmetic == "q31" or not told:
+                if arithmetic == "q31" or not reported:
                     run()
                     continue
                 with pytest.raises(compilers.CompileError, match="build without -f"):
@@ -639,11 +639,11 @@ def test_auto_takes_the_engine_that_was_measured_cheaper() -> None:
 def test_optimize_comes_from_the_call_or_the_file(optimize: str) -> None:
     wanted = {"speed": "corners", "size": "loop"}[optimize]
     assert emit_options(model("plain"), optimize=optimize).engine == wanted
-    told = Model(parse_parameters(FILES["plain"] + f"emit: {{optimize: {optimize}}}\n", "plain.yaml"))
-    assert emit_options(told).engine == wanted
-    assert emit_options(told, engine="corners").engine == "corners"
+    chosen = Model(parse_parameters(FILES["plain"] + f"emit: {{optimize: {optimize}}}\n", "plain.yaml"))
+    assert emit_options(chosen).engine == wanted
+    assert emit_options(chosen, engine="corners").engine == "corners"
     other = {"speed": "size", "size": "speed"}[optimize]
-    assert emit_options(told, optimize=other).engine != wanted
+    assert emit_options(chosen, optimize=other).engine != wanted
 
 
 def test_same_bytes_from_any_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

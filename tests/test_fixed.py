@@ -273,7 +273,7 @@ def test_formats_that_cannot_be_are_refused(
     assert str(caught.value).startswith(message)
 
 
-def test_the_least_lsb_that_is_told_is_enough() -> None:
+def test_the_least_lsb_in_the_message_is_enough() -> None:
     for arithmetic in ("q15", "q31"):
         for high in (100.0, 4.0, 0.7, 12345.678, 3e-9):
             model = Cascade(PI([0, high / 4], [1, 1]), (), 0.0, (0.0, high))

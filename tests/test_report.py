@@ -403,7 +403,7 @@ class TestCommand:
         assert "hystgen emit stage.yaml -o firmware/ --operator forward\n" in lead
         assert "fitted to the first 75 % of the records, such a model predicts the rest" in lead
 
-    def test_without_matplotlib_it_is_told_before_the_fit(
+    def test_missing_matplotlib_is_reported_before_the_fit(
         self, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         a, _ = self.files(tmp_path)
@@ -469,13 +469,13 @@ class TestDrawing:
         return Shown(record, Used("made", False, n, ((0, n),), none, none, none, none, none, none, none), np.zeros(n))
 
     @pytest.mark.parametrize("sigma", [0.01, 0.3])
-    def test_white_noise_is_told_beside_what_is_smooth(self, sigma: float) -> None:
+    def test_white_noise_is_found_beside_smooth_errors(self, sigma: float) -> None:
         t = np.linspace(0.0, 20.0, 20_000)
         noise = np.random.default_rng(4).normal(0.0, sigma, len(t))
         found = self.shown(np.sin(t) + noise, t).noise
         assert found == pytest.approx(sigma, rel=0.05)
 
-    def test_noise_that_is_not_white_is_not_told(self) -> None:
+    def test_noise_that_is_not_white_is_not_reported(self) -> None:
         t = np.linspace(0.0, 20.0, 20_000)
         white = np.random.default_rng(5).normal(size=len(t))
         for length in (2, 3, 9):
