@@ -21,7 +21,7 @@ class MissingExtraError(ImportError):
 
 
 def require_fit(what: str) -> None:
-    """Raise MissingExtraError if `what` needs packages of the extra `fit` that are not installed."""
+    """Raise MissingExtraError where `what` cannot be done because packages of the extra `fit` are not installed."""
     missing = [name for name in FIT if importlib.util.find_spec(name) is None]
     if missing:
         raise MissingExtraError(f"{what} needs {', '.join(missing)}; install the extra with: {install('fit')}")

@@ -130,7 +130,6 @@ class FormatError(ValueError):
         self.problems = [((), problem) if isinstance(problem, str) else problem for problem in problems]
         super().__init__("\n".join(Problem(path_text(path), message).named for path, message in self.problems))
 
-
 def counted(number: int, what: str) -> str:
     """`1 sample`, `2 samples`."""
     return f"{number} {what}{'' if number == 1 else 's'}"

@@ -315,7 +315,7 @@ def between_gaps(record: Record) -> list[Piece]:
 
 
 BRIDGED, NOT_COMPARED = "v that y does not bear out, bridged", "y far from their neighbours, not compared"
-"""How isolated wrong samples are treated."""
+"""What is done about isolated wrong samples."""
 
 
 def sentence(name: str, found: NDArray[np.intp], what: str) -> str:

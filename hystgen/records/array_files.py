@@ -140,7 +140,7 @@ class _MatVectors:
 def _fields(
     struct: NDArray[Any], folder: str, columns: list[Column], ignored: list[str], steps: list[Step]
 ) -> None:
-    """The vectors among the fields of a struct and of the structs in it; lists of structs are left out."""
+    """The vectors among the fields of a struct, and of the structs in it; lists of structs have none."""
     if struct.shape != (1, 1):
         ignored.append(folder[:-1])
         return
