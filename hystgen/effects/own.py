@@ -52,7 +52,7 @@ def source(effect: type[Effect]) -> Path:
 
 
 def _file(effect: type[Effect]) -> str:
-    """The Python file of an effect, or only the name of its module if it has no file."""
+    """The Python file of an effect; `model.py` if it has none."""
     return str(getattr(sys.modules.get(effect.__module__), "__file__", None) or "model.py")
 
 

@@ -36,7 +36,7 @@ FIXED_CHAIN_BLOCKS = (
     "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "mode_fixed.c",
     "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c", "bend.c", "stops.c",
 )  # fmt: skip
-"""Pieces that models with effects carry themselves, even with a shared run time."""
+"""Files that models with effects carry themselves, even with a shared run time."""
 
 SIGNALS = {
     "hystgen_signal_t": "hystgen_sum_t", "hystgen_fine_t": "hystgen_play_t", "hystgen_travel_t": "hystgen_sum_t",
@@ -47,7 +47,7 @@ FINE = {
     "HYSTGEN_FINE_MIN": "HYSTGEN_DRIVE_MIN", "HYSTGEN_FINE_MAX": "HYSTGEN_DRIVE_MAX",
     "hystgen_clamp_fine": "hystgen_clamp_drive",
 }  # fmt: skip
-"""Types finer than a drive code in such a model, and what they are elsewhere."""
+"""Names of numbers finer than a drive code in such a model, and what they stand for elsewhere."""
 
 FIXED_KERNELS = (
     "over_slope.c",

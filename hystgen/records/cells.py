@@ -111,7 +111,7 @@ BLANKS = " "
 """The delimiter of columns that any number of blanks separates, as aligned ones."""
 
 COMMENT = re.compile(r"^[^\S\n]*(?:#|%|//)", re.MULTILINE)
-"""Prefixes of comment lines."""
+"""The beginning of a comment line."""
 
 _THOUSANDS = (
     re.compile(r"[+-]?\d{1,3}(?:(?P<mark>[,' \u00a0\u202f\u2019])\d{3})(?:(?P=mark)\d{3})*(?:\.\d*)?"),

@@ -172,7 +172,7 @@ class Reading:
         return found
 
     def further(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> dict[str, Column]:
-        """The columns that were not asked for, by the names they get; names without a column are noted."""
+        """The columns that were not asked for, by the names they get; one whose name is taken is noted."""
         used = {c.name for c in chosen.values()}
         others = [c for c in columns if c.name not in used]
         names = further_names(others, list(chosen))

@@ -93,7 +93,7 @@ def find(name: str) -> Compiler | None:
 
 
 def missing(name: str) -> str:
-    """The name of what is missing if `find` finds nothing."""
+    """The message for a compiler that `find` does not find."""
     return f"{shlex.split(name)[0]} is not installed"
 
 
