@@ -26,7 +26,7 @@ from scipy.signal import lfilter
 import hystgen
 from hystgen.basics import parallel
 from hystgen.diagnosis import Diagnosis
-from hystgen.diagnosis.data import preparing
+from hystgen.diagnosis.data import items, preparing
 from hystgen.diagnosis.data.items import Item, rms
 from hystgen.diagnosis.data.preparing import set_aside
 from hystgen.diagnosis.data.signals import noise_floor
@@ -45,7 +45,7 @@ from hystgen.effects.noncongruent.model import PlayFunctions
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.effects.sensor_nonlinearity.model import SensorPolynomial
 from hystgen.identification.joint import Bent, DeadZones, Ends, Kept
-from hystgen.records import Record
+from hystgen.records import Record, read_record
 from hystgen.report import diagnosis as report
 from tests.plants import run as plants_run
 from tests.plants.__main__ import main as plants
@@ -227,6 +227,22 @@ def test_flexure_stage_with_its_start(measured: Path, tmp_path: Path) -> None:
     assert content["effects"][0]["name"] == "lag"
     assert ["lag", "delay"] in content["not_separable"]
     assert content["gap"]["after"]["holdout"] <= 0.005 * content["output_range"]
+
+
+@pytest.mark.data
+def test_flexure_stage_with_more_records(measured: Path, tmp_path: Path) -> None:
+    """The end of the fades hardly shows what the larger loops do, by which it would then be left out."""
+    sine = part_of_file(measured / "p885_sine_1hz.csv", tmp_path / "sine.csv", 300)
+    fades = read_record(part_of_file(measured / "p885_fades_and_hold.csv", tmp_path / "fades.csv", 300))
+    half = len(fades) // 2
+    hystgen.identify(sine).write(tmp_path / "stage.yaml")
+    found = hystgen.diagnose(
+        tmp_path / "stage.yaml", [sine, fades.section(0, half)], holdout=fades.section(half, None, "end")
+    )
+    names = [each["name"] for each in found.content["effects"]]
+    assert names[1:] == ["noncongruent"]
+    assert "lag" in names or [names[0], "lag"] in found.content["not_separable"]
+    assert found.content["gap"]["after"]["holdout"] <= 0.003 * found.content["output_range"]
 
 
 def test_the_sentence_says_what_is_left_open(tmp_path: Path) -> None:
@@ -1068,3 +1084,23 @@ def test_rooms_import_earlier_rooms_and_no_report() -> None:
             for name in node.names if within else ():
                 target = f"{within}.{name.name}" if "." not in within and within != "run" else within
                 assert _room(target) <= _room(module), (path, target)
+
+
+def test_ends_of_fitted_records_judge_too() -> None:
+    """They are held out once, from records of the same name too."""
+
+    def made(seed: int, name: str) -> Record:
+        v = wander(seed)
+        return record(v, noisy(brute_output(v, (0.0, 5.0), (1.0, 0.5), 0.0), 0.02), name)
+
+    ready = preparing.prepare([made(1, "same"), made(2, "same")], [made(3, "other")], (0.0,), 0.0)
+    more = preparing.with_ends(ready)
+    assert more is not None
+    for item, front, end in zip(ready.to_fit, more.to_fit, more.held[1:], strict=True):
+        number = np.count_nonzero(item.known)
+        assert np.count_nonzero(end.known) == pytest.approx(0.3 * number, abs=1)
+        assert (front.known | end.known).tolist() == item.known.tolist()
+        assert not (front.known & end.known).any()
+    assert items.compared([*more.to_fit, *more.held]) == items.compared([*ready.to_fit, *ready.held])
+    assert more.notes[-1].endswith("the last 30 % of each fitted record judges too")
+    assert preparing.with_ends(more) is None

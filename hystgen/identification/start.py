@@ -113,9 +113,11 @@ def of_model(
     least: float = LEAST_KNOWN,
 ) -> list[Course]:
     """Courses by which a model is judged: its weights stay as they are, and starts of those not `lacking` ignored."""
+    if len(thresholds) == 1:  # without plays there is nothing to know
+        return [replace(item, start=Start((), 0.0), first=item.begin) for item in courses]
     begun = [unknown(item) for item in courses]
     places = [k for k, item in enumerate(begun) if lacking(item, least)]
-    if len(thresholds) > 1 and places:
+    if places:
         for k, item in zip(places, _started([begun[k] for k in places], stages, thresholds, weights), strict=True):
             begun[k] = item
     return begun

@@ -113,11 +113,18 @@ def rms(errors: Sequence[Array]) -> float:
 
 
 def compared(items: Sequence[Item]) -> tuple[int, int]:
-    """Samples that are compared, and samples recorded; the two ends of a record are two items."""
-    known: dict[str, Mask] = {}
+    """Samples that are compared, and samples recorded."""
+    found = [mask for _, mask in masks(items)]
+    return sum(int(np.count_nonzero(mask)) for mask in found), sum(map(len, found))
+
+
+def masks(items: Sequence[Item]) -> list[tuple[str, Mask]]:
+    """Name of each record and the samples of it that are compared; the two ends of a record are two items."""
+    found: dict[int, tuple[str, Mask]] = {}
     for item in items:
-        known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
-    return sum(int(np.count_nonzero(x)) for x in known.values()), sum(map(len, known.values()))
+        _, others = found.get(id(item.run), ("", np.zeros(len(item.known), dtype=bool)))
+        found[id(item.run)] = item.name, item.known | others
+    return list(found.values())
 
 
 class Model(Protocol):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.problems import counted
 from hystgen.chain import chain
-from hystgen.diagnosis.data.items import Item, Model, rms
+from hystgen.diagnosis.data.items import Item, Model, masks, rms
 from hystgen.diagnosis.data.signals import unresolved_edges
 from hystgen.diagnosis.findings.kinds import (
     DropOuts,
@@ -439,11 +439,8 @@ def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
 
 def hardly_compared(items: Sequence[Item]) -> list[str]:
     """Notes on records that show nothing beside others that do, and on those that are mostly not compared."""
-    known: dict[str, NDArray[np.bool_]] = {}
-    for item in items:  # the two ends of a record are two items
-        known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
     notes = []
-    for name, compared in known.items():
+    for name, compared in masks(items):
         number = int(np.count_nonzero(compared))
         if number <= acceptance.COMPARED_SAMPLES:
             notes.append(
@@ -474,6 +471,18 @@ def set_aside(records: Sequence[Record]) -> list[int]:
     counts = [list(range(first, len(records), 3)) for first in (2, 1, 0)]
     others = [[*aside[:k], aside[k] - 1, *aside[k + 1 :]] for aside in counts for k in range(len(aside)) if aside[k]]
     return max(counts + others, key=shared)
+
+
+def with_ends(ready: Prepared) -> Prepared | None:
+    """The records with the end of each fitted one held out as well; None where they are, or are too short."""
+    ends = {id(item.run) for item in ready.to_fit} & {id(item.run) for item in ready.held}
+    longest = max(int(np.count_nonzero(item.known)) for item in ready.to_fit)
+    if ends or acceptance.SET_ASIDE * longest <= acceptance.COMPARED_SAMPLES:
+        return None
+    to_fit, held = parted(ready.to_fit)
+    share = f"{100 * acceptance.SET_ASIDE:g} %"
+    note = f"by the held-out records alone nothing could be named: the last {share} of each fitted record judges too"
+    return replace(ready, to_fit=to_fit, held=[*ready.held, *held], notes=[*ready.notes, note])
 
 
 def parted(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:
