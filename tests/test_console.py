@@ -272,7 +272,7 @@ def test_files_of_the_cache_that_are_cut_off_are_made_again(
     assert compiled_once() == (3.0, []), "it was repaired"
 
 
-def test_a_cache_on_a_full_disk_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_means_no_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import numba
     from numba.core import caching
 

@@ -1,4 +1,4 @@
-"""What the commands have in common: arguments, options, and errors as messages with an exit code."""
+"""Shared by the commands: arguments, options, and errors as messages with an exit code."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ U = TypeVar("U")
 
 
 def for_each(items: Sequence[T], action: Callable[[T], U]) -> list[U]:
-    """What `action` gives for every item. Raises Failed with all messages and the higher one of the exit codes."""
+    """The results of `action` for all items. Raises Failed with all messages and the higher one of the exit codes."""
     made, failures = [], []
     for item in items:
         try:

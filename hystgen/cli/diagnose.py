@@ -81,16 +81,15 @@ def diagnose(
     if max_rate is not None:
         raise click.UsageError("--max-rate is for drives; give --plan with it")
     from hystgen import diagnosis
-    from hystgen.basics import drawing, extras
+    from hystgen.basics import drawing, extras, writing
     from hystgen.effects import load_user_effects
-    from hystgen.emission import files
     from hystgen.report import diagnosis as report
 
     model = load_model(params, effects)
     guarded(params, partial(extras.require_fit, "diagnose"))
     guarded(params, drawing.require)
     keep_inputs([Path(output) / name for name in diagnosis.Diagnosis.FILES], (params, *data, *holdout))
-    guarded(output, partial(files.check, Path(output), diagnosis.Diagnosis.FILES))
+    guarded(output, partial(writing.check_files, Path(output), diagnosis.Diagnosis.FILES))
     visited = history_values(history)
     how = reading_options(**reading)
 

@@ -93,7 +93,6 @@ def identify(
     def run() -> None:
         from hystgen import records
         from hystgen.basics import drawing
-        from hystgen.emission import files
         from hystgen.identification import settings
         from hystgen.report import plots
 
@@ -105,7 +104,7 @@ def identify(
             drawing.check_path(plot)
         if report:
             pages.check_folder(report)
-            files.check(Path(report), pages.names())
+            writing.check_files(Path(report), pages.names())
         older = settings.of(output)
         read = records.read_records([*data, *holdout], points=True, **how)
         fit = identification.identify(

@@ -41,7 +41,7 @@ P0_FLOOR = 0.05
 """Share of the sum of weights below which p_0 is raised where the data allow it."""
 
 NEAR_ZERO = 0.01
-"""Share of the drive range by which a loading curve may miss 0 and fall back."""
+"""[share of the drive range] A loading curve may miss 0, and fall back, by this much."""
 
 PASSES = 60.0
 """Approximate number of times that the search for a front runs through all samples, for the progress bar."""
@@ -202,7 +202,7 @@ def check_options(
 
 @dataclass(frozen=True)
 class _How:
-    """What was asked of a fit."""
+    """The options of a fit."""
 
     wanted: int | tuple[float, ...] | None
     breaks: int | tuple[float, ...] | None
@@ -331,8 +331,8 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
 def _trial(
     courses: Sequence[Course], kinds: Sequence[str], how: _How, bar: Progress
 ) -> tuple[list[Row], str, list[pi.Errors], str]:
-    """Rows of models fitted to the first part of each record and compared with the rest, the kind chosen by them, the
-    errors of the chosen one, and why there are none."""
+    """Rows of models fitted to the first part of each record and compared with the rest, the kind that they choose, the
+    errors of that one, and the reason if there are no rows."""
     if not courses:
         if len(kinds) > 1:
             raise ValueError("model auto needs something held out: give holdout records beside the loading curve")

@@ -171,7 +171,7 @@ class Fit:
 
     @property
     def remarks(self) -> list[str]:
-        """What the fit table's words mean, one or two sentences each."""
+        """Explanations of the words in the fit table, one or two sentences each."""
         n = len(self.parameters.model.pi.thresholds) - 1
         reported = [
             f"{counted(n, 'play')}. Errors of a free run with a free offset a record; % of the largest "
@@ -261,7 +261,7 @@ class Used:
 
 
 def used_of(records: Sequence[Record], courses: Sequence[Course], held_out: bool) -> tuple[Used, ...]:
-    """What became of the samples of `records`, given the courses that were compared in the end."""
+    """How the samples of `records` were used, given the courses that were compared in the end."""
     return tuple(
         _of_record(record, [item for item in courses if item.origin[0] == number], held_out)
         for number, record in enumerate(records)

@@ -57,7 +57,7 @@ class Front(Protocol):
 
     @property
     def name(self) -> str:
-        """What the fit table calls it."""
+        """Its name in the fit table."""
 
     @property
     def straight(self) -> Array:
@@ -68,7 +68,7 @@ class Front(Protocol):
         """Least and largest value of every shape number."""
 
     def slack(self, shape: Array) -> Array:
-        """What must not be negative for the front to be invertible, beyond the bounds; empty when there is nothing."""
+        """Values that must not be negative for the front to be invertible, beyond the bounds; may be empty."""
 
     def stages(self, shape: Array) -> tuple[Stage, ...]:
         """The stages of the model."""
@@ -76,7 +76,7 @@ class Front(Protocol):
 
 @dataclass(frozen=True)
 class Kept:
-    """A memoryless part that stays as it is; by default none, which makes a plain play sum."""
+    """A memoryless part that stays as it is; without stages, the default, the model is a plain play sum."""
 
     given: tuple[Stage, ...] = ()
     name: str = "pi"
@@ -236,7 +236,7 @@ class Tanh:
 
     @property
     def name(self) -> str:
-        """With the number of branches, which the table tells apart."""
+        """With the number of branches, which distinguishes rows of the table."""
         return "gpi-tanh" if self.branches == 1 else "gpi-tanh, two branches"
 
     @property
@@ -272,7 +272,7 @@ class Tanh:
         return np.linspace(*self.drive, 61)
 
     def stages(self, shape: Array) -> tuple[Stage, ...]:
-        """The envelope, its numbers rounded; the descending branch is lifted by what rounding lets it fall short."""
+        """The envelope with rounded numbers; the descending branch is lifted where rounding would put it too low."""
         return (self._stage(shape, DIGITS),)
 
     def _stage(self, shape: Array, digits: int | None) -> TanhEnvelope:
@@ -310,7 +310,7 @@ def _numbers(values: tuple[float, ...], digits: int | None) -> tuple[float, floa
 
 
 def even_breaks(drive: tuple[float, float], count: int) -> tuple[float, ...]:
-    """So many breaks evenly spaced inside the drive range; one that would fall on 0 is moved aside by a little."""
+    """`count` breaks evenly spaced inside the drive range; one that would fall on 0 is moved aside a little."""
     low, high = drive
     step = (high - low) / (count + 1)
     return aside([rounded(low + step * (j + 1), 6) for j in range(count)], 0.05 * step)
@@ -406,14 +406,14 @@ def refine(
 
 
 class Limits(Protocol):
-    """What a shape must keep to."""
+    """Constraints on a shape."""
 
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest value of every shape number."""
 
     def slack(self, shape: Array) -> Array:
-        """What must not be negative beyond the bounds."""
+        """Values that must not be negative, beyond the bounds."""
 
 
 def search(

@@ -52,7 +52,7 @@ class Solution:
     sense: Sense
 
     def without_idle_plays(self) -> Solution:
-        """The same without plays that have no weight: they are no part of the model."""
+        """The same without plays of weight 0, which are not part of the model."""
         kept = (self.weights > 0.0) | (self.thresholds == 0.0)
         return replace(self, thresholds=self.thresholds[kept], weights=self.weights[kept])
 
@@ -195,7 +195,7 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
 
 
 def dense(reach: float, samples: int, most: int = DENSE) -> Candidate:
-    """One list of `most` plays, which leaves little to wish for, to judge by what else there is in a record."""
+    """One list of `most` plays, fine enough to show what else a record contains."""
     return candidates(reach, samples, min(most, max(1, samples // SAMPLES_A_PLAY)))[:2][-1]
 
 
@@ -252,7 +252,7 @@ moves like no other keeps its weight to about six digits.
 """
 
 FLOOR_COST = 0.05
-"""How much the rms error may grow, as a share of itself, for p_0 to be raised to its floor."""
+"""[share of the rms error] The error may grow by this much for p_0 to be raised to its floor."""
 
 
 def non_negative(system: Array, columns: Columns) -> Array:

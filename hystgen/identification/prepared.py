@@ -216,7 +216,7 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
 
     There, where a model then misses it by far less, and the rest of it by no more: a wrong drive is remembered, where a
     wrong output is not. Or where the whole row is wrong, which shows in the output there, or behind it: a pulse that
-    was real has left its memory. A pulse right before the end of a record tells a fit nothing, and cannot be told from
+    was real has left its memory. A pulse right before the end of a record does not help a fit, and looks the same as
     a fault: it would only widen the range, and hide when the memory became known. A `robust` solution is asked about
     the largest and the least drive too, if it misses the output there by as much as anywhere: what they spoil may hide
     them, and the range of the model ends at them.
@@ -281,7 +281,7 @@ def _errors(item: Course, solution: pi.Solution) -> Array:
 
 
 def _most_missed(item: Course, error: Array) -> NDArray[np.intp]:
-    """As many of the samples compared as may be isolated faults, those with the largest errors."""
+    """The samples compared with the largest errors, as many as may be isolated faults."""
     compared = item.compared
     return compared[np.argsort(-np.abs(error[compared]), kind="stable")[: faults.most(len(compared))]]
 

@@ -1,4 +1,4 @@
-"""From records to a small triangular system: what a fit needs to know of any number of samples.
+"""From records to a small triangular system, which is all that a fit needs of any number of samples.
 
 The regressors of a PI model are its plays, `y = sum p_i play_(r_i)[v] + offset`. They are formed a few thousand
 samples at a time and reduced by QR (a sequential TSQR; Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci. Comput. 34,
@@ -32,8 +32,8 @@ BLOCKED = 64
 """Columns for which the linear algebra library has room to work on at a time."""
 
 AS_FAR = 1e-3
-"""Share of its range by which the drive may miss its largest or least value and still have been there: four codes of a
-12-bit converter. A play that reaches further is missed by no more than that share of the motion."""
+"""[share of its range] A drive that misses its largest or least value by no more than this has still been there: four
+codes of a 12-bit converter. A play that reaches further is missed by no more than that share of the motion."""
 
 FOLDS = 4
 """Consecutive blocks of each record for the blocked validation."""
@@ -90,7 +90,7 @@ class Course:
 
     @property
     def drive_range(self) -> tuple[float, float]:
-        """Least and largest drive among the samples compared; of none that of all from `first` on."""
+        """Least and largest drive among the samples compared; if there are none, among all from `first` on."""
         part = self.v[self.compared] if self.used else self.v[self.first : self.last]
         return float(part.min()), float(part.max())
 

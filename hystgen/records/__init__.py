@@ -59,7 +59,7 @@ FORMATS: dict[str, Callable[[Reading, IO[bytes]], Table]] = {
     ".parquet": read_parquet,
     ".pq": read_parquet,
 }
-"""How a file is read, by its suffix in lower case; anything else is text."""
+"""Readers by suffix in lower case; any other file is text."""
 
 
 def read_records(
@@ -137,7 +137,7 @@ def read_record(
 
 
 def several(sources: Source | Iterable[Source]) -> list[Source]:
-    """One source of a record, or several, as a list. Raises TypeError for what is none."""
+    """One source of a record, or several, as a list. Raises TypeError for anything else."""
     if isinstance(sources, Record | str | os.PathLike):
         return [sources]
     listed = isinstance(sources, list) or (isinstance(sources, tuple) and not sources)
@@ -166,7 +166,7 @@ def _check_options(columns: object, sample_time: object, delimiter: object) -> N
 
 
 def _check_arrays(record: Record) -> None:
-    """Raise ValueError or TypeError for a record made of arrays that are none, or not of one dimension."""
+    """Raise ValueError or TypeError unless a record is made of arrays of numbers with one dimension."""
     if not isinstance(record.name, str):
         raise TypeError(f"a record's name is text, not {arguments.kind(record.name)}; Record(name, t, v, y)")
     for name, values in record.columns().items():
@@ -207,7 +207,7 @@ def _read(
 
 
 def _size(source: Source) -> int:
-    """Bytes to read; 0 where there is no file, which is reported when it is opened."""
+    """Bytes to read; 0 for a missing file, which is reported when it is opened."""
     try:
         return os.stat(source).st_size if isinstance(source, str | os.PathLike) else 0
     except OSError:

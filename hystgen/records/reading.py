@@ -1,4 +1,4 @@
-"""What every format shares: the request, the problems found, the columns chosen, and the record made of them."""
+"""Steps that every format shares: the request, the problems found, the columns chosen, and the record made of them."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ SAME_STEP = 1e-6
 """Largest relative difference of two sample times that say the same: files write at least seven digits, or round."""
 
 BESIDE = 2
-"""Memory for a record over that of its numbers: 1.7 were measured with 2e7 samples of HDF5 on 2026-11-26, for what is
-sorted and marked beside them."""
+"""[times] Memory for a record over that of its numbers, because of sorted copies and marks: 1.7 with 2e7 samples of
+HDF5 (2026-11-26)."""
 
 NO_SECONDS = 1e11
 """Times from here on are no seconds: those since 1970 get there in the year 5138, milliseconds did in 1973."""
@@ -59,7 +59,7 @@ class Lines:
 
 @dataclass
 class Table:
-    """What a file holds before it is judged: columns under our names, NaN where there is no value.
+    """The content of a file before it is judged: columns under our names, NaN for missing values.
 
     `units`: those the file gives; `lines`: where the file has lines.
     """
@@ -172,7 +172,7 @@ class Reading:
         return found
 
     def further(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> dict[str, Column]:
-        """The columns that were not asked for, by the names they get; what finds none is noted."""
+        """The columns that were not asked for, by the names they get; one whose name is taken is noted."""
         used = {c.name for c in chosen.values()}
         others = [c for c in columns if c.name not in used]
         names = further_names(others, list(chosen))
@@ -219,7 +219,7 @@ class Reading:
         return self.finished(numbers, taken)
 
     def finished(self, numbers: dict[str, Array], taken: Mapping[str, Column], lines: Lines | None = None) -> Table:
-        """A table with NaN for every value that is none, time in seconds and units by name."""
+        """A table with NaN for every cell that is not a number, time in seconds, and units by name."""
         for name, x in numbers.items():
             wrong = no_value(x)
             written = np.unique(x[wrong & np.isfinite(x)])

@@ -69,7 +69,7 @@ class Compiler:
 
 @functools.cache
 def find(name: str) -> Compiler | None:
-    """The compiler of that name, or None where it is not installed.
+    """The compiler of that name, or None if it is not installed.
 
     Any other name is a command as a shell takes it, words and quotes: `ccache gcc`, `gcc -m32`. Raises ValueError for a
     quote that is not closed, and for no command at all.
@@ -93,7 +93,7 @@ def find(name: str) -> Compiler | None:
 
 
 def missing(name: str) -> str:
-    """What is not installed where `find` finds nothing."""
+    """The message for a compiler that `find` does not find."""
     return f"{shlex.split(name)[0]} is not installed"
 
 

@@ -385,7 +385,7 @@ class Cleaned:
         return bool(ruling(clean, fitted.errors(clean))[0])
 
     def notes(self, unit: str | None) -> list[str]:
-        """What was done to the records, one sentence each."""
+        """Repairs of the records, one sentence each."""
         return [line.sentence(unit) for line in self.lines]
 
 

@@ -42,7 +42,7 @@ Kind = TypeVar("Kind", bound=Finding)
 
 
 Predict = Callable[[Record], Array]
-"""What the nominal model predicts of a record, (N,) in output units up to an offset."""
+"""The nominal model's prediction of a record, (N,) in output units up to an offset."""
 
 
 @dataclass(frozen=True)
@@ -275,8 +275,8 @@ def prepare(
 ) -> Prepared:
     """Items for the fits; without held-out records that can judge one in three is held out, or the end of each.
 
-    `skip`: seconds at the start of every record that are not compared. Raises IdentificationError, also where there is
-    too little to compare.
+    `skip`: seconds at the start of every record that are not compared. Raises IdentificationError, also if there are
+    too few samples to compare.
     """
     notes: list[str] = []
     held_courses, held_rails = _courses(holdout, history, skip)
@@ -547,7 +547,7 @@ def merged(findings: Sequence[Kind]) -> list[Kind]:
 
 
 def not_at_the_end(repaired: Sequence[Finding], items: Sequence[Item]) -> list[Finding]:
-    """What was repaired, with samples as held, not saturated, where another record goes beyond their level."""
+    """The repairs, with samples listed as held, not saturated, if another record goes beyond their level."""
     highest, lowest = (f([float(f(item.y[item.known])) for item in items if item.known.any()]) for f in (max, min))
     span = highest - lowest
     found: list[Finding] = []

@@ -202,7 +202,7 @@ class Actuator:
         return course.v, item.run, self.thresholds, start
 
     def mapped(self, h: Array, level: Array, item: Item) -> Array:
-        """The output behind its maps: a limit in front of the offset `level`, a sensor behind it."""
+        """The output after its maps: a limit before the offset `level`, a sensor after it."""
         maps = self.at(Place.OUTPUT)
         for effect in maps:
             if effect.order == 0:
