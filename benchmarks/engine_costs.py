@@ -23,7 +23,7 @@ import targets as bench
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.compensator import engines
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options
 from hystgen.emission.options import OPERATORS

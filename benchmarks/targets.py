@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.compensator import fixed_tables, float_tables
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.emission.calls import emit_options
 from hystgen.emission.text import operand, table
 from hystgen.model import Model
@@ -49,10 +49,10 @@ HERE = Path(__file__).resolve().parent
 PLAYS = (4, 8, 16, 32, 64, 128, 256)
 SAMPLES = 4000
 SEARCHED = 200_000  # samples of a round of the search for the worst case
-# Samples of a trial from which on it is searched apart. `trials` makes 600 of random turns this long; with 4 and 16
-# plays no other has more than 18 samples, with 128 plays corner lists are on both sides of it
+# A trial with at least this many samples is searched separately. `trials` makes 600 of random turns this long; with 4
+# and 16 plays no other has more than 18 samples, with 128 plays corner lists are on both sides of it
 LONG = 100
-KEPT = 30  # trials, the dearest ones, whose neighbours the next round is about
+KEPT = 30  # trials, the most expensive ones, whose neighbours the next round tries
 RANGE = 10.0  # half of it
 MEANS = {"fine": lambda: multisine(20000), "coarse": lambda: multisine(2000), "walk": lambda: walk(5000)}
 """More signals, over which the corner engine's mean is taken: a multisine in finer and coarser steps, a random walk."""
@@ -222,7 +222,7 @@ def activations(case: Case, points: Reals) -> Reals:
 
 
 def thinned(x: Reals, most: int) -> Reals:
-    """At most so many of them, the ends among them."""
+    """At most `most` of them, both ends included."""
     return x[np.linspace(0, len(x) - 1, min(most, len(x))).round().astype(int)]
 
 
@@ -300,7 +300,7 @@ def alternating(found: Sequence[Iterable[Reals]]) -> Iterator[Reals]:
 
 
 def within(most: int, found: Iterable[Reals]) -> list[Reals]:
-    """The first of them, of so many samples together."""
+    """The first of them, with `most` samples together."""
     kept = []
     for trial in found:
         most -= len(trial) + 1
@@ -589,7 +589,7 @@ class Bench:
     def _better(
         self, case: Case, best: list[Reals], rounds: int, most: int, hair: float, form: Form, behind: bool = False
     ) -> list[Reals]:
-        """The dearest of trials and of what lies near the dearest of them, as long as that is dearer."""
+        """The most expensive of trials and of their neighbours, as long as those are more expensive."""
         before, (dear, best) = 0, self._dearest(case, best, KEPT, form, behind)
         for _ in range(rounds):
             if dear == before:
@@ -601,8 +601,8 @@ class Bench:
     def _dearest(
         self, case: Case, found: list[Reals], number: int, form: Form = plain, behind: bool = False
     ) -> tuple[int, list[Reals]]:
-        """Instructions of the dearest sample, and so many trials with the dearest ones, those first, and one of those
-        that jump from the same place."""
+        """Instructions of the most expensive sample, and `number` trials with such samples, the most expensive first,
+        and one of those that jump from the same place."""
         call, x, ends = form(case, found)
         counts = np.zeros(len(call))
         counts[call == slots.OP_STEP] = self.run(case, self.image(case, "corners"), "corners", x, call).counts

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from hystgen.cascade import PI as PI
     from hystgen.cascade import Cascade as Cascade
     from hystgen.cascade import InverseCascade as InverseCascade
-    from hystgen.compensator.session import Session as Session
+    from hystgen.compensator.reference import Session as Session
     from hystgen.emission.calls import differences as differences
     from hystgen.emission.calls import emit as emit
     from hystgen.fleet.batch import identify_batch as identify_batch
@@ -58,7 +58,7 @@ _PLACES = {
     "NotInvertibleError": "basics.problems",
     "PI": "cascade",
     "ParameterError": "basics.problems",
-    "Session": "compensator.session",
+    "Session": "compensator.reference",
     "TanhEnvelope": "front.tanh.model",
     "diagnose": "report.diagnosis",
     "differences": "emission.calls",

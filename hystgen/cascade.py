@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.problems import NotInvertibleError
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.plays.play_sum import PlaySum
 
 Array = NDArray[np.float64]
@@ -24,8 +24,8 @@ class PI(PlaySum):
     """Play sum `y = p_0 v + sum p_i play_(r_i)[v]` (21).
 
     `thresholds`: r_0 = 0 < r_1 < ... < r_n in units of the input; `weights`: p_0 .. p_n, any finite numbers, in output
-    per input unit; `initial_state`: one number or n+1 of them, projected to the admissible set (`projected` tells).
-    Raises ValueError for anything else.
+    per input unit; `initial_state`: one number or n+1 of them, projected to the admissible set (`projected`: whether it
+    was). Raises ValueError for anything else.
     """
 
     def simulate(self, v: ArrayLike) -> Array:

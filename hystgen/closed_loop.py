@@ -41,7 +41,7 @@ from hystgen.basics import extras
 from hystgen.basics.checks import finite
 from hystgen.cascade import PI, Cascade, InverseCascade
 from hystgen.compensator import fixed_tables
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.emission.calls import emit_options
 from hystgen.emission.options import Options
 from hystgen.model import InverseModel, Model, as_model
@@ -170,7 +170,7 @@ class Loop:
         """The response to `reference` from rest: N samples at t_k, or a function of the time in s with a `duration`.
 
         Every run starts anew: plant at 0, all memories at their start. Raises ValueError for a reference that is not a
-        signal or a duration that is none.
+        signal, or for an impossible duration.
         """
         r = self._reference(reference, duration)
         controller, compensator, hysteresis = self._blocks

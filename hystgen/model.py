@@ -1,4 +1,4 @@
-"""What `hystgen.load` gives: the parameters of a model and the chain that they describe."""
+"""A model as `hystgen.load` returns it: its parameters and the chain that they describe."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hystgen.basics import arguments, display, drawing
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError, counted
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator import engines, tables
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 MOST_A_CODE = 0.01
-"""Share of its range by which the drive of fixed point may move for one code of the reference: more is noise."""
+"""[share of its range] The drive may move this far for one code of the reference; in fixed point more is noise."""
 
 
 def cascade_of(parameters: Parameters) -> Cascade:
@@ -387,13 +387,13 @@ def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> li
 
 
 def check_arithmetic(arithmetic: str) -> None:
-    """Raise FormatError for an arithmetic that there is not."""
+    """Raise FormatError for the name of an arithmetic that does not exist."""
     if arithmetic not in ARITHMETICS:
         raise FormatError(f"arithmetic {arithmetic!r} is none of {', '.join(ARITHMETICS)}")
 
 
 class HasModel(Protocol):
-    """What has a model, such as a fit or a diagnosis."""
+    """An object that has a model, such as a fit or a diagnosis."""
 
     @property
     def model(self) -> Model:
@@ -401,13 +401,13 @@ class HasModel(Protocol):
 
 
 ModelSource: TypeAlias = "Model | HasModel | str | os.PathLike[str]"
-"""A model, what has one, or the path of a parameter file."""
+"""A model, an object that has one, or the path of a parameter file."""
 
 
 def as_model(source: ModelSource) -> Model:
-    """The model, that of a parameter file, or that of what has one, such as a fit.
+    """The model itself, that of a parameter file, or that of an object that has one, such as a fit.
 
-    Raises ParameterError, and TypeError for what is none of them.
+    Raises ParameterError, and TypeError for anything else.
     """
     if isinstance(source, str | os.PathLike):
         return load(source)

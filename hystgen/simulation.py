@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.problems import EffectsError
 from hystgen.chain.chain import join
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.model import Model
 from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
@@ -57,7 +57,7 @@ def simulate_records(
 def _emulated(
     model: Model, records: Sequence[Record], operator: str, arithmetic: str | None
 ) -> tuple[NDArray[Any], list[str]]:
-    """Answers of the bit reference of a model with effects for the one record that there is, and no remarks."""
+    """Answers of the bit reference of a model with effects, which takes one record, and no remarks."""
     if len(records) > 1:
         raise EffectsError("the bit reference of a model with effects takes one record; simulate them one by one")
     (record,) = records

@@ -29,7 +29,8 @@ import hystgen
 from hystgen import cli, records, verification
 from hystgen.compensator import tables
 from hystgen.compensator.bounds import error_bounds
-from hystgen.emission import banner, module
+from hystgen.emission import module
+from hystgen.emission.options import seal
 from hystgen.emission.text import literal
 from hystgen.verification import compilers, run
 
@@ -220,7 +221,7 @@ def test_check_says_in_what_a_file_differs(layout: str) -> None:
         return said.splitlines()[0].removeprefix("error: fw/stage.c ")
 
     text = re.sub(r" \* Text: .*\n", "", good).replace(f"hystgen {hystgen.__version__};", "hystgen 0.0.1;")
-    older = banner.seal(text.replace("return", "return ", 1))
+    older = seal(text.replace("return", "return ", 1))
     assert check(good.replace("\n", "\r\n")) == "has other line ends than LF"
     assert check(good.replace("return", "return ", 1)) == "was edited by hand"
     both = good.replace("return", "return ", 1).replace("\n", "\r\n")
@@ -533,7 +534,7 @@ def test_a_folder_in_place_of_an_output_file_stops_all_of_them() -> None:
         assert everything(folder) == before, "nothing half-written"
 
 
-def test_a_start_memory_that_has_to_be_moved_is_told_on_stderr() -> None:
+def test_a_projected_start_memory_is_reported_on_stderr() -> None:
     Path("listed.yaml").write_text(FILES["listed"])
     result = hyst("emit", "listed.yaml", "-o", "fw")
     assert "initial_state" in result.stderr
@@ -969,7 +970,7 @@ def test_simulate_names_the_missing_column_and_those_there(operator: str, missin
     assert all(name in result.stderr for name in ("t", "Steuerung", "Weg"))
 
 
-def test_simulate_repairs_are_told_on_stderr_only() -> None:
+def test_simulate_reports_repairs_on_stderr_only() -> None:
     lines = ["t,v,note", *(f"{k},{math.sin(k)},text" for k in range(40))]
     lines[7] = "6,,text"
     Path("drive.csv").write_text("\n".join(lines) + "\n")
@@ -983,7 +984,7 @@ def test_simulate_repairs_are_told_on_stderr_only() -> None:
 # show ----------------------------------------------------------------------------------------------------
 
 
-def test_show_tells_ranges_width_and_slopes() -> None:
+def test_show_prints_ranges_width_and_slopes() -> None:
     result = hyst("show", "stage.yaml")
     low, high = reachable()
     text = result.stdout

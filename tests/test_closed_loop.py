@@ -595,7 +595,7 @@ def test_what_cannot_be_a_loop(change: dict[str, object], error: type[Exception]
         Loop(**{"plant": ([1.0], [1.0, 1.0]), "controller": 1.0, "sample_time": 0.1, **change})  # type: ignore[arg-type]
 
 
-def test_loops_are_told_apart_as_objects() -> None:
+def test_loops_compare_by_identity() -> None:
     one, other = (Loop((np.eye(1), [[1.0]], [[1.0]], [[0.0]]), 1.0, 0.1) for _ in range(2))
     assert one != other
     assert len({one, other}) == 2

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from elftools.elf.elffile import ELFFile
+from mains import c_main
 from modelfiles import FILES
 
 import hystgen
@@ -20,8 +21,9 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.names import MAX_NAME
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator.engines import ENGINES, choose
-from hystgen.emission import banner, runtime
+from hystgen.emission import cost, runtime
 from hystgen.emission.calls import emit_options, emitted_files
+from hystgen.emission.options import read_banner
 from hystgen.emission.text import literal
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.model import Model
@@ -49,7 +51,7 @@ def required_compilers() -> list[compilers.Compiler]:
 
 
 LENGTH = 20_000
-"""Calls of each record, a fifth of what `verify` takes by default; all mutants of `test_mutants.py` show in so many."""
+"""Calls of each record, a fifth of the default of `verify`; this number shows all mutants of `test_mutants.py`."""
 
 
 def check_codegen(name: str, **options: str) -> None:
@@ -233,28 +235,6 @@ def test_bits_equal_in_other_layouts(name: str, arithmetic: str, layout: str) ->
     check_codegen(name, arithmetic=arithmetic, layout=layout)
 
 
-SANITIZED = """
-#include "{name}.h"
-#include <stdio.h>
-int main(void)
-{{
-    static {name}_{op}_t self;
-    int call;
-    {name}_real_t x;
-    {name}_{op}_init(&self);
-    while ((call = getchar()) != EOF && fread(&x, sizeof x, 1, stdin) == 1) {{
-        switch (call) {{
-        case 0: (void){name}_{op}_step(&self, x); break;
-        case 1: {commit} break;
-        case 2: {name}_{op}_reset(&self, x); break;
-        default: {name}_{op}_init(&self); break;
-        }}
-    }}
-    return 0;
-}}
-"""
-
-
 @pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
@@ -268,8 +248,7 @@ def test_sanitizers_find_nothing(name: str, arithmetic: str, engine: str, tmp_pa
     hystgen.emit(one, tmp_path, operator="both", arithmetic=arithmetic, engine=engine)
     numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
     for op in ("forward", "inverse"):
-        commit = f"{name}_{op}_commit(&self, x);" if op == "inverse" else ""
-        (tmp_path / "main.c").write_text(SANITIZED.format(name=name, op=op, commit=commit))
+        (tmp_path / "main.c").write_text(c_main(name, op))
         flags = ["-std=c99", "-g", "-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
         gcc.run([*flags, "-I", tmp_path, tmp_path / "main.c", tmp_path / f"{name}.c", "-o", tmp_path / "run"])
         for record, call, x in signals.suite(numbers, real, op == "inverse", 20_000):
@@ -373,10 +352,10 @@ def test_flags_that_change_answers_are_refused(flags: str, layout: str, tmp_path
         for compiler in required_compilers():
             if compiler.name == "zig":  # clang, for which -Ofast is another name of -O3
                 continue
-            told = compiler.name == "gcc" or not flags.startswith(("-funsafe", "-fassociative"))
+            reported = compiler.name == "gcc" or not flags.startswith(("-funsafe", "-fassociative"))
             for source in folder.glob("*.c"):
                 run = functools.partial(compiler.run, ["-c", *flags.split(), "-o", tmp_path / "one.o", source])
-                if arithmetic == "q31" or not told:
+                if arithmetic == "q31" or not reported:
                     run()
                     continue
                 with pytest.raises(compilers.CompileError, match="build without -f"):
@@ -537,7 +516,7 @@ def test_a_banner_of_two_lines_is_read(tmp_path: Path) -> None:
     one = renamed("plain", "n" * MAX_NAME)
     hystgen.emit(one, tmp_path, arithmetic="q15", engine="loop", layout="single-header", operator="both")
     text = next(tmp_path.glob(f"{one.name}.h")).read_text()
-    read = banner.read(text)
+    read = read_banner(text)
     assert read is not None
     assert " \\\n" in text[: text.index("Parameters:")]
     assert read.options == {"arithmetic": "q15", "engine": "loop", "layout": "single-header", "operator": "both"}
@@ -587,6 +566,39 @@ def test_templates_hold_no_algorithm() -> None:
     assert 0 < questions <= 40
 
 
+@pytest.mark.parametrize("arithmetic", ARITHMETICS)
+def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Path) -> None:
+    """Memory in the banner is counted from the declarations of `c_runtime/`; here by the compiler of this machine."""
+    family = runtime.FAMILIES[arithmetic]
+    variants = [
+        runtime.Variant(engine, family.fixed, fronts, branches)
+        for engine in ("corners", "loop")
+        for fronts, branches in ((False, False), (True, False), (True, True))
+    ]
+    names = {"hystgen_real_t": family.real, "hystgen_play_t": family.real, "hystgen_reach_t": family.real}
+    names |= {f"hystgen_{own}": kind for own, kind in family.types.items()}
+    lengths = {"HYSTGEN_N_PLAYS": 3, "HYSTGEN_CORNERS": 5}
+    shared = [*runtime.memory_pieces(family), *runtime.table_pieces(family)]
+    for number, variant in enumerate(variants):
+        pieces = [*shared, *runtime.state_pieces(variant, ["forward", "inverse"])]
+        sizes = cost.declared(pieces, ARITHMETICS[arithmetic], cost.Layout(4, 8, packed=False), lengths)
+        types = [each.name for each in pieces if "typedef struct" in each.code]
+        assert {"hystgen_corner_t", "hystgen_inverse_t", "hystgen_forward_t"} <= set(types)
+        lines = ["#include <stdbool.h>", "#include <stdint.h>", "#include <stdio.h>"]
+        lines += [f"typedef {kind} {own};" for own, kind in names.items()]
+        lines += [f"#define {macro} {length}" for macro, length in lengths.items()]
+        lines += [each.text for each in pieces]
+        printed = [f'    printf("%zu ", sizeof({each}));' for each in types]
+        lines += ["int main(void)", "{", *printed, "    return 0;", "}"]
+        source = tmp_path / f"sizes_{number}.c"
+        source.write_text("\n".join(lines) + "\n")
+        subprocess.run(["cc", "-std=c99", source, "-o", source.with_suffix("")], check=True)
+        found = subprocess.run([source.with_suffix("")], capture_output=True, text=True, check=True).stdout.split()
+        assert dict(zip(types, found, strict=True)) == {
+            each: str(sizes[each.removeprefix("hystgen_")][0]) for each in types
+        }
+
+
 def measured(name: str) -> dict[tuple[str, ...], dict[str, int]]:
     """A table of measured costs: rows by what stands before the two cores."""
     with (Path(hystgen.__file__).parent / "compensator" / name).open() as file:
@@ -614,8 +626,8 @@ def test_auto_takes_the_engine_that_was_measured_cheaper() -> None:
         stages = (DeadZone([-0.5, 0.0, 0.5], [0.1, 0.1, 0.1]),) if kind == "gpi" else ()
         for plays in (int(n), int(n) + 1) if int(n) + 1 not in counts else (int(n),):
             pi = PI(np.linspace(0, 0.5, plays + 1).tolist(), [1.0] * (plays + 1))
-            for optimize, cost in costs.items():
-                cheaper = "corners" if cost["corners"] < cost["loop"] else "loop"
+            for optimize, of in costs.items():
+                cheaper = "corners" if of["corners"] < of["loop"] else "loop"
                 assert choose("auto", optimize, Cascade(pi, stages, 0.0, (-1.0, 1.0)), operator, arithmetic) == cheaper
                 chosen.add((optimize, cheaper))
     assert {("speed", "loop"), ("speed", "corners"), ("auto", "loop"), ("auto", "corners"), ("size", "loop")} <= chosen
@@ -627,11 +639,11 @@ def test_auto_takes_the_engine_that_was_measured_cheaper() -> None:
 def test_optimize_comes_from_the_call_or_the_file(optimize: str) -> None:
     wanted = {"speed": "corners", "size": "loop"}[optimize]
     assert emit_options(model("plain"), optimize=optimize).engine == wanted
-    told = Model(parse_parameters(FILES["plain"] + f"emit: {{optimize: {optimize}}}\n", "plain.yaml"))
-    assert emit_options(told).engine == wanted
-    assert emit_options(told, engine="corners").engine == "corners"
+    chosen = Model(parse_parameters(FILES["plain"] + f"emit: {{optimize: {optimize}}}\n", "plain.yaml"))
+    assert emit_options(chosen).engine == wanted
+    assert emit_options(chosen, engine="corners").engine == "corners"
     other = {"speed": "size", "size": "speed"}[optimize]
-    assert emit_options(told, optimize=other).engine != wanted
+    assert emit_options(chosen, optimize=other).engine != wanted
 
 
 def test_same_bytes_from_any_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,14 +21,14 @@ from hystgen.cascade import PI, Cascade
 from hystgen.cli import main
 from hystgen.compensator import fixed_tables, reference
 from hystgen.compensator.layout import FixedTables
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.emission.calls import emitted_files
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.model import Model, cascade_of
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import fixed, slots
-from hystgen.plays.corners import memory
+from hystgen.plays.corners import corners_float
 
 pytestmark = pytest.mark.thorough
 
@@ -157,7 +157,7 @@ def test_rounding_of_the_inverse_is_apart_from_what_another_branch_makes(
     for code in codes:
         answer = ours.run([code])[0][0]
         errors.append(abs(answer - exact.run([code * float(form.output_lsb)])[0][0] / float(form.drive_lsb)))
-        assert ours.state.counts[memory.ASCENDING] == exact.state.counts[memory.ASCENDING]
+        assert ours.state.counts[corners_float.ASCENDING] == exact.state.counts[corners_float.ASCENDING]
     assert 0 < max(errors) <= form.inverse_rounding
 
 
@@ -187,8 +187,8 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
         for code in codes.tolist():
             with plain():
                 answers.append((operations.inverse_step if inverse else operations.forward_step)(whole, state, code))
-            assert max(map(abs, [state.real[memory.OUTPUT], *state.output])) <= form.largest_sum
-            assert max(map(abs, [state.real[memory.INPUT], *state.input])) < 2**31
+            assert max(map(abs, [state.real[corners_float.OUTPUT], *state.output])) <= form.largest_sum
+            assert max(map(abs, [state.real[corners_float.INPUT], *state.input])) < 2**31
         steps = np.full(len(codes), slots.OP_STEP)
         assert answers == reference.answers(tables, bool(inverse), steps, codes, compiled=False)[0].tolist()
 
@@ -273,7 +273,7 @@ def test_formats_that_cannot_be_are_refused(
     assert str(caught.value).startswith(message)
 
 
-def test_the_least_lsb_that_is_told_is_enough() -> None:
+def test_the_least_lsb_in_the_message_is_enough() -> None:
     for arithmetic in ("q15", "q31"):
         for high in (100.0, 4.0, 0.7, 12345.678, 3e-9):
             model = Cascade(PI([0, high / 4], [1, 1]), (), 0.0, (0.0, high))

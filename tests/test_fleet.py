@@ -329,7 +329,7 @@ def test_another_version_of_the_tool_does_all_again(few: Path, tmp_path: Path, m
     assert not any(unit.kept for unit in done.units)
 
 
-def test_a_worker_of_another_version_is_told(few: Path) -> None:
+def test_a_worker_of_another_version_is_reported(few: Path) -> None:
     task = Task("a", (("a.csv", (few / "SN-100.csv").read_bytes()),), (), {}, None, version="0.0.1")
     assert workers.fit_unit(task).message == (
         f"the worker has hystgen {hystgen.__version__}, not 0.0.1; install the same"

@@ -116,7 +116,7 @@ def test_a_defect_is_found(change: Callable[[str], str], said: str, tmp_path: Pa
         fuzz(tmp_path, 5, "plain", "float32", "corners", change=change)
 
 
-def test_a_crash_before_the_first_call_is_told(tmp_path: Path) -> None:
+def test_a_crash_before_the_first_call_is_reported(tmp_path: Path) -> None:
     """By a program that leaves an artifact and writes no call, beside what an earlier run has found."""
     binary = tmp_path / "fuzz"
     artifact = "for each; do case $each in -artifact_prefix=*) : > ${each#*=}crash;; esac; done"

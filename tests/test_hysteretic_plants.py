@@ -848,7 +848,7 @@ def test_friction_of_more_than_half_the_spring_has_no_inverse(example: Any) -> N
         emitted_files(hystgen.Model(fit.parameters))
 
 
-def test_what_a_play_sum_cannot_do_is_told_apart(example: Any) -> None:
+def test_what_a_play_sum_cannot_do_is_distinguished(example: Any) -> None:
     """Spread over places, dependence on history and openness of minor loops: 0 for a play sum, and each kind of plant
     shows those that its remark names."""
     cases = {case.name: case for case in example.cases()}

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from hystgen.basics.problems import NotInvertibleError
 from hystgen.cascade import PI, Cascade
 from hystgen.compensator.bounds import error_bounds, largest_sum
-from hystgen.compensator.session import Session
+from hystgen.compensator.reference import Session
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.plays import memory

@@ -199,7 +199,7 @@ class TestThreads:
 
 class TestInterrupt:
     @pytest.mark.parametrize("to_all", [True, False])
-    def test_ends_all_processes_and_is_told_once(self, to_all: bool) -> None:
+    def test_ends_all_processes_and_is_reported_once(self, to_all: bool) -> None:
         program = there("""
             def work(k):
                 os.write(1, b"%d\\n" % os.getpid())

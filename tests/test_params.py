@@ -20,8 +20,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from hystgen.basics.names import comment_text, name_problem
+from hystgen.basics.names import name_problem
 from hystgen.basics.problems import ParameterError
+from hystgen.emission.text import comment_text
 from hystgen.parameters import checks as param_checks
 from hystgen.parameters import yaml as yaml_positions
 from hystgen.parameters.files import (

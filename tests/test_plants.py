@@ -565,7 +565,7 @@ class TestScore:
         assert table["none"] == {score.NOTHING: 1}
         assert "creep" in score.text(some, score.figures(some))
 
-    def test_what_is_not_visible_is_not_counted_but_told(self) -> None:
+    def test_what_is_not_visible_is_reported_but_not_counted(self) -> None:
         hidden = outcome("pair", ("lag", "creep"), (), ratio=2.0)
         some = [hidden, *[outcome("pair", ("lag", "creep"), ("lag", "creep"))] * 3]
         (figure,) = [figure for figure in score.figures(some) if figure.what == "pair: both names"]

@@ -21,6 +21,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from granted import granted, granted_states
+from mains import c_main
 from modelfiles import FILES, chain, head
 
 import hystgen
@@ -251,32 +252,15 @@ def test_faults_raise_alarms(
     assert any(alarm in found for found in alarms(source, "32 bits"))
 
 
-RUN = """
-#include "{name}.h"
+NOT_GRANTED = """\
 #include <stdio.h>
 #include <stdlib.h>
 void not_granted(int line);
 void not_granted(int line)
-{{
+{
     fprintf(stderr, "not so: line %d", line);
     exit(1);
-}}
-int main(void)
-{{
-    static {name}_{op}_t self;
-    int call;
-    {name}_real_t x;
-    {name}_{op}_init(&self);
-    while ((call = getchar()) != EOF && fread(&x, sizeof x, 1, stdin) == 1) {{
-        switch (call) {{
-        case 0: (void){name}_{op}_step(&self, x); break;
-        case 1: {commit} break;
-        case 2: {name}_{op}_reset(&self, x); break;
-        default: {name}_{op}_init(&self); break;
-        }}
-    }}
-    return 0;
-}}
+}
 """
 
 
@@ -290,8 +274,7 @@ def run(folder: Path, one: Model, arithmetic: str, op: str, sums: int = 1) -> st
     hystgen.emit(one, folder, operator="both", arithmetic=arithmetic, engine="corners")
     source = folder / f"{name}.c"
     source.write_text(granted(source.read_text(), one, arithmetic, sums))
-    commit = f"{name}_{op}_commit(&self, x);" if op == "inverse" else ""
-    (folder / "main.c").write_text(RUN.format(name=name, op=op, commit=commit))
+    (folder / "main.c").write_text(NOT_GRANTED + c_main(name, op))
     gcc.run(["-std=c99", "-O2", "-I", folder, folder / "main.c", source, "-o", folder / "run"])
     numbers, real = one.tables(arithmetic, "corners"), ARITHMETICS[arithmetic].number
     said = ""

@@ -25,6 +25,7 @@ from scipy.stats import binned_statistic
 import hystgen
 from hystgen.basics import drawing, extras
 from hystgen.basics.problems import percent
+from hystgen.diagnosis.findings.kinds import times_noise
 from hystgen.identification import Fit, Used, prepared
 from hystgen.records import Record
 from hystgen.report import fit_figures
@@ -126,7 +127,7 @@ def table(page: Page, section: str) -> list[dict[str, str]]:
 @pytest.fixture(scope="module")
 def fitted() -> tuple[Fit, Record, Record]:
     first, other = spoilt(), made("other.csv", 7)
-    return hystgen.identify(first, model="gpi-deadzone", holdout=other, skip=SKIP, name="axis"), first, other
+    return hystgen.identify(first, model="gpi-deadzone", holdout=other, skip=1e-3 * SKIP, name="axis"), first, other
 
 
 @pytest.fixture(scope="module")
@@ -153,7 +154,8 @@ class TestMasks:
         assert first.outliers.tolist() == known
         assert len(known) >= 3
         assert first.skipped.tolist() == [*range(SKIP)], "at the start of the record, not behind the gap"
-        assert CUT in first.ignored
+        assert [start is None for start in first.starts] == [True, False], "most of the second part needs one"
+        assert CUT not in first.ignored
         assert other.skipped.tolist() == [*range(SKIP)]
         for name in ("outliers", "bridged", "gaps", "left_out"):
             assert getattr(other, name).tolist() == []
@@ -194,12 +196,13 @@ class TestMasks:
         part = fit.parameters.model.pi
         drive = record.v.copy()
         good = np.setdiff1d(np.arange(len(drive)), place(SPIKES))
-        for begin, end in ((0, CUT), (CUT, len(record))):
+        for (begin, end), found in zip(((0, CUT), (CUT, len(record))), used.starts, strict=True):
             inside = good[(good >= begin) & (good < end)]
             v = np.interp(np.arange(begin, end), inside, drive[inside])
             start: float | Array = float(v[0])
-            if begin == 0 and history is not None:
-                start = brute_plays(history, part.thresholds, 0.0)[-1]
+            before = history if begin == 0 and history is not None else found.turns if found else None
+            if before is not None:
+                start = brute_plays(before, part.thresholds, 0.0)[-1]
             expected = brute_output(v, part.thresholds, part.weights, start)
             known = used.compared[begin:end]
             expected += np.mean((record.y[begin:end] - expected)[known])
@@ -402,7 +405,7 @@ class TestCommand:
         assert "hystgen emit stage.yaml -o firmware/ --operator forward\n" in lead
         assert "fitted to the first 75 % of the records, such a model predicts the rest" in lead
 
-    def test_without_matplotlib_it_is_told_before_the_fit(
+    def test_missing_matplotlib_is_reported_before_the_fit(
         self, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         a, _ = self.files(tmp_path)
@@ -465,16 +468,17 @@ class TestDrawing:
     def shown(self, residual: Array, v: Array) -> Shown:
         n, none = len(residual), np.empty(0, dtype=np.intp)
         record = Record("made", np.arange(n) * 0.01, v, residual, sample_time=0.01)
-        return Shown(record, Used("made", False, n, ((0, n),), none, none, none, none, none, none, none), np.zeros(n))
+        used = Used("made", False, n, ((0, n),), (None,), none, none, none, none, none, none, none)
+        return Shown(record, used, np.zeros(n))
 
     @pytest.mark.parametrize("sigma", [0.01, 0.3])
-    def test_white_noise_is_told_beside_what_is_smooth(self, sigma: float) -> None:
+    def test_white_noise_is_found_beside_smooth_errors(self, sigma: float) -> None:
         t = np.linspace(0.0, 20.0, 20_000)
         noise = np.random.default_rng(4).normal(0.0, sigma, len(t))
         found = self.shown(np.sin(t) + noise, t).noise
         assert found == pytest.approx(sigma, rel=0.05)
 
-    def test_noise_that_is_not_white_is_not_told(self) -> None:
+    def test_noise_that_is_not_white_is_not_reported(self) -> None:
         t = np.linspace(0.0, 20.0, 20_000)
         white = np.random.default_rng(5).normal(size=len(t))
         for length in (2, 3, 9):
@@ -577,3 +581,10 @@ def test_shares_of_ten_times_and_more_are_factors() -> None:
     assert percent(9.994, of="the range") == "999 % of the range"
     assert percent(32.0, of="the range") == "32 times the range"
     assert percent(-0.5, "+.0f") == "-50 %"
+
+
+def test_ratios_to_the_noise_have_two_digits() -> None:
+    assert [times_noise(ratio) for ratio in (2.84, 45.6, 99.7, 100.0)] == [
+        "2.8 times the noise", "46 times the noise", "100 times the noise", "100 times the noise",
+    ]  # fmt: skip
+    assert times_noise(130.0) == "more than 100 times the noise"

@@ -36,7 +36,7 @@ def identified(target: Path, run: Run, *more: object, record: Path = RECORDING) 
     return load_parameters(target), err
 
 
-def test_settings_of_the_file_that_is_replaced_are_kept_and_told(tmp_path: Path, run: Run) -> None:
+def test_settings_of_a_replaced_file_are_kept_and_reported(tmp_path: Path, run: Run) -> None:
     record = tmp_path / "named.csv"
     record.write_text("\n".join(["t,v [V],y [um]", *RECORDING.read_text().splitlines()[1:]]) + "\n")
     fresh, said = identified(tmp_path / "stage.yaml", run, record=record)

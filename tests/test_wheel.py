@@ -222,7 +222,7 @@ def test_what_needs_an_extra_names_it_and_leaves_nothing(command: list[str], pyt
     assert tree(tmp_path) == before
 
 
-def test_plots_are_an_extra_and_its_absence_is_told(python: Path, tmp_path: Path) -> None:
+def test_plots_are_an_extra_and_its_absence_is_reported(python: Path, tmp_path: Path) -> None:
     (tmp_path / "plain.yaml").write_text(FILES["plain"])
     program = python.with_name("hystgen")
     assert "slope ratio" in run(program, "show", "plain.yaml", folder=tmp_path).stdout

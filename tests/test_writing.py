@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from hystgen.basics import writing
-from hystgen.emission import files
 
 
 @pytest.fixture(autouse=True)
@@ -126,7 +125,7 @@ def test_files_get_the_usual_rights(tmp_path: Path) -> None:
     before = os.umask(0o027)
     try:
         writing.write_atomically(tmp_path / "a.txt", "µ")
-        files.write(tmp_path / "new", {"b.txt": "b"})
+        writing.write_files(tmp_path / "new", {"b.txt": "b"})
     finally:
         os.umask(before)
     modes = [(tmp_path / name).stat().st_mode & 0o777 for name in ("a.txt", "new", "new/b.txt")]
@@ -138,7 +137,7 @@ def test_a_link_leads_where_it_points_whether_or_not_there_is_anything(tmp_path:
     (tmp_path / "file").symlink_to("there.txt")
     writing.write_atomically(tmp_path / "file", "a")
     (tmp_path / "folder").symlink_to("a/b/c")
-    written = files.write(tmp_path / "folder", {"x.c": "x"})
+    written = writing.write_files(tmp_path / "folder", {"x.c": "x"})
     assert written == [tmp_path / "folder" / "x.c"]
     assert (tmp_path / "there.txt").read_text() == "a"
     assert (tmp_path / "a" / "b" / "c" / "x.c").read_text() == "x"
@@ -154,16 +153,16 @@ def test_a_link_that_leads_nowhere_is_named(tmp_path: Path, monkeypatch: pytest.
         writing.write_atomically("lost", "a")
     assert caught.value.filename == "lost"
     assert caught.value.strerror == f"the folder {tmp_path}/nowhere does not exist; make it, or choose another output"
-    for write in (lambda: writing.write_atomically("loop", "a"), lambda: files.write(Path("loop"), {"a": "a"})):
+    for write in (lambda: writing.write_atomically("loop", "a"), lambda: writing.write_files(Path("loop"), {"a": "a"})):
         with pytest.raises(OSError, match="leads back to itself; choose another output") as refused:
             write()
         assert refused.value.filename == "loop"
     with pytest.raises(OSError, match="leads back to itself"):  # before there is anything to write, too
-        files.check(Path("loop"), ["a"])
+        writing.check_files(Path("loop"), ["a"])
     Path("file").touch()
     Path("through").symlink_to("file/folder")
     with pytest.raises(NotADirectoryError):
-        files.check(Path("through"), ["a"])
+        writing.check_files(Path("through"), ["a"])
     Path("file").unlink()
     Path("through").unlink()
     assert sorted(os.listdir()) == ["loop", "lost"]
@@ -175,7 +174,7 @@ def test_a_failure_names_what_was_asked_for(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(Path, "write_bytes", full)
     for write in (
-        lambda: writing.write_atomically(tmp_path / "a", "a"), lambda: files.write(tmp_path / "a", {"b": "b"})
+        lambda: writing.write_atomically(tmp_path / "a", "a"), lambda: writing.write_files(tmp_path / "a", {"b": "b"})
     ):  # fmt: skip
         with pytest.raises(OSError, match="No space left on device") as caught:
             write()

@@ -44,7 +44,7 @@ def known_options(call: str, function: Callable[..., Any], given: Iterable[str])
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """The public call with a TypeError that suggests the right option where it is given one that it does not have."""
+    """The public call, which raises a TypeError with a suggestion for an option that it does not have."""
     needed = [each.name for each in inspect.signature(function).parameters.values() if each.default is each.empty]
 
     @functools.wraps(function)
@@ -89,7 +89,7 @@ def path(name: str, value: object) -> str:
 
 
 def choice(name: str, value: object, known: Sequence[str]) -> None:
-    """Raise ValueError for a word that is not among the known ones."""
+    """Raise ValueError for an unknown word."""
     if not (isinstance(value, str) and value in known):
         raise ValueError(f"{name} {printable(repr(value))} is none of {', '.join(known)}")
 

@@ -1,4 +1,4 @@
-"""What models, plants and operators ask of their parameters and of their input."""
+"""Checks of the parameters and the input of models, plants and operators."""
 
 from __future__ import annotations
 

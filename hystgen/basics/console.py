@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 ENDING = ("SIGTERM", "SIGHUP")
-"""Signals, by the names that the system may have, by which others end a process and expect it to clean up first."""
+"""Names of the signals with which others end a process and expect it to clean up first; not every system has all."""
 
 
 class OutputError(click.ClickException):

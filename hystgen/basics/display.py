@@ -1,4 +1,4 @@
-"""What a notebook shows of a result: a line, a table as text, a picture where matplotlib is there."""
+"""How a notebook shows a result: a line, a table as text and, with matplotlib, a picture."""
 
 from __future__ import annotations
 

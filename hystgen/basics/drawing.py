@@ -101,8 +101,8 @@ def require() -> None:
 def _import() -> None:
     """Import matplotlib. Raises ImportError.
 
-    A notebook hands on its backend, which this environment may not have, and matplotlib then refuses to be imported.
-    Pictures here are files, for which no backend is needed; for others it is the one that was asked for, if there is.
+    A notebook passes on its backend, which this environment may lack, and matplotlib then cannot be imported. Pictures
+    here are files, which need no backend; for others it is the one asked for, if it exists.
     """
     backend = None if "matplotlib" in sys.modules else os.environ.pop("MPLBACKEND", None)
     try:
@@ -160,7 +160,7 @@ def content(drawn: Any, kind: str) -> bytes:
 
 
 def label(what: str, unit: str | None) -> str:
-    """`drive (V)`; without a unit the word alone."""
+    """`drive (V)`, or only the word if there is no unit."""
     return f"{what} ({unit})" if unit else what
 
 

@@ -1,4 +1,4 @@
-"""The extras of this package: what needs one says so, and how to install it into the Python that runs."""
+"""The extras of this package, and the command that installs one into the Python that runs."""
 
 from __future__ import annotations
 

@@ -3,13 +3,13 @@
     @jit
     def followed(state, x, r): ...
 
-`followed` is then the compiled function, wherever it is called from; inside `with plain():` it is the Python that
-stands there, as `followed.py_func` is anywhere. Numba is imported with the first call that needs it; where it is not
-installed everything runs as Python, with the same bits.
+`followed` is then the compiled function, wherever it is called from; inside `with plain():` it is the Python function,
+as `followed.py_func` is everywhere. Numba is imported with the first call that needs it; without numba everything runs
+as Python, with the same bits.
 
 Compiled code is cached on disk; its cache key contains the source of every function that takes part, so that a change
 in a helper can never leave a stale caller behind. The cache saves time and is never needed: where no folder can be
-written to there is none, and files of it that cannot be read are made again.
+written to, nothing is cached; cached files that cannot be read are made again.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ EVERY_TIME = (
 
 
 def interpreted() -> str:
-    """The message where there is no numba."""
+    """The message for a machine without numba."""
     return f"computing in Python, which takes longer than compiled; to have it compiled: {extras.install('fit')}"
 
 
@@ -94,7 +94,7 @@ class Jit(Generic[P, R]):
     def inner(self) -> Any:
         """The function compiled by numba, to be called from compiled code only.
 
-        What takes a model's tables apart for it would be more code than the function itself.
+        The wrapper that unpacks a model's tables would be more code than the function itself.
         """
         return self._dispatcher("inner", {**self.targetoptions, "no_cpython_wrapper": True, "no_cfunc_wrapper": True})
 
@@ -139,8 +139,8 @@ def jit(function: Callable[P, R], /) -> Jit[P, R]: ...
 @overload
 def jit(*, inline: bool) -> Callable[[Callable[P, R]], Jit[P, R]]: ...
 def jit(function: Callable[..., Any] | None = None, /, *, inline: bool = False) -> Any:
-    """Have a function compiled; `inline` makes it part of its callers, since handing over a model's many tables costs
-    more than a short function computes."""
+    """Compile a function; `inline` makes it part of its callers, since passing a model's many tables costs more than a
+    short function computes."""
     if function is None:
         return functools.partial(Jit, inline=inline)
     return Jit(function, inline)
@@ -148,7 +148,7 @@ def jit(function: Callable[..., Any] | None = None, /, *, inline: bool = False) 
 
 @functools.cache
 def _cache_class() -> Any:
-    """Numba's cache of a function, which takes a file that it cannot read or write for one that is not there."""
+    """Numba's cache of a function, which treats a file that it cannot read or write as missing."""
     from numba.core.caching import FunctionCache
 
     class Cache(FunctionCache):

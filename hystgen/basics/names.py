@@ -1,15 +1,18 @@
-"""A user's words in C: the model's name and the text of comments."""
+"""A model's name, which is the prefix of its C, and the length of names of units."""
 
 from __future__ import annotations
 
 import re
-import unicodedata
 
 from hystgen.basics.problems import printable
 
 MAX_NAME = 40
 NAME_PATTERN = "^[A-Za-z](_?[A-Za-z0-9])*$"
 """Letters, digits and single underscores between them, starting with a letter."""
+
+MAX_UNIT = 40
+"""[characters] The longest name of a unit: a longer one in the header of a recording is not taken for a unit, since it
+would not fit a parameter file."""
 
 
 def _words(text: str) -> frozenset[str]:
@@ -89,51 +92,3 @@ def name_problem(name: str) -> str | None:
     if header:
         return f"the macros {(family or word).upper()}_... belong to <{header}.h>; {other}"
     return None
-
-
-# Accented letters by their decomposition (Latin-1 and Extended-A only: those never change with Python's Unicode).
-_ASCII = {code: unicodedata.normalize("NFD", chr(code))[0] for code in range(0xC0, 0x180)} | {
-    ord(sign): plain
-    for sign, plain in (
-        ("\N{MICRO SIGN}", "u"),
-        ("\N{GREEK SMALL LETTER MU}", "u"),
-        ("\N{DEGREE SIGN}", "deg"),
-        ("\N{OHM SIGN}", "Ohm"),
-        ("\N{GREEK CAPITAL LETTER OMEGA}", "Ohm"),
-        ("\N{PLUS-MINUS SIGN}", "+/-"),
-        ("\N{MULTIPLICATION SIGN}", "x"),
-        ("\N{MIDDLE DOT}", "."),
-        ("\N{SUPERSCRIPT ONE}", "^1"),
-        ("\N{SUPERSCRIPT TWO}", "^2"),
-        ("\N{SUPERSCRIPT THREE}", "^3"),
-        ("\N{SUPERSCRIPT MINUS}", "^-"),
-        ("\N{EN DASH}", "-"),
-        ("\N{EM DASH}", "-"),
-        ("\N{MINUS SIGN}", "-"),
-        ("\N{LEFT SINGLE QUOTATION MARK}", "'"),
-        ("\N{RIGHT SINGLE QUOTATION MARK}", "'"),
-        ("\N{LEFT DOUBLE QUOTATION MARK}", '"'),
-        ("\N{RIGHT DOUBLE QUOTATION MARK}", '"'),
-        ("\N{HORIZONTAL ELLIPSIS}", "..."),
-        ("\N{LATIN SMALL LETTER SHARP S}", "ss"),
-        ("\N{LATIN SMALL LETTER AE}", "ae"),
-        ("\N{LATIN CAPITAL LETTER AE}", "AE"),
-        ("\N{LATIN SMALL LETTER O WITH STROKE}", "o"),
-        ("\N{LATIN CAPITAL LETTER O WITH STROKE}", "O"),
-        ("\N{LATIN SMALL LETTER L WITH STROKE}", "l"),
-        ("\N{LATIN CAPITAL LETTER L WITH STROKE}", "L"),
-    )
-}
-
-
-def comment_text(text: str) -> str:
-    """Any text as one line of printable ASCII that is harmless inside a C comment of either kind.
-
-    Common letters and signs beyond ASCII are spelt out, others become `?`; white space becomes single blanks.
-    Nothing in the result opens or closes a comment, forms a trigraph or continues a line, and it neither
-    starts nor ends in a blank.
-    """
-    text = re.sub(r"[^ -~]", "?", " ".join(text.translate(_ASCII).split())).replace("\\", "/")
-    text = re.sub(r"\*(?=/)", "* ", text)
-    text = re.sub(r"/(?=\*)", "/ ", text)
-    return re.sub(r"\?(?=\?)", "? ", text)

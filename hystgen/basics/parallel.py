@@ -29,7 +29,7 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 MOST_PROCESSES = 16
-"""Processes at most; each has its own results in memory."""
+"""[processes] At most this many; each has its own results in memory."""
 
 _at_work: Sequence[int] | memoryview[int] = (0,)
 """Number of busy workers in this process's pool."""
@@ -166,7 +166,7 @@ class Pool(Generic[T, R]):
                 process = fork.Process(target=_serve, args=(self._work, there, others, self._at_work), daemon=True)
                 try:
                     process.start()
-                except OSError:  # no room for another: those that there are will do, or none
+                except OSError:  # no room for another: go on with those already running, or without any
                     here.close()
                     return
                 finally:
@@ -202,7 +202,7 @@ def _serve(
 def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
     """`work(item)` for all items, in threads that are gone when it is done; compiled work runs side by side there.
 
-    Where other cores are idle, as when the last worker of a pool has a long task; else a plain loop.
+    Used while other cores are idle, as when the last worker of a pool has a long task; otherwise a plain loop.
     """
     room = min(len(items), _cores() // max(1, _at_work[0]))
     if room < 2:
@@ -220,7 +220,7 @@ def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
 
 
 def one_thread() -> Any:
-    """Context in which linear algebra uses a single thread: on small matrices several wait for each other."""
+    """Context in which linear algebra uses a single thread: on small matrices, several would wait for each other."""
     try:
         import scipy.linalg  # noqa: F401  # has a library of its own, and one that comes later is not limited
         from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]

@@ -73,7 +73,7 @@ def shown(value: object) -> str:
 
 
 def path_text(path: Path) -> str:
-    """A path as a message names it: `model.pi.weights[2]`; keys that are no plain words are quoted."""
+    """A path as a message names it: `model.pi.weights[2]`; keys that are not plain words are quoted."""
     text = ""
     for part in path:
         if isinstance(part, int):
@@ -105,7 +105,7 @@ class PlanError(ValueError):
 
 
 class EffectsError(ValueError):
-    """An effect that cannot be used, or not with these records."""
+    """An effect that cannot be used at all, or not with these records."""
 
 
 class UnsupportedEffectsError(EffectsError):
@@ -137,7 +137,9 @@ def counted(number: int, one: str, several: str = "") -> str:
 
 
 FACTOR = 10.0
-"""[times] From here on a share is given as a factor: "32 times" reads more easily than "3200 %"."""
+"""[times] From here on a share is given as a factor: "32 times" reads more easily than "3200 %", which is more than the
+three digits of a share. Only wording depends on it. Changed by:
+report::test_shares_of_ten_times_and_more_are_factors."""
 
 
 def percent(share: float, digits: str = ".3g", of: str = "") -> str:

@@ -18,7 +18,7 @@ process (`parallel`)."""
 class Progress:
     """Context manager; `tick` counts work, in the unit of `total`, under a `title`.
 
-    A `total` of 0 is one that is not known. Silent unless `shown`, stderr is a terminal, time has passed, and rich is
+    A `total` of 0 is unknown. Silent unless `shown`, stderr is a terminal, time has passed, and rich is
     installed.
     """
 
@@ -41,7 +41,7 @@ class Progress:
             self._bar.stop()
 
     def tick(self, work: float) -> None:
-        """More work is done, in the unit of `total`."""
+        """Count finished work, in the unit of `total`."""
         self._done += work
         now = time.monotonic()
         if not self._shown or now < self._next:

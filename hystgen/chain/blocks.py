@@ -1,4 +1,4 @@
-"""What a block of the chain is, for one sample at a time: the interface from which a compensator is made.
+"""The interface of a block of the chain, one sample at a time, from which a compensator is made.
 
 Every block between the drive and the output has three verbs: `rest`, everything settled at an input; `solve`, which
 input gives an output now, moving nothing; `absorb`, the input was this. A compensator solves from the output backwards

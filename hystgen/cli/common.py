@@ -1,4 +1,4 @@
-"""What the commands have in common: arguments, options, and errors as messages with an exit code."""
+"""Shared by the commands: arguments, options, and errors as messages with an exit code."""
 
 from __future__ import annotations
 
@@ -81,6 +81,12 @@ def load_model(path: str, effects: Sequence[str] = ()) -> Model:
     return model
 
 
+def seconds(_context: click.Context, _option: click.Parameter, value: float) -> float:
+    if not 0 <= value < math.inf:
+        raise click.BadParameter("give seconds, 0 or more")
+    return value
+
+
 params_argument = click.argument("params", type=click.Path())
 operator_option = click.option(
     "--operator", type=click.Choice(["inverse", "forward", "both"]), help="default: the file's"
@@ -101,12 +107,16 @@ layout_option = click.option(
     "--layout", type=click.Choice(["self-contained", "shared-runtime", "single-header"]), default="self-contained",
     show_default=True,
 )  # fmt: skip
+skip_option = click.option(
+    "--skip", type=float, callback=seconds, default=0.0,
+    help="seconds at the start of every record that are not compared, though their drive counts",
+)  # fmt: skip
 T = TypeVar("T")
 U = TypeVar("U")
 
 
 def for_each(items: Sequence[T], action: Callable[[T], U]) -> list[U]:
-    """What `action` gives for every item. Raises Failed with all messages and the higher one of the exit codes."""
+    """The results of `action` for all items. Raises Failed with all messages and the higher one of the exit codes."""
     made, failures = [], []
     for item in items:
         try:
@@ -137,12 +147,6 @@ def history_values(text: str | None) -> list[float] | None:
     if not all(map(math.isfinite, numbers)):
         raise Failed(f"error: --history {text!r} is not a list of numbers; write --history 100,-100", 2)
     return numbers
-
-
-def seconds(_context: click.Context, _option: click.Parameter, value: float) -> float:
-    if not 0 <= value < math.inf:
-        raise click.BadParameter("give seconds, 0 or more")
-    return value
 
 
 def matched(_context: click.Context, _option: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:

@@ -22,6 +22,7 @@ from hystgen.cli.common import (
     params_argument,
     reading_options,
     record_options,
+    skip_option,
 )
 
 
@@ -56,9 +57,10 @@ def _plan(params: str, output: str, effects: Sequence[str], max_rate: float | No
 @click.option("--max-rate", type=float, help="with --plan: fastest change of the drive, input units per second")
 @effects_option
 @record_options
+@skip_option
 def diagnose(
     params: str, data: tuple[str, ...], output: str | None, holdout: tuple[str, ...], effects: tuple[str, ...],
-    plan: bool, max_rate: float | None, history: str | None, rest: float, **reading: Any,
+    plan: bool, max_rate: float | None, history: str | None, rest: float, skip: float, **reading: Any,
 ) -> None:
     """Find what a model is missing: where it disagrees with records, the missing effect, the model with it added.
 
@@ -70,7 +72,7 @@ def diagnose(
         what = "the drives, as in -o plan/" if plan else "what is found, as in -o diagnosis/"
         raise click.UsageError(f"Missing option '-o': give a folder for {what}")
     if plan:
-        unused = {"DATA": data, "--holdout": holdout, "--history": history, "--rest": rest}
+        unused = {"DATA": data, "--holdout": holdout, "--history": history, "--rest": rest, "--skip": skip}
         unused |= {f"--{option}": reading[option] for option in ("columns", "delimiter")}
         given = [option for option, value in unused.items() if value]
         if given:
@@ -85,23 +87,22 @@ def diagnose(
     if max_rate is not None:
         raise click.UsageError("--max-rate is for drives; give --plan with it")
     from hystgen import diagnosis
-    from hystgen.basics import drawing, extras
+    from hystgen.basics import drawing, extras, writing
     from hystgen.effects import load_user_effects
-    from hystgen.emission import files
     from hystgen.report import diagnosis as report
 
     model = load_model(params, effects)
     guarded(params, partial(extras.require_fit, "diagnose", plot=True))
     guarded(params, drawing.require)
     keep_inputs([Path(output) / name for name in diagnosis.Diagnosis.FILES], (params, *data, *holdout))
-    guarded(output, partial(files.check, Path(output), diagnosis.Diagnosis.FILES))
+    guarded(output, partial(writing.check_files, Path(output), diagnosis.Diagnosis.FILES))
     visited = history_values(history)
     how = reading_options(**reading)
 
     def run() -> None:
         own = [kind for path in effects for kind in load_user_effects(path)]
         found = report.diagnose(
-            model, list(data), holdout=list(holdout), history=visited, rest=rest, effects=own, **how
+            model, list(data), holdout=list(holdout), history=visited, rest=rest, skip=skip, effects=own, **how
         )
         for note in (*found.notes, *found.warnings):
             console.note(f"warning: {note}")

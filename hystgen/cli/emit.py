@@ -49,7 +49,8 @@ def emit(
 
     With an effect of your own: hystgen emit diagnosis/params.yaml -o firmware/ --effects my_effect/
     """
-    from hystgen.emission import calls, files
+    from hystgen.basics import writing
+    from hystgen.emission import calls
 
     params = tuple(dict.fromkeys(params))
     models = for_each(params, partial(load_model, effects=effects))
@@ -63,7 +64,7 @@ def emit(
         for name in made:
             console.say(str(Path(output) / name))
     else:
-        for path in guarded(output, lambda: files.write(Path(output), made)):
+        for path in guarded(output, lambda: writing.write_files(Path(output), made)):
             console.say(str(path))
 
 
@@ -71,7 +72,8 @@ def _check(
     models: Sequence[tuple[str, Model]], output: str, options: Mapping[str, Any], effects: Sequence[str]
 ) -> None:
     """Exit code 1 with the differences of files on disk, and the commands that fit."""
-    from hystgen.emission import banner, calls, stale
+    from hystgen.emission import calls, stale
+    from hystgen.emission.options import OPTIONS
 
     problems, advice = [], []
     for path, model in models:
@@ -81,7 +83,7 @@ def _check(
         given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
         partial_too = {"allow_partial": True} if options["allow_partial"] else {}
         chosen = calls.emit_options(model, **options)
-        wanted = {key: getattr(chosen, key) for key in banner.OPTIONS} | partial_too
+        wanted = {key: getattr(chosen, key) for key in OPTIONS} | partial_too
         problems += [f"error: {each.sentence()}" for each in found]
 
         def again(other: Mapping[str, str], model: Model = model, found: Any = found) -> list[stale.Difference]:

@@ -21,6 +21,7 @@ from hystgen.cli.common import (
     matched,
     reading_options,
     record_options,
+    skip_option,
 )
 
 
@@ -48,7 +49,7 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
     help="record that takes no part in the fit; or a pattern in quotes, 'held/*.csv'; with --batch for example "
     "'holdout/{unit}.csv'",
 )  # fmt: skip
-@click.option("--skip", type=int, default=0, help="samples at the start of every record that are not compared")
+@skip_option
 @click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, from 0 up")
 @click.option("--name", help="C identifier of the model; default: from the output file")
 @click.option("--units", metavar="V,um", callback=_units, help="units of drive and output; default: the records'")
@@ -57,7 +58,7 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
 @record_options
 def identify(
     data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
-    holdout: tuple[str, ...], skip: int, loading_curve: bool, name: str | None, units: dict[str, str] | None,
+    holdout: tuple[str, ...], skip: float, loading_curve: bool, name: str | None, units: dict[str, str] | None,
     plot: str | None, report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None,
     jobs: int | None, scheduler: str | None, **reading: Any,
 ) -> None:
@@ -107,7 +108,6 @@ def identify(
     def run() -> None:
         from hystgen import records
         from hystgen.basics import drawing
-        from hystgen.emission import files
         from hystgen.identification import settings
         from hystgen.report import plots
 
@@ -119,9 +119,9 @@ def identify(
             drawing.check_path(plot)
         if report:
             pages.check_folder(report)
-            files.check(Path(report), pages.names())
+            writing.check_files(Path(report), pages.names())
         older = settings.of(output)
-        read = records.read_records([*data, *holdout], **how)
+        read = records.read_records([*data, *holdout], points=True, **how)
         fit = identification.identify(
             read[: len(data)],
             holdout=read[len(data) :],

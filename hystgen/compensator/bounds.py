@@ -19,7 +19,7 @@ With two branches two drives can give the same output, one on each, and rounding
 reference moves by no more than that. Both outputs are right to within the bound; the drives then differ by what the
 gap between the branches makes at the input of the plays, now and in what the plays remember. The bound counts that.
 The first move starts from the drive that the start memory stands for, G_R^-1(s_0), which need not be a number of the
-type. The forward operator tells on which side of it every drive lies, to the rounding of G_R^-1 in double precision.
+type. The forward operator knows on which side of it every drive lies, to the rounding of G_R^-1 in double precision.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class ErrorBounds:
 
 
 def largest_sum(cascade: StaticModel) -> float:
-    """Size that nothing added up for a play sum exceeds: sum |p_i| max |w| + sum |p_i| r_i."""
+    """Bound of every partial result of a play sum: sum |p_i| max |w| + sum |p_i| r_i."""
     pi = cascade.pi
     total = math.fsum(abs(p) for p in pi.weights)
     lift = math.fsum(abs(p) * r for p, r in zip(pi.weights, pi.thresholds, strict=True))

@@ -1,4 +1,4 @@
-"""Which engine a model gets, and how much code it has there: tables measured on emulated cores, and a rule.
+"""The engine of a model, and its size in code: tables measured on emulated cores, and a rule.
 
 Both tables are made by `benchmarks/engine_costs.py`. `engine_costs.csv` has the instructions of a sample, the mean over
 a decaying multisine; `code_sizes.csv` the bytes of code of a module, of both compilers the larger one.
@@ -20,7 +20,7 @@ ENGINES = ("corners", "loop")
 OPTIMIZE = ("auto", "speed", "size")
 CORES = ("cortex-m0plus", "cortex-m4f")
 SMALL, FLASH, CYCLES = "cortex-m0plus", 32768, 4800
-"""What `auto` weighs for: a core, its bytes of flash, and its cycles in a sample (48 MHz at 10 kHz)."""
+"""The controller that `auto` decides for: a core, its bytes of flash, and its cycles in a sample (48 MHz at 10 kHz)."""
 
 
 def choose(engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str) -> str:
@@ -47,7 +47,8 @@ def code_bytes(cascade: StaticModel, operator: str, arithmetic: str, engine: str
 
 
 def kind(cascade: StaticModel, arithmetic: str) -> str:
-    """What of a model its code depends on: the stages in front, in fixed point only whether there are any; branches."""
+    """The properties of a model on which its code depends: the stages in front (in fixed point only whether it has any)
+    and the branches."""
     if not cascade.stages:
         return "pi"
     tanh = [isinstance(stage, TanhEnvelope) for stage in cascade.stages]

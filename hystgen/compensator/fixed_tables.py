@@ -49,7 +49,7 @@ FAR = 2.0**40
 
 @dataclass(frozen=True)
 class Format:
-    """What the codes of a model mean, and how exact it is.
+    """The meaning of a model's codes, and its accuracy.
 
     `drive_lsb`, `output_lsb`: physical units a code; `forward_error` in output codes, `inverse_error` in drive codes
     (None: no inverse), `inverse_rounding` the part of it without taking another branch; `largest_sum`: bound of every
@@ -220,7 +220,7 @@ class Builder:
             raise FormatError(*self.refused)
 
     def _finer(self, key: str) -> str:
-        """What helps where codes are too coarse; those that nobody asked for are as fine as they can be."""
+        """Advice for codes that are too coarse; those that nobody set are already as fine as possible."""
         return f"use {f'a smaller emit.{key} or ' if self.given[key] else ''}a finer arithmetic"
 
     # ------------------------------------------------------------ the input of the plays

@@ -1,14 +1,15 @@
-"""The constants of one model in one arithmetic, as the bit reference and the C text take them."""
+"""The constants of one model in one arithmetic, as the bit reference and the C text take them, and their limits."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
+from hystgen.basics.jit import jit
 from hystgen.chain.static import StaticModel
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
-from hystgen.plays.corners.memory import Curve, Start
-from hystgen.plays.slots import Counts, Reals
+from hystgen.plays.corners.corners_float import Curve, Start
+from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, OUTPUT_MAX, OUTPUT_MIN, Counts, Reals
 
 
 class Tables(NamedTuple):
@@ -89,6 +90,39 @@ class FixedTables(NamedTuple):
     def has_front(self) -> bool:
         """Whether there is a memoryless part."""
         return self.fronts > 0
+
+
+# ---------------------------------------------------------------- clamp.c
+
+
+class Limited(Protocol):
+    """The limits of drive and output, which all tables have."""
+
+    @property
+    def limits(self) -> Reals: ...
+
+
+@jit(inline=True)
+def clamp_drive(t: Limited, v: Any) -> Any:
+    """v inside the input range."""
+    if v < t.limits[DRIVE_MIN]:
+        return t.limits[DRIVE_MIN]
+    if v > t.limits[DRIVE_MAX]:
+        return t.limits[DRIVE_MAX]
+    return v
+
+
+@jit(inline=True)
+def inverse_clamp(t: Limited, u: Any) -> Any:
+    """u inside the output range."""
+    if u < t.limits[OUTPUT_MIN]:
+        return t.limits[OUTPUT_MIN]
+    if u > t.limits[OUTPUT_MAX]:
+        return t.limits[OUTPUT_MAX]
+    return u
+
+
+# ---------------------------------------------------------------- before the first move
 
 
 def first_moves(

@@ -1,16 +1,22 @@
-"""The bit reference: the emitted C, operation for operation, of the functions for the tables it is given."""
+"""The bit reference, which computes what the emitted C does, operation for operation; and sessions, which run it, or
+the same in double precision, over sampled signals."""
 
 from __future__ import annotations
 
 import contextlib
 import functools
+from collections.abc import Iterable
+from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics import jit
-from hystgen.compensator import step, step_fixed, step_float
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics import arguments, jit
+from hystgen.basics.problems import NotInvertibleError
+from hystgen.chain.static import StaticModel
+from hystgen.compensator import step, step_fixed, step_float, tables
 from hystgen.compensator.chain import step as chain_step
 from hystgen.compensator.chain import step_fixed as chain_step_fixed
 from hystgen.compensator.chain import step_float as chain_step_float
@@ -23,19 +29,31 @@ from hystgen.compensator.corners import (
     inverse_fixed,
     inverse_front,
     inverse_front_fixed,
-    run,
 )
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.compensator.step import Operations
 from hystgen.effects.kinds import OwnBlock
 from hystgen.front import compensator, curve
 from hystgen.plays import loop
-from hystgen.plays.corners.memory import new_fixed_memory, new_memory
-from hystgen.plays.slots import CODE_MAX, LOOP
+from hystgen.plays.corners.corners_fixed import new_fixed_memory
+from hystgen.plays.corners.corners_float import STATUS, new_memory
+from hystgen.plays.slots import (
+    CODE_MAX,
+    DRIVE_MAX,
+    DRIVE_MIN,
+    LOOP,
+    OP_COMMIT,
+    OP_INIT,
+    OP_RESET,
+    OP_STEP,
+    ZERO,
+    Bytes,
+    Reals,
+)
 
 
 def operations(t: Tables | FixedTables | ChainTables) -> Operations:
-    """What the bit reference is made of for the arithmetic and the engine of these tables."""
+    """The functions of the bit reference for the arithmetic and the engine of these tables."""
     if isinstance(t, ChainTables):
         drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
         return _chain_operations(t.fixed, drives, outputs)
@@ -49,8 +67,9 @@ def _operations(loops: bool, fixed: bool, front: bool) -> Operations:
         own = step_fixed if fixed else step_float
         return step.made_of(*ends, own.output, own.inverse_solve, own.finite)
     if fixed:
-        return run.made_of(forward_fixed, inverse_front_fixed if front else inverse_fixed, *ends)
-    return run.made_of(forward_front, inverse_front, *ends) if front else run.made_of(forward, inverse, *ends)
+        return _corner_operations(forward_fixed, inverse_front_fixed if front else inverse_fixed, *ends)
+    modules = (forward_front, inverse_front) if front else (forward, inverse)
+    return _corner_operations(*modules, *ends)
 
 
 @functools.cache
@@ -59,6 +78,55 @@ def _chain_operations(
 ) -> Operations:
     own = chain_step_fixed if fixed else chain_step_float
     return chain_step.made_of(own.BLOCKS, own.CODES, drives, outputs)
+
+
+def _corner_operations(
+    forward: ModuleType, inverting: ModuleType, front_forward: Any, front_inverse: Any
+) -> Operations:
+    """The operations of engine corners, from a module with the functions of each operator, and of the front."""
+    forward_init, forward_reset, forward_step = forward.forward_init, forward.forward_reset, forward.forward_step
+    inverse_init, inverse_reset, inverse_step = inverting.inverse_init, inverting.inverse_reset, inverting.inverse_step
+    forward_visit, inverse_visit = forward.forward_visit, inverting.inverse_visit
+    inverse_commit = inverting.inverse_commit
+
+    @jit.jit
+    def init(t: Any, m: Any, inverse: int) -> None:
+        """Start memory of the parameter file."""
+        if inverse:
+            inverse_init(t, m)
+        else:
+            forward_init(t, m)
+
+    @jit.jit
+    def visit(t: Any, m: Any, inverse: int, v: Any) -> None:
+        """Let the actuator be at drive v before the next sample."""
+        if inverse:
+            inverse_visit(t, m, v)
+        else:
+            forward_visit(t, m, v)
+
+    @jit.jit
+    def run(t: Any, m: Any, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
+        """Operations op[i] with argument x[i]; answers[i] is that of a step, else 0; status[i] is read and cleared."""
+        for i in range(len(op)):
+            answers[i] = t.limits[ZERO]
+            if op[i] == OP_INIT:
+                init(t, m, inverse)
+            elif op[i] == OP_COMMIT:
+                inverse_commit(t, m, x[i])
+            elif inverse:
+                if op[i] == OP_RESET:
+                    inverse_reset(t, m, x[i])
+                else:
+                    answers[i] = inverse_step(t, m, x[i])
+            elif op[i] == OP_RESET:
+                forward_reset(t, m, x[i])
+            else:
+                answers[i] = forward_step(t, m, x[i])
+            status[i] = m.counts[STATUS]
+            m.counts[STATUS] = 0
+
+    return Operations(init, visit, run, forward_step, inverse_step, front_forward, front_inverse)
 
 
 def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
@@ -72,7 +140,7 @@ def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
 
 
 def codes(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[Any]:
-    """Samples as fixed point takes them. Raises ValueError for what is no code."""
+    """Samples as codes of fixed point. Raises ValueError for numbers that are not codes."""
     with np.errstate(invalid="ignore"):  # what is no code is found below
         found = np.ascontiguousarray(x, dtype=t.threshold.dtype)
     most = int(t.limits[CODE_MAX])
@@ -84,7 +152,7 @@ def codes(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[Any
 def answers(
     t: Tables | FixedTables | ChainTables, inverse: bool, call: Any, x: Any, compiled: bool = True
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
-    """What the bit reference makes of operations `call` with arguments `x` from the start on, and its status."""
+    """Answers and status of the bit reference for operations `call` with arguments `x`, from the start memory on."""
     code, state = operations(t), new_state(t, inverse)
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
@@ -92,3 +160,84 @@ def answers(
         code.init(t, state, int(inverse))
         code.run(t, state, int(inverse), np.asarray(call, dtype=np.uint8), x, found, status)
     return found, status
+
+
+class Session:
+    """One instance of an operator, run over records that follow one another.
+
+    `operator`: 'forward' or 'inverse'. Without `arithmetic` it computes in double precision and limits nothing unless
+    `clamp`; with one it is the bit reference of the emitted C, which clamps, in codes of `lsb` (drive and output, None
+    for the finest) where it is fixed point. Raises NotInvertibleError and FormatError.
+    """
+
+    def __init__(
+        self,
+        cascade: StaticModel,
+        operator: str = "forward",
+        arithmetic: str | None = None,
+        engine: str = "corners",
+        clamp: bool = False,
+        lsb: tuple[float | None, float | None] = (None, None),
+    ) -> None:
+        arguments.choice("operator", operator, ("forward", "inverse"))
+        self._inverse = int(operator == "inverse")
+        if self._inverse:
+            problems = cascade.inverse_problems()
+            if problems:
+                raise NotInvertibleError(problems)
+        limited = clamp or arithmetic is not None
+        if engine == "corners" and min(cascade.pi.weights) < 0:  # outputs that fall in a rising move have no corners
+            engine = "loop"
+        self._build = functools.partial(
+            tables.build, cascade, arithmetic or "float64", engine, limited, lsb, bool(self._inverse)
+        )
+        self._fixed = ARITHMETICS[arithmetic or "float64"].fixed
+        self.tables = self._build()
+        self._range, self._cascade = cascade.input_range, cascade
+        self._code = operations(self.tables)
+        self.state = new_state(self.tables, bool(self._inverse))
+        self.init()
+
+    def init(self) -> None:
+        """Back to the start memory."""
+        self._code.init(self.tables, self.state, self._inverse)
+
+    @property
+    def drive_range(self) -> tuple[float, float]:
+        """`input_range` in the operator's own numbers: physical units, or codes in fixed point."""
+        if self._fixed:
+            low, high = self.tables.limits[DRIVE_MIN : DRIVE_MAX + 1]
+            return float(low), float(high)
+        return self._range
+
+    def visit(self, drives: Iterable[float]) -> None:
+        """Let the actuator see these drive values, in range or not, after `init` and before what comes next."""
+        seen = self._samples(list(drives))
+        if not self._fixed:
+            inputs = [self._cascade.front(float(v), up) for v in seen for up in (True, False)]
+            self.tables = self._build(visited=[float(w) for w in inputs])
+            self.init()
+        for drive in seen:
+            self._code.visit(self.tables, self.state, self._inverse, drive)
+
+    def run(self, x: ArrayLike) -> tuple[NDArray[Any], Bytes]:
+        """Answers (N,) for the input samples (N,), and the status bits of each sample.
+
+        Fixed point takes and gives codes. Raises ValueError for numbers that are not codes and for another shape,
+        TypeError for anything but an array of numbers.
+        """
+        samples = self._samples(x)
+        return self.operate(np.full(len(samples), OP_STEP, dtype=np.uint8), samples)
+
+    def _samples(self, x: ArrayLike) -> NDArray[Any]:
+        given = arguments.signal("u" if self._inverse else "v", x)
+        if self._fixed:
+            return codes(self.tables, given)
+        return np.ascontiguousarray(given, dtype=self.tables.threshold.dtype)
+
+    def operate(self, op: Bytes, x: NDArray[Any]) -> tuple[NDArray[Any], Bytes]:
+        """A sequence of init, reset, step and commit with their arguments; answers are those of the steps."""
+        answers = np.zeros_like(x)
+        status = np.zeros(len(x), dtype=np.uint8)
+        self._code.run(self.tables, self.state, self._inverse, op, x, answers, status)
+        return answers, status

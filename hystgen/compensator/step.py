@@ -1,17 +1,17 @@
 """One step of engine loop, and the operations around it: commit, reset, init.
 
-Every function has its counterpart of the same name in `c_runtime/`. What both operators do alike C has for each of them
-(`forward_begin`, `inverse_begin`); here it is written once (`begin`). Engine corners has its own in
+Every function has its counterpart of the same name in `c_runtime/`. Functions that both operators share exist twice in
+C (`forward_begin`, `inverse_begin`); here they are written once (`begin`). Engine corners has its own in
 `hystgen.compensator.corners`, and shares the memoryless part and the tables.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.layout import FixedTables, Tables
+from hystgen.compensator.layout import FixedTables, Tables, clamp_drive, inverse_clamp
 from hystgen.plays.loop import (
     ANSWER,
     ASCENDING,
@@ -31,8 +31,6 @@ from hystgen.plays.loop import (
 )
 from hystgen.plays.slots import (
     DOMAIN,
-    DRIVE_MAX,
-    DRIVE_MIN,
     HELD,
     HOLD,
     INPUT_CLAMPED,
@@ -41,8 +39,6 @@ from hystgen.plays.slots import (
     OP_RESET,
     OP_STEP,
     OUTPUT_CLAMPED,
-    OUTPUT_MAX,
-    OUTPUT_MIN,
     ZERO,
     Bytes,
     Reals,
@@ -50,7 +46,7 @@ from hystgen.plays.slots import (
 
 
 class Operations(NamedTuple):
-    """What is done to an instance: `init`, `visit` and `run` as in `made_of`, a step of each operator, the front."""
+    """The operations on an instance: `init`, `visit` and `run` as in `made_of`, a step of each operator, the front."""
 
     init: Callable[..., Any]
     visit: Callable[..., Any]
@@ -69,33 +65,6 @@ def inverse_answer(s: State, v: Any) -> Any:
     s.counts[HAS_PENDING] = 1
     s.counts[STEPPED] = 1
     return v
-
-
-class Limited(Protocol):
-    """The limits of drive and output, as `hystgen.compensator.layout.Tables` has them."""
-
-    @property
-    def limits(self) -> Reals: ...
-
-
-@jit(inline=True)
-def clamp_drive(t: Limited, v: Any) -> Any:
-    """v inside the input range."""
-    if v < t.limits[DRIVE_MIN]:
-        return t.limits[DRIVE_MIN]
-    if v > t.limits[DRIVE_MAX]:
-        return t.limits[DRIVE_MAX]
-    return v
-
-
-@jit(inline=True)
-def inverse_clamp(t: Limited, u: Any) -> Any:
-    """u inside the output range."""
-    if u < t.limits[OUTPUT_MIN]:
-        return t.limits[OUTPUT_MIN]
-    if u > t.limits[OUTPUT_MAX]:
-        return t.limits[OUTPUT_MAX]
-    return u
 
 
 @jit

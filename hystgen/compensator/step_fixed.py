@@ -1,4 +1,4 @@
-"""What a step of engine loop does otherwise in fixed point: limiting the output code, solving for one."""
+"""The parts of a step of engine loop that differ in fixed point: limiting the output code, solving for one."""
 
 from __future__ import annotations
 

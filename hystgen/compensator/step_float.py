@@ -1,4 +1,4 @@
-"""What a step of engine loop does in floating point where fixed point differs."""
+"""The parts of a step of engine loop that differ in floating point."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ __all__ = [
 
 @functools.cache
 def shapes(name: str) -> tuple[type[Effect], ...]:
-    """The classes of a catalogue entry, its default shape first. Raises KeyError for a name that is none."""
+    """The classes of a catalogue entry, its default shape first. Raises KeyError for an unknown name."""
     if name not in CATALOGUE:
         raise KeyError(name)
     found: tuple[type[Effect], ...] = importlib.import_module(f"hystgen.effects.{name}.model").SHAPES

@@ -1,4 +1,4 @@
-"""What an effect is: parameters with units, a place in the chain, a forward model and shapes to try in a fit.
+"""The base of all effects: parameters with units, a place in the chain, a forward model and shapes to try in a fit.
 
 Between two samples every signal is taken as straight, so that the filters are exact for any time steps on drives that
 are; before the first sample everything is at rest at that sample.
@@ -38,7 +38,7 @@ class Place(enum.Enum):
 
 
 USER = "user:"
-"""What names of a user's own effects begin with."""
+"""Prefix of the names of a user's own effects."""
 
 MOST_BYTES = 2**25
 """Size of the factors that a record remembers."""
@@ -46,7 +46,7 @@ MOST_BYTES = 2**25
 
 @dataclass(frozen=True)
 class Run:
-    """What an effect sees of one record, N samples.
+    """One record as an effect sees it, N samples.
 
     `t`: seconds, rising, session time; `v`: the drive as recorded; `extra`: further columns by name; `rest`: seconds of
     pause before the first sample, at the drive before it (`chain.join` turns it into samples).
@@ -57,7 +57,7 @@ class Run:
     extra: Mapping[str, Array] = field(default_factory=dict)
     rest: float = 0.0
     within: tuple[Run, NDArray[np.intp]] | None = field(default=None, repr=False, compare=False)
-    """a run of more samples, of which these are the ones at some places, the first and the last among them"""
+    """the longer run from which these samples are taken; its first and its last sample are among them"""
 
     def picked(self, places: NDArray[np.intp]) -> Run:
         """Fewer samples of it; what adds up from sample to sample adds up over all of them."""
@@ -110,7 +110,7 @@ class Run:
 
     @cached_property
     def different(self) -> tuple[Array, NDArray[np.intp]]:
-        """The steps that there are, and which of them each step is."""
+        """The distinct step lengths, and for each step the index of its own."""
         return np.unique(self.steps, return_inverse=True)
 
     def remembered(self, by: Hashable, make: Callable[[], Array]) -> Array:
@@ -130,7 +130,7 @@ class Run:
 
 @dataclass(frozen=True)
 class About:
-    """What is known of the records for which shapes are listed."""
+    """The properties of the records for which shapes are listed."""
 
     drive: tuple[float, float]
     output_range: float
@@ -149,6 +149,8 @@ class About:
     """further columns that every record has"""
     ringing: tuple[float, ...] = ()
     """frequencies at which the error so far has narrow peaks of its own, Hz, the strongest first"""
+    timed: bool = True
+    """whether the times of the records are known"""
 
 
 @dataclass(frozen=True)
@@ -180,7 +182,7 @@ class Candidate:
 
 
 Problem = tuple[tuple[str | int, ...], str]
-"""What does not fit together in an effect: keys, and a message."""
+"""An inconsistency of an effect: its keys, and a message."""
 
 
 def without_plays(thresholds: tuple[float, ...] | None) -> Iterator[Problem]:

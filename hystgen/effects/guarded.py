@@ -1,4 +1,4 @@
-"""Checks of what a user's own effects return, before anything depends on it."""
+"""Checks of the results of a user's own effects, before anything depends on them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a kind of block of a compensator is made of: its numbers by name and its verbs, in Python and in C alike."""
+"""Kinds of blocks of a compensator: their numbers by name and their verbs, the same in Python and in C."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 from hystgen.basics.jit import jit
 
 VERBS = ("rest", "resting", "solve", "absorb")
-"""What every block does: settle at an input, give the input of a settled output, solve for one, absorb one."""
+"""The verbs of every block: settle at an input, give the input of a settled output, solve for an input, absorb one."""
 
 
 @dataclass(frozen=True)

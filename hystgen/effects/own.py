@@ -40,7 +40,7 @@ WORD = re.compile(r"[a-z][a-z0-9_]{0,30}")
 
 
 def kind(effect: type[Effect]) -> Kind:
-    """What the C calls the block of an effect that has one."""
+    """The name of an effect's block in the C."""
     assert effect.block is not None
     return Kind(f"user_{_name(effect).partition(':')[2]}", effect.block.table, effect.block.state)
 
@@ -52,12 +52,12 @@ def source(effect: type[Effect]) -> Path:
 
 
 def _file(effect: type[Effect]) -> str:
-    """The Python file of an effect; a name alone where there is none."""
+    """The Python file of an effect; `model.py` if it has none."""
     return str(getattr(sys.modules.get(effect.__module__), "__file__", None) or "model.py")
 
 
 def origin(effect: type[Effect]) -> str:
-    """What `--effects` is given for an effect: the last part of the folder's or file's name."""
+    """The argument of `--effects` for an effect: the last part of the folder's or file's name."""
     file = Path(_file(effect))
     return file.parent.name if file.name == "model.py" else file.name
 
@@ -163,7 +163,7 @@ ALLOWED = (
     ast.FunctionDef, ast.arguments, ast.arg, ast.Assign, ast.Return, ast.Expr, ast.BinOp, ast.Add, ast.Sub, ast.Mult,
     ast.UnaryOp, ast.USub, ast.Name, ast.Load, ast.Store, ast.Subscript, ast.For, ast.Call, ast.Constant,
 )  # fmt: skip
-"""What the functions are written with."""
+"""Names and operations that the functions may use."""
 
 
 def _of_function(verb: str, function: Any) -> Iterator[str]:

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from hystgen.basics import arguments
+from hystgen.basics import arguments, writing
 from hystgen.compensator import engines
-from hystgen.emission import files, module, worth
+from hystgen.emission import module, worth
 from hystgen.emission.options import LAYOUTS, OPERATORS, Options
 from hystgen.model import Model, ModelSource, as_model, check_arithmetic
 from hystgen.parameters.files import parameters_sha256
@@ -82,7 +82,7 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
 
 
 def doubts(model: Model) -> list[str]:
-    """What may be wrong with the inverse of a model whose diagnosis could not tell the stage from its sensor."""
+    """Possible faults of the inverse of a model whose diagnosis could not separate the stage from its sensor."""
     named, advice = model.parameters.not_separable, "Record wide and nested loops, or with another sensor"
     found = []
     if ("asymmetry", "sensor_nonlinearity") in named and model.cascade.stages:
@@ -118,12 +118,12 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
     Files that are there with the same bytes are left as they are. Raises ParameterError, NotInvertibleError,
     FormatError and UnsupportedEffectsError; then nothing is written.
     """
-    return files.write(Path(arguments.path("output", output)), emitted_files(source, **options))
+    return writing.write_files(Path(arguments.path("output", output)), emitted_files(source, **options))
 
 
 @arguments.taking(emit_options, "emit")
 def differences(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) -> list[str]:
-    """What in folder `output` is missing or other than what `emit` would write, one sentence a file.
+    """The files in folder `output` that are missing or differ from what `emit` would write, one sentence a file.
 
     The sentence names what differs: options, parameters, version of hystgen, edits by hand, line ends.
     """

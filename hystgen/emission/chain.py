@@ -106,7 +106,7 @@ def _table(declared: str, entries: Sequence[str]) -> str:
     return f"static const {declared} = {{\n" + "\n".join(lines) + "\n};\n"
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
-    """The blocks of an operator in front of the plays, from the drive on, and those behind them."""
+    """The blocks of an operator in front of the plays, starting from the drive, and those behind them."""
     found: list[list[Block]] = []
     for side in blocks.sides(t, operator):
         counts: Counter[str] = Counter()

@@ -16,6 +16,7 @@ from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.effects.kinds import Kind, Rows
 from hystgen.emission.chain import Field
 from hystgen.emission.options import Options
+from hystgen.emission.runtime import Piece
 from hystgen.plays import slots
 
 
@@ -78,31 +79,45 @@ _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "ui
           "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
 
 
-def _corner_structs(arithmetic: Arithmetic, layout: Layout) -> dict[str, tuple[int, int]]:
-    """Sizes and alignments of the structures of the corner engine."""
-    pointer = (layout.pointer, layout.pointer)
-    eight, four, two, one = (8, 8), (4, 4), (2, 2), (1, 1)
-    if arithmetic.fixed:
-        low = arithmetic.low_bits // 8
-        direction = [one] if low == 4 else []  # else a bit of the number beside it
-        return {
-            "place_t": layout.struct(eight, four, two, two, one),
-            "segment_t": layout.struct(eight, four, four, four, one),
-            "kink_t": layout.struct(eight, eight, two, two),
-            "corner_t": layout.struct(four, four, (low, low), two, *direction),
-            "curve_t": layout.struct(pointer, eight, eight, eight, two),
-            "drive_t": layout.struct(four, one),
-        }
-    reals = (arithmetic.bytes, arithmetic.bytes)
-    corner = layout.struct(*3 * [reals], two, one)
-    return {
-        "place_t": layout.struct(reals, reals, two, two, one),
-        "segment_t": layout.struct(*4 * [reals]),
-        "corner_t": corner,
-        "curve_t": layout.struct(pointer, *6 * [reals]),
-        "start_t": layout.struct(pointer, two, two, corner),
-        "drive_t": layout.struct(reals, reals, one),
-    }
+_MEMBER = re.compile(r"(unsigned int|\w+) \w+((?:\[[^\]]+\])*)(?: : (\d+))?")
+
+
+def declared(
+    pieces: Iterable[Piece], arithmetic: Arithmetic, layout: Layout, lengths: Mapping[str, int]
+) -> dict[str, tuple[int, int]]:
+    """Sizes and alignments of the structures of `c_runtime/`, by their names without prefix, from their declarations.
+
+    `pieces`: in an order in which a type stands before those that contain it; `lengths`: macros in lengths of arrays.
+    """
+    real = (arithmetic.bytes, arithmetic.bytes)
+    play = (4, 4) if arithmetic.fixed else real
+    reach = 2 * (arithmetic.reach_bytes,) if arithmetic.fixed else real
+    found = {"real_t": real, "play_t": play, "reach_t": reach, "unsigned int": (layout.integer, layout.integer)}
+    found |= {name: (size, size) for name, size in _SIZES.items() if size} | {"bool": (1, 1)}
+    for piece in pieces:
+        _, opened, members = piece.code.partition("{")
+        if not opened or "typedef struct" not in piece.code:
+            continue
+        fields: list[tuple[int, int]] = []
+        bits = 0
+        for member in re.findall(r"[^;{}]+(?=;)", members.rpartition("}")[0]):
+            if "*" in member:
+                fields.append((layout.pointer, layout.pointer))
+                continue
+            parts = _MEMBER.fullmatch(" ".join(member.split()))
+            assert parts, f"{piece.name}: {member}"
+            kind, sizes, width = parts.groups()
+            bits += int(width or 0)
+            if width:
+                continue
+            size, alignment = found[kind.removeprefix("hystgen_")]
+            for length in re.findall(r"\[(.+?)\]", sizes):
+                size *= sum(lengths[term] if term in lengths else int(term) for term in length.split(" + "))
+            fields.append((size, alignment))
+        if bits:  # side by side in whole numbers, which stand last
+            fields.append((-(-bits // 8), min(-(-bits // 8), layout.integer)))
+        found[piece.name.removeprefix("hystgen_")] = layout.struct(*fields)
+    return found
 
 
 _LETTERS = {"w": (8, 8), "i": (4, 4), "c": (16, 4), "b": (1, 1)}
@@ -126,13 +141,19 @@ def _block_structs(kinds: Iterable[Kind], real: tuple[int, int], layout: Layout)
     return found
 
 
-def _constants(text: str, arithmetic: Arithmetic, layout: Layout, kinds: Iterable[Kind], plays: int = 1) -> int:
-    """Bytes of the constants that the C text defines, alignment between them left out; of those with an entry for each
-    of `plays` the bytes of one. `kinds`: of the blocks of a chain."""
+def _constants(
+    text: str,
+    arithmetic: Arithmetic,
+    layout: Layout,
+    types: Mapping[str, tuple[int, int]],
+    kinds: Iterable[Kind],
+    plays: int = 1,
+) -> int:
+    """Bytes of the constants that the C text defines, without padding between them; for constants with an entry for
+    each of `plays`, the bytes of one entry. `types`: as `declared` gives them; `kinds`: of the blocks of a chain."""
     fixed = arithmetic.fixed
     real = arithmetic.reach_bytes if fixed else arithmetic.bytes
     reach = (real, real)
-    pointers = 6 * [(layout.pointer, layout.pointer)]
     count = (2, 2)
     factor, table = layout.struct((4, 4), (1, 1)), (layout.pointer, layout.pointer)
     bend = layout.struct(table, table, table, (4, 4), count, *3 * [(1, 1)])
@@ -142,11 +163,7 @@ def _constants(text: str, arithmetic: Arithmetic, layout: Layout, kinds: Iterabl
         "stops_t": layout.struct(*2 * [(8, 8)], factor, factor),
     }
     structs = {
-        "dead_zone_t": layout.struct(*pointers, count),
-        "envelope_t": layout.struct(*(7 * [reach])),
-        "ends_t": layout.struct((8, 8), (8, 8), reach, reach, (4, 4), (4, 4)),
-        "tables_t": layout.struct(*pointers[:5], reach, reach, count) if fixed else layout.struct(*pointers[:4], count),
-        **_corner_structs(arithmetic, layout),
+        **{name: size for name, size in types.items() if name not in _SIZES},
         **_block_structs(kinds, reach, layout),
         **(behind if fixed else {}),
     }
@@ -170,12 +187,13 @@ def estimate(
     numbers: Tables | FixedTables | ChainTables,
     text: str,
     plays: str,
+    types: Sequence[Piece],
     fields: Mapping[str, Sequence[Field]],
 ) -> Cost:
-    """Cost of the emitted model whose implementation is `text`, with what of a shared run time it needs.
+    """Cost of the emitted model whose implementation is `text`, with the parts of a shared run time that it needs.
 
-    `plays`: the part of it that defines the tables with an entry for each play; `fields`: of a model with effects, the
-    memory of each operator.
+    `plays`: the part of it that defines the tables with an entry for each play; `types`: declarations of the tables and
+    of the instances; `fields`: of a model with effects, the memory of each operator.
     """
     corners = options.engine == "corners"
     known = options.arithmetic != "float64"  # a double of the AVR is a float
@@ -187,7 +205,7 @@ def estimate(
         products = chain_products(numbers)
         worst = [(op, f"{words}; effects: {products[op]} multiplications") for op, words in worst]
     kinds = [each.kind for each in blocks.every(numbers, "forward")] if isinstance(numbers, ChainTables) else []
-    memory, avr = (_memory(cascade, options, text, plays, layout, fields, kinds) for layout in (CORE_32, AVR))
+    memory, avr = (_memory(cascade, options, text, plays, layout, types, fields, kinds) for layout in (CORE_32, AVR))
     code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))
     if isinstance(numbers, ChainTables):
         for op, _ in worst:
@@ -228,31 +246,23 @@ def _memory(
     text: str,
     plays: str,
     layout: Layout,
+    types: Sequence[Piece],
     chain: Mapping[str, Sequence[Field]],
     kinds: Sequence[Kind],
 ) -> Memory:
     n = cascade.pi.n
     arithmetic = ARITHMETICS[options.arithmetic]
-    real, fixed = arithmetic.bytes, arithmetic.fixed
-    play = 4 if fixed else real
-    branches = cascade.branches_differ
+    lengths = {"HYSTGEN_N_PLAYS": n, "HYSTGEN_CORNERS": max(n, 1) if arithmetic.fixed else n + 1}
+    known = declared(types, arithmetic, layout, lengths)
     sizes = []
-    a_play = play
     for op in ("forward", "inverse"):
-        if not getattr(options, op):
-            continue
-        if op in chain:
-            size = layout.struct(*(_field(each, arithmetic, layout) for each in chain[op]))[0]
-        elif options.engine == "corners":
-            size, a_play = _corner_instance(n, op, arithmetic, bool(cascade.stages), layout)
-        else:
-            fields = [real] * (1 + branches) + [1] * branches + [layout.integer]
-            if op == "inverse":
-                fields = [real] * (4 + branches) + [1] * (3 + branches) + [layout.integer, layout.integer]
-            size = layout.struct(*((field, field) for field in fields), ((n + 1) * play, play))[0]
-        sizes.append((op, size))
-    more = _constants(plays, arithmetic, layout, kinds, n + 1) + a_play * len(sizes)
-    return Memory(_constants(text, arithmetic, layout, kinds), sizes, more)
+        if getattr(options, op):
+            fields = chain.get(op)
+            members = [_field(each, arithmetic, layout) for each in fields] if fields else [known[f"{op}_t"]]
+            sizes.append((op, layout.struct(*members)[0]))
+    a_play, _ = known["corner_t" if options.engine == "corners" else "play_t"]
+    more = _constants(plays, arithmetic, layout, known, kinds, n + 1) + a_play * len(sizes)
+    return Memory(_constants(text, arithmetic, layout, known, kinds), sizes, more)
 
 
 def _field(field: Field, arithmetic: Arithmetic, layout: Layout) -> tuple[int, int]:
@@ -266,29 +276,9 @@ def _field(field: Field, arithmetic: Arithmetic, layout: Layout) -> tuple[int, i
     return size * max(field.count, 1), alignment
 
 
-def _corner_instance(n: int, op: str, arithmetic: Arithmetic, front: bool, layout: Layout) -> tuple[int, int]:
-    """Bytes of an instance of the corner engine, and of one corner."""
-    real, fixed = arithmetic.bytes, arithmetic.fixed
-    reals, flag, status = (real, real), (1, 1), (layout.integer, layout.integer)
-    structs = _corner_structs(arithmetic, layout)
-    place, (corner, alignment) = structs["place_t"], structs["corner_t"]
-    plays = place if fixed else layout.struct(place, *9 * [reals], flag)
-    if op == "forward":
-        own = [(4, 4), *([reals, flag] if front else []), status, structs["kink_t"]] if fixed else []
-        beside = own or ([reals, flag, status] if front else [status])
-    elif fixed:
-        beside = [(8, 8), *4 * [reals], *5 * [flag]] if front else [(4, 4), (4, 4), reals, *3 * [flag]]
-        beside += [status, place, structs["kink_t"]]
-    else:
-        beside = [place, *5 * [reals], *6 * [flag], status] if front else [place, reals, reals, flag, flag]
-        beside.append(status)
-    corners = max(n, 1) if fixed else n + 1
-    return layout.struct(plays, *beside, (corners * corner, alignment))[0], corner
-
-
 def worst_case(n: int, op: str, corners: bool, numbers: Tables | FixedTables) -> str:
-    """Most multiplications and comparisons of numbers in one step as functions of n, kernels of tanh and atanh aside;
-    b are the bits of n."""
+    """The largest numbers of multiplications and comparisons in one step as functions of n, without those of tanh and
+    atanh; b are the bits of n."""
     stages: list[tuple[int, int]] = []
     fixed = isinstance(numbers, FixedTables)
     if isinstance(numbers, FixedTables):

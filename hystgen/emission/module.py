@@ -14,7 +14,6 @@ from typing import Any
 import jinja2
 import numpy as np
 
-from hystgen.basics.names import comment_text
 from hystgen.basics.problems import NotInvertibleError
 from hystgen.basics.version import __version__
 from hystgen.chain.chain import Chain
@@ -24,14 +23,11 @@ from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 from hystgen.compensator.chain.layout import SHARE_BITS, Compiled, OwnChainTables
 from hystgen.effects import own as own_effects
 from hystgen.effects.base import USER
-from hystgen.emission import banner, chain, cost, layout, numbers, own, runtime, selftest
-from hystgen.emission.layout import define
-from hystgen.emission.options import Options
-from hystgen.emission.text import literal
+from hystgen.emission import chain, cost, numbers, own, runtime, selftest
+from hystgen.emission.options import OPTIONS, Options, seal
+from hystgen.emission.text import WIDTH, comment_text, define, fit, literal
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters, parameters_sha256
-
-LICENCE_WIDTH = 100
 
 
 @functools.cache
@@ -54,14 +50,14 @@ def render(template: str, values: SimpleNamespace, **more: object) -> str:
 def files(
     parameters: Parameters, cascade: StaticModel, options: Options, sha256: str | None = None
 ) -> dict[str, str]:
-    """File names and their ASCII text; `sha256`: of the parameters that the file has, by default these.
+    """File names and their ASCII text; `sha256`: hash of the parameters in the file, by default of `parameters`.
 
     Raises NotInvertibleError and tables.FormatError.
     """
     if options.inverse and cascade.inverse_problems():
         raise NotInvertibleError(cascade.inverse_problems())
     values = values_of(parameters, cascade, options)
-    values.sha256 = sha256 or values.sha256
+    values.sha256 = sha256 or parameters_sha256(parameters)
     name, shared = parameters.name, options.layout == "shared-runtime"
     single = options.layout == "single-header"
 
@@ -91,11 +87,11 @@ def files(
         file = f"{name}_selftest{ending}"
         top = _banner(values, file, about, details)
         made[file] = render(f"selftest{ending}.j2", values, banner=top, operators=operators)
-    return {file: banner.seal(_tidy(layout.fit(text))) for file, text in made.items()}
+    return {file: seal(_tidy(fit(text))) for file, text in made.items()}
 
 
 def _implementation(values: SimpleNamespace) -> str:
-    """The operators with all that they need of the run time, but what a shared one has."""
+    """The operators with the parts of the run time that they need, except those in a shared one."""
     family: runtime.Family = values.family
     single = values.single_header
     opening, apart, closing = (
@@ -124,7 +120,7 @@ def _tidy(text: str) -> str:
 
 
 def _banner(values: SimpleNamespace, file: str, what: str, details: Sequence[str] = ()) -> str:
-    width = layout.WIDTH - len(" * ")
+    width = WIDTH - len(" * ")
     lines = []
     for line in details:
         hang = " " * 8 if line.startswith(" ") else ""
@@ -186,7 +182,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
 
 
 def compiled_of(parameters: Parameters, cascade: StaticModel, options: Options) -> Compiled | None:
-    """The numbers of a model with effects; None without any."""
+    """The numbers of a model with effects; None for a model without effects."""
     effects = parameters.model.effects
     if not effects:
         return None
@@ -197,7 +193,7 @@ def compiled_of(parameters: Parameters, cascade: StaticModel, options: Options) 
 
 
 def values_of(parameters: Parameters, cascade: StaticModel, options: Options) -> SimpleNamespace:
-    """What the templates are filled with, and what the cost is counted from."""
+    """Values for the templates, from which the cost is counted too."""
     name = parameters.name
     about = _arithmetic(options.arithmetic)
     shared = options.layout == "shared-runtime"
@@ -219,7 +215,6 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         single_header=options.layout == "single-header",
         version=__version__,
         command=_command(parameters, options),
-        sha256=parameters_sha256(parameters),
         units=_units(parameters),
         n=n,
         engine=options.engine,
@@ -267,7 +262,8 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.macros = _macros(values)
     text = runtime.render(kernels, prefix, family, static=True)
     values.kernels = "" if shared else text
-    values.cost = _cost(cascade, options, values, text)
+    types = [*runtime.memory_pieces(family), *runtime.table_pieces(family), *([] if glue else states)]
+    values.cost = _cost(cascade, options, values, text, types)
     values.details = _details(parameters, cascade, options, values)
     return values
 
@@ -333,7 +329,7 @@ def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, 
 
 
 def _settings(compiled: Compiled) -> list[tuple[str, str, str]]:
-    """In fixed point, what a code is that sets a temperature or a gain."""
+    """In fixed point, the size of a code that sets a temperature or a gain."""
     if not compiled.tables.fixed:
         return []
     bits = int(31 - compiled.tables.number[SHARE_BITS])
@@ -361,7 +357,7 @@ def _status(values: SimpleNamespace) -> list[str]:
 
 
 def _macros(values: SimpleNamespace) -> list[str]:
-    """The numbers of the model that its functions name, those that none names left out."""
+    """The numbers of the model that its functions use."""
     return [
         define(f"{values.NAME}_{name}", value, comment)
         for name, value, comment in values.constants
@@ -374,7 +370,7 @@ def _command(parameters: Parameters, options: Options) -> str:
         own_effects.origin(type(effect)) for effect in parameters.model.effects if effect.name.startswith(USER)
     )
     more = " --allow-partial" * bool(options.left_out) + "".join(f" --effects {shlex.quote(each)}" for each in origins)
-    chosen = " ".join(f"--{key} {getattr(options, key)}" for key in banner.OPTIONS)
+    chosen = " ".join(f"--{key} {getattr(options, key)}" for key in OPTIONS)
     return f"hystgen emit {parameters.name}.yaml {chosen}{more}"
 
 
@@ -389,22 +385,24 @@ def _units(parameters: Parameters) -> SimpleNamespace:
 
 
 def calls_of(parameters: Parameters, cascade: StaticModel, options: Options) -> dict[str, list[str]]:
-    """By operator, the functions that a model with effects has beside those of every model."""
+    """By operator, the functions that a model with effects has in addition to those of every model."""
     glue: chain.Glue | None = getattr(values_of(parameters, cascade, options), "glue", None)
     return glue.calls if glue else {}
 
 
 def cost_of(parameters: Parameters, cascade: StaticModel, options: Options) -> cost.Cost:
-    """What the emitted model costs, as its banner says."""
+    """The cost of the emitted model, as in its banner."""
     found: cost.Cost = values_of(parameters, cascade, options).cost
     return found
 
 
-def _cost(cascade: StaticModel, options: Options, values: SimpleNamespace, kernels: str) -> cost.Cost:
+def _cost(
+    cascade: StaticModel, options: Options, values: SimpleNamespace, kernels: str, types: Sequence[runtime.Piece]
+) -> cost.Cost:
     text = _implementation(values) + (kernels if values.shared else "")
     glue: chain.Glue | None = getattr(values, "glue", None)
     fields = glue.fields if glue else {}
-    return cost.estimate(cascade, options, values.numbers, text, "".join(values.arrays), fields)
+    return cost.estimate(cascade, options, values.numbers, text, "".join(values.arrays), types, fields)
 
 
 def _selftest_cost(options: Options, found: cost.Cost, samples: int) -> list[str]:

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics.names import comment_text
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables, float_tables
 from hystgen.compensator.bounds import error_bounds
@@ -20,24 +19,24 @@ from hystgen.compensator.chain.layout import ARRIVING_BITS, LEVEL_BITS, Compiled
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import chain
 from hystgen.emission.options import Options
-from hystgen.emission.text import WIDTH, constant, literal, operand, structure, table
+from hystgen.emission.text import WIDTH, comment_text, constant, literal, operand, structure, table
 from hystgen.front.curve import FORWARD, INVERSE
 from hystgen.front.stage import StageTables
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters
 from hystgen.plays import slots
-from hystgen.plays.corners.memory import BOTTOM, Curve, Start
+from hystgen.plays.corners.corners_float import BOTTOM, Curve, Start
 
 
 def fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
-    """What the templates need to know of the numbers; `prefix` is that of the types of the run time."""
+    """Values for the templates; `prefix`: of the types of the run time."""
     if not ARITHMETICS[options.arithmetic].fixed:
         return _float_fields(parameters, cascade, options, prefix)
     return _fixed_fields(parameters, cascade, options, prefix)
 
 
 def _limits(numbers: Tables | FixedTables, more: Sequence[tuple[str, str, str]] = ()) -> dict[str, Any]:
-    """What both kinds of arithmetic have; `constants` are macros that functions may name, with `more` of them."""
+    """Values that both kinds of arithmetic have; `constants` are macros that functions may use, with `more` of them."""
     limits = numbers.limits
     return {
         "numbers": numbers,
@@ -196,7 +195,7 @@ def _loop_pointers(name: str, options: Options) -> list[str]:
 def _loop_tables(
     pointers: Sequence[str], numbers: Tables | FixedTables, name: str, prefix: str, whose: str = "model"
 ) -> str:
-    """What points to the tables of engine loop."""
+    """Pointers to the tables of engine loop."""
     entries = _lines([*pointers, str(len(numbers.threshold) - 1)])
     return constant(f"{prefix}_tables_t {name}_{whose}_tables", entries.splitlines())
 
@@ -223,7 +222,7 @@ def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options) ->
 
 
 def _lines(entries: Sequence[str]) -> str:
-    """Entries of a table, none of them broken that fits in a line, on as few lines as they take."""
+    """Entries of a table on as few lines as possible; an entry that fits on a line is not broken."""
     fitting = WIDTH - len("    ,")
     whole = ", ".join(entry.replace(" ", "\0") if len(entry) <= fitting else entry for entry in entries)
     lines = textwrap.wrap(whole, WIDTH, initial_indent="    ", subsequent_indent="    ", break_long_words=False)
@@ -338,7 +337,7 @@ def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options
 def _precision(
     parameters: Parameters, lsb: tuple[Any, Any], errors: tuple[float, float | None], branch: str
 ) -> list[str]:
-    """What codes are, and how far answers are from the exact model."""
+    """The size of codes, and how far answers are from the exact model."""
     units = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
     drive, output = (f" {unit}" if unit else "" for unit in units)
     drive_lsb, output_lsb = (float(x) for x in lsb)
@@ -432,7 +431,7 @@ def _decimal(x: float) -> str:
 def _curves(
     numbers: FixedTables, name: str, prefix: str, options: Options
 ) -> tuple[list[str], list[tuple[str, str, str]]]:
-    """The curves of the memoryless part that are used, forward, and back where there is an inverse; their sizes."""
+    """The curves of the memoryless part in use: forward and, for an inverse, back; and their sizes."""
     arrays = []
     counts = [("DEGREE", f"{numbers.coefficient.shape[1] - 1}u", "of the polynomials of every curve")]
     directions = (("_ascending", 0), ("_descending", 1)) if numbers.branches else (("", 0),)

@@ -1,8 +1,8 @@
 """The C of an effect of the user's own: its file, checked, as pieces of the run time.
 
-The file is the user's own code and is carried as it stands, with the model's name in front of its own. What it may hold
-is what blocks of `c_runtime/` hold: two types of real numbers, named as in Python, and four functions, with further
-static functions that they call. It is no language checker: what compiles, and to which bits, `hystgen verify` tells.
+The file is the user's own code and is carried as it stands, with the model's name in front of its own. It may contain
+what blocks of `c_runtime/` contain: two types of real numbers, named as in Python, and four functions, with further
+static functions that they call. The language is not checked: `hystgen verify` shows what compiles, and to which bits.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.effects import own
 from hystgen.effects.base import Effect
 from hystgen.effects.kinds import VERBS, Kind
-from hystgen.emission.layout import WIDTH
 from hystgen.emission.runtime import Piece
+from hystgen.emission.text import WIDTH
 
 MOST_BYTES = 1 << 16
 
 INCLUDE = '#include "hystgen_runtime.h"'
-"""The one line of the preprocessor that a file has, so that it compiles as it stands."""
+"""The one preprocessor line that a file has, so that it compiles by itself."""
 
 CALLED = frozenset(["if", "for", "while", "switch", "return", "sizeof"])
 """Words before a parenthesis that call nothing."""
@@ -31,7 +31,7 @@ REFUSED = {
     "float": "hystgen_real_t", "double": "hystgen_real_t", "extern": "nothing", "volatile": "nothing",
     "asm": "C", "union": "struct", "goto": "a loop", "register": "nothing", "auto": "a type",
 }  # fmt: skip
-"""Words that a file does not have, and what to write in their place."""
+"""Words that a file may not contain, and what to write instead."""
 
 
 def pieces(t: ChainTables) -> tuple[list[Piece], list[Piece]]:
@@ -73,7 +73,7 @@ def _code(text: str) -> str:
 
 
 def _of_lines(text: str) -> Iterator[tuple[int, str]]:
-    """What no line may have."""
+    """Problems of single lines."""
     code = _code(text)
     opened = code.find("/*")
     if opened >= 0:
@@ -112,7 +112,7 @@ _NAME = re.compile(r"\b(?:hystgen|HYSTGEN)_\w+")
 
 
 def _split(text: str, problems: list[tuple[int, str]]) -> Iterator[Piece]:
-    """The types and functions of a file, each with the comment right above it; whatever else there is, is a problem."""
+    """The types and functions of a file, each with the comment right above it; anything else is a problem."""
     code = _code(text).replace(INCLUDE, " " * len(INCLUDE))
     end = 0
     while start := re.search(r"\S", code[end:]):
@@ -173,7 +173,7 @@ def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int,
 
 
 def _bare(declared: str) -> str:
-    """A declaration without what makes no difference: spaces, and a memory that is only read."""
+    """A declaration without spaces and without the `const` of a memory, neither of which matters."""
     return re.sub(r"\s+", "", re.sub(r"const (hystgen_\w+ \*self)", r"\1", declared))
 
 

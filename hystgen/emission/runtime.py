@@ -1,7 +1,7 @@
 """The hand-written C of `c_runtime/`, as text to be carried by emitted files.
 
 A file is a sequence of top-level pieces (functions, tables, types, constants). Only the pieces that a model needs are
-carried. What a run time defines, which models may share, has its prefix; all else has the model's name.
+carried. Names that a run time defines, which models may share, have its prefix; all others have the model's name.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ FIXED_CHAIN_BLOCKS = (
     "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "mode_fixed.c",
     "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c", "bend.c", "stops.c",
 )  # fmt: skip
-"""What models with effects have of their own, also beside a shared run time."""
+"""Files that models with effects carry themselves, even with a shared run time."""
 
 SIGNALS = {
     "hystgen_signal_t": "hystgen_sum_t", "hystgen_fine_t": "hystgen_play_t", "hystgen_travel_t": "hystgen_sum_t",
@@ -47,7 +47,7 @@ FINE = {
     "HYSTGEN_FINE_MIN": "HYSTGEN_DRIVE_MIN", "HYSTGEN_FINE_MAX": "HYSTGEN_DRIVE_MAX",
     "hystgen_clamp_fine": "hystgen_clamp_drive",
 }  # fmt: skip
-"""What is finer than a drive code there, and what it is elsewhere."""
+"""Names of numbers finer than a drive code in such a model, and what they stand for elsewhere."""
 
 FIXED_KERNELS = (
     "over_slope.c",
@@ -96,7 +96,7 @@ class Family:
 
     @property
     def signals(self) -> dict[str, str]:
-        """What code that models with and without effects share names, and what that is here."""
+        """Names in code that models with and without effects share, and their meaning here."""
         if self.chain and self.fixed:
             return SIGNALS
         return dict.fromkeys(SIGNALS, "hystgen_real_t") | FINE
@@ -146,18 +146,18 @@ class Family:
 
     @property
     def opening(self) -> tuple[str, ...]:
-        """What stands before all code of a file; in a header between `opening_apart` and `closing`."""
+        """Headers before all code of a file; in a single header between `opening_apart` and `closing`."""
         double = ("constants_double.h",) if self.real == "double" else ()
         return () if self.fixed else ("rounding_begin.h", *double)
 
     @property
     def opening_apart(self) -> tuple[str, ...]:
-        """What stands before that where the code of a user follows."""
+        """Headers before those if the user's own code follows."""
         return () if self.fixed else ("rounding_push.h",)
 
     @property
     def closing(self) -> tuple[str, ...]:
-        """What stands behind all code of a header, so that the code of its user is compiled as before."""
+        """Headers after all code of a single header, so that its user's code is compiled as before."""
         return () if self.fixed else ("rounding_end.h",)
 
 
@@ -260,6 +260,11 @@ class Piece:
     text: str
     uses: frozenset[str]
 
+    @property
+    def code(self) -> str:
+        """Its text without comments."""
+        return _COMMENT.sub("", self.text)
+
 
 _COMMENT = re.compile(r"/\*.*?\*/", flags=re.DOTALL)
 _NAME = re.compile(r"\b(?:hystgen|HYSTGEN)_\w+")
@@ -326,6 +331,11 @@ def table_pieces(family: Family) -> list[Piece]:
     return _pieces(family.tables)
 
 
+def memory_pieces(family: Family) -> list[Piece]:
+    """The types that instances and tables of an arithmetic are made of."""
+    return _pieces(family.states)
+
+
 def operator_pieces(
     variant: Variant,
     operators: Iterable[str],
@@ -358,7 +368,7 @@ def state_pieces(variant: Variant, operators: Iterable[str]) -> list[Piece]:
 
 
 def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
-    """The pieces that `roots` lead to, in their order; names in `roots` that no piece has are of elsewhere."""
+    """The pieces that `roots` need, in their order; names in `roots` that no piece has are defined elsewhere."""
     by_name = {piece.name: piece for piece in pieces}
     wanted: set[str] = set()
     queue = [name for name in roots if name in by_name]
@@ -376,7 +386,7 @@ def used(pieces: Iterable[Piece]) -> set[str]:
 
 
 def _joined(pieces: Iterable[Piece]) -> str:
-    """Their text, an empty line between them but where a constant shares the comment of the one before."""
+    """Their text, with an empty line between them unless a constant shares the comment of the one before."""
     text = ""
     for piece in pieces:
         shared = piece.text.startswith("#define") and text.rpartition("\n\n")[2].count("#define")

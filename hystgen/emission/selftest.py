@@ -29,10 +29,10 @@ LETTERS = {
 """Letters of the settings of models with effects."""
 
 WIDE = ("set_travel",)
-"""Settings that take more bits than a code, which samples of fixed point have no room for."""
+"""Settings that take more bits than a code, too many for the samples of fixed point."""
 
 SHARE = 0.125
-"""Of the spans of settings by which the samples change them: small enough for references to stay in reach."""
+"""[share of its span] The samples change a setting by this much: little enough for references to stay in reach."""
 
 
 def _fractions(length: int) -> list[float]:

@@ -1,4 +1,4 @@
-"""Emitted files that are no longer what would be emitted: in what they differ, and the command that fits."""
+"""Emitted files that are out of date: how they differ, and the command that updates them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from hystgen.emission import banner
+from hystgen.emission.options import read_banner
 
 LINE_ENDS = "has other line ends than LF"
 MISSING = "is missing"
@@ -16,14 +16,14 @@ EDITED = "was edited by hand"
 
 @dataclass(frozen=True)
 class Difference:
-    """A file that is not what would be written: `reasons` in words, and the options that its own banner names."""
+    """A file that differs from what would be written: `reasons` in words, and the options that its own banner names."""
 
     path: Path
     reasons: tuple[str, ...]
     options: Mapping[str, str]
 
     def sentence(self) -> str:
-        """The file and in what it differs."""
+        """The file and how it differs."""
         return f"{self.path} {', '.join(self.reasons)}"
 
 
@@ -44,7 +44,7 @@ def _difference(path: Path, content: bytes, text: str) -> Difference:
     here = content.decode("utf-8", "surrogateescape")
     there = here.replace("\r\n", "\n").replace("\r", "\n")
     ends = (LINE_ENDS,) if there != here else ()
-    old, new = banner.read(there), banner.read(text)
+    old, new = read_banner(there), read_banner(text)
     assert new is not None
     if there == text:
         return Difference(path, ends, new.options)

@@ -1,13 +1,36 @@
-"""Numbers and arrays as C text: exact literals, wrapped lines."""
+"""C text: exact literals, tables, comments, and lines of at most WIDTH characters, however long the model's name is.
+
+The files of `c_runtime/` are formatted for the prefix `hystgen_`; with another name in them statements are broken
+anew. Tables, whose lines are made to fit, stay as they are. clang-format formats `c_runtime/` but not what is emitted:
+its lines depend on its version, and the same parameters have to give the same bytes anywhere.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+import re
+import textwrap
+import unicodedata
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 WIDTH = 100
+
+_WAYS = [
+    re.compile(form)
+    for form in (
+        r"(?<=,) ",
+        r" (?=[?:] )",
+        r"(?<= (?:\|\||&&)) ",
+        r"(?<=[\w)\]] [-+*/|^]) |(?<= (?:<<|>>)) ",
+        r"(?<= (?:==|!=|<=|>=)) |(?<=[\w)\]] [<>]) ",
+    )
+]
+"""Where a line may be broken, the best places first: behind commas, before ? and :, behind operators."""
+_ASSIGNED = re.compile(r"(?<= =) |(?<=return) ")
+"""Where a line is broken as a last resort, or to keep a sum or a choice together."""
 
 
 def literal(x: Any) -> str:
@@ -47,7 +70,7 @@ def _wrapped(values: Sequence[Any], suffix: str, indent: str) -> list[str]:
 
 
 def constant(declared: str, lines: Sequence[str]) -> str:
-    """A constant with these lines between its braces, in one line where there is room."""
+    """A constant with these lines between its braces, on one line if it fits."""
     whole = f"static const {declared} = {{{lines[0].strip()}}};"
     if len(lines) == 1 and len(whole) <= WIDTH:
         return whole + "\n"
@@ -68,3 +91,253 @@ def structure(kind: str, name: str, columns: Sequence[tuple[str, Sequence[Any]]]
         end = "    }" + ("," if i + 1 < len(columns) else "")
         lines += [f"    {{ /* {own} */", *_wrapped(values, "", "       "), end]
     return "\n".join(["static const struct {", *members, f"}} {name} = {{", *lines, "};"]) + "\n"
+
+
+# Accented letters by their decomposition (Latin-1 and Extended-A only: those never change with Python's Unicode).
+_ASCII = {code: unicodedata.normalize("NFD", chr(code))[0] for code in range(0xC0, 0x180)} | {
+    ord(sign): plain
+    for sign, plain in (
+        ("\N{MICRO SIGN}", "u"),
+        ("\N{GREEK SMALL LETTER MU}", "u"),
+        ("\N{DEGREE SIGN}", "deg"),
+        ("\N{OHM SIGN}", "Ohm"),
+        ("\N{GREEK CAPITAL LETTER OMEGA}", "Ohm"),
+        ("\N{PLUS-MINUS SIGN}", "+/-"),
+        ("\N{MULTIPLICATION SIGN}", "x"),
+        ("\N{MIDDLE DOT}", "."),
+        ("\N{SUPERSCRIPT ONE}", "^1"),
+        ("\N{SUPERSCRIPT TWO}", "^2"),
+        ("\N{SUPERSCRIPT THREE}", "^3"),
+        ("\N{SUPERSCRIPT MINUS}", "^-"),
+        ("\N{EN DASH}", "-"),
+        ("\N{EM DASH}", "-"),
+        ("\N{MINUS SIGN}", "-"),
+        ("\N{LEFT SINGLE QUOTATION MARK}", "'"),
+        ("\N{RIGHT SINGLE QUOTATION MARK}", "'"),
+        ("\N{LEFT DOUBLE QUOTATION MARK}", '"'),
+        ("\N{RIGHT DOUBLE QUOTATION MARK}", '"'),
+        ("\N{HORIZONTAL ELLIPSIS}", "..."),
+        ("\N{LATIN SMALL LETTER SHARP S}", "ss"),
+        ("\N{LATIN SMALL LETTER AE}", "ae"),
+        ("\N{LATIN CAPITAL LETTER AE}", "AE"),
+        ("\N{LATIN SMALL LETTER O WITH STROKE}", "o"),
+        ("\N{LATIN CAPITAL LETTER O WITH STROKE}", "O"),
+        ("\N{LATIN SMALL LETTER L WITH STROKE}", "l"),
+        ("\N{LATIN CAPITAL LETTER L WITH STROKE}", "L"),
+    )
+}
+
+
+def comment_text(text: str) -> str:
+    """Any text as one line of printable ASCII that is harmless inside a C comment of either kind.
+
+    Common letters and signs beyond ASCII are spelt out, others become `?`; white space becomes single blanks.
+    Nothing in the result opens or closes a comment, forms a trigraph or continues a line, and it neither
+    starts nor ends in a blank.
+    """
+    text = re.sub(r"[^ -~]", "?", " ".join(text.translate(_ASCII).split())).replace("\\", "/")
+    text = re.sub(r"\*(?=/)", "* ", text)
+    text = re.sub(r"/(?=\*)", "/ ", text)
+    return re.sub(r"\?(?=\?)", "? ", text)
+
+
+def fit(text: str) -> str:
+    """The text of a C file with every statement on as few lines as it needs."""
+    return "".join(f"{line}\n" for line in _in_columns(list(_fitted(text.splitlines()))))
+
+
+_BEHIND = re.compile(r"(\s*\S.*?)\s+(/\* .* \*/)$")
+
+
+def _in_columns(lines: list[str]) -> Iterator[str]:
+    """Comments behind consecutive lines begin in one column."""
+    for commented, group in itertools.groupby(map(_BEHIND.fullmatch, lines), bool):
+        found = list(group)
+        here, lines = lines[: len(found)], lines[len(found) :]
+        column = max(len(each[1]) for each in found if each) if commented else 0
+        aligned = [f"{each[1]:{column}} {each[2]}" for each in found if each]
+        yield from aligned if commented and max(map(len, aligned)) <= WIDTH else here
+
+
+def define(name: str, value: str, comment: str = "") -> str:
+    """A macro with a comment behind it."""
+    return f"#define {name} {value}" + (f" /* {comment} */" if comment else "")
+
+
+def _fitted(lines: list[str]) -> Iterator[str]:
+    at = 0
+    while at < len(lines):
+        line = lines[at]
+        indent = line[: len(line) - len(line.lstrip())]
+        if line.startswith("#"):
+            end = at
+            while lines[end].endswith("\\"):
+                end += 1
+            yield from _directive(line) if end == at else lines[at : end + 1]
+            at = end + 1
+        elif line.lstrip().startswith("/*"):
+            end = next(i for i in range(at, len(lines)) if "*/" in lines[i])
+            yield from _comment(lines[at : end + 1])
+            at = end + 1
+        elif re.search(r"= \{$", line):  # a table
+            end = next(i for i in range(at, len(lines)) if lines[i].endswith("};"))
+            yield from _broken(line, indent)
+            yield from lines[at + 1 : end + 1]
+            at = end + 1
+        else:
+            end = at
+            while not _ends(lines, end):
+                end += 1
+            yield from _statement(lines[at : end + 1], indent)
+            at = end + 1
+
+
+def _ends(lines: list[str], at: int) -> bool:
+    """Whether a statement, or the head of a block, ends in this line."""
+    code = re.sub(r"\s*/\*.*$", "", lines[at])
+    following = lines[at + 1].strip() if at + 1 < len(lines) else "{"
+    return not code.strip() or code.endswith((";", "{", "}")) or following in ("{", "")
+
+
+def _statement(lines: list[str], indent: str) -> Iterator[str]:
+    last = re.match(r"^(.*?)(\s+/\*.*)?$", lines[-1])
+    assert last
+    code = re.sub(r"([(\[]) ", r"\1", " ".join([*(line.strip() for line in lines[:-1]), last[1].strip()]))
+    comment = (last[2] or "") if code else ""
+    code = re.sub(r" {2,}", " ", code)
+    kept = _aligned(lines)
+    anew = list(_broken(code, indent))
+    if len(indent + code + comment) <= WIDTH and "/*" not in code:
+        yield indent + code + comment
+    elif max(map(len, kept)) <= WIDTH and (comment or "/*" in code or len(kept) <= len(anew)):
+        yield from kept
+    elif comment and code.endswith("{"):
+        yield from _broken(code, indent)
+        yield from _comment([f"{indent}    {comment.strip()}"])
+    else:
+        if comment:
+            yield from _comment([indent + comment.strip()])
+        yield from anew
+
+
+def _aligned(lines: list[str]) -> list[str]:
+    """Lines inside parentheses begin below the first character in them, as before names were put in."""
+    made: list[str] = []
+    opened: list[int] = []
+    first: dict[int, int] = {}  # column of the first line inside, by that of the parenthesis
+    for line in lines:
+        column = len(line) - len(line.lstrip())
+        if opened:
+            base = first.setdefault(opened[-1], column)
+            choice = made[-1].rfind(" ? ") + 1
+            under = line.lstrip().startswith(": ") and column > base and choice  # the ? of the line before
+            column = under or opened[-1] + column - base
+        made.append(" " * column + line.lstrip())
+        for at, character in enumerate(re.sub(r"/\*.*", "", made[-1])):
+            if character == "(":
+                opened.append(at + 1)
+            elif character == ")":
+                opened.pop()
+    return made
+
+
+def _broken(code: str, indent: str) -> list[str]:
+    """Code on lines of WIDTH, broken where the fewest parentheses are open."""
+    inside = len(indent) + 4
+    lines = []
+    text = indent + code.strip()
+    opened: list[int] = []  # columns behind parentheses of earlier lines that are still open
+    while len(text) > WIDTH:
+        found = _place(text, opened, inside)
+        if found is None:  # too far to the right
+            text, opened = " " * inside + text.lstrip(), [inside] * len(opened)
+            found = _place(text, opened, inside)
+        assert found, text
+        place, opened = found
+        lines.append(text[:place].rstrip())
+        text = " " * (opened[-1] if opened else inside) + text[place:].lstrip()
+    return [*lines, text]
+
+
+def _place(text: str, before: list[int], inside: int) -> tuple[int, list[int]] | None:
+    """Where to break a line that is too long, and the parentheses that are open there; None for nowhere."""
+    start = len(text) - len(text.lstrip())
+    opened = list(before)
+    stacks = []  # at each character
+    for at, character in enumerate(text):
+        if character in ")]}" and opened:
+            opened.pop()
+        if character in "([{":
+            opened.append(at + 1)
+        stacks.append(list(opened))
+    found = [
+        (len(stacks[m.start()]), way, m.end())
+        for way, form in enumerate(_WAYS)
+        for m in form.finditer(text, start + 1)
+        if m.start() <= WIDTH
+    ]
+    fitting = [each for each in found if _rest_fits(text, each[2], (stacks[each[2] - 1] or [inside])[-1])]
+    assigned = _ASSIGNED.search(text, start + 1, WIDTH)
+    whole = assigned and inside + len(text) - assigned.end() <= WIDTH
+    if assigned and not before and (not fitting or (whole and min(fitting)[0] == 0)):
+        return assigned.end(), []
+    if fitting:
+        depth, way, _ = min(fitting)
+        place = max(end for d, w, end in fitting if (d, w) == (depth, way))
+        return place, stacks[place - 1]
+    heads = [m.end() for m in re.finditer(r"(?<=\w) (?=[\w*])", text) if m.end() <= WIDTH and not stacks[m.start()]]
+    bracket = re.compile(r"\w\(").search(text, start, WIDTH)
+    if heads and not before and (start == 0 or not bracket):  # between a type and a name
+        return heads[-1], []
+    if bracket:
+        return bracket.end(), [*stacks[bracket.end() - 1][:-1], inside]
+    cast = re.compile(r"_t\)(?=\w)").search(text, start, WIDTH)
+    last = cast.end() if cast else max((end for _, _, end in found), default=0)
+    return (last, stacks[last - 1]) if last else None
+
+
+def _rest_fits(text: str, place: int, column: int) -> bool:
+    """Whether the longest piece that cannot be broken would fit behind the break."""
+    pieces = re.split(r"(?<=,) | ", text[place:])
+    return column + max(map(len, pieces)) <= WIDTH
+
+
+def _comment(lines: list[str]) -> Iterator[str]:
+    """A comment with lines of WIDTH; what does not fit in a line goes in one of its own."""
+    indent = " " * (len(lines[0]) - len(lines[0].lstrip()))
+    starred = any(line.startswith(indent + " *") for line in lines[1:])
+    more = indent + (" * " if starred else "   ")
+    for line in lines:
+        if len(line) <= WIDTH:
+            yield line
+            continue
+        body = line[len(indent) :]
+        mark = re.match(r"/\* | \* {1,}|\s+|", body)
+        assert mark
+        hang = more if body.startswith("/*") else indent + mark[0]
+        yield from textwrap.wrap(
+            body[mark.end() :], WIDTH, initial_indent=indent + mark[0], subsequent_indent=hang,
+            break_long_words=False, break_on_hyphens=False,
+        )  # fmt: skip
+
+
+def _directive(line: str) -> Iterator[str]:
+    """A line of the preprocessor; a comment behind it goes above, a message is continued."""
+    macro = re.match(r"^(#define .*?) (/\* .* \*/)$", line)
+    if len(line) <= WIDTH:
+        yield line
+    elif macro:
+        yield from _comment([macro[2]])
+        yield macro[1]
+    elif line.startswith("#error"):
+        words = textwrap.wrap(line.partition(" ")[2].strip('"'), WIDTH - len('#error " " \\'), break_long_words=False)
+        inside = [*(f'"{part} "' for part in words[:-1]), f'"{words[-1]}"']
+        yield from _continued([f"#error {inside[0]}", *(f"       {part}" for part in inside[1:])])
+    else:
+        yield from _continued(textwrap.wrap(line, WIDTH - len(" \\"), subsequent_indent=" " * 4))
+
+
+def _continued(lines: list[str]) -> Iterator[str]:
+    """Lines that are one to the preprocessor."""
+    yield from (f"{line} \\" for line in lines[:-1])
+    yield lines[-1]

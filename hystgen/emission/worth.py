@@ -1,4 +1,4 @@
-"""What an effect that is left out of the C is worth."""
+"""How much an effect that is left out of the C matters."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from hystgen.effects.base import Effect
 from hystgen.model import Model
 
 SWEEPS = 8
-"""Sweeps over the whole range that the effect is looked at on."""
+"""[sweeps] Over the whole range, on which the effect is looked at. What settles is then within 2 % of its worth over 64
+sweeps (lag, resonance; a slew limit 16 %); creep and ageing never settle. Set by: benchmarks/chosen_numbers.py
+sweeps."""
 
 
 def sentence(model: Model, effect: Effect, reason: str) -> str:

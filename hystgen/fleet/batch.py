@@ -29,7 +29,6 @@ from hystgen.basics import arguments, extras, writing
 from hystgen.basics.problems import counted
 from hystgen.basics.progress import Progress
 from hystgen.basics.version import __version__
-from hystgen.emission import files
 from hystgen.emission.calls import emit_options
 from hystgen.fleet import outliers, workers
 from hystgen.fleet.workers import Result, Task
@@ -183,7 +182,7 @@ def identify_batch(
     with workers.cluster(scheduler) if scheduler is not None else contextlib.nullcontext() as client:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / KEPT_IN).mkdir(exist_ok=True)
-        files.check(folder, ["summary.csv"])
+        writing.check_files(folder, ["summary.csv"])
         found = [replace(job, settings=settings.of(folder / f"{job.unit}.yaml")) for job in found]
         found = [_keyed(job, options, wanted) for job in found]
         rows = _kept_rows(folder, found)
@@ -334,7 +333,7 @@ def _keep(folder: Path, job: _Job, result: Result) -> Unit:
     try:
         written = []
         if result.files:
-            written += files.write(folder / job.unit, result.files)
+            written += writing.write_files(folder / job.unit, result.files)
         if result.parameters:
             write_atomically(folder / f"{job.unit}.yaml", result.parameters)
             written.append(folder / f"{job.unit}.yaml")

@@ -17,7 +17,7 @@ BEYOND = 3.5
 """Modified z-score beyond which a unit is an outlier."""
 
 FEWEST = 8
-"""With fewer units a median absolute deviation means little, and none is marked."""
+"""[units] With fewer, a median absolute deviation means little, and no unit is marked."""
 
 SAME = 1e-6
 """Relative spread below which units are alike for every purpose: written digits and solvers differ by less."""

@@ -1,4 +1,4 @@
-"""What a memoryless stage in front of the plays is, and what its functions need of a model's constants."""
+"""The interface of a memoryless stage in front of the plays, and the constants that its functions need."""
 
 from __future__ import annotations
 

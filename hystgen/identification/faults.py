@@ -23,7 +23,7 @@ LONGEST = 4
 """Most samples in a row that count as an isolated fault; more are something that the actuator or the sensor did."""
 
 OUTLYING = 8.0
-"""Standard deviations of its surroundings' scatter by which an outlier is off their median."""
+"""[standard deviations of the scatter around it] An outlier is farther than this from the median around it."""
 
 LITTLE = 5e-4
 """Least scatter, as a share of the peak-to-peak output: a model of a simulation leaves next to nothing but at its
@@ -67,7 +67,7 @@ def most(samples: int) -> int:
 
 
 def outliers(error: Array, v: Array, swing: float) -> Flags:
-    """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN counts as none.
+    """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN is not one.
 
     `swing`: peak-to-peak output, against which an error may be too small to spoil anything.
 
@@ -179,7 +179,7 @@ def pulses(v: Array) -> list[tuple[int, int]]:
     """Runs [first, last) of few samples of the drive that jump away and back, or stand apart at an end.
 
     They may be real, or rows of which all is wrong: zeros, another sample's numbers, the converter's end. None where
-    they are so many that they are the drive.
+    there are enough of them to be the drive.
     """
     span = _span(v)
     found = [(first, last) for first, last, _ in _pulses(v, span)] if span > 0.0 and len(v) > WINDOW else []
@@ -348,7 +348,7 @@ SHORT = 3
 """Fewer samples are isolated ones, which the fit leaves out by itself."""
 
 MOVES_ON = 0.01
-"""Least share of its range by which the drive goes on outwards while the output stands at a converter's end."""
+"""[share of its range] The drive goes on outwards by at least this while the output stands at a converter's end."""
 
 SUDDEN = 4.0
 """A converter's end is reached in steps of less than this many times the steps that the drive makes."""

@@ -57,7 +57,7 @@ class Front(Protocol):
 
     @property
     def name(self) -> str:
-        """What the fit table calls it."""
+        """Its name in the fit table."""
 
     @property
     def straight(self) -> Array:
@@ -68,7 +68,7 @@ class Front(Protocol):
         """Least and largest value of every shape number."""
 
     def slack(self, shape: Array) -> Array:
-        """What must not be negative for the front to be invertible, beyond the bounds; empty when there is nothing."""
+        """Values that must not be negative for the front to be invertible, beyond the bounds; may be empty."""
 
     def stages(self, shape: Array) -> tuple[Stage, ...]:
         """The stages of the model."""
@@ -76,7 +76,7 @@ class Front(Protocol):
 
 @dataclass(frozen=True)
 class Kept:
-    """A memoryless part that stays as it is; by default none, which makes a plain play sum."""
+    """A memoryless part that stays as it is; without stages, the default, the model is a plain play sum."""
 
     given: tuple[Stage, ...] = ()
     name: str = "pi"
@@ -236,7 +236,7 @@ class Tanh:
 
     @property
     def name(self) -> str:
-        """With the number of branches, which the table tells apart."""
+        """With the number of branches, which distinguishes rows of the table."""
         return "gpi-tanh" if self.branches == 1 else "gpi-tanh, two branches"
 
     @property
@@ -272,7 +272,7 @@ class Tanh:
         return np.linspace(*self.drive, 61)
 
     def stages(self, shape: Array) -> tuple[Stage, ...]:
-        """The envelope, its numbers rounded; the descending branch is lifted by what rounding lets it fall short."""
+        """The envelope with rounded numbers; the descending branch is lifted where rounding would put it too low."""
         return (self._stage(shape, DIGITS),)
 
     def _stage(self, shape: Array, digits: int | None) -> TanhEnvelope:
@@ -310,7 +310,7 @@ def _numbers(values: tuple[float, ...], digits: int | None) -> tuple[float, floa
 
 
 def even_breaks(drive: tuple[float, float], count: int) -> tuple[float, ...]:
-    """So many breaks evenly spaced inside the drive range; one that would fall on 0 is moved aside by a little."""
+    """`count` breaks evenly spaced inside the drive range; one that would fall on 0 is moved aside a little."""
     low, high = drive
     step = (high - low) / (count + 1)
     return aside([rounded(low + step * (j + 1), 6) for j in range(count)], 0.05 * step)
@@ -370,19 +370,22 @@ class Shaped:
 
 
 def through_front(item: Course, stages: Sequence[Stage]) -> Course:
-    """The course as the plays see it: their input in place of the drive, in the history too."""
+    """The course as the plays see it: their input in place of the drive, and of what was visited before."""
     if not stages:
         return item
-    rising, history = _session(item, stages)
-    return replace(item, v=through_stages(stages, item.v, rising), history=history)
+    rising, visited = _session(item, stages)
+    v = through_stages(stages, item.v, rising)
+    if item.history is None and item.start is not None and visited is not None:
+        return replace(item, v=v, start=replace(item.start, turns=visited))
+    return replace(item, v=v, history=visited)
 
 
 def _session(item: Course, stages: Sequence[Stage]) -> tuple[NDArray[np.bool_] | None, tuple[float, ...] | None]:
-    """Directions of the drive along the course, and the history behind the front."""
+    """Directions of the drive along the course, and what was visited before it, behind the front."""
     branched = any(stage.branches_differ for stage in stages)
-    if item.history is None:
+    if item.visited is None:
         return (directions(item.v, True) if branched else None), None
-    before = np.array([0.0, *item.history])
+    before = np.array([0.0, *item.visited])
     whole = directions(np.concatenate([before, item.v]), True) if branched else None
     visited = through_stages(stages, before[1:], None if whole is None else whole[1 : len(before)])
     return (None if whole is None else whole[len(before) :]), tuple(visited.tolist())
@@ -403,14 +406,14 @@ def refine(
 
 
 class Limits(Protocol):
-    """What a shape must keep to."""
+    """Constraints on a shape."""
 
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest value of every shape number."""
 
     def slack(self, shape: Array) -> Array:
-        """What must not be negative beyond the bounds."""
+        """Values that must not be negative, beyond the bounds."""
 
 
 def search(
@@ -497,9 +500,9 @@ def _rows_with_derivatives(
     """The plays behind the first version of a front, and the change of their weighted sum with every other version."""
     carried = []
     for stages in versions:
-        rising, history = _session(course, stages)
+        rising, visited = _session(course, stages)
         first = through_stages(stages, course.v[:1], None if rising is None else rising[:1])
-        carried.append((stages, rising, reduction.start_states(first, history, thresholds)))
+        carried.append((stages, rising, reduction.start_states(first, visited, thresholds)))
     n1 = len(thresholds)
 
     def rows(start: int, stop: int, compared: bool) -> Array:

@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.identification import reduction
+from hystgen.identification import reduction, sense
 from hystgen.identification.reduction import Course, Reduced, others, travel
+from hystgen.identification.sense import Sense
 
 Array = NDArray[np.float64]
 
@@ -39,15 +40,19 @@ class IdentificationError(ValueError):
 
 @dataclass(frozen=True)
 class Solution:
-    """A fitted play sum. `reach`: largest threshold that the records support; `fitted`: what was done about p_0."""
+    """A fitted play sum.
+
+    `reach`: largest threshold that the records support; `fitted`: what was done about p_0; `sense`: of the records.
+    """
 
     thresholds: Array
     weights: Array
     reach: float
     fitted: Weights
+    sense: Sense
 
     def without_idle_plays(self) -> Solution:
-        """The same without plays that have no weight: they are no part of the model."""
+        """The same without plays of weight 0, which are not part of the model."""
         kept = (self.weights > 0.0) | (self.thresholds == 0.0)
         return replace(self, thresholds=self.thresholds[kept], weights=self.weights[kept])
 
@@ -90,7 +95,8 @@ def solve(
     r = np.array(chosen.thresholds)
     if not np.any(p > 0.0):
         raise IdentificationError(FALLS)
-    solution = Solution(r, p, reach, fitted)
+    way = sense.of(reduced, compared, residual(reduced.whole, columns(reduced, chosen), p))
+    solution = Solution(r, p, reach, fitted, way)
     return (solution if wanted is not None else solution.without_idle_plays()), compared
 
 
@@ -105,7 +111,7 @@ class Errors:
 
 def compare(item: Course, r: Array, p: Array) -> Errors:
     """Free run of the model along the drive, compared from `first` to `last`, with one free offset."""
-    error = (item.y - reduction.prediction(item.v, item.history, r, p))[item.first : item.last]
+    error = (item.y - reduction.prediction(item.v, item.visited, r, p))[item.first : item.last]
     offset = float(np.nanmean(error))
     return Errors(item, offset, error - offset)
 
@@ -189,7 +195,7 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
 
 
 def dense(reach: float, samples: int, most: int = DENSE) -> Candidate:
-    """One list of `most` plays, which leaves little to wish for, to judge by what else there is in a record."""
+    """One list of `most` plays, fine enough to show what else a record contains."""
     return candidates(reach, samples, min(most, max(1, samples // SAMPLES_A_PLAY)))[:2][-1]
 
 
@@ -246,7 +252,7 @@ moves like no other keeps its weight to about six digits.
 """
 
 FLOOR_COST = 0.05
-"""How much the rms error may grow, as a share of itself, for p_0 to be raised to its floor."""
+"""[share of the rms error] The error may grow by this much for p_0 to be raised to its floor."""
 
 
 def non_negative(system: Array, columns: Columns) -> Array:

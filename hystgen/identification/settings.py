@@ -63,7 +63,7 @@ class Settings:
 
 
 def of(path: str | os.PathLike[str]) -> Settings:
-    """The settings of the file at `path`; none where there is no file, or an empty one."""
+    """The settings of the file at `path`; no settings if the file is missing or empty."""
     from hystgen.basics.problems import ParameterError
     from hystgen.parameters.files import make_parameters, parameter_data
 

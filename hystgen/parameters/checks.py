@@ -117,7 +117,7 @@ class _Checker:
     # Bookkeeping ------------------------------------------------------------------------------------------
 
     def add(self, path: Path, message: str, at_key: bool = False) -> None:
-        """Note a problem of the value (or key) at `path`; where there is none, at what should hold it."""
+        """Note a problem of the value (or key) at `path`, or, if it is missing, of what should hold it."""
         line, column = self.document.position(path, at_key) if self.document else (None, None)
         self.problems.append(Problem(path_text(path), message, line, column))
 
@@ -131,11 +131,11 @@ class _Checker:
         return path not in self._above_bad and not self.judged(path)
 
     def judged(self, path: Path) -> bool:
-        """Whether the structure at `path`, or of what holds it, is known not to be sound."""
+        """Whether the structure at `path`, or of something that holds it, is known to be unsound."""
         return any(path[:n] in self._bad for n in range(len(path) + 1))
 
     def at(self, path: Path) -> Any:
-        """Value in the data, None where there is none."""
+        """Value in the data; None if it is missing."""
         value: Any = self.data
         for part in path:
             if isinstance(part, int):
@@ -501,7 +501,7 @@ def _nearest(word: str, known: Sequence[str]) -> str:
 
 
 def _choice(value: Any, known: Sequence[Any]) -> str:
-    """Message for a value that is none of the known ones."""
+    """Message for an unknown value."""
     listed = ", ".join(str(choice) for choice in known[:-1]) + (" or " if len(known) > 1 else "") + str(known[-1])
     words = [choice for choice in known if isinstance(choice, str)]
     near = _nearest(value, words) if isinstance(value, str) and words else ""

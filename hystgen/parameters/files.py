@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from hystgen.basics.names import comment_text, name_problem
+from hystgen.basics.names import name_problem
 from hystgen.basics.problems import ParameterError, Path, Problem, path_text
 from hystgen.parameters.checks import EFFECT_NAMES, check
 from hystgen.parameters.schema import (
@@ -52,7 +52,6 @@ __all__ = [
     "TanhParameters",
     "Units",
     "canonical_json",
-    "comment_text",
     "dump_parameters",
     "load_parameters",
     "located",
@@ -87,7 +86,7 @@ def parameter_data(path: str | os.PathLike[str]) -> Mapping[str, Any]:
 
 
 def located(path: str | os.PathLike[str], problems: Iterable[tuple[Path, str]]) -> ParameterError:
-    """What turned out to be wrong with values of a file that was read before, at their positions in it."""
+    """Problems found later with values of a file that was read before, at their positions in it."""
     file = os.fspath(path)
     try:
         document = read(_text(file).removeprefix("\ufeff"))
@@ -224,7 +223,7 @@ def dump_parameters(parameters: Parameters, comments: Mapping[str, str] | None =
 
 @cache
 def _defaults() -> dict[str, Any]:
-    """What is left out when it has this value."""
+    """Keys that are left out when they have this value."""
     pi = PIParameters(weights=(1.0,))
     data = Parameters(hystgen=1, name="x", input_range=(0.0, 1.0), model=ModelParameters(pi=pi)).model_dump()
     for key in ("hystgen", "name", "input_range"):
@@ -293,7 +292,7 @@ def _flow(value: Any) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A text as a YAML scalar: plain where that is safe anywhere, else in double quotes."""
+    """A text as a YAML scalar: plain if that is safe in any place, else in double quotes."""
     plain = re.fullmatch(r"[A-Za-z][A-Za-z0-9_/%^.]*(?:[ -][A-Za-z0-9_/%^.()]+)*", text) and resolve(text) == text
     return text if plain else json.dumps(text, ensure_ascii=False)
 

@@ -21,13 +21,12 @@ from pydantic import (
 )
 from pydantic_core import PydanticCustomError
 
-from hystgen.basics.names import MAX_NAME, NAME_PATTERN
+from hystgen.basics.names import MAX_NAME, MAX_UNIT, NAME_PATTERN
 from hystgen.basics.quantities import MAX_PLAYS, NotNegative, Number, Positive
 
 MAX_STAGES = 16
 MAX_EFFECTS = 64
 MAX_DESCRIPTION = 500
-MAX_UNIT = 40
 
 STAGE_KINDS = ("dead_zone", "tanh")
 
@@ -220,7 +219,7 @@ def _auto(value: Any) -> Any:
 
 
 class Compensation(_Part):
-    """How effects are compensated in the C."""
+    """How the C compensates effects."""
 
     preview: Annotated[int, Field(ge=0, le=1000)] | None = Field(
         default=None,

@@ -43,18 +43,18 @@ _INF = re.compile(r"[-+]?\.(?:inf|Inf|INF)\Z")
 _NAN = re.compile(r"\.(?:nan|NaN|NAN)\Z")
 _DIRECTIVE = re.compile(r"\ufeff?(?:[ \t]*(?:#[^\r\n]*)?(?:\r\n|\r|\n))*(?P<line>%[^\r\n]*)")
 _LONGEST_INT = 400
-"""Digits from which a decimal integer is beyond the doubles whatever they are."""
+"""[digits] A decimal integer with this many is beyond double precision, whatever the digits are."""
 
 Position = tuple[int, int]
 
 
 @dataclass
 class Document:
-    """What was read: the data (None if nothing usable), where it stood, and what was refused.
+    """The result of reading: the data (None if nothing is usable), its positions, and the problems.
 
     Lists arrive as tuples. `values` and `keys` map a path to the 1-based (line, column) of the value and of
     the key in front of it. `poisoned` holds the paths whose value was refused here and is None in `data`.
-    `complete` tells whether `data` is a mapping that was read to the end of the file.
+    `complete`: whether `data` is a mapping that was read to the end of the file.
     """
 
     data: Any = None
@@ -65,7 +65,7 @@ class Document:
     complete: bool = False
 
     def position(self, path: Path, at_key: bool = False) -> Position:
-        """Where the value (or key) at `path` stands; where there is none, what should hold it."""
+        """Position of the value (or key) at `path`, or, if it is missing, of what should hold it."""
         places = self.keys if at_key else self.values
         held = next(path[:n] for n in range(len(path), -1, -1) if path[:n] in places or n == 0)
         return places.get(held) or self.values[held]
@@ -117,7 +117,7 @@ def resolve(text: str) -> str | int | float | bool | None:
 
 
 def read(text: str) -> Document:
-    """Read one YAML document; whatever is refused is listed in the result's `problems`, nothing is raised."""
+    """Read one YAML document; problems are listed in the result's `problems`, and nothing is raised."""
     document = Document()
     directive = _DIRECTIVE.match(text)
     if directive and directive["line"].split() != ["%YAML", "1.2"]:

@@ -1,4 +1,4 @@
-"""Drive records to measure for a diagnosis, in which every effect of the catalogue shows and none looks like another.
+"""Drive records to measure for a diagnosis, in which every effect of the catalogue shows and no two look alike.
 
 >>> planned = hystgen.plan("stage.yaml", max_rate=5000.0)
 >>> planned.write("plan/")
@@ -257,7 +257,7 @@ class Grid:
         return [code / unit if self.digits >= 0 else float(code * unit) for code in codes]
 
     def rate(self, per_second: float, seconds: float) -> int:
-        """Most codes by which the drive moves in `seconds`."""
+        """The largest number of codes that the drive moves in `seconds`."""
         return math.floor(Decimal(OF_RATE * per_second) * Decimal(seconds) * Decimal(1).scaleb(self.digits))
 
 

@@ -119,7 +119,7 @@ class Formula:
         return tuple(operators.get(step) or (0, None if step == "r" else mp.mpf(step)) for step in self.steps)
 
     def __call__(self, r: Any) -> Any:
-        """Value at `r` with 40 digits. Raises DensityError where there is none."""
+        """Value at `r` with 40 digits. Raises DensityError where it has no value."""
         real = _context().mpf
         r = real(r)
         stack: list[Any] = []

@@ -2,7 +2,7 @@
 
 A spring of modulus E and a rigid-plastic slider of yield stress r, side by side or in a row. A step is a return
 mapping: a trial with the slider at rest, which stands where the slider can bear it and is brought back to its yield
-stress otherwise. No operator takes part, so that the elements can tell whether the operators are right.
+stress otherwise. No operator takes part, so that the elements are an independent test of the operators.
 
 Of a slider the relation between stress and rate is `stress in r sign(rate)`, set-valued at rest, with the rate of the
 slider's own strain; the note prints the rate of the whole strain in (16).

@@ -23,7 +23,7 @@ from hystgen.plays.slots import (
 
 
 class FixedPlayTables(PlayTables, Protocol):
-    """What plays need of a model's constants in fixed point."""
+    """The constants of a model that plays need in fixed point."""
 
     @property
     def slope(self) -> Reals: ...

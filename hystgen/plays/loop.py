@@ -21,7 +21,7 @@ ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5
 
 
 class PlayTables(Protocol):
-    """What memory and plays need of a model's constants, in any arithmetic."""
+    """The constants of a model that memory and plays need, in any arithmetic."""
 
     @property
     def threshold(self) -> Reals: ...
@@ -32,7 +32,7 @@ class PlayTables(Protocol):
 
 
 class LoopTables(PlayTables, Protocol):
-    """What solving needs beyond that in floating point."""
+    """The further constants that solving needs in floating point."""
 
     @property
     def lift(self) -> Reals: ...

@@ -1,4 +1,4 @@
-"""What the plays of a model remember: admissible states and how they map between a model and its inverse.
+"""The memory of the plays: admissible states, and how they map between a model and its inverse.
 
 After any input the states satisfy `|s_i - s_(i-1)| <= r_i - r_(i-1)` with `s_0 = w`, the input of the plays. A state
 list that breaks this cannot have come from any history, and the inverse is not exact with it.

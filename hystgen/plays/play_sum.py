@@ -24,8 +24,8 @@ class PlaySum:
     """Play sum `y = p_0 v + sum p_i play_(r_i)[v]` (21).
 
     `thresholds`: r_0 = 0 < r_1 < ... < r_n in units of the input; `weights`: p_0 .. p_n, any finite numbers, in output
-    per input unit; `initial_state`: one number or n+1 of them, projected to the admissible set (`projected` tells).
-    Raises ValueError for anything else.
+    per input unit; `initial_state`: one number or n+1 of them, projected to the admissible set (`projected`: whether it
+    was). Raises ValueError for anything else.
     """
 
     thresholds: Sequence[float]

@@ -59,7 +59,7 @@ FORMATS: dict[str, Callable[[Reading, IO[bytes]], Table]] = {
     ".parquet": read_parquet,
     ".pq": read_parquet,
 }
-"""How a file is read, by its suffix in lower case; anything else is text."""
+"""Readers by suffix in lower case; any other file is text."""
 
 
 def read_records(
@@ -69,10 +69,12 @@ def read_records(
     delimiter: str | None = None,
     need: Sequence[str] = ("v", "y"),
     progress: bool = False,
+    points: bool = False,
 ) -> list[Record]:
     """Read several data files as `read_record` does; records that are in memory already are kept.
 
-    Samples in memory are called `record`, or `record 1`, `record 2`, .. where there are several.
+    Samples in memory are called `record`, or `record 1`, `record 2`, .. where there are several. `points`: samples
+    without a time are points taken one by one, and not refused.
 
     `progress`: says on stderr once how files were understood ("read as: .."), with a bar on a terminal when it takes
     more than a second. Raises RecordError with every problem in all files, ValueError and TypeError for other
@@ -91,7 +93,8 @@ def read_records(
                     _check_arrays(source)
                     record = source
                 elif isinstance(source, str | os.PathLike):
-                    record = _read(arguments.path("a record", source), columns, sample_time, delimiter, need, bar.tick)
+                    path = arguments.path("a record", source)
+                    record = _read(path, columns, sample_time, delimiter, need, bar.tick, points)
                 else:
                     name = f"record {unnamed.index(k) + 1}" if len(unnamed) > 1 else "record"
                     record = read_memory(source, name, columns, sample_time, need)
@@ -134,7 +137,7 @@ def read_record(
 
 
 def several(sources: Source | Iterable[Source]) -> list[Source]:
-    """One source of a record, or several, as a list. Raises TypeError for what is none."""
+    """One source of a record, or several, as a list. Raises TypeError for anything else."""
     if isinstance(sources, Record | str | os.PathLike):
         return [sources]
     listed = isinstance(sources, list) or (isinstance(sources, tuple) and not sources)
@@ -163,7 +166,7 @@ def _check_options(columns: object, sample_time: object, delimiter: object) -> N
 
 
 def _check_arrays(record: Record) -> None:
-    """Raise ValueError or TypeError for a record made of arrays that are none, or not of one dimension."""
+    """Raise ValueError or TypeError unless a record is made of arrays of numbers with one dimension."""
     if not isinstance(record.name, str):
         raise TypeError(f"a record's name is text, not {arguments.kind(record.name)}; Record(name, t, v, y)")
     for name, values in record.columns().items():
@@ -181,8 +184,9 @@ def _read(
     delimiter: str | None,
     need: Sequence[str],
     tick: Callable[[float], None],
+    points: bool,
 ) -> Record:
-    reading = Reading(file, columns or {}, sample_time, delimiter, tuple(need), tick)
+    reading = Reading(file, columns or {}, sample_time, delimiter, tuple(need), tick, points)
     mark = reading.delimiter
     if mark is not None and (len(mark) != 1 or mark in "\"'.\r\n" or mark.isalnum()):
         reading.problem(f'the delimiter "{printable(mark)}" is not usable; give one character such as ;')
@@ -203,7 +207,7 @@ def _read(
 
 
 def _size(source: Source) -> int:
-    """Bytes to read; 0 where there is no file, which is reported when it is opened."""
+    """Bytes to read; 0 for a missing file, which is reported when it is opened."""
     try:
         return os.stat(source).st_size if isinstance(source, str | os.PathLike) else 0
     except OSError:

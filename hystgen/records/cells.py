@@ -24,7 +24,7 @@ DAY = 86400
 NANO = 10**9
 
 PAST_MIDNIGHT = 0.5
-"""Fraction of a day by which a clock without a date has to go back to have passed midnight."""
+"""[days] A clock without a date that goes back by at least this much has passed midnight."""
 
 
 def is_time(cell: str) -> bool:
@@ -114,7 +114,7 @@ BLANKS = " "
 """The delimiter of columns that any number of blanks separates, as aligned ones."""
 
 COMMENT = re.compile(r"^[^\S\n]*(?:#|%|//)", re.MULTILINE)
-"""How a line begins that is a comment."""
+"""The beginning of a comment line."""
 
 _THOUSANDS = (
     re.compile(r"[+-]?\d{1,3}(?:(?P<mark>[,' \u00a0\u202f\u2019])\d{3})(?:(?P=mark)\d{3})*(?:\.\d*)?"),
@@ -150,7 +150,8 @@ class Dialect:
         return cells
 
     def number(self, cell: str) -> float:
-        """The number of a cell, NaN where it holds none. Raises ValueError for anything else."""
+        """The number of a cell, NaN if the cell is empty or marks a missing value. Raises ValueError for anything
+        else."""
         if cell.strip().lower() in MISSING:
             return float("nan")
         if "_" in cell or (self.decimal != "." and "." in cell):
@@ -172,7 +173,7 @@ class Dialect:
         return _EITHER.fullmatch(cell.strip()) is not None
 
     def fault(self, cell: str) -> tuple[str, str]:
-        """What is wrong with a cell that is no number: a kind of fault, empty for a single one, and what to do."""
+        """The fault of a cell that is not a number: its kind, empty for a unique one, and what to do."""
         text = cell.strip()
         if self.either(text):
             return "comma", "its comma may be a decimal comma or a thousands mark, write decimals with a point"
@@ -188,7 +189,7 @@ class Dialect:
 
 
 def shape(cell: str) -> str:
-    """What cells with the same fault have in common: a word itself, of text with digits what kinds of signs it has."""
+    """A key that cells with the same fault share: a word itself, or for text with digits its kinds of characters."""
     text = cell.strip()
     if not any(map(str.isdigit, text)):
         return text

@@ -11,14 +11,12 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from hystgen.basics.names import MAX_UNIT
 from hystgen.basics.problems import printable
 from hystgen.records.record import Array, Record
 
 # Units: how headers write them, which ones are times, and what several records agree on ----------------------
 
-
-MAX_UNIT = 40
-"""Longest text in a header that is taken for a unit; longer ones do not fit a parameter file either."""
 
 SECONDS = ("s", "sec", "secs", "second", "seconds")
 
@@ -49,7 +47,7 @@ _TIME_NAMES = ("t", "time")
 
 
 def split_unit(header: str) -> tuple[str, str]:
-    """Name and unit of a header: `pos [um]`, `pos (um)`, `U / V`, `time_ms`; the unit is empty where there is none."""
+    """Name and unit of a header: `pos [um]`, `pos (um)`, `U / V`, `time_ms`; the unit may be empty."""
     text = header.strip()
     match = re.fullmatch(r"(.*?\S)\s*\[\s*([^\[\]]*?)\s*\]", text)
     # In square brackets anything is a unit but a number, which counts channels
@@ -64,7 +62,7 @@ def split_unit(header: str) -> tuple[str, str]:
 
 
 def unit_alone(text: str) -> str | None:
-    """The unit that a cell below a header holds, `s` or `[um]`, empty for none; None for a cell that is no unit."""
+    """The unit that a cell below a header holds, `s` or `[um]`, or empty; None for a cell that is not a unit."""
     inside = re.fullmatch(r"\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\)", text.strip())
     unit = text.strip() if inside is None else inside[1] or inside[2] or ""
     if unit in ("", "-") or (inside is not None and inside[1] and not unit.isdecimal()):
@@ -183,7 +181,7 @@ class Step:
 
 
 def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
-    """What numbered lines of text say of the sample rate."""
+    """The sample rate according to numbered lines of text."""
     found = []
     for number, line in lines:
         for match in _LINE.finditer(line.replace('"', "")):
@@ -206,7 +204,7 @@ def is_named(name: str) -> bool:
 
 
 def from_number(name: str, value: float, of: str = "", unit: str = "") -> Step | None:
-    """What a number beside the columns says of their sample rate, by its name; `of` as in `Step`."""
+    """The sample rate according to a number beside the columns, by its name; `of` as in `Step`."""
     key, own_unit = split_unit(name)
     rate = re.fullmatch(_RATE, key) is not None
     if not rate and re.fullmatch(_STEP, key) is None:
@@ -216,7 +214,7 @@ def from_number(name: str, value: float, of: str = "", unit: str = "") -> Step |
 
 
 def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
-    """Seconds a sample of a rate or an interval; a unit that is none of it gives nothing."""
+    """Seconds a sample, from a rate or an interval; None if the unit is of neither."""
     if not 0.0 < value < float("inf"):
         return None
     plain = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u")
@@ -252,7 +250,7 @@ MEANINGS = {
          "auslenkung", "déplacement", "deplacement", "desplazamiento")
     ),
 }  # fmt: skip
-"""Words in names of columns that may be meant where none has our name."""
+"""Words in the names of columns that may be meant if no column has our name."""
 
 DECIDE = {
     "y": frozenset(("measured", "sensor", "actual", "istwert", "messwert")),
@@ -293,7 +291,7 @@ class Column:
 
     @property
     def folder(self) -> str:
-        """What stands before the last part: the group or struct it is in, empty at the top."""
+        """The part before the last one: the group or struct it is in, empty at the top."""
         return self.name.removesuffix(self.own)
 
 
@@ -312,7 +310,7 @@ def column(
 
 
 def meaning(c: Column) -> str:
-    """Which of our columns the words of a name mean; empty where they mean none, or more than one."""
+    """Our column that the words of a name mean; empty if they mean none, or more than one."""
     plain = _words(c)
     if plain & OTHERWISE:
         return ""
@@ -414,15 +412,13 @@ class Finder:
             if ours not in self._asked and ours not in self._several and not (ours == "t" and self.steps):
                 self._missing(ours, self.mapping.get(ours, ours))
         self._name_together(found)
-        self._apart({ours: c for ours, c in found.items() if ours in self.mapping}, found, need, timed)
+        self._apart({ours: c for ours, c in found.items() if ours in self.mapping}, found, need)
         return found
 
-    def _apart(
-        self, named: Mapping[str, Column], found: Mapping[str, Column], need: Sequence[str], timed: bool
-    ) -> None:
+    def _apart(self, named: Mapping[str, Column], found: Mapping[str, Column], need: Sequence[str]) -> None:
         """One column cannot be two of those that are needed."""
         for ours, c in found.items():
-            if ours in named or ours not in (need if timed else (*need, "t")):
+            if ours in named or ours not in (*need, "t"):
                 continue
             for other in (other for other, theirs in named.items() if theirs is c):
                 self.problems.append(

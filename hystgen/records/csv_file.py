@@ -30,7 +30,7 @@ from hystgen.records.record import Array
 
 
 BLOCK = 1 << 20
-"""Bytes read at a time; a longer line is none of a text table."""
+"""[bytes] Read at a time; a longer line does not belong to a text table."""
 
 WIDE = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
 """Encodings by the byte order mark that a file begins with."""
@@ -192,7 +192,7 @@ def _refuse_wrong_delimiter(reading: Reading, found: Layout, lines: Sequence[str
 
 
 def _is_below_text(lines: Sequence[str], header: int) -> bool:
-    """Whether a header is a comment, or has lines above it that are none."""
+    """Whether a header is a comment, or lines above it are not comments."""
     above = (line for line in lines[: header - 1] if line.strip())
     return is_comment(lines[header - 1]) or not all(map(is_comment, above))
 

@@ -134,7 +134,7 @@ def _parts(reading: Reading, fields: Mapping[str, Any]) -> Parts:
 
 
 def _attributes(found: Any, of: str) -> list[Step]:
-    """What the attributes of a file, group or dataset say of the sample rate."""
+    """The sample rate according to the attributes of a file, group or dataset."""
     numbers = {name: np.asarray(found.attrs[name]) for name in found.attrs if is_named(name)}
     steps = [
         from_number(name, float(value.ravel()[0]), of)
@@ -145,7 +145,7 @@ def _attributes(found: Any, of: str) -> list[Step]:
 
 
 def _scalar(dataset: Any, name: str, folder: str, matlab: bool) -> Step | None:
-    """What one number beside the vectors says of their sample rate."""
+    """The sample rate according to one number beside the vectors."""
     if dataset.shape is None or dataset.dtype.kind not in "fiu" or dataset.size != 1 or not is_named(name):
         return None
     return from_number(name, float(np.asarray(dataset[()]).ravel()[0]), folder, "" if matlab else _unit(dataset))

@@ -1,4 +1,4 @@
-"""How a text table is laid out: what separates its cells, where its header, its units and its numbers are.
+"""The layout of a text table: the separator of its cells, the lines of its header, its units and its numbers.
 
 The numbers show it: of all ways to separate cells and to write decimals the one that makes numbers of most cells of the
 first lines is that of the file. Header and units are then the lines above them with as many cells. The headers of some
@@ -19,7 +19,7 @@ from hystgen.records.columns import STANDARD, Step, column, meaning, unit_alone
 from hystgen.records.reading import Reading
 
 DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": '"|"', BLANKS: "blanks"}
-"""What may separate cells, the less ambiguous first, and in words."""
+"""Separators of cells, the least ambiguous first, and their names."""
 
 _RULE = re.compile(r"\s*([-=_*~])\1{2,}[\s\-=_*~+]*")
 """A line that is drawn, not written."""
@@ -158,7 +158,7 @@ def _with_header(reading: Reading, view: _View, lines: Sequence[_Line]) -> Layou
 
 
 def _plain_header(view: _View, lines: Sequence[_Line]) -> Layout | None:
-    """The layout with a header that is no comment; None where there is none."""
+    """The layout with a header that is not a comment; None if there is no such header."""
     block = []
     for k in range(view.start - 1, -1, -1):
         if lines[k].comment:

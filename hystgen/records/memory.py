@@ -1,8 +1,8 @@
-"""Records of what is in memory already: columns by name, data frames, arrays side by side.
+"""Records from data in memory: columns by name, data frames, arrays side by side.
 
-A data frame is known by what it can do (`columns` or `column_names`, and columns by name), so that pandas, polars and
-Arrow tables are read without importing any of them. Names, units in them, missing values and times are treated as in a
-file.
+A data frame is recognised by its interface (`columns` or `column_names`, and columns by name), so that pandas, polars
+and Arrow tables are read without importing any of them. Names, units in them, missing values and times are treated as
+in a file.
 """
 
 from __future__ import annotations

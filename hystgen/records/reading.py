@@ -1,4 +1,4 @@
-"""What every format shares: the request, the problems found, the columns chosen, and the record made of them."""
+"""Steps that every format shares: the request, the problems found, the columns chosen, and the record made of them."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ SAME_STEP = 1e-6
 """Largest relative difference of two sample times that say the same: files write at least seven digits, or round."""
 
 BESIDE = 2
-"""Memory for a record over that of its numbers: 1.7 were measured with 2e7 samples of HDF5 on 2026-11-26, for what is
-sorted and marked beside them."""
+"""[times] Memory for a record over that of its numbers, because of sorted copies and marks: 1.7 with 2e7 samples of
+HDF5 (2026-11-26)."""
 
 NO_SECONDS = 1e11
 """Times from here on are no seconds: those since 1970 get there in the year 5138, milliseconds did in 1973."""
@@ -61,7 +61,7 @@ class Lines:
 
 @dataclass
 class Table:
-    """What a file holds before it is judged: columns under our names, NaN where there is no value.
+    """The content of a file before it is judged: columns under our names, NaN for missing values.
 
     `units`: those the file gives; `lines`: where the file has lines.
     """
@@ -79,8 +79,8 @@ class Reading:
     """One file being read: the request, and the problems and notes about it.
 
     `delimiter`: what separates cells, None where the file has to show it; `fills`: of each column with numbers that
-    stand for no value which ones these are, in words; `read_as`: what was understood that the file does not say in the
-    plainest way.
+    stand for no value which ones these are, in words; `points`: whether it may be without a time; `read_as`: what was
+    understood that the file does not say in the plainest way.
     """
 
     def __init__(
@@ -91,12 +91,14 @@ class Reading:
         delimiter: str | None,
         need: tuple[str, ...],
         tick: Callable[[float], None],
+        points: bool = False,
     ) -> None:
         self.file = file
         self.columns = columns
         self.sample_time = sample_time
         self.delimiter = "\t" if delimiter in ("\\t", "tab") else delimiter
         self.need = need
+        self.points = points
         self.tick = tick
         self.problems: list[str] = []
         self.notes: list[str] = []
@@ -147,7 +149,7 @@ class Reading:
         `steps`: what the file says of its sample rate; it counts where there is neither a time nor `sample_time`.
         """
         finder = Finder(columns, self.columns, ignored, outside)
-        found = finder.find(self.need, self.sample_time is not None, steps)
+        found = finder.find(self.need, self.sample_time is not None or (self.points and not steps), steps)
         for text in finder.problems:
             self.problem(text, line)
         steps = finder.steps
@@ -172,7 +174,7 @@ class Reading:
         return found
 
     def further(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> dict[str, Column]:
-        """The columns that were not asked for, by the names they get; what finds none is noted."""
+        """The columns that were not asked for, by the names they get; one whose name is taken is noted."""
         used = {c.name for c in chosen.values()}
         others = [c for c in columns if c.name not in used]
         names = further_names(others, list(chosen))
@@ -238,7 +240,7 @@ class Reading:
         ]
 
     def finished(self, numbers: dict[str, Array], taken: Mapping[str, Column], lines: Lines | None = None) -> Table:
-        """A table with NaN for every value that is none, time in seconds and units by name."""
+        """A table with NaN for every cell that is not a number, time in seconds, and units by name."""
         for name, x in numbers.items():
             wrong = no_value(x)
             written = np.unique(x[wrong & np.isfinite(x)])
@@ -341,6 +343,9 @@ def repaired(reading: Reading, table: Table) -> Record:
         )
     reading.refuse_if_any()
     t: Array
+    timed = "t" in columns or reading.sample_time is not None
+    if not timed:
+        reading.notes.append("no time: taken as points one by one; give --sample-time if it was recorded evenly")
     if "t" in columns:
         t = columns.pop("t")
         step = _step(reading, t)
@@ -350,7 +355,7 @@ def repaired(reading: Reading, table: Table) -> Record:
     v: Array = columns.pop("v", np.empty(0, dtype=np.float64))
     y = columns.pop("y", None)
     name, read_as = Path(reading.file).name, "; ".join(reading.read_as)
-    return Record(name, t, v, y, columns, step, tuple(reading.notes), table.units, read_as)
+    return Record(name, t, v, y, columns, step, tuple(reading.notes), table.units, read_as, timed)
 
 
 def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_], which: str) -> None:

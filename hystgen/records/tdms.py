@@ -48,7 +48,7 @@ def _unit(channel: Any) -> str:
 
 
 def _steps(channel: Any, name: str) -> list[Step]:
-    """The sampling of a waveform; that of a channel which is none has an increment of 0, or no such property."""
+    """The sampling of a waveform; a channel that is not a waveform has an increment of 0, or no such property."""
     seconds = channel.properties.get("wf_increment")
     if not isinstance(seconds, float | int) or not 0.0 < seconds < float("inf"):
         return []

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hystgen.effects.base import Effect
 
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
-"""How exactly, and how, a compensator corrects a stage in front of the plays."""
+"""How a compensator corrects a stage in front of the plays, and how exactly."""
 
 VISIBLE = 0.01
 """An error is visibly larger than another from this share on."""
@@ -76,7 +76,7 @@ def html(found: Diagnosis, parameters_text: str) -> str:
 
 
 def _next_step(found: Diagnosis) -> Text:
-    """What to do with the diagnosis, and the command."""
+    """The next step after the diagnosis, with its command."""
     if found.verdict == "unexplained" and not found.result.effects:
         plan = "hystgen diagnose --plan params.yaml -o plan/"
         return Text("Your next step: record drives in which every effect shows.", plan)
@@ -115,7 +115,7 @@ NOISE_FROM = {
     "differences": "the differences of neighbouring samples, since the records have no holds and no equal periods",
     "resolution": "the resolution of the recorded numbers, since every other estimate is smaller",
 }
-"""What the noise floor comes from, in words."""
+"""The source of the noise floor, in words."""
 
 
 def _noise(result: Result) -> Text:

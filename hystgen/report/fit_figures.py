@@ -25,7 +25,7 @@ BINS, FEWEST = 40, 5
 """Bins of the residual's mean, and the fewest samples in one that is shown."""
 
 TAIL, FAR = 0.002, 3.0
-"""Quantiles at which an axis ends, and the factor by which the extremes then lie farther out."""
+"""[quantiles, times] An axis ends at these quantiles if the extremes lie this many times farther out."""
 
 AGREE = 1.2
 """Two estimates of the noise that differ by at most this factor agree."""
@@ -332,7 +332,7 @@ def residual(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
 
 
 def judged(shown: Sequence[Shown]) -> list[Shown]:
-    """The held-out records, or all where there are none."""
+    """The held-out records, or all records if none was held out."""
     return [each for each in shown if each.used.held_out] or list(shown)
 
 

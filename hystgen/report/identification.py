@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any, ParamSpec
 import numpy as np
 
 from hystgen import identification
-from hystgen.basics import arguments, drawing
+from hystgen.basics import arguments, drawing, writing
 from hystgen.basics.problems import counted, percent
 from hystgen.basics.version import __version__
-from hystgen.emission import files
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.identification import MODEL_PARSIMONY
 from hystgen.identification.fit import HELD_OUT, Fit
@@ -58,7 +57,7 @@ def names() -> list[str]:
 
 
 def check_folder(folder: str | os.PathLike[str]) -> None:
-    """Raise PlotError without matplotlib, NotADirectoryError where there is a file of that name."""
+    """Raise PlotError without matplotlib, NotADirectoryError if `folder` is a file."""
     drawing.require()
     target = Path(folder)
     for place in (target, *target.parents):
@@ -111,7 +110,7 @@ def write(
         _verdict(fit, parameter_file or f"{fit.parameters.name}.yaml"),
         _sections(fit, shown, figures),
     )
-    return files.write(Path(folder), {PAGE: text.encode("utf-8"), **made})[0]
+    return writing.write_files(Path(folder), {PAGE: text.encode("utf-8"), **made})[0]
 
 
 # Text ----------------------------------------------------------------------------------------------
@@ -133,7 +132,7 @@ def _kind(fit: Fit) -> str:
 
 
 def held_out_row(fit: Fit) -> Row | None:
-    """The row by which the model is judged; None if nothing was held out."""
+    """The row that judges the model; None if nothing was held out."""
     return next((row for row in fit.rows if row.part == "held out"), None)
 
 

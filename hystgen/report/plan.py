@@ -8,10 +8,9 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from hystgen.basics import drawing
+from hystgen.basics import drawing, writing
 from hystgen.basics.drawing import label
 from hystgen.basics.version import __version__
-from hystgen.emission import files
 from hystgen.planning import plan as planning
 from hystgen.planning.plan import EDGE, MEASURED, Drive, lasting
 from hystgen.report.html import Figure, Listing, Section, Table, Text, page
@@ -32,7 +31,7 @@ class Plan(planning.Plan):
         Raises PlotError without matplotlib, OSError.
         """
         made = {**self.tables(), "plan.html": html(self, folder)}
-        return files.write(Path(folder), {name: text.encode("utf-8") for name, text in made.items()})
+        return writing.write_files(Path(folder), {name: text.encode("utf-8") for name, text in made.items()})
 
 
 @functools.wraps(planning.plan)

@@ -19,14 +19,14 @@ from hystgen.verification.targets import Board
 
 SECONDS = 120
 HERTZ = "16000000"  # simavr asks for a clock; the firmware needs none
-TELLS = "selftest returned"
+REPORT = "selftest returned"
 STACK = 512  # bytes for the firmware's stack and serial port; filling up the RAM, two branches in q31 failed below 264
 CONSTANTS = (".data", ".rodata")  # both lie in RAM, and in flash with what fills it at the start
 
 
 @dataclass(frozen=True)
 class Size:
-    """Number of plays of a model, and the memory that it should take."""
+    """The number of plays of a model, and the memory that it should take."""
 
     plays: int
     memory: cost.Memory
@@ -130,7 +130,7 @@ def sections(board: Board, objects: Iterable[Path]) -> list[tuple[str, int]]:
 def link(board: Board, sources: Sources, objects: Sequence[Path], folder: Path) -> Path:
     """Link a firmware in `folder`, its main, which is never shipped, compiled without warnings. Raises CompileError."""
     main = folder / "firmware.c"
-    values = SimpleNamespace(name=sources.name, tells=TELLS)
+    values = SimpleNamespace(name=sources.name, report=REPORT)
     main.write_text(module.render("firmware_avr.c.j2", values), encoding="ascii")
     image = folder / "firmware.elf"
     _gcc(board).run([*compilers.USER, f"-I{sources.harness.parent}", "-o", image, main, *objects])
@@ -138,7 +138,7 @@ def link(board: Board, sources: Sources, objects: Sequence[Path], folder: Path) 
 
 
 def run(board: Board, image: Path) -> int:
-    """The self-test's result, which the firmware tells on its serial port. Raises EmulatorError."""
+    """The self-test's result, which the firmware prints on its serial port. Raises EmulatorError."""
     command = [board.simulator, "-m", board.name, "-f", HERTZ, str(image)]
     try:
         done = subprocess.run(
@@ -147,7 +147,7 @@ def run(board: Board, image: Path) -> int:
     except subprocess.TimeoutExpired:
         raise EmulatorError(f"{board.simulator} -m {board.name} did not end within {SECONDS} s") from None
     said = done.stdout + done.stderr
-    count = re.search(rf"{TELLS} (\d+)", said)
+    count = re.search(rf"{REPORT} (\d+)", said)
     if count is None or done.returncode:
         raise EmulatorError(f"{board.simulator} -m {board.name} failed ({done.returncode}):\n{said.strip()}")
     return int(count[1])

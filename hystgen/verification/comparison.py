@@ -18,7 +18,7 @@ from hystgen.verification import signals
 
 @dataclass(frozen=True)
 class Expected:
-    """A record and what the reference makes of it."""
+    """A record and the reference's answers to it."""
 
     name: str
     call: Bytes

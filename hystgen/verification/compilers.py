@@ -12,6 +12,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -68,7 +69,7 @@ class Compiler:
 
 @functools.cache
 def find(name: str) -> Compiler | None:
-    """The compiler of that name, or None where it is not installed.
+    """The compiler of that name, or None if it is not installed.
 
     Any other name is a command as a shell takes it, words and quotes: `ccache gcc`, `gcc -m32`. Raises ValueError for a
     quote that is not closed, and for no command at all.
@@ -92,7 +93,7 @@ def find(name: str) -> Compiler | None:
 
 
 def missing(name: str) -> str:
-    """What is not installed where `find` finds nothing."""
+    """The message for a compiler that `find` does not find."""
     return f"{shlex.split(name)[0]} is not installed"
 
 
@@ -102,10 +103,11 @@ def _own(name: str) -> dict[str, str]:
     if not name.startswith("zig") or "ZIG_GLOBAL_CACHE_DIR" in os.environ:
         return {}
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    while not os.path.exists(home):  # it would be made
-        home = os.path.dirname(home) or "."
-    if os.path.isdir(home) and os.access(home, os.W_OK | os.X_OK):
-        return {}
+    # zig makes this folder, or waits for ever where that fails (under /proc, say): permissions alone do not show it
+    with contextlib.suppress(OSError):
+        os.makedirs(os.path.join(home, "zig"), exist_ok=True)
+        with tempfile.TemporaryFile(dir=os.path.join(home, "zig")):
+            return {}
     instead = contextlib.ExitStack()
     atexit.register(instead.close)
     return {"ZIG_GLOBAL_CACHE_DIR": str(instead.enter_context(writing.temporary()))}

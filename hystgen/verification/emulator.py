@@ -29,7 +29,7 @@ PAGE = 0x1000
 
 
 class EmulatorError(RuntimeError):
-    """The emulated core did not do what was asked for; the message says why."""
+    """The emulated core did not do what it should; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -151,12 +151,12 @@ class Core:
 
     @property
     def counts(self) -> NDArray[np.uint32]:
-        """Instructions of every call that the harness made of what is counted, in order."""
+        """Instructions of every counted call that the harness made, in order."""
         return np.concatenate(self._counts) if self._counts else np.zeros(0, dtype=np.uint32)
 
     @property
     def stack(self) -> int:
-        """Bytes below the harness's frame that the deepest call used, by what is left of the paint."""
+        """Bytes below the harness's frame that the deepest call used: where the painted stack was overwritten."""
         painted = bytes(self._uc.mem_read(self._top - STACK, STACK))
         untouched = len(painted) - len(painted.lstrip(bytes([PAINT])))
         return self._stack_at_step - (self._top - STACK + untouched)
@@ -214,7 +214,7 @@ class Core:
         return answer, status
 
     def _counting(self, function: str, op: str, calls: int) -> Callable[[Callable[[], object]], None]:
-        """What runs an action with the hook in place."""
+        """A function that runs an action with the hook in place."""
         from unicorn import UC_HOOK_CODE
         from unicorn.unicorn_py3.unicorn import uc_hook_h, uclib
 

@@ -21,7 +21,7 @@ FAULT = 255
 
 
 def available(target: Target) -> Machine | None:
-    """The board to run a firmware for `target` on, or None where there is none or qemu is not installed."""
+    """The board that runs firmware for `target`; None if there is no such board or qemu is not installed."""
     return target.machine if shutil.which(QEMU) else None
 
 

@@ -17,9 +17,9 @@ from hystgen.verification.loading import load
 class Instance:
     """A context of NAME_OP_init and NAME_OP_step in the C that a model emits; numbers as the C takes them.
 
-    `options`: one operator. `compiler`: `gcc`, `clang` or `zig`, else the first that is installed; it is called as a
-    user calls it, in its default dialect. The files lie in a temporary folder. Raises CompileError, also where there
-    is no compiler, LoadError, and ValueError for another name.
+    `options`: one operator. `compiler`: `gcc`, `clang` or `zig`, else the first that is installed; it is called as
+    users call it, in its default dialect. The files lie in a temporary folder. Raises CompileError, also where there is
+    no compiler, LoadError, and ValueError for another name.
     """
 
     def __init__(self, model: Model, options: Options, compiler: str | None = None) -> None:

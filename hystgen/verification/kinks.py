@@ -1,4 +1,4 @@
-"""Calls that lead from one kink of a model to the next, which is where its searches and roundings have to be right."""
+"""Calls that lead from one kink of a model to the next, where its searches and roundings have to be right."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ class LoadError(RuntimeError):
 
 
 def load(library: Path, loader: Callable[[str], Loaded]) -> Loaded:
-    """What `loader` makes of the library, which stays loaded when its file is gone. Raises LoadError.
+    """The result of `loader` for the library, which stays loaded when its file is gone. Raises LoadError.
 
     Where its folder is mounted noexec, as temporary folders of hardened machines are, a copy elsewhere is loaded.
     """
@@ -37,7 +37,7 @@ def load(library: Path, loader: Callable[[str], Loaded]) -> Loaded:
 
 
 def _elsewhere() -> Iterator[Path]:
-    """Other folders for files of the moment."""
+    """Other folders for temporary files."""
     named = [os.environ.get("XDG_RUNTIME_DIR"), os.environ.get("XDG_CACHE_HOME"), os.path.expanduser("~/.cache")]
     for place in dict.fromkeys([*filter(None, named), "/var/tmp", "/dev/shm"]):
         if os.path.isdir(place) and os.access(place, os.W_OK | os.X_OK):

@@ -1,4 +1,4 @@
-"""What a verification found, as a table for people, JSON for programs and JUnit XML for CI."""
+"""The results of a verification, as a table for people, JSON for programs and JUnit XML for CI."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def failed(row: Row, error: object) -> Row:
 
 
 def selftest(row: Row, name: str, result: int) -> Row:
-    """The row of a self-test, by what it returned."""
+    """The row of a self-test, from its result."""
     return failed(row, f"{name}_selftest() returned {result}") if result else row
 
 

@@ -1,4 +1,4 @@
-"""The calls that verification makes: what an ISR may feed a model, and what it never should."""
+"""The calls that verification makes: those that an ISR may make, and those that it never should."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The emitted files and what calls them, on disk and ready to compile."""
+"""The emitted files and their harness, on disk and ready to compile."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from pathlib import Path
 from types import MappingProxyType, SimpleNamespace
 
 from hystgen.arithmetic import ARITHMETICS, FLOAT32, Arithmetic
+from hystgen.basics import writing
 from hystgen.compensator.chain.layout import TRAVEL_BITS, VERIFIED_SHARE
-from hystgen.emission import files, module
+from hystgen.emission import module
 from hystgen.emission.chain import SETTINGS
 from hystgen.emission.options import Options
 from hystgen.model import Model
@@ -18,7 +19,7 @@ from hystgen.plays import slots
 CALLS = {"init": slots.OP_INIT, "reset": slots.OP_RESET, "commit": slots.OP_COMMIT}
 @dataclass(frozen=True)
 class Sources:
-    """C files by what they are: the module with its run time, and what the verification adds."""
+    """C files by role: the module with its run time, and the files that the verification adds."""
 
     name: str
     operators: tuple[str, ...]
@@ -28,7 +29,7 @@ class Sources:
 
     @property
     def emitted(self) -> tuple[Path, ...]:
-        """What a user gets: the module, and its self-test where there is one."""
+        """The files that a user gets: the module and, if it has one, its self-test."""
         return self.module if self.selftest is None else (*self.module, self.selftest)
 
     @property
@@ -77,6 +78,6 @@ def write(folder: Path, model: Model, options: Options) -> Sources:
     texts["hystgen_harness.c"] = harness(
         name, operators, module.calls_of(model.parameters, model.cascade, options), ARITHMETICS[options.arithmetic]
     )
-    paths = {path.name: path for path in files.write(folder, texts) if path.suffix == ".c"}
+    paths = {path.name: path for path in writing.write_files(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
     return Sources(name, operators, tuple(paths.values()), caller, selftest)

@@ -98,7 +98,7 @@ NAMES = (HOST, *(target.name for target in TARGETS), AVR.name)
 
 
 def find(name: str) -> Target:
-    """The core of that name. Raises ValueError for a name that is none."""
+    """The core of that name. Raises ValueError for an unknown name."""
     for target in TARGETS:
         if target.name == name:
             return target

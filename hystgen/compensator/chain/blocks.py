@@ -1,4 +1,4 @@
-"""The blocks on both sides of the plays with their numbers, in the order of the chain, whatever is made of them."""
+"""The blocks on both sides of the plays with their numbers, in the order of the chain."""
 
 from __future__ import annotations
 

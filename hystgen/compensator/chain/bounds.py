@@ -211,7 +211,7 @@ def _lags(compiled: Compiled, error: float, u: float, same: bool) -> float:
 
 
 def _seen_by_creep(compiled: Compiled) -> float:
-    """What the states of creep, which see what the plays give, make of an error of what they are asked for."""
+    """Error that the states of creep, which see the sum of the plays, make of an error of their target."""
     t, found = compiled.tables.creep, 1.0
     for j, slope in enumerate(t.block[:, creep.SLOPE].astype(float).tolist()):
         found *= slope * _creep(compiled, j, 0.0, 0.0)[1]

@@ -1,4 +1,4 @@
-"""How much code effects add to a model: a table measured on emulated cores (`benchmarks/effect_costs.py`)."""
+"""The code that effects add to a model: a table measured on emulated cores (`benchmarks/effect_costs.py`)."""
 
 from __future__ import annotations
 

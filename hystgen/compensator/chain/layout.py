@@ -1,4 +1,4 @@
-"""What a model with effects is compiled to: constants in one arithmetic, and what they mean."""
+"""The constants of a model with effects in one arithmetic, and their meaning."""
 
 from __future__ import annotations
 

@@ -16,14 +16,8 @@ from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import FALLING, FARTHEST, OFFSET, RISING, SHARE, ChainTables
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat
 from hystgen.compensator.chain.sides import Blocks, sides_of
-from hystgen.compensator.step import (
-    Operations,
-    clamp_drive,
-    inverse_answer,
-    inverse_clamp,
-    inverse_replace,
-    plays_of,
-)
+from hystgen.compensator.layout import clamp_drive, inverse_clamp
+from hystgen.compensator.step import Operations, inverse_answer, inverse_replace, plays_of
 from hystgen.effects.ageing.compensator import HIGH as AGEING_HIGH
 from hystgen.effects.ageing.compensator import AgeingState
 from hystgen.effects.creep.compensator import CreepState

@@ -6,8 +6,7 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import Tables
-from hystgen.plays.corners.corners_float import plays_step, start
-from hystgen.plays.corners.memory import OUTPUT, STATUS, Memory, Start
+from hystgen.plays.corners.corners_float import OUTPUT, STATUS, Memory, Start, plays_step, start
 from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, HELD, INPUT_CLAMPED, OFFSET, REAL_MAX
 
 

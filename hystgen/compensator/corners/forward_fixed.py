@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.corners.inverse import clamp_drive
-from hystgen.compensator.layout import FixedTables
+from hystgen.compensator.layout import FixedTables, clamp_drive
 from hystgen.front.curve import front_forward
-from hystgen.plays.corners.corners_fixed import plays_step, start
-from hystgen.plays.corners.memory import ASCENDING, DRIVE, INPUT, NEXT, OUTPUT, STATUS, FixedMemory, Reals
+from hystgen.plays.corners.corners_fixed import FixedMemory, plays_step, start
+from hystgen.plays.corners.corners_float import ASCENDING, DRIVE, INPUT, NEXT, OUTPUT, STATUS
 from hystgen.plays.fixed import code
-from hystgen.plays.slots import INPUT_CLAMPED
+from hystgen.plays.slots import INPUT_CLAMPED, Reals
 
 
 @jit

@@ -5,16 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.layout import Tables
+from hystgen.compensator.layout import Tables, clamp_drive
 from hystgen.plays.corners.corners_float import (
-    forget_line,
-    move_in_block,
-    move_to_input,
-    move_to_output,
-    start,
-    stop_in_block,
-)
-from hystgen.plays.corners.memory import (
     BEFORE,
     BEGIN,
     BEHIND,
@@ -38,8 +30,13 @@ from hystgen.plays.corners.memory import (
     Memory,
     Start,
     copy_place,
+    forget_line,
+    move_in_block,
+    move_to_input,
+    move_to_output,
+    start,
+    stop_in_block,
 )
-from hystgen.plays.loop import PlayTables
 from hystgen.plays.slots import (
     DRIVE_MAX,
     DRIVE_MIN,
@@ -52,16 +49,6 @@ from hystgen.plays.slots import (
     REAL_MAX,
     ZERO,
 )
-
-
-@jit
-def clamp_drive(t: PlayTables, v: Any) -> Any:
-    """v inside the range of the drive."""
-    if v < t.limits[DRIVE_MIN]:
-        return t.limits[DRIVE_MIN]
-    if v > t.limits[DRIVE_MAX]:
-        return t.limits[DRIVE_MAX]
-    return v
 
 
 @jit

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.corners.inverse import clamp_drive
-from hystgen.compensator.layout import FixedTables
-from hystgen.plays.corners.corners_fixed import FAR, along, move_to_input, move_to_solution, solve, start
-from hystgen.plays.corners.memory import (
+from hystgen.compensator.layout import FixedTables, clamp_drive, inverse_clamp
+from hystgen.plays.corners.corners_fixed import FAR, FixedMemory, along, move_to_input, move_to_solution, solve, start
+from hystgen.plays.corners.corners_float import (
     BEFORE,
     BITS,
     HERE,
@@ -21,9 +20,7 @@ from hystgen.plays.corners.memory import (
     RISING,
     STATUS,
     UNDO,
-    FixedMemory,
     K,
-    Reals,
     copy_place,
 )
 from hystgen.plays.fixed import nearest, over_slope
@@ -37,19 +34,10 @@ from hystgen.plays.slots import (
     OUTPUT_MAX,
     OUTPUT_MIN,
     SHY,
+    Reals,
 )
 
 NEVER = -(2**31)
-
-
-@jit
-def inverse_clamp(t: FixedTables, u: Any) -> Any:
-    """u inside the range of the output."""
-    if u < t.limits[OUTPUT_MIN]:
-        return t.limits[OUTPUT_MIN]
-    if u > t.limits[OUTPUT_MAX]:
-        return t.limits[OUTPUT_MAX]
-    return u
 
 
 @jit(inline=True)

@@ -6,11 +6,9 @@ from collections.abc import Callable
 from typing import Any
 
 from hystgen.basics.jit import Jit, jit
-from hystgen.compensator.corners.inverse import clamp_drive
-from hystgen.compensator.layout import Tables
+from hystgen.compensator.layout import Tables, clamp_drive
 from hystgen.front.compensator import front_forward, front_inverse
-from hystgen.plays.corners.corners_float import forget_line, move_to_output, plays_step, start
-from hystgen.plays.corners.memory import (
+from hystgen.plays.corners.corners_float import (
     ASCENDING,
     BITS,
     COMMITTED,
@@ -30,6 +28,10 @@ from hystgen.plays.corners.memory import (
     Memory,
     Start,
     copy_place,
+    forget_line,
+    move_to_output,
+    plays_step,
+    start,
 )
 from hystgen.plays.slots import (
     DOMAIN,

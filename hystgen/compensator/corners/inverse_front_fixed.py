@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.corners.inverse import clamp_drive
-from hystgen.compensator.corners.inverse_fixed import inverse_clamp
 from hystgen.compensator.corners.inverse_front import choosing
-from hystgen.compensator.layout import FixedTables
+from hystgen.compensator.layout import FixedTables, clamp_drive, inverse_clamp
 from hystgen.front.curve import front_forward, front_inverse
-from hystgen.plays.corners.corners_fixed import FAR, move_to_input, move_to_solution, solve, start
-from hystgen.plays.corners.memory import (
+from hystgen.plays.corners.corners_fixed import FAR, FixedMemory, move_to_input, move_to_solution, solve, start
+from hystgen.plays.corners.corners_float import (
     ASCENDING,
     BITS,
     DRIVE,
@@ -25,12 +23,10 @@ from hystgen.plays.corners.memory import (
     UNDO,
     UNDO_ASCENDING,
     UNDO_DRIVE,
-    FixedMemory,
-    Reals,
     copy_place,
 )
 from hystgen.plays.fixed import code
-from hystgen.plays.slots import DOMAIN, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED
+from hystgen.plays.slots import DOMAIN, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED, Reals
 
 inverse_choose = choosing(front_inverse)
 

@@ -1,1 +1,1 @@
-"""What is wrong with the records, and the records as the fits take them."""
+"""Faults of the records, and the records as the fits take them."""

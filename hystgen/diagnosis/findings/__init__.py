@@ -1,1 +1,1 @@
-"""What was found: typed results, their sentences and `diagnosis.json`."""
+"""Findings: typed results, their sentences and `diagnosis.json`."""

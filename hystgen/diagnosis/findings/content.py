@@ -126,7 +126,7 @@ def _in_digits(value: Any) -> Any:
 def _unexplained(
     ready: Prepared, after: Sequence[list[Array]], noise: float, usual: float, odd: Sequence[Finding]
 ) -> list[Finding]:
-    """What the model leaves that is neither noise nor a fault of the recording; `usual`: error of a fitted record."""
+    """The remaining error that is neither noise nor a fault of the recording; `usual`: error of a fitted record."""
     everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
     lines, errors = disturbances.lines(everything, errors)
     known = [each for each in odd if isinstance(each, Line | Ripple)]
@@ -135,10 +135,10 @@ def _unexplained(
     jumping = max([noise, *(each.amplitude for each in (*known, *new) if isinstance(each, Ripple))])
     sticking = preparing.merged(disturbances.stick_slip(everything, errors, jumping))
     remaining = [each for each in odd if not isinstance(each, Fault)] + new + sticking
-    held = errors[len(ready.to_fit) :]
+    fitted, held = errors[: len(ready.to_fit)], errors[len(ready.to_fit) :]
     share, _ = shares(ready.held, held)
     share = max(share, *together(everything, errors))
-    if not acceptance.is_noise(rms(held), noise, share):
+    if not acceptance.is_noise(rms(held), noise, share) or not acceptance.is_noise(rms(fitted), noise, 0.0):
         alone = tuple(
             item.name for item, e in zip(ready.held, after[1], strict=True)
             if rms([e]) > acceptance.HELD_OUT_ALONE * usual
@@ -205,7 +205,10 @@ MEMORIES = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
 
 
 LENGTHS = (0.02, 0.05, 0.15, 0.5, 1.5, 5.0)
-"""Distances of the averages of the drive over its travel, as shares of the drive range: as many as of the times."""
+"""[share of the drive range] Distances of the averages of the drive over its travel: six, as many as of the times, each
+about three times the one before, from the smallest play up to five ranges. They explain 0.55 of what plays leave of a
+Bouc-Wen plant; four explain 0.34, eleven 0.59, and of creep none more than 0.09. Set by: benchmarks/chosen_numbers.py
+lengths."""
 
 
 @dataclass(frozen=True)
@@ -476,7 +479,7 @@ def _stretches(item: Item, error: Array, noise: float) -> list[Stretch]:
 
 
 class _Kinds:
-    """What the drive of a record does in samples [a, b): `after_step`, `range_end`, `fast` or `moving`."""
+    """The kind of motion of a record's drive in samples [a, b): `after_step`, `range_end`, `fast` or `moving`."""
 
     def __init__(self, item: Item) -> None:
         self._v = item.run.v

@@ -366,12 +366,13 @@ def several(names: Sequence[str]) -> str:
 
 
 MANY = 100.0
-"""[times the noise] More is not said in figures: the noise is an estimate, and twice as much would mean the same."""
+"""[times the noise] Larger ratios are not given in figures: two digits end here, and the noise is an estimate of which
+they would claim more. Only wording depends on it. Changed by: report::test_ratios_to_the_noise_have_two_digits."""
 
 
 def times_noise(ratio: float) -> str:
     """An error as a multiple of the noise, in words."""
-    return f"{ratio:.2g} times the noise" if ratio <= MANY else f"more than {MANY:g} times the noise"
+    return f"{float(f'{ratio:.2g}'):g} times the noise" if ratio <= MANY else f"more than {MANY:g} times the noise"
 
 
 def _unit(unit: str | None) -> str:

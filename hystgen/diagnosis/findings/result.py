@@ -181,7 +181,7 @@ class Diagnosis:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What the user should know about the inverse of the written model, one or two sentences each."""
+        """Advice about the inverse of the written model, one or two sentences each."""
         return self.result.inverse.warnings
 
     @property
@@ -201,7 +201,7 @@ class Diagnosis:
         return " ".join(f"{part}." for part in parts)
 
     def _limits(self) -> list[str]:
-        """What a reader has to know before any name: how few samples were compared, how much is left."""
+        """Warnings that come before any name: how few samples were compared, how much error remains."""
         result = self.result
         compared, recorded = result.compared
         said = []
@@ -226,7 +226,10 @@ class Diagnosis:
             return f"Missing: {names}. The held-out rms error falls from {before} to {after}{more}"
         if self.verdict == "nothing_missing":
             return f"Nothing is missing: the refitted model leaves {after} rms on held-out records, which is noise"
-        missing = f"{self._missing()}: {after} rms is left{self._nearest()}"
+        where, left = "", gap.after.holdout
+        if acceptance.is_noise(left, result.noise_floor):  # the held-out records do not show it
+            where, left = " of the fitted records", gap.after.fit
+        missing = f"{self._missing()}: {self._rms(left)} rms is left{where}{self._nearest()}"
         disturbing = [each for each in seen if not isinstance(each, Fault | Structure)]
         if not disturbing:
             return missing
@@ -291,7 +294,7 @@ class Diagnosis:
 
         Raises PlotError without matplotlib.
         """
-        from hystgen.emission import files
+        from hystgen.basics import writing
         from hystgen.parameters.files import dump_parameters
 
         said = [f"Diagnosed by hystgen. {self.sentence()}", *(f"Warning: {text}" for text in self.warnings)]
@@ -299,7 +302,7 @@ class Diagnosis:
         pages = [] if self.page is None else [self.page(self, text)]
         names = self.FILES if pages else (self.FILES[0], self.FILES[2])
         made = zip(names, (self.to_json(), *pages, text), strict=True)
-        return files.write(Path(folder), {name: content.encode("utf-8") for name, content in made})
+        return writing.write_files(Path(folder), {name: content.encode("utf-8") for name, content in made})
 
 
 def plain(value: Any) -> Any:

@@ -1,1 +1,1 @@
-"""The search for what the nominal model is missing."""
+"""The search for effects that the nominal model is missing."""

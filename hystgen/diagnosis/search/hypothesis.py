@@ -196,13 +196,13 @@ class Actuator:
         a = item.run.v
         for effect in self.at(Place.DRIVE):
             a = effect.drive(a, item.run)
-        course = reduction.Course(item.name, a, a, item.history, 0, len(a))
+        course = reduction.Course(item.name, a, a, item.visited, 0, len(a))
         course = joint.through_front(course, self.stages)
         start = reduction.start_states(course.v, course.history, self.thresholds)
         return course.v, item.run, self.thresholds, start
 
     def mapped(self, h: Array, level: Array, item: Item) -> Array:
-        """The output behind its maps: a limit in front of the offset `level`, a sensor behind it."""
+        """The output after its maps: a limit before the offset `level`, a sensor after it."""
         maps = self.at(Place.OUTPUT)
         for effect in maps:
             if effect.order == 0:

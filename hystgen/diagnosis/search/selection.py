@@ -158,7 +158,7 @@ def _without_merit(now: Fitted, best: Tried, items: Sequence[Item]) -> list[Arra
 
 
 def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
-    """All that were tried: the best and those about as good first, of these the ones with fewer numbers first.
+    """All candidates tried: first the best and those about as good, in the order of their number of parameters.
 
     About as good: with the same start states free, held-out records find them no worse, whatever more the best explains
     of the fitted ones (between two shapes of one effect each has its own free states, which are part of the effect); or

@@ -13,17 +13,20 @@ from hystgen.basics.jit import jit
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
+from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE
 from hystgen.plays.slots import Counts, Reals, zero
 
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
 
 DECADES = 6
-"""Decades of the longest travel that the table of a gain covers; beyond it the gain keeps its last value."""
+"""[decades of the longest travel] What the table of a gain covers; beyond it the gain keeps its last value. A travel of
+a few moves over the range is then covered for a million of them, in 65 pieces (1560 bytes in float32) where the gain
+falls by 5 % a decade; each decade costs 11 pieces. Set by: benchmarks/chosen_numbers.py decades."""
 
 TABLE_ERROR = 1e-6
-"""Share of the output by which a table may differ from the gain; 67 pieces cover six decades of 5 % each (a logarithm
-over a piece of 1.23 to 1: `0.05/2.3 * 6/384 * 0.23^4`)."""
+"""[share of the output] A table differs from the gain by at most this, about the rounding of ten operations in float32.
+A piece of a logarithm of 5 % a decade then ends 1.23 times as far along as it begins: `0.05/2.3 * 6/384 * 0.23^4`. Set
+by: benchmarks/chosen_numbers.py decades."""
 
 
 def gain(effect: Ageing, travelled: float) -> float:
@@ -94,12 +97,8 @@ def most_at_once(effect: Ageing, span: float) -> float:
 def problems(effect: Ageing, span: float) -> Iterator[str]:
     """Why the C cannot follow the gain."""
     change = most_at_once(effect, span)
-    if len(pieces(effect)) == 0 or change > MOST:
-        yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST:.0%}"
-
-
-MOST = 0.25
-"""Largest relative change of the gain in one sample: five steps of Newton's leave `0.25^32`."""
+    if len(pieces(effect)) == 0 or change > MOST_CHANGE:
+        yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST_CHANGE:.0%}"
 
 
 def turns(effect: Ageing, span: float, roundoff: float) -> int:

@@ -43,7 +43,7 @@ def numbers(seconds: float, step: float) -> tuple[float, int]:
 
 @jit
 def delay_rest(line: Waiting, v: Any) -> None:
-    """The drive has been v for long."""
+    """Settle at the drive v."""
     for i in range(len(line.sample)):
         line.sample[i] = v
     line.oldest[0] = 0
@@ -65,7 +65,7 @@ def delay_put(line: Waiting, v: Any) -> None:
 
 @jit
 def delayed(t: DelayTables, line: Waiting) -> Any:
-    """The drive that has waited long enough."""
+    """The drive that leaves the delay now."""
     oldest = line.sample[line.oldest[0]]
     return oldest + t.share[0] * (line.sample[delay_next(line)] - oldest)
 

@@ -54,7 +54,7 @@ def clock_tick(t: Reals, s: Reals, j: int) -> None:
 
 @jit
 def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
-    """The drift so many samples ahead of the clock."""
+    """The drift `ahead` samples ahead of the clock."""
     time = s[j, HIGH] * t[j, BLOCK] + (s[j, LOW] + ahead) * t[j, SAMPLE]
     drift = (t[j, RATE] + t[j, HALF_CHANGE] * time) * time
     if drift > t[j, FARTHEST]:

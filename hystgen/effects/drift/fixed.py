@@ -64,7 +64,7 @@ def _drift(slope: float, twice: float, n: float) -> float:
 
 
 def _samples(slope: float, twice: float, farthest: float) -> int:
-    """After how many the drift lies beyond `farthest`, and goes on away from it; at most `MOST_SAMPLES`."""
+    """The number of samples after which the drift stays beyond `farthest`; at most `MOST_SAMPLES`."""
     if abs(_drift(slope, twice, float(MOST_SAMPLES))) <= farthest:
         return MOST_SAMPLES
     low, high = max(math.ceil(-slope / twice) + 1, 0) if slope * twice < 0.0 else 0, MOST_SAMPLES  # from where it turns
@@ -109,7 +109,7 @@ def clock_tick(t: Reals, s: Reals, j: int) -> None:
 
 @jit
 def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
-    """The drift so many samples ahead of the clock."""
+    """The drift `ahead` samples ahead of the clock."""
     more = (t[j, SLOPE] + s[j, GAINED]) * ahead + t[j, CHANGE] * ((ahead * (ahead - 1)) // 2)
     drift = s[j, WHOLE] + ((s[j, PART] + more) >> t[j, BITS])
     if drift > t[j, FARTHEST]:

@@ -33,7 +33,7 @@ from hystgen.plays.operators import followed
 Places = NDArray[np.intp]
 
 LARGE, TOGETHER = 10_000, 4
-"""Samples of plays with a nonlinear dashpot from which on threads share them, and plays that one takes at a time."""
+"""[samples, plays] From this many samples on, threads share the plays of a nonlinear dashpot, this many at a time."""
 
 
 MOST_PIECES = 1000
@@ -46,7 +46,8 @@ SLOW = 1.0
 """Share of a disturbance that friction may take in a piece by the Taylor series."""
 
 NEARLY = 0.3
-"""Share of a stretch by which it may change in a piece whose curvature counts with its leading term."""
+"""[share of a stretch] A stretch may change by this much in a piece of which only the leading term of curvature
+counts."""
 
 SLIGHT = 1e-4
 """Share of the speed that friction may take while what it takes is summed along the way without it."""

@@ -13,7 +13,13 @@ from hystgen.effects.thermal.model import LoggedThermal, SelfHeating
 from hystgen.plays.slots import Counts, Reals, zero
 
 LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
-"""A gain set from outside is kept between these: one outside is a fault of its sensor, or of its unit."""
+"""[times] A gain set from outside is kept between these: one beyond them is a fault of its sensor, or a wrong unit. Set
+by fixed point: with `fixed.GAIN_BITS` fraction bits, 2 is the end of what a gain and its reciprocal can be."""
+
+MOST_CHANGE = 0.25
+"""[share of the gain] The largest change of a gain in one sample that the C follows: five of Newton's iterations from
+the last reciprocal leave `0.25^32`, less than the rounding of double precision. A limit of 0.5 would take six of them
+in every sample, one of 0.9 nine. Set by: benchmarks/chosen_numbers.py newton."""
 
 # ---------------------------------------------------------------- gain.c
 
@@ -104,9 +110,6 @@ def gain_absorb(s: Reals, j: int, x: Any) -> Any:
 
 # ---------------------------------------------------------------- heat.c
 
-MOST = 0.25
-"""Largest relative change of the gain in one sample: five steps of Newton's leave `0.25^32`."""
-
 HEAT_KIND = Kind(
     "heat", ("rate", "per_square", "per_degree", "offset_per_degree", "hottest"),
     ("high", "low", "gain", "inverse", "offset"), counts=("turns",), reading=(), own=("solve", "absorb"),
@@ -154,8 +157,8 @@ def heat_numbers(effect: SelfHeating, span: float, seconds: float) -> tuple[floa
 def heat_problems(effect: SelfHeating, ends: tuple[float, float], seconds: float) -> Iterator[str]:
     """Why the C cannot follow the gain."""
     change = abs(effect.gain_per_degree) * most_at_once(effect, ends, ends[1] - ends[0], seconds) / LEAST_GAIN
-    if change > MOST:
-        yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST:.0%}"
+    if change > MOST_CHANGE:
+        yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST_CHANGE:.0%}"
 
 
 def heat_turns(effect: SelfHeating, ends: tuple[float, float], seconds: float, roundoff: float) -> int:

@@ -21,7 +21,7 @@ SHARES = (0.3, 0.15, 0.5)
 """Shares of the way down from the longest time constant to the shortest from which searches start."""
 
 SMALLEST, LARGEST, REACH = -2.0, 0.5, -0.8
-"""Decimal logarithms of the reach of what rubs, in ranges of the drive: bounds and start."""
+"""[decimal logarithms of ranges of the drive] Reach of the rubbing elements: bounds and start of a search."""
 
 
 @jit

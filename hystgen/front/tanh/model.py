@@ -82,7 +82,7 @@ class TanhEnvelope:
         return min(slope(ends[0]), slope(ends[1])), slope(nearest)
 
     def inverse_problems(self, low: float, high: float) -> list[str]:
-        """Slopes that vanish in double precision: the range lies beyond what the envelope can tell apart."""
+        """Slopes that vanish in double precision: the envelope is flat to rounding over the range."""
         return [
             f"the {'ascending' if up else 'descending'} envelope is flat to double precision within "
             f"{low:.6g} to {high:.6g}; narrow input_range"

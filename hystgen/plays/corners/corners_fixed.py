@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.plays.corners.memory import DEPTH, INPUT, NEXT, OUTPUT, RISING, FixedMemory, K, Reals
+from hystgen.plays.corners.corners_float import DEPTH, INPUT, LEVEL, NEXT, OUTPUT, RISING, K
 from hystgen.plays.fixed import FixedPlayTables, over_slope
-from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN
+from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN, Counts, Reals
 
 INPUT_MOST = 2**31 - 1  # inputs of the plays, in their least steps, are an int32_t in C
 
@@ -16,6 +18,30 @@ Kink = tuple[Any, Any, int, int]
 the others."""
 
 FAR = 1 << 62
+
+
+class FixedMemory(NamedTuple):
+    """One instance in fixed point: plain arrays of int64, however narrow they are in C."""
+
+    real: Reals
+    counts: Counts
+    output: Reals  # (n): of each corner, as the three that follow
+    input: Reals
+    top: Counts
+    rose: Counts
+
+
+def new_fixed_memory(plays: int, dtype: Any = np.int64) -> FixedMemory:
+    """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
+    corners = max(plays, 1)
+    return FixedMemory(
+        real=np.zeros(LEVEL + 1, dtype),
+        counts=np.zeros(15, np.int64),
+        output=np.zeros(corners, dtype),
+        input=np.zeros(corners, dtype),
+        top=np.zeros(corners, np.int64),
+        rose=np.zeros(corners, np.int64),
+    )
 
 
 @jit(inline=True)
@@ -88,7 +114,7 @@ def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
 
 @jit
 def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
-    """The same for any move to an input; turns, moves nothing."""
+    """The same for a move to any input; turns if it has to, but moves nothing."""
     if along(m, to - m.real[INPUT]) < 0:
         turn_back(m)
     return find(t, m, along(m, to), False)

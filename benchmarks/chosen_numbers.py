@@ -1,0 +1,185 @@
+"""Runs that set numbers which no test of a model can set: what each would cost or spoil with another value.
+
+    python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths]
+
+lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.thermal.compensator.MOST_CHANGE`; decades:
+`effects.ageing.compensator.DECADES`; sweeps: `emission.worth.SWEEPS`; unknown: `tracking.MOST_UNKNOWN`; exact:
+`diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`. All of them take some seconds; what
+is random has fixed seeds.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import numpy as np
+from numpy.typing import NDArray
+
+import hystgen
+from hystgen import plants
+from hystgen.compensator.chain.layout import SAMPLES_A_SWEEP
+from hystgen.diagnosis.data import signals
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.findings import content
+from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects.ageing.model import LogarithmicAgeing
+from hystgen.effects.base import Run
+from hystgen.effects.lag.compensator import LagBlock
+from hystgen.parameters.files import parse_parameters
+from hystgen.records import Record
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+WITH_EFFECT = """\
+hystgen: 1
+name: stage_x
+sample_time: 1.0e-3
+input_range: [-4, 4]
+model:
+  pi: {{thresholds: [0, 0.45, 0.9], weights: [0.72, 0.6, 0.48]}}
+  effects:
+    - {{{effect}}}
+"""
+EFFECTS = (
+    "name: creep, time_constants: [0.1, 1.0], weights: [0.02, 0.01]",
+    "name: lag, time_constant: 2.0e-3",
+    "name: resonance, frequency: 120, damping: 0.02",
+    "name: ageing, shape: logarithmic, loss: 0.01, travel: 1.0e4",
+    "name: slew_limit, rate: 2000",
+)
+
+
+def lag() -> None:
+    """Both inverses of a lag of 1 s: largest gain from reference to drive, and the error on a sine of 40 steps."""
+    print("lag: step / time constant, pole of the exact inverse, its gain and that of the lead, error of the lead, %")
+    for step in (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0):
+        block = LagBlock(1.0)
+        block.advance(step)
+        pole = -block.early / block.late
+
+        def drives(reference: NDArray[np.float64], exact: bool, block: LagBlock = block) -> tuple[Any, Any]:
+            block.rest(0.0)
+            block.exact = exact
+            pairs = [(x := block.solve(y), block.absorb(x)) for y in reference.tolist()]
+            return tuple(np.array(each) for each in zip(*pairs, strict=True))
+
+        impulse = np.eye(1, 400)[0]
+        gains = [float(np.sum(np.abs(drives(impulse, exact)[0]))) for exact in (True, False)]
+        sine = np.sin(2.0 * np.pi * np.arange(200) / 40.0)
+        error = 100.0 * float(np.max(np.abs(drives(sine, False)[1] - sine)[80:]))
+        print(f"  {step:5.2f} {pole:7.3f} {gains[0]:9.3g} {gains[1]:9.3g} {error:9.3g}")
+
+
+def newton() -> None:
+    """Steps of Newton's from the reciprocal of the gain before to that of the gain after."""
+    print("newton: change of the gain in one step, iterations to 2^-24 and to 2^-53")
+    for change in (0.1, 0.25, 0.5, 0.75, 0.9):
+        iterations = [
+            next(n for n in itertools.count(1) if change ** (2**n) < roundoff) for roundoff in (2.0**-24, 2.0**-53)
+        ]
+        print(f"  {change:5.2f} {iterations[0]:4} {iterations[1]:4}")
+
+
+def decades() -> None:
+    """The table of a logarithmic gain that loses 5 % a decade: pieces, bytes in float32, the gain at its end."""
+    print("decades: decades, pieces, bytes, gain at the end")
+    effect = LogarithmicAgeing(name="ageing", loss=0.05, travel=1.0)
+    whole = ageing.pieces(effect)
+    for power in (2, 3, 4, 5, 6):
+        count = int(np.sum(whole[:, 0] < 10.0**power))
+        print(f"  {power:3} {count:4} {24 * count:6} {ageing.gain(effect, 10.0**power):7.3f}")
+
+
+def sweeps() -> None:
+    """What an effect is worth over a number of sweeps, as a share of what it is worth over 64 of them."""
+    counts = (1, 2, 4, 8, 16, 32)
+    print("sweeps: effect, worth over", *counts, "sweeps / over 64")
+    for effect in EFFECTS:
+        model = hystgen.Model(parse_parameters(WITH_EFFECT.format(effect=effect), "stage_x.yaml"))
+        place = np.arange(64 * SAMPLES_A_SWEEP + 1) / SAMPLES_A_SWEEP
+        v = -4.0 + 8.0 * np.abs(place % 2.0 - 1.0)
+        missing = model.simulate(v) - model.without(model.effects).simulate(v)
+        rms = [math.sqrt(float(np.mean(missing[: n * SAMPLES_A_SWEEP + 1] ** 2))) for n in (*counts, 64)]
+        print(f"  {model.effects[0].name:12}", *(f"{each / rms[-1]:7.3f}" for each in rms[:-1]))
+
+
+def unknown() -> None:
+    """The rms error of a fit over parts of a record, as a share of that over all of it."""
+    shares = (0.5, 0.2, 0.1, 0.05, 0.02)
+    print("unknown: record, length of a part of it, least and largest rms over such a part / over all")
+    fit = hystgen.identify(EXAMPLES / "stage_recording.csv")
+    for name in ("stage_recording", "stage_holdout"):
+        t, v, y = np.loadtxt(EXAMPLES / f"{name}.csv", delimiter=",", skiprows=1, usecols=(0, 1, 2)).T
+        error = y - fit.model.simulate(v)
+        error -= error.mean()
+        whole = math.sqrt(float(np.mean(error**2)))
+        for share in shares:
+            n = max(2, round(share * len(t)))
+            begins = range(0, len(t) - n + 1, max(1, n // 2))
+            parts = [math.sqrt(float(np.var(error[at : at + n]))) / whole for at in begins]
+            print(f"  {name:16} {share:5.0%} {min(parts):6.2f} to {max(parts):5.2f}")
+
+
+def exact() -> None:
+    """Changes of the output at samples that hold a value or lie on a line between two, as shares of its range."""
+    print("exact: written with digits, offset / range, largest change where nothing was measured: held, interpolated")
+    t = np.arange(4001)
+    slow = np.arange(0, 4001, 8)
+    y = np.sin(0.01 * slow) + 1e-4 * np.random.default_rng(1).normal(size=len(slow))
+    for digits, offset in itertools.product((17, 12, 9, 6), (0.0, 10.0, 1000.0)):
+        held, line = (np.array([float(f"{x:.{digits}g}") for x in each]) for each in (
+            offset + np.repeat(y, 8)[:4001], np.interp(t, slow, offset + y)
+        ))  # fmt: skip
+        span = float(np.ptp(y))
+        between = np.arange(4000) % 8 != 7
+        bend = np.arange(1, 4000) % 8 != 0
+        largest = [np.max(np.abs(np.diff(held))[between]), np.max(np.abs(np.diff(line, 2))[bend])]
+        words = ["found" if len(signals._sampled(each)) < len(each) else "not found" for each in (held, line)]
+        print(f"  {digits:3} {offset:6g}", *(f"{x / span:9.2g} {word}" for x, word in zip(largest, words, strict=True)))
+
+
+def lengths() -> None:
+    """What the error of a play sum on rate-independent plants goes with, and that of a stage that creeps."""
+    print("lengths: plant, error explained without rates / with them, by averages over 0, 2, 3, 4, 6 and 11 distances")
+    t = 1e-3 * np.arange(12000)
+    v = 4.0 * np.exp(-0.15 * t) * np.sin(2.0 * np.pi * (0.7 * t + 0.05 * t**2))
+    every = np.geomspace(content.LENGTHS[0], content.LENGTHS[-1], 11)
+    sets: tuple[Any, ...] = ((), every[[0, 10]], every[::5], every[[0, 3, 7, 10]], content.LENGTHS, every)
+    stages: dict[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
+        "Bouc-Wen": plants.BoucWen(1.5, 2.0, D=1.3).simulate,
+        "Dahl": plants.Dahl(2.0, 1.5).simulate,
+        "Jiles-Atherton": plants.JilesAtherton(2.0, 1.0, 0.8, 0.5, 0.2).simulate,
+        "creep": hystgen.Model(parse_parameters(WITH_EFFECT.format(effect=EFFECTS[0]), "stage_x.yaml")).simulate,
+    }
+    for name, simulate in stages.items():
+        y = simulate(v)
+        record = Record("made", t, v, y)
+        error = y - hystgen.identify([record], thresholds=6).model.simulate(v)
+        item = Item("made", Run(t, v), y, None, float(np.ptp(y)))
+        shares = []
+        for each in sets:
+            with mock.patch.object(content, "LENGTHS", each):
+                shares.append(content.together([item], [error]))
+        print(f"  {name:15}", *(f"{free:5.2f}/{rates:4.2f}" for free, rates in shares))
+
+
+RUNS: dict[str, Callable[[], None]] = {
+    each.__name__: each for each in (lag, newton, decades, sweeps, unknown, exact, lengths)
+}
+
+
+def main() -> None:
+    """Print the tables asked for, or all."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", help=", ".join(RUNS))
+    for name in parser.parse_args().names or RUNS:
+        RUNS[name]()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,28 @@
+"""The C program that runs recorded calls of an emitted operator, shared by the tests that watch it."""
+
+_MAIN = """\
+#include "{name}.h"
+#include <stdio.h>
+int main(void)
+{{
+    static {name}_{op}_t self;
+    int call;
+    {name}_real_t x;
+    {name}_{op}_init(&self);
+    while ((call = getchar()) != EOF && fread(&x, sizeof x, 1, stdin) == 1) {{
+        switch (call) {{
+        case 0: (void){name}_{op}_step(&self, x); break;
+        case 1: {commit} break;
+        case 2: {name}_{op}_reset(&self, x); break;
+        default: {name}_{op}_init(&self); break;
+        }}
+    }}
+    return 0;
+}}
+"""
+
+
+def c_main(name: str, op: str) -> str:
+    """Its text for operator `op` of the model `name`; reads a byte for the call and a number for its argument, each."""
+    commit = f"{name}_{op}_commit(&self, x);" if op == "inverse" else ""
+    return _MAIN.format(name=name, op=op, commit=commit)
