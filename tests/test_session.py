@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 Call = Callable[..., tuple[int, str, str]]
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "acquire"
+CLEAN = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wsign-conversion", "-Wshadow", "-Werror"]
 RATE = 50.0
 LOW, HIGH = -20.0, 120.0
 
@@ -120,6 +121,27 @@ class TestDrives:
         part = parts_of(played).records[2]
         assert np.array_equal(single, rows[part.first : part.first + part.samples])
         assert [*tables, "plan.html"] == list(played.names)
+
+    @pytest.mark.parametrize(("bits", "coding"), [(8, "straight"), (16, "twos-complement"), (32, "straight")])
+    def test_firmware_plays_the_same_codes(self, tmp_path: Path, bits: int, coding: str) -> None:
+        """The player of the documentation, compiled as C, over the header that has the corners alone."""
+        found = made(tmp_path, dac_bits=bits, dac_range=(-25.0, 125.0), dac_coding=coding)
+        tables = found.tables()
+        page = (Path(hystgen.__file__).parents[1] / "docs" / "howto" / "acquire.md").read_text()
+        (player,) = re.findall(r"```c\n(.*?)```", page, re.DOTALL)
+        main = """
+#include <stdio.h>
+static void print(int64_t code) { printf("%lld\\n", (long long)code); }
+int main(void) { play(print); return 0; }
+"""
+        (tmp_path / "stage_session.h").write_text(tables["stage_session.h"])
+        for ours, theirs in (("plan/", ""), ("stage_x", "stage"), ("STAGE_X", "STAGE")):
+            player = player.replace(ours, theirs)
+        (tmp_path / "play.c").write_text(player + main)
+        command = ["cc", *CLEAN, "-O1", "-o", tmp_path / "play", tmp_path / "play.c"]
+        subprocess.run(command, check=True)
+        out = subprocess.run([tmp_path / "play"], capture_output=True, text=True, check=True).stdout
+        assert out == tables["session_codes.txt"]
 
     def test_the_page_says_time_memory_and_resolution(self, played: Plan, tmp_path: Path) -> None:
         played.write(tmp_path / "plan")

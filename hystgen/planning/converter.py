@@ -83,8 +83,8 @@ class Dac:
         how = "straight binary" if self.coding == CODINGS[0] else "two's complement"
         return (
             f"Drives are codes of a DAC of {self.bits} bits over {self.low:g} to {self.high:g}{unit}, {how}: a code is "
-            f"{self.lsb:.4g}{unit}, {100.0 * self.lsb / span:.2g} % of the drives' span. Column v is what the codes "
-            "give, at most one code from the straight lines between turning points."
+            f"{self.lsb:.4g}{unit}, {100.0 * self.lsb / span:.2g} % of the drives' span, and they lie at most one code "
+            "from the straight lines between turning points."
         )
 
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics import arguments
 from hystgen.basics.problems import PlanError
-from hystgen.planning import converter, session
+from hystgen.planning import converter, header, session
 from hystgen.planning.converter import Codes, Dac
 from hystgen.planning.session import Part, Session
 
@@ -115,7 +115,7 @@ class Plan:
     `source`, `effects`: files of the model and of the user's own effects; `history`: drive values visited before every
     record; `rest`: seconds of pause before each; `max_rate`: input/s; `defaults`: a sentence for each of these that was
     chosen here. `session`: where the records are in one drive at one rate, which is `whole`, with codes of `dac`; None
-    where no rate was given.
+    where no rate was given. `stretches` of it: numbers of steps between samples that were drawn, and ticks of each.
     """
 
     parameters: Parameters
@@ -130,6 +130,7 @@ class Plan:
     session: Session | None = None
     whole: Drive | None = None
     dac: Dac | None = None
+    stretches: tuple[tuple[int, int], ...] = ()
 
     @property
     def duration(self) -> float:
@@ -145,7 +146,8 @@ class Plan:
     @property
     def names(self) -> tuple[str, ...]:
         """The files that `write` makes."""
-        whole = () if self.whole is None else (WHOLE, *((CODES,) if self.dac else ()), session.FILE)
+        codes = (CODES, header.file(self.parameters)) if self.dac else ()
+        whole = () if self.whole is None else (WHOLE, *codes, session.FILE)
         return (*(drive.name for drive in self.drives), *whole, "plan.html")
 
     def sentence(self) -> str:
@@ -178,18 +180,33 @@ class Plan:
         from hystgen.records import columns_text, headers
 
         names = ("t", "v") if self.dac is None else ("t", "v", "code")
-        header = headers(names, {"t": "s", "v": self.parameters.units.input})
+        top = headers(names, {"t": "s", "v": self.parameters.units.input})
 
         def text(drive: Drive) -> str:
-            return columns_text(header, (drive.t, drive.v, *(() if drive.codes is None else (drive.codes,))))
+            return columns_text(top, (drive.t, drive.v, *(() if drive.codes is None else (drive.codes,))))
 
         made = {drive.name: text(drive) for drive in self.drives}
         if self.session is None or self.whole is None:
             return made
         made[WHOLE] = text(self.whole)
-        if self.whole.codes is not None:
-            made[CODES] = "\n".join(map(str, self.whole.codes.tolist())) + "\n"
+        if self.dac is not None and self.whole.codes is not None:
+            codes = self.whole.codes
+            made[CODES] = "\n".join(map(str, codes.tolist())) + "\n"
+            made[header.file(self.parameters)] = header.header(
+                self.parameters, self.session, self.dac, codes, self.stretches, self._options()
+            )
         return {**made, session.FILE: self.session.to_json()}
+
+
+    def _options(self) -> str:
+        """Of the command line that makes the same session."""
+        said = [f"--max-rate {self.max_rate!r}"]
+        if self.session is not None:
+            said.append(f"--rate {self.session.rate!r}")
+        if self.dac is not None:
+            dac = self.dac
+            said.append(f"--dac-bits {dac.bits} --dac-range={dac.low!r},{dac.high!r} --dac-coding {dac.coding}")
+        return " ".join(said)
 
 
 @arguments.checked
@@ -342,7 +359,7 @@ class _Player:
 
     def session(self, plan: Plan) -> Plan:
         """The plan with its drives as one."""
-        parts, at = [], self.first
+        parts, at, stretches = [], self.first, [(len(self.nodes) - 1, self.every)]
         lead = self.played(self.nodes, self.every)
         pieces = [lead]
         for drive in plan.drives:
@@ -351,6 +368,8 @@ class _Player:
             pieces.append((np.repeat(before[-1:], hold), None if code is None else np.repeat(code[-1:], hold)))
             pieces.append((drive.v, drive.codes))
             parts.append(Part(drive.name, at, len(drive.v), drive.held_out))
+            every = round(drive.corner_time / drive.sample_time)
+            stretches += [(1, self.tempo.rest), ((len(drive.v) - 1) // every, every)]
             at += len(drive.v) - 1 + self.tempo.rest
         v = np.concatenate([each for each, _ in pieces])
         codes = None if self.dac is None else np.concatenate([each for _, each in pieces if each is not None])
@@ -360,7 +379,9 @@ class _Player:
         dac = None if self.dac is None else asdict(self.dac)
         where = Session(self.rate, len(v), (top, bottom), plan.rest, rise, tuple(parts), dac)
         whole = Drive(WHOLE, "", (), False, plan.sample_time, plan.sample_time, t, v, codes)
-        return replace(plan, history=(top, bottom), session=where, whole=whole, dac=self.dac)
+        return replace(
+            plan, history=(top, bottom), session=where, whole=whole, dac=self.dac, stretches=tuple(stretches)
+        )
 
 
 def _lead_in(grid: Grid, tempo: Tempo, every: int) -> list[int]:

@@ -10,8 +10,10 @@ from typing import Any
 
 from hystgen.basics import drawing
 from hystgen.basics.drawing import label
+from hystgen.basics.problems import counted
 from hystgen.basics.version import __version__
 from hystgen.emission import files
+from hystgen.planning import header
 from hystgen.planning import plan as planning
 from hystgen.planning.plan import CODES, EDGE, MEASURED, RECORDING, WHOLE, Drive, lasting
 from hystgen.planning.session import FILE as SESSION
@@ -109,11 +111,13 @@ def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
         "sample late, and a commanded v would show that as a delay.",
     ]
     if plan.dac is not None:
-        size = samples * plan.dac.bytes
+        size, corners = samples * plan.dac.bytes, header.nodes(plan.stretches)
         said.insert(
             1,
             f"{CODES} has the same as one code a line: {samples} codes, {size / 1e6:.3g} MB of memory at "
-            f"{plan.dac.bytes} bytes each. The files of the single records have their codes in the column code.",
+            f"{counted(plan.dac.bytes, 'byte')} each. The files of the single records have their codes in the column "
+            f"code. For firmware {header.file(plan.parameters)} has the {len(corners)} codes between which the drive "
+            f"is straight, {len(corners) * plan.dac.bytes / 1e3:.3g} kB.",
         )
     return said
 
