@@ -138,7 +138,7 @@ int main(void) { play(print); return 0; }
         for ours, theirs in (("plan/", ""), ("stage_x", "stage"), ("STAGE_X", "STAGE")):
             player = player.replace(ours, theirs)
         (tmp_path / "play.c").write_text(player + main)
-        command = ["cc", *CLEAN, "-O1", "-o", tmp_path / "play", tmp_path / "play.c"]
+        command = ["cc", *CLEAN, "-O1", "-o", str(tmp_path / "play"), str(tmp_path / "play.c")]
         subprocess.run(command, check=True)
         out = subprocess.run([tmp_path / "play"], capture_output=True, text=True, check=True).stdout
         assert out == tables["session_codes.txt"]
@@ -181,6 +181,7 @@ class TestCut:
             (lambda t, v: (t, v / 15.0), "give the drive in the units of the model"),
             (lambda t, v: (1.2 * t, v), "is it a recording of this session, at this rate?"),
             (lambda t, v: (t[len(t) // 3 :], v[len(t) // 3 :]), "the drive is"),
+            (lambda t, v: (t, np.sort(v)[::-1]), "the drive never rises"),
         ],
     )
     def test_a_recording_of_something_else(
@@ -190,8 +191,12 @@ class TestCut:
         with pytest.raises(PlanError, match=re.escape(said)):
             parts_of(played).cut(Record("all.csv", t, v, v, sample_time=float(t[1] - t[0])))
 
-    @pytest.mark.parametrize("text", ["", "[]", "{}", '{"hystgen": 1}', '{"hystgen": 1, "records": [{"name": "a"}]}'])
-    def test_a_file_that_is_no_session(self, tmp_path: Path, text: str) -> None:
+    @pytest.mark.parametrize("text", ["", "[]", "{}", '{"hystgen": 1}', '{"hystgen": 1, "records": [{"name": "a"}]}',
+                                      '"rate": "50"', '"rate": -50.0', '"hystgen": 2', '"history": [1.0]'])  # fmt: skip
+    def test_a_file_that_is_no_session(self, played: Plan, tmp_path: Path, text: str) -> None:
+        """Of other content, or a session with one key of another value."""
+        if text.startswith('"'):
+            text = json.dumps({**json.loads(parts_of(played).to_json()), **json.loads(f"{{{text}}}")})
         (tmp_path / "session.json").write_text(text)
         with pytest.raises(PlanError, match="no session; give the session"):
             Session.read(tmp_path / "session.json")
@@ -262,7 +267,7 @@ class TestCommand:
 
 def test_from_a_plan_to_a_diagnosis_in_one_run(tmp_path: Path) -> None:
     """The example, as it is: codes through the two functions of its hardware, and the creep of its bench comes back."""
-    command = [sys.executable, EXAMPLE, "-o", tmp_path / "out", "--rate", "100"]
+    command = [sys.executable, str(EXAMPLE), "-o", str(tmp_path / "out"), "--rate", "100"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     plan, found = done.stdout.splitlines()
     assert "the session takes 6.7 min" in plan

@@ -80,16 +80,16 @@ class Settling:
         close = f"within {percent(self.within, '.3g')} of a step over the drive range"
         close += f" ({self.error:.3g}{f' {unit}' if unit else ''})"
         without = f"; {' and '.join(self.left_out)} not counted" if self.left_out else ""
-        if not self.because:
-            return f"{close} at once: no effect of the model takes time{without}"
         why = " and ".join(self.because)
-        if math.isinf(self.seconds):
-            return f"{close} not within {self.followed:.4g} s, because of {why}{without}"
         if self.seconds == 0.0:
-            return f"{close} at once: {why} is over sooner{without}"
+            reason = f"{why} moves it by less" if why else "no effect of the model takes time"
+            return f"{close} at once: {reason}{without}"
+        if math.isinf(self.seconds):
+            return f"{close} not within {self.followed:.4g} s{f', because of {why}' if why else ''}{without}"
         each = f"{_time(self.up)} upwards, {_time(self.down)} downwards"
         alike = _time(self.up) == _time(self.down)
-        return f"{close} after {_time(self.seconds) if alike else each}, mostly because of {why}{without}"
+        because = f", mostly because of {why}" if why else ""
+        return f"{close} after {_time(self.seconds) if alike else each}{because}{without}"
 
 
 def _time(seconds: float) -> str:

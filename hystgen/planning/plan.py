@@ -376,6 +376,7 @@ class _Player:
         t = np.array([self.tempo.seconds(k) for k in range(len(v))])
         top, bottom = (float(self.played([code], 1)[0][0]) for code in (self.grid.high, self.grid.low))
         rise = session.crossing(t, v, 0.5 * (top + bottom))
+        assert rise is not None
         dac = None if self.dac is None else asdict(self.dac)
         where = Session(self.rate, len(v), (top, bottom), plan.rest, rise, tuple(parts), dac)
         whole = Drive(WHOLE, "", (), False, plan.sample_time, plan.sample_time, t, v, codes)

@@ -61,13 +61,14 @@ class Session:
             content = json.loads(Path(path).read_text(encoding="utf-8"))
             version = content.pop("hystgen")
             parts = tuple(Part(**part) for part in content.pop("records"))
-            top, bottom = map(float, content.pop("history"))
+            top, bottom = content.pop("history")
             found = cls(history=(top, bottom), records=parts, **content)
-            numbers = [float(x) for x in (found.rate, found.samples, found.rest, found.rise, top, bottom)]
             inside = all(part.first >= 0 and part.first + part.samples <= found.samples for part in parts)
+            right = version == 1 and inside and found.rate > 0.0 and top > bottom
+            right = right and bool(np.isfinite([found.rate, found.rest, found.rise, top, bottom]).all())
         except (ValueError, TypeError, KeyError, AttributeError):
-            raise PlanError([wrong]) from None
-        if version != 1 or not np.isfinite(numbers).all() or not (found.rate > 0.0 and top > bottom and inside):
+            right = False
+        if not right:
             raise PlanError([wrong])
         return found
 
@@ -117,11 +118,17 @@ class Session:
                     f"{top:.6g}; give the drive in the units of the model"
                 ]
             )
-        return crossing(t, v, middle) - self.rise
+        rising = crossing(t, v, middle)
+        if rising is None:
+            raise PlanError([f"{name}: the drive never rises; is it a recording of this session?"])
+        return rising - self.rise
 
 
-def crossing(t: NDArray[np.float64], v: NDArray[np.float64], middle: float) -> float:
-    """When a drive first rises through `middle`, s."""
-    k = int(np.flatnonzero((v[:-1] < middle) & (v[1:] >= middle))[0])
+def crossing(t: NDArray[np.float64], v: NDArray[np.float64], middle: float) -> float | None:
+    """When a drive first rises through `middle`, s; None where it does not."""
+    rising = np.flatnonzero((v[:-1] < middle) & (v[1:] >= middle))
+    if not len(rising):
+        return None
+    k = int(rising[0])
     share = (middle - v[k]) / (v[k + 1] - v[k])
     return float(t[k] + share * (t[k + 1] - t[k]))
