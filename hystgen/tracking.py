@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.identification import identify
+from hystgen.identification.prepared import samples_in
 from hystgen.model import Model
 
 if TYPE_CHECKING:
@@ -67,19 +68,22 @@ class Tracking:
         return "\n".join(lines)
 
 
-def track(model: Model, records: Sequence[Record], history: Sequence[float] = (), rest: float = 0.0) -> Tracking:
+def track(
+    model: Model, records: Sequence[Record], history: Sequence[float] = (), rest: float = 0.0, skip: float = 0.0
+) -> Tracking:
     """What each compensator would leave, were the records' motions the references.
 
     The recorded actuator answers a drive as the model does, and beyond that by what it did in the record that the model
     does not explain: `y = model[v] + (y_recorded - model[v_recorded])`. The reference is the model's own motion of the
     record. `straight line`: the drive as a linear function of the reference, least squares; `plays alone`: the inverse
     of a Prandtl-Ishlinskii model identified from the same records; `whole model`: the inverse of `model`. `history` and
-    `rest` come before every record. Raises NotInvertibleError, EffectsError, ValueError for records without y.
+    `rest` come before every record; `skip`: seconds at its start that are not compared. Raises NotInvertibleError,
+    EffectsError, ValueError for records without y.
     """
     if any(record.y is None for record in records):
         raise ValueError("tracking needs the measured motion: a column y in every record")
     model.inverse()
-    plain = Model(identify(list(records), history=list(history) or None, rest=rest).parameters)
+    plain = Model(identify(list(records), history=list(history) or None, rest=rest, skip=skip).parameters)
     runs = [model.run(record.v, record.t, record.extra, rest=rest) for record in records]
     moved = [model.chain.simulate([run], history)[0] for run in runs]
     ends = model.cascade.input_range
@@ -95,7 +99,7 @@ def track(model: Model, records: Sequence[Record], history: Sequence[float] = ()
         beside = record.y - reference
         moves = {which: model.chain.simulate([model.run(v, run.t, run.extra)])[0] for which, v in drives.items()}
         known = max(int(np.argmax(record.v)), int(np.argmin(record.v)))
-        known = known if known < MOST_UNKNOWN * len(record.v) else 0
+        known = max(known if known < MOST_UNKNOWN * len(record.v) else 0, samples_in(record, skip))
         errors = {}
         for which, y in moves.items():
             error = y - reference + beside

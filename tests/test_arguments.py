@@ -123,7 +123,7 @@ OPTIONS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
     "history as text": ({"history": "100,-100"}, TypeError, "not '100,-100'; give a list"),
     "history of texts": ({"history": ["a"]}, TypeError, "history .* an entry is none"),
     "rest": ({"rest": "1"}, TypeError, "rest is a number of seconds, not '1'"),
-    "skip": ({"skip": 2.5}, TypeError, "skip is a whole number of samples, not 2.5"),
+    "skip": ({"skip": -2.5}, ValueError, "skip is a number of seconds, not negative, not -2.5"),
     "columns as text": ({"columns": "t=Time"}, TypeError, "columns is a mapping .* not 't=Time'; give {'t': 'Time'"),
     "columns as a list": ({"columns": ["t", "v"]}, TypeError, "columns is a mapping .* not a list"),
     "sample time": ({"sample_time": "1"}, TypeError, "sample_time is a number of seconds, not '1'"),

@@ -311,7 +311,9 @@ def test_a_home_folder_that_cannot_be_written_to_makes_no_noise() -> None:
     assert Path("a.png").exists()
 
 
-def test_zig_builds_without_a_home_folder() -> None:
-    env = {"HOME": "/dev/null/home", "XDG_CACHE_HOME": "/dev/null/cache"}
+@pytest.mark.parametrize("home", ["/dev/null/home", "/proc/none"])
+def test_zig_builds_without_a_home_folder(home: str) -> None:
+    """For one that cannot be made under /proc zig would wait for ever."""
+    env = {"HOME": home, "XDG_CACHE_HOME": f"{home}/cache"}
     done = process("verify", "stage.yaml", "--compiler", "zig", env=env)
     assert done.returncode == 0, done.stdout.decode()

@@ -26,7 +26,7 @@ from scipy.signal import lfilter
 import hystgen
 from hystgen.basics import parallel
 from hystgen.diagnosis import Diagnosis
-from hystgen.diagnosis.data import preparing
+from hystgen.diagnosis.data import items, preparing
 from hystgen.diagnosis.data.items import Item, rms
 from hystgen.diagnosis.data.preparing import set_aside
 from hystgen.diagnosis.data.signals import noise_floor
@@ -45,7 +45,7 @@ from hystgen.effects.noncongruent.model import PlayFunctions
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.effects.sensor_nonlinearity.model import SensorPolynomial
 from hystgen.identification.joint import Bent, DeadZones, Ends, Kept
-from hystgen.records import Record
+from hystgen.records import Record, read_record
 from hystgen.report import diagnosis as report
 from tests.plants import run as plants_run
 from tests.plants.__main__ import main as plants
@@ -229,6 +229,22 @@ def test_flexure_stage_with_its_start(measured: Path, tmp_path: Path) -> None:
     assert content["gap"]["after"]["holdout"] <= 0.005 * content["output_range"]
 
 
+@pytest.mark.data
+def test_flexure_stage_with_more_records(measured: Path, tmp_path: Path) -> None:
+    """The end of the fades hardly shows what the larger loops do, by which it would then be left out."""
+    sine = part_of_file(measured / "p885_sine_1hz.csv", tmp_path / "sine.csv", 300)
+    fades = read_record(part_of_file(measured / "p885_fades_and_hold.csv", tmp_path / "fades.csv", 300))
+    half = len(fades) // 2
+    hystgen.identify(sine).write(tmp_path / "stage.yaml")
+    found = hystgen.diagnose(
+        tmp_path / "stage.yaml", [sine, fades.section(0, half)], holdout=fades.section(half, None, "end")
+    )
+    names = [each["name"] for each in found.content["effects"]]
+    assert names[1:] == ["noncongruent"]
+    assert "lag" in names or [names[0], "lag"] in found.content["not_separable"]
+    assert found.content["gap"]["after"]["holdout"] <= 0.003 * found.content["output_range"]
+
+
 def test_the_sentence_says_what_is_left_open(tmp_path: Path) -> None:
     """What may be another effect, and an error far from noise."""
     parameters = hystgen.load(_model(tmp_path)).parameters
@@ -274,13 +290,13 @@ def test_one_loop_supports_one_name(bent: float, names: int, tmp_path: Path) -> 
 
 
 def test_a_record_of_which_most_is_not_compared_is_told() -> None:
-    """Its largest drive comes late: what is before it may hang on a start that nobody knows."""
-    t = np.arange(4000) * 1e-3
-    v = 50.0 - np.interp(t, [0.0, 3.0], [40.0, 50.0]) * np.cos(2 * np.pi * 2.0 * t)
-    late, early = Record("late", t, v, 0.1 * v), Record("early", t, v[::-1], 0.1 * v[::-1])
+    """Its drive turns for the first time late, and not by enough to show a start memory."""
+    v = np.concatenate([np.linspace(0.0, 100.0, 3000), np.linspace(100.0, 90.0, 300)])
+    late = record(v, noisy(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0), 0.01), "late")
+    early = record(w := wander(3), noisy(brute_output(w, (0.0, 10.0), (1.0, 0.5), 0.0), 0.01), "early")
     ready = preparing.prepare([early, late], [early], None, 0.0)
     (said,) = ready.notes
-    assert said.startswith(f"late: {np.count_nonzero(ready.to_fit[1].known)} of 4000 samples are compared")
+    assert said.startswith(f"late: {np.count_nonzero(ready.to_fit[1].known)} of 3300 samples are compared")
     assert preparing.prepare([early, late], [early], (0.0,), 0.0).notes == []
 
 
@@ -597,12 +613,13 @@ def test_held_out_records_take_no_part_in_the_fit(tmp_path: Path) -> None:
 
 
 def test_records_of_which_the_memory_is_known_at_the_end_only(tmp_path: Path) -> None:
-    """A single sweep tells nothing without a history; with one it does."""
+    """A single sweep says nothing without a history but by its way back; with one it does."""
     v = np.concatenate([np.linspace(0.0, 100.0, 600), np.linspace(100.0, 90.0, 60)])
     sweep = record(v, noisy(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0), 0.01), "sweep")
     path = _model(tmp_path)
-    with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"sweep: there is too little to fit.*--history"):
-        hystgen.diagnose(path, sweep, holdout=sweep)
+    found = hystgen.diagnose(path, sweep, holdout=sweep)
+    assert found.verdict == "nothing_missing"
+    assert any("61 of 660 samples are compared" in note and "--history" in note for note in found.notes)
     short = record(v[:-55], np.asarray(sweep.y)[:-55], "short")
     with pytest.raises(hystgen.diagnosis.IdentificationError, match=r"short: .*: \d samples at most .*--history"):
         hystgen.diagnose(path, short, holdout=short)
@@ -641,14 +658,15 @@ def test_a_history_that_the_starts_contradict_is_left_out(tmp_path: Path) -> Non
     assert "another history than was given" in (tmp_path / "out" / "report.html").read_text()
 
 
-def test_without_the_history_that_the_starts_contradict_there_may_be_too_little(tmp_path: Path) -> None:
+def test_short_records_without_the_history_that_the_starts_contradict(tmp_path: Path) -> None:
+    """What the history hid is found as a start memory: without one next to nothing could be compared."""
     ways = [np.random.default_rng(number).uniform(0.0, 100.0, 9) for number in range(8)]
     legs = [np.concatenate([[way[0], 60.0, 5.0, 0.0, 100.0], way[1:]]) for way in ways]
     records = _behind_a_cycle([np.interp(np.arange(130) / 10.0, np.arange(len(leg)), leg) for leg in legs])
-    hystgen.diagnose(_model(tmp_path), records[:6], holdout=records[6:], history=[100.0, 0.0])
-    said = r"^the \d+ samples at the start, .* the history is left out, and without it record 0, .* too little to fit"
-    with pytest.raises(hystgen.diagnosis.IdentificationError, match=said):
-        hystgen.diagnose(_model(tmp_path), records[:6], holdout=records[6:], history=[0.0])
+    for history in ([100.0, 0.0], [0.0]):
+        found = hystgen.diagnose(_model(tmp_path), records[:6], holdout=records[6:], history=history)
+        assert found.verdict == "nothing_missing"
+        assert [each["kind"] for each in found.content["unexplained"]] == (["history"] if history == [0.0] else [])
 
 
 @pytest.mark.parametrize("command", ["identify", "diagnose"])
@@ -1066,3 +1084,23 @@ def test_rooms_import_earlier_rooms_and_no_report() -> None:
             for name in node.names if within else ():
                 target = f"{within}.{name.name}" if "." not in within and within != "run" else within
                 assert _room(target) <= _room(module), (path, target)
+
+
+def test_ends_of_fitted_records_judge_too() -> None:
+    """They are held out once, from records of the same name too."""
+
+    def made(seed: int, name: str) -> Record:
+        v = wander(seed)
+        return record(v, noisy(brute_output(v, (0.0, 5.0), (1.0, 0.5), 0.0), 0.02), name)
+
+    ready = preparing.prepare([made(1, "same"), made(2, "same")], [made(3, "other")], (0.0,), 0.0)
+    more = preparing.with_ends(ready)
+    assert more is not None
+    for item, front, end in zip(ready.to_fit, more.to_fit, more.held[1:], strict=True):
+        number = np.count_nonzero(item.known)
+        assert np.count_nonzero(end.known) == pytest.approx(0.3 * number, abs=1)
+        assert (front.known | end.known).tolist() == item.known.tolist()
+        assert not (front.known & end.known).any()
+    assert items.compared([*more.to_fit, *more.held]) == items.compared([*ready.to_fit, *ready.held])
+    assert more.notes[-1].endswith("the last 30 % of each fitted record judges too")
+    assert preparing.with_ends(more) is None

@@ -126,7 +126,7 @@ def table(page: Page, section: str) -> list[dict[str, str]]:
 @pytest.fixture(scope="module")
 def fitted() -> tuple[Fit, Record, Record]:
     first, other = spoilt(), made("other.csv", 7)
-    return hystgen.identify(first, model="gpi-deadzone", holdout=other, skip=SKIP, name="axis"), first, other
+    return hystgen.identify(first, model="gpi-deadzone", holdout=other, skip=1e-3 * SKIP, name="axis"), first, other
 
 
 @pytest.fixture(scope="module")
@@ -153,7 +153,8 @@ class TestMasks:
         assert first.outliers.tolist() == known
         assert len(known) >= 3
         assert first.skipped.tolist() == [*range(SKIP)], "at the start of the record, not behind the gap"
-        assert CUT in first.ignored
+        assert [start is None for start in first.starts] == [True, False], "most of the second part needs one"
+        assert CUT not in first.ignored
         assert other.skipped.tolist() == [*range(SKIP)]
         for name in ("outliers", "bridged", "gaps", "left_out"):
             assert getattr(other, name).tolist() == []
@@ -194,12 +195,13 @@ class TestMasks:
         part = fit.parameters.model.pi
         drive = record.v.copy()
         good = np.setdiff1d(np.arange(len(drive)), place(SPIKES))
-        for begin, end in ((0, CUT), (CUT, len(record))):
+        for (begin, end), found in zip(((0, CUT), (CUT, len(record))), used.starts, strict=True):
             inside = good[(good >= begin) & (good < end)]
             v = np.interp(np.arange(begin, end), inside, drive[inside])
             start: float | Array = float(v[0])
-            if begin == 0 and history is not None:
-                start = brute_plays(history, part.thresholds, 0.0)[-1]
+            before = history if begin == 0 and history is not None else found.turns if found else None
+            if before is not None:
+                start = brute_plays(before, part.thresholds, 0.0)[-1]
             expected = brute_output(v, part.thresholds, part.weights, start)
             known = used.compared[begin:end]
             expected += np.mean((record.y[begin:end] - expected)[known])
@@ -465,7 +467,8 @@ class TestDrawing:
     def shown(self, residual: Array, v: Array) -> Shown:
         n, none = len(residual), np.empty(0, dtype=np.intp)
         record = Record("made", np.arange(n) * 0.01, v, residual, sample_time=0.01)
-        return Shown(record, Used("made", False, n, ((0, n),), none, none, none, none, none, none, none), np.zeros(n))
+        used = Used("made", False, n, ((0, n),), (None,), none, none, none, none, none, none, none)
+        return Shown(record, used, np.zeros(n))
 
     @pytest.mark.parametrize("sigma", [0.01, 0.3])
     def test_white_noise_is_told_beside_what_is_smooth(self, sigma: float) -> None:

@@ -79,6 +79,12 @@ def load_model(path: str, effects: Sequence[str] = ()) -> Model:
     return model
 
 
+def seconds(_context: click.Context, _option: click.Parameter, value: float) -> float:
+    if not 0 <= value < math.inf:
+        raise click.BadParameter("give seconds, 0 or more")
+    return value
+
+
 params_argument = click.argument("params", type=click.Path())
 operator_option = click.option(
     "--operator", type=click.Choice(["inverse", "forward", "both"]), help="default: the file's"
@@ -98,6 +104,10 @@ partial_option = click.option(
 layout_option = click.option(
     "--layout", type=click.Choice(["self-contained", "shared-runtime", "single-header"]), default="self-contained",
     show_default=True,
+)  # fmt: skip
+skip_option = click.option(
+    "--skip", type=float, callback=seconds, default=0.0,
+    help="seconds at the start of every record that are not compared, though their drive counts",
 )  # fmt: skip
 T = TypeVar("T")
 U = TypeVar("U")
@@ -138,12 +148,6 @@ def number_list(option: str, text: str, example: str) -> list[float]:
     if not all(map(math.isfinite, numbers)):
         raise Failed(f"error: {option} {text!r} is not a list of numbers; write {option} {example}", 2)
     return numbers
-
-
-def seconds(_context: click.Context, _option: click.Parameter, value: float) -> float:
-    if not 0 <= value < math.inf:
-        raise click.BadParameter("give seconds, 0 or more")
-    return value
 
 
 def reading_options(columns: str | None, sample_time: float | None, delimiter: str | None) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from hystgen.cli.common import (
     params_argument,
     reading_options,
     record_options,
+    skip_option,
 )
 
 PLAYED = ("rate", "dac_bits", "dac_range", "dac_coding")
@@ -68,9 +69,11 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
 )
 @effects_option
 @record_options
+@skip_option
 def diagnose(
     params: str, data: tuple[str, ...], output: str | None, holdout: tuple[str, ...], effects: tuple[str, ...],
-    plan: bool, max_rate: float | None, session: str | None, history: str | None, rest: float, **reading: Any,
+    plan: bool, max_rate: float | None, session: str | None, history: str | None, rest: float, skip: float,
+    **reading: Any,
 ) -> None:
     """Find what a model is missing: where it disagrees with records, the missing effect, the model with it added.
 
@@ -87,7 +90,10 @@ def diagnose(
         raise click.UsageError(f"Missing option '-o': give a folder for {what}")
     played = {name: reading.pop(name) for name in PLAYED}
     if plan:
-        unused = {"DATA": data, "--holdout": holdout, "--history": history, "--rest": rest, "--session": session}
+        unused = {
+            "DATA": data, "--holdout": holdout, "--history": history, "--rest": rest, "--skip": skip,
+            "--session": session,
+        }  # fmt: skip
         unused |= {f"--{option}": reading[option] for option in ("columns", "delimiter")}
         given = [option for option, value in unused.items() if value]
         if given:
@@ -126,7 +132,7 @@ def diagnose(
     inputs = (params, *data, *holdout, *([session] if session else []))
     keep_inputs([Path(output) / name for name in diagnosis.Diagnosis.FILES], inputs)
     guarded(output, partial(files.check, Path(output), diagnosis.Diagnosis.FILES))
-    how: dict[str, Any] = {"holdout": list(holdout), "history": history_values(history), "rest": rest}
+    how: dict[str, Any] = {"holdout": list(holdout), "history": history_values(history), "rest": rest, "skip": skip}
     read_as = reading_options(**reading)
 
     def run() -> None:

@@ -9,7 +9,15 @@ from typing import Any
 import click
 
 from hystgen.basics import console
-from hystgen.cli.common import Failed, guarded, history_values, keep_inputs, reading_options, record_options
+from hystgen.cli.common import (
+    Failed,
+    guarded,
+    history_values,
+    keep_inputs,
+    reading_options,
+    record_options,
+    skip_option,
+)
 
 
 @click.command()
@@ -26,7 +34,7 @@ from hystgen.cli.common import Failed, guarded, history_values, keep_inputs, rea
     "--holdout", multiple=True, type=click.Path(),
     help="record that takes no part in the fit; with --batch for example 'holdout/{unit}.csv'",
 )  # fmt: skip
-@click.option("--skip", type=int, default=0, help="samples at the start of every record that are not compared")
+@skip_option
 @click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, from 0 up")
 @click.option("--name", help="C identifier of the model; default: from the output file")
 @click.option("--units", metavar="V,um", help="units of drive and output; default: the records'")
@@ -35,7 +43,7 @@ from hystgen.cli.common import Failed, guarded, history_values, keep_inputs, rea
 @record_options
 def identify(
     data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
-    holdout: tuple[str, ...], skip: int, loading_curve: bool, name: str | None, units: str | None, plot: str | None,
+    holdout: tuple[str, ...], skip: float, loading_curve: bool, name: str | None, units: str | None, plot: str | None,
     report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None, jobs: int | None,
     scheduler: str | None, **reading: Any,
 ) -> None:
@@ -99,7 +107,7 @@ def identify(
             pages.check_folder(report)
             files.check(Path(report), pages.names())
         older = settings.of(output)
-        read = records.read_records([*data, *holdout], **how)
+        read = records.read_records([*data, *holdout], points=True, **how)
         fit = identification.identify(
             read[: len(data)],
             holdout=read[len(data) :],

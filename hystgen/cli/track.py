@@ -17,6 +17,7 @@ from hystgen.cli.common import (
     params_argument,
     reading_options,
     record_options,
+    skip_option,
 )
 
 
@@ -26,9 +27,10 @@ from hystgen.cli.common import (
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the tracking errors along time")
 @effects_option
 @record_options
+@skip_option
 def track(
     params: str, data: tuple[str, ...], plot: str | None, effects: tuple[str, ...], history: str | None, rest: float,
-    **reading: Any,
+    skip: float, **reading: Any,
 ) -> None:
     """Print what tracking would leave on the recorded actuator: with a straight line, with plays alone, with the model.
 
@@ -48,7 +50,7 @@ def track(
     for record in read:
         for note in record.notes:
             console.note(f"warning: {record.name}: {note}")
-    found = guarded(params, lambda: tracking.track(model, read, visited or (), rest))
+    found = guarded(params, lambda: tracking.track(model, read, visited or (), rest, skip))
     console.say(found.table())
     if plot:
         guarded(params, lambda: plots.show_tracking(found, plot))

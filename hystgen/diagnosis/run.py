@@ -19,7 +19,7 @@ from hystgen.diagnosis.data.signals import NoiseFloor, noise_floor
 from hystgen.diagnosis.findings.content import result_of
 from hystgen.diagnosis.findings.kinds import OtherHistory
 from hystgen.diagnosis.findings.result import Diagnosis, Errors, Inverse, Signals
-from hystgen.diagnosis.search import fits, hypothesis, selection
+from hystgen.diagnosis.search import acceptance, fits, hypothesis, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome
@@ -50,6 +50,7 @@ def diagnose(
     holdout: Source | Iterable[Source] = (),
     history: Sequence[float] | None = None,
     rest: float = 0.0,
+    skip: float = 0.0,
     effects: Sequence[type[Effect]] = (),
     columns: dict[str, str] | None = None,
     sample_time: float | None = None,
@@ -61,8 +62,9 @@ def diagnose(
     `parameters`: a `Model`, a parameter file, or what `identify` found; `records`: measured, to be fitted, each as
     `identify` takes them; `holdout`: records with other waveforms that judge; without them, or where too little of them
     can be compared, every third record, or the end of one, is held out. `history`: drive values visited before every
-    record, ignored where the starts of the records contradict it; `rest`: seconds of pause after them. `effects`:
-    further effects that take part.
+    record, ignored where the starts of the records contradict it; `rest`: seconds of pause after them. `skip`: seconds
+    at the start of every record that are not compared, though their drive counts. `effects`: further effects that take
+    part.
 
     The nominal model is refitted first. Then one effect after the other is added, each shape fitted jointly with the
     weights on the free-run error, and accepted if it removes a worthwhile part of the held-out error that chance does
@@ -86,9 +88,10 @@ def diagnose(
     if not fitted:
         raise ValueError("there is no record to fit")
     arguments.number("rest", rest, "seconds", 0.0)
+    arguments.number("skip", skip, "seconds", 0.0)
     if not all(isinstance(effect, type) and issubclass(effect, Effect) for effect in effects):
         raise TypeError("effects are classes, of files as hystgen.effects.load_user_effects returns them")
-    read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress)
+    read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress, points=True)
     before = None if history is None else visited(history)
     with parallel.one_thread(), Progress(STEPS, progress, "diagnosing") as bar:
         first = hypothesis.as_given(model.cascade, given)
@@ -98,7 +101,7 @@ def diagnose(
             for group in (usable[: len(fitted)], usable[len(fitted) :])
         )
         task = _Task(
-            model.cascade, given, to_fit or read[: len(fitted)], to_hold, rest, effects, lambda: bar.tick(1)
+            model.cascade, given, to_fit or read[: len(fitted)], to_hold, rest, skip, effects, lambda: bar.tick(1)
         )
         done, wrong = task.with_history(before, unit)
         found, made = selection.invertible(done.found, done.records, P0_FLOOR)
@@ -139,6 +142,7 @@ class _Task:
     to_fit: Sequence[Record]
     held: Sequence[Record]
     rest: float
+    skip: float
     user: Sequence[type[Effect]]
     tick: Callable[[], None]
 
@@ -159,7 +163,7 @@ class _Task:
 
     def _begun(self, history: History) -> tuple[Prepared, Callable[[Prepared], Fitted]]:
         """The records as they are compared, and how the nominal model is refitted to such records."""
-        ready = preparing.prepare(self.to_fit, self.held, history, self.rest)
+        ready = preparing.prepare(self.to_fit, self.held, history, self.rest, self.skip)
         base, start = hypothesis.structure_of(self.cascade, self.given, ready)
         weights = hypothesis.nominal_weights(self.cascade, base)
         return ready, lambda ready: selection.refit(base, ready.to_fit, start, weights)
@@ -176,7 +180,20 @@ class _Task:
         return preparing.bends(ready.to_fit, refit(ready), refit_others(others))
 
     def _searched(self, history: History) -> _Done:
+        """The search, and another where nothing could be named though much is left.
+
+        In that one the end of each fitted record judges too: the held-out records may not show what these do.
+        """
         ready, refit = self._begun(history)
+        done = self._search(ready, refit)
+        left = rms(done.found.fitted.errors(done.records.to_fit))
+        if done.found.found or acceptance.is_noise(left, done.noise.rms):
+            return done
+        more = preparing.with_ends(ready)
+        again = None if more is None else self._search(more, refit)
+        return done if again is None or not again.found.found else again
+
+    def _search(self, ready: Prepared, refit: Callable[[Prepared], Fitted]) -> _Done:
         refitted = refit(ready)
         cleaned = disturbances.taken_out(Cleaned(ready, ready), refitted, refit)
         if cleaned.lines:

@@ -149,6 +149,8 @@ class About:
     """further columns that every record has"""
     ringing: tuple[float, ...] = ()
     """frequencies at which the error so far has narrow peaks of its own, Hz, the strongest first"""
+    timed: bool = True
+    """whether the times of the records are known"""
 
 
 @dataclass(frozen=True)

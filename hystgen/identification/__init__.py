@@ -50,6 +50,10 @@ MOST_PLAYS = 1000
 
 MOST_BREAKS = 64
 
+BEYOND = 0.1
+"""Share of the range of the fitted drive by which a held-out part of a record may leave it; further out every model is
+a guess."""
+
 MODEL_PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
 
@@ -66,7 +70,7 @@ def identify(
     rest: float = 0.0,
     name: str = "stage",
     units: Mapping[str, str] | None = None,
-    skip: int = 0,
+    skip: float = 0.0,
     loading_curve: bool = False,
     p0_floor: float = P0_FLOOR,
     columns: Mapping[str, str] | None = None,
@@ -86,9 +90,10 @@ def identify(
     choice but that of `auto`; without them the last quarter of each record gives the held-out figures, from a trial
     model that has not seen it, and the model written is then fitted to everything. `history`: drive values visited
     before every record from a virgin state; without it the start of each record is ignored until the drive has wiped
-    the memory that matters. `rest`: seconds of pause after the history; a PI model does not depend on time, so it
-    changes nothing here. `name`: C identifier of the model. `units`: `input` and `output`, by default those of the
-    records. `skip`: samples at the start of every record that are not compared, though their drive counts.
+    the memory that matters, or where less than half of it would be left its start memory estimated with the weights.
+    `rest`: seconds of pause after the history; a PI model does not depend on time, so it changes nothing here. `name`:
+    C identifier of the model. `units`: `input` and `output`, by default those of the records. `skip`: seconds at the
+    start of every record that are not compared, though their drive counts.
     `loading_curve`: the records are initial loading curves, the drive rising from 0 in a virgin actuator, and nothing
     is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22). `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as it
     comes. `progress`: a bar on a terminal's stderr when it takes more than a second.
@@ -109,7 +114,7 @@ def identify(
     """
     how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve, units)
     to_fit, to_hold = several(records), several(holdout)
-    read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress)
+    read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress, points=True)
     fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
     if not fit_records:
         raise ValueError("there is no record to fit")
@@ -145,7 +150,7 @@ def identify(
     errors = [_compare(item, fitted) for item in compared]
     own = Row.of("fit" if held or not rows else "all", "written", errors)
     rows.append(own)
-    drive = (min(item.drive_range[0] for item in compared), max(item.drive_range[1] for item in compared))
+    drive = _drive(compared)
     if held:
         rows.append(done.held_out)
         reported += [text for item in held if (text := quality.outside(item.name, item.v, drive))]
@@ -171,7 +176,7 @@ def check_options(
     breaks: int | Sequence[float] | None = None,
     history: Sequence[float] | None = None,
     rest: float = 0.0,
-    skip: int = 0,
+    skip: float = 0.0,
     p0_floor: float = P0_FLOOR,
     loading_curve: bool = False,
     units: Mapping[str, str] | None = None,
@@ -187,7 +192,7 @@ def check_options(
             raise ValueError("history and loading_curve exclude each other: an initial loading curve has none")
         before = ()
     arguments.number("rest", rest, "seconds", 0.0)
-    arguments.whole("skip", skip, "samples", 0)
+    arguments.number("skip", skip, "seconds", 0.0)
     if units is not None:
         arguments.texts("units", units, ("input", "output"), "{'input': 'V', 'output': 'um'}")
     if not 0.0 <= p0_floor < 1.0:
@@ -220,26 +225,56 @@ class _Tried:
 
 
 def _try(
-    courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, bar: Progress
+    courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, bar: Progress, parts: bool = False
 ) -> _Tried:
-    """Fit one kind to courses and compare it with others."""
+    """Fit one kind to courses and compare it with others; `parts`: these are parts of the same records."""
     fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, how.floor, bar.tick)
+    if parts:
+        begun = [replace(other, start=item.start) for item, other in zip(compared, held, strict=True)]
+    else:
+        begun = fitted.begun(held)
     largest = float(fitted.solution.thresholds[-1])
-    settled = [replace(item, first=fitted.inner(item).resettled(largest).first) for item in held]
+    settled = [replace(item, first=fitted.inner(item).resettled(largest).first) for item in begun]
     for item in settled:
         if item.used < SHORTEST:
             raise IdentificationError(
-                f"{item.name} is held out, but only {item.used} of its samples can be compared once its start "
-                f"memory is known, at least {SHORTEST} are needed; hold out a longer record, or give --history"
+                f"{item.name} is held out, but only {item.used} of its samples can be compared, at least {SHORTEST} "
+                "are needed; hold out a longer record"
             )
     errors = [_compare(item, fitted) for item in settled]
     return _Tried(fitted, compared, settled, errors, Row.of("held out", "written", errors))
 
 
 def _choose(tried: Sequence[_Tried]) -> int:
-    """The first, that is the simplest, whose held-out error is about as small as any."""
-    enough = MODEL_PARSIMONY * min(each.held_out.rms for each in tried)
-    return next(k for k, each in enumerate(tried) if each.held_out.rms <= enough)
+    """The first, that is the simplest, whose held-out error is about as small as any.
+
+    Samples whose drive lies far outside the fitted range do not choose, if there are others: there every model is a
+    guess.
+    """
+    found = [_rms_inside(each) for each in tried]
+    enough = MODEL_PARSIMONY * min(found)
+    return next(k for k, rms in enumerate(found) if rms <= enough)
+
+
+def _rms_inside(tried: _Tried) -> float:
+    """Held-out rms error over the samples whose drive lies within `BEYOND` of the fitted range; of too few over all."""
+    low, high = _drive(tried.compared)
+    low, high = low - BEYOND * (high - low), high + BEYOND * (high - low)
+    if all(low <= np.min(each.course.v) and np.max(each.course.v) <= high for each in tried.errors):
+        return tried.held_out.rms
+    squares = []
+    for each in tried.errors:
+        drive = each.course.v[each.course.first : each.course.last]
+        inside = each.error[np.isfinite(each.error) & (drive >= low) & (drive <= high)]
+        if len(inside) >= SHORTEST:
+            squares.append((inside - np.mean(inside)) ** 2)
+    return float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else tried.held_out.rms
+
+
+def _drive(courses: Sequence[Course]) -> tuple[float, float]:
+    """Least and largest drive of all courses."""
+    ranges = [item.drive_range for item in courses]
+    return min(low for low, _ in ranges), max(high for _, high in ranges)
 
 
 def _compare(item: Course, fitted: Fitted) -> pi.Errors:
@@ -306,14 +341,13 @@ def _trial(
     instead = "" if len(kinds) == 1 else f". Without anything held out nothing can be chosen: {kinds[0]} was fitted"
     fronts, ends = [], []
     for item in courses:
-        split = round(len(item.v) * (1.0 - HELD_OUT))
-        front = replace(item, last=split).resettled(math.inf)
-        if front.used < SHORTEST or np.ptp(item.v[front.first : split]) == 0.0:
+        front, end = _parted(item)
+        if front.used < SHORTEST or np.ptp(item.v[front.first : front.last]) == 0.0:
             return [], kinds[0], [], f"{item.name}: {short}{instead}"
         fronts.append(front)
-        ends.append(replace(item, begin=max(split, item.begin)))
+        ends.append(end)
     try:
-        tried = [_try(fronts, ends, kind, how, bar) for kind in kinds]
+        tried = [_try(fronts, ends, kind, how, bar, True) for kind in kinds]
     except IdentificationError as failure:
         return [], kinds[0], [], f"nothing was held out: {failure}{instead}"
     chosen = _choose(tried)
@@ -322,8 +356,29 @@ def _trial(
     rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
     rows += [own, replace(best.held_out, model="trial")]
     # of an amplitude that fades the end alone is a smaller range, and no measure for the errors of both
-    whole = max(replace(item, last=len(item.v)).output_range for item in best.compared)
+    whole = max(item.output_range for item in courses)
     return [replace(row, output_range=whole) for row in rows], kinds[chosen], best.errors, ""
+
+
+def _parted(item: Course) -> tuple[Course, Course]:
+    """The part of a record to fit and the share of it to hold out: its end, unless the drive goes there far beyond what
+    it does before, as where amplitudes grow. Then it is the last part of that length that stays within the rest."""
+    number = round(len(item.v) * HELD_OUT)
+    last = len(item.v)
+    beyond = {}
+    for stop in range(last, max(number, item.begin), -number) if number else ():
+        inside = item.v[stop - number : stop]
+        rest = np.concatenate([item.v[item.begin : stop - number], item.v[stop:]])
+        if len(rest) and np.ptp(rest) > 0.0:
+            over = max(float(np.max(inside) - np.max(rest)), float(np.min(rest) - np.min(inside)))
+            beyond[stop] = over / float(np.ptp(rest))
+    stop = next((k for k, over in beyond.items() if over <= BEYOND), last)
+    if stop == last:
+        split = round(len(item.v) * (1.0 - HELD_OUT))
+        return replace(item, last=split).resettled(math.inf), replace(item, begin=max(split, item.begin))
+    y = item.y.copy()
+    y[stop - number : stop] = np.nan
+    return replace(item, y=y), replace(item, begin=max(stop - number, item.begin), last=stop)
 
 
 def _parameters(

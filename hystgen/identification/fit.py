@@ -17,7 +17,7 @@ from hystgen.basics import arguments, display, drawing
 from hystgen.basics.problems import counted
 from hystgen.identification import faults, joint, quality, reduction
 from hystgen.identification.quality import Intervals, Row, table
-from hystgen.identification.reduction import Course
+from hystgen.identification.reduction import Course, Start
 from hystgen.records import Record, Source, read_record, write_atomically
 
 if TYPE_CHECKING:
@@ -113,10 +113,11 @@ class Fit:
         wrong[used.bridged] = True
         part = self.parameters.model.pi
         found = np.full(len(record), np.nan)
-        for start, stop in used.parts:
-            here = slice(start, stop)
-            drive = replace(record.section(start, stop), v=faults.bridged(record.v[here], wrong[here]))
-            inner = self._inner(drive, None if start in used.gaps else self.history)
+        for (first, stop), start in zip(used.parts, used.starts, strict=True):
+            here = slice(first, stop)
+            drive = replace(record.section(first, stop), v=faults.bridged(record.v[here], wrong[here]))
+            visited = None if first in used.gaps else self.history
+            inner = self._inner(drive, visited if start is None else start.turns)
             output = reduction.prediction(inner.v, inner.history, np.array(part.thresholds), np.array(part.weights))
             known = compared[here]
             found[here] = output + float(np.mean((record.y[here] - output)[known]))
@@ -184,7 +185,11 @@ class Fit:
         elif any(row.part == "held out" for row in self.rows):
             reported.append("written: fitted to the records of row fit only.")
         if any(row.ignored for row in self.rows):
-            reported.append("ignored: samples at the start, before the drive had wiped an unknown start memory.")
+            reported.append(
+                "ignored: samples at the start, before the drive had wiped an unknown start memory; none explains them."
+            )
+        if len(self.parameters.model.pi.thresholds) > 1:
+            reported += [each.start_sentence(self.unit) for each in self.used if any(each.starts)]
         reported.append(f"95 % confidence: {self._interval_sentence()}.")
         return reported
 
@@ -209,8 +214,9 @@ class Used:
     """What a fit made of one record; arrays are ascending indices into its samples.
 
     `name`: of the record; `held_out`: whether it took no part in the fit; `samples`: its length; `parts`: first and
-    last sample (exclusive) of each part that was run, one where there is no gap; `skipped`: samples at the start not
-    compared because that was asked for; `ignored`: at the start of a part, because its start memory was not known;
+    last sample (exclusive) of each part that was run, one where there is no gap; `starts`: the start memory that was
+    found for each of them, None where it was given or not found; `skipped`: samples at the start not compared because
+    that was asked for; `ignored`: at the start of a part, because its start memory is not known;
     `outliers`: of y, not compared; `stretches`: the same in drop-outs, held samples or a converter's end; `bridged`: of
     v, replaced by a straight line; `gaps`: first sample behind each gap; `left_out`: between gaps, too little to be of
     use.
@@ -220,6 +226,7 @@ class Used:
     held_out: bool
     samples: int
     parts: tuple[tuple[int, int], ...]
+    starts: tuple[Start | None, ...] = field(repr=False)
     skipped: Indices = field(repr=False, compare=False)
     ignored: Indices = field(repr=False, compare=False)
     outliers: Indices = field(repr=False, compare=False)
@@ -236,6 +243,13 @@ class Used:
             found[masked] = False
         return found
 
+    def start_sentence(self, unit: str) -> str:
+        """The sentence about the start memories that were found."""
+        most = max(start.uncertainty for start in self.starts if start is not None)
+        return (
+            f"{self.name}: the start memory was estimated with the weights, the output at the start to +-{most:.3g}"
+            f"{' ' if unit else ''}{unit} (95 %)."
+        )
 
     def sentences(self) -> list[str]:
         """The sentences that count isolated wrong samples."""
@@ -274,6 +288,7 @@ def _of_record(record: Record, courses: Sequence[Course], held_out: bool) -> Use
         held_out,
         len(record),
         parts,
+        tuple(item.start if item.history is None else None for item in courses),
         np.concatenate(skipped),
         np.concatenate(ignored),
         np.concatenate(outliers),

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.front.stage import Stage
-from hystgen.identification import faults, joint, pi, reduction
+from hystgen.identification import faults, joint, pi, reduction, start
 from hystgen.identification.joint import DeadZones, Front, Kept, Tanh, even_breaks
 from hystgen.identification.pi import IdentificationError, Solution
 from hystgen.identification.reduction import Course, Source
@@ -56,6 +56,10 @@ class Fitted:
         """A course as the plays see it."""
         return joint.through_front(item, self.stages)
 
+    def begun(self, courses: Sequence[Course]) -> list[Course]:
+        """Courses that had no part in the fit, with start memories where their history is not known."""
+        return start.of_model(courses, self.stages, self.solution.thresholds, self.solution.weights)
+
 
 def solve(
     courses: Sequence[Course],
@@ -70,6 +74,8 @@ def solve(
     Of several fronts of a kind the one with the fewest shape numbers is taken that predicts blocks of the records left
     out of the fit about as well as any. Raises IdentificationError.
     """
+    # a start memory found without the front is not the one behind it, but better than too little to compare
+    courses = start.needed(courses, (), wanted if kind == "pi" else None)
     plain, compared = pi.solve(courses, wanted, floor, tick)
     if kind == "pi":
         return Fitted(Kept(), np.empty(0), plain), compared
@@ -87,6 +93,7 @@ def solve(
             best = error, front, shaped.shape
     assert best is not None
     _, front, shape = best
+    courses = start.needed(courses, front.stages(shape), wanted)
     fitted = _solve_behind(courses, front, shape, wanted, floor, tick)
     # the plays may have moved, and the shape is to be the best one for them
     r = fitted.solution.thresholds
@@ -94,6 +101,7 @@ def solve(
     fitted = _solve_behind(courses, front, shape, tuple(float(x) for x in r), floor, tick)
     if wanted is None:
         fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
+    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # the records', whatever the front
     largest = float(fitted.solution.thresholds[-1])
     firsts = [fitted.inner(item).resettled(largest).first for item in courses]
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]
@@ -134,10 +142,10 @@ def _shaped(
     if isinstance(front, Tanh) and front.branches == 2 and before is not None:
         starts = [front.doubled(before)]
     if isinstance(front, DeadZones):
-        start = convex_start(courses, front)
-        if start is not None:
-            starts.append(start)
-    found = [joint.refine(courses, front, start, thresholds, tick) for start in starts]
+        convex = convex_start(courses, front)
+        if convex is not None:
+            starts.append(convex)
+    found = [joint.refine(courses, front, shape, thresholds, tick) for shape in starts]
     return min(found, key=lambda shaped: shaped.rms)
 
 
@@ -173,7 +181,7 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
         first = max(item.first, reduction.settled(measured[: item.last], math.inf))
         pieces = np.clip(item.v[None, :], places[:-1, None], places[1:, None]) - places[:-1, None]
         target = pieces[-1] * ((high - low) / length[-1])
-        turned.append((replace(item, v=measured, y=target, history=None, first=first), pieces))
+        turned.append((replace(item, v=measured, y=target, history=None, start=None, first=first), pieces))
     if not sum(item.used for item, _ in turned):
         return None
     of_course = {id(item): pieces for item, pieces in turned}

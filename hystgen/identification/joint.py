@@ -370,19 +370,22 @@ class Shaped:
 
 
 def through_front(item: Course, stages: Sequence[Stage]) -> Course:
-    """The course as the plays see it: their input in place of the drive, in the history too."""
+    """The course as the plays see it: their input in place of the drive, and of what was visited before."""
     if not stages:
         return item
-    rising, history = _session(item, stages)
-    return replace(item, v=through_stages(stages, item.v, rising), history=history)
+    rising, visited = _session(item, stages)
+    v = through_stages(stages, item.v, rising)
+    if item.history is None and item.start is not None and visited is not None:
+        return replace(item, v=v, start=replace(item.start, turns=visited))
+    return replace(item, v=v, history=visited)
 
 
 def _session(item: Course, stages: Sequence[Stage]) -> tuple[NDArray[np.bool_] | None, tuple[float, ...] | None]:
-    """Directions of the drive along the course, and the history behind the front."""
+    """Directions of the drive along the course, and what was visited before it, behind the front."""
     branched = any(stage.branches_differ for stage in stages)
-    if item.history is None:
+    if item.visited is None:
         return (directions(item.v, True) if branched else None), None
-    before = np.array([0.0, *item.history])
+    before = np.array([0.0, *item.visited])
     whole = directions(np.concatenate([before, item.v]), True) if branched else None
     visited = through_stages(stages, before[1:], None if whole is None else whole[1 : len(before)])
     return (None if whole is None else whole[len(before) :]), tuple(visited.tolist())
@@ -497,9 +500,9 @@ def _rows_with_derivatives(
     """The plays behind the first version of a front, and the change of their weighted sum with every other version."""
     carried = []
     for stages in versions:
-        rising, history = _session(course, stages)
+        rising, visited = _session(course, stages)
         first = through_stages(stages, course.v[:1], None if rising is None else rising[:1])
-        carried.append((stages, rising, reduction.start_states(first, history, thresholds)))
+        carried.append((stages, rising, reduction.start_states(first, visited, thresholds)))
     n1 = len(thresholds)
 
     def rows(start: int, stop: int, compared: bool) -> Array:

@@ -14,8 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.identification import reduction
+from hystgen.identification import reduction, sense
 from hystgen.identification.reduction import Course, Reduced, others, travel
+from hystgen.identification.sense import Sense
 
 Array = NDArray[np.float64]
 
@@ -39,12 +40,16 @@ class IdentificationError(ValueError):
 
 @dataclass(frozen=True)
 class Solution:
-    """A fitted play sum. `reach`: largest threshold that the records support; `fitted`: what was done about p_0."""
+    """A fitted play sum.
+
+    `reach`: largest threshold that the records support; `fitted`: what was done about p_0; `sense`: of the records.
+    """
 
     thresholds: Array
     weights: Array
     reach: float
     fitted: Weights
+    sense: Sense
 
     def without_idle_plays(self) -> Solution:
         """The same without plays that have no weight: they are no part of the model."""
@@ -90,7 +95,8 @@ def solve(
     r = np.array(chosen.thresholds)
     if not np.any(p > 0.0):
         raise IdentificationError(FALLS)
-    solution = Solution(r, p, reach, fitted)
+    way = sense.of(reduced, compared, residual(reduced.whole, columns(reduced, chosen), p))
+    solution = Solution(r, p, reach, fitted, way)
     return (solution if wanted is not None else solution.without_idle_plays()), compared
 
 
@@ -105,7 +111,7 @@ class Errors:
 
 def compare(item: Course, r: Array, p: Array) -> Errors:
     """Free run of the model along the drive, compared from `first` to `last`, with one free offset."""
-    error = (item.y - reduction.prediction(item.v, item.history, r, p))[item.first : item.last]
+    error = (item.y - reduction.prediction(item.v, item.visited, r, p))[item.first : item.last]
     offset = float(np.nanmean(error))
     return Errors(item, offset, error - offset)
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.problems import counted
-from hystgen.identification import faults, pi
+from hystgen.identification import faults, pi, start
 from hystgen.identification.pi import IdentificationError
 from hystgen.identification.reduction import Course
 from hystgen.records import LARGEST, SHORTEST, Record, no_value
@@ -37,24 +37,26 @@ that there are in double precision and in parameter files."""
 
 
 def courses(
-    records: Sequence[Record], history: tuple[float, ...] | None, skip: int
+    records: Sequence[Record], history: tuple[float, ...] | None, skip: float
 ) -> tuple[list[Course], list[str]]:
     """The courses of the records, and a sentence about each change.
 
-    `history` precedes every record; behind a gap the memory is unknown again. Raises IdentificationError.
+    `history` precedes every record; behind a gap the memory is unknown again. `skip`: seconds at the start of every
+    record that are not compared. Raises IdentificationError.
     """
     made: list[Course] = []
     reported: list[str] = []
     for number, record in enumerate(records):
+        skipped = samples_in(record, skip)
         pieces = faults.between_gaps(record)
         if len(pieces) == 1:
-            made.append(replace(course_of(record, history, skip), origin=(number, 0)))
+            made.append(replace(course_of(record, history, skipped), origin=(number, 0)))
             continue
         found = []
         for piece in pieces:
             try:
                 before = None if piece.after_gap else history
-                part = course_of(piece.record, before, max(skip - piece.first, 0))
+                part = course_of(piece.record, before, max(skipped - piece.first, 0))
                 found.append(replace(part, origin=(number, piece.first)))
             except IdentificationError as failure:
                 reported.append(f"left out: {failure}")
@@ -69,6 +71,11 @@ def courses(
         made[k], more = _without_stretches(item)
         reported += more
     return made, reported
+
+
+def samples_in(record: Record, seconds: float) -> int:
+    """Number of samples in the first seconds of a record."""
+    return int(np.searchsorted(record.t, record.t[0] + seconds - 1e-6 * record.sample_time)) if seconds else 0
 
 
 def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
@@ -175,7 +182,9 @@ def mask_outliers(
     Driessen, Data Mining and Knowledge Discovery 12, 2006): it is fitted again without the samples that it misses most,
     as many as may be left out, so that none of them draws it near.
     """
-    solution, _ = pi.solve([_without_pulses(_without_runs(item)[0]) for item in to_fit], wanted, floor)
+    first = start.needed([_without_pulses(_without_runs(item)[0]) for item in to_fit])
+    solution, _ = pi.solve(first, wanted, floor)
+    to_fit[:] = [replace(item, start=each.start).resettled(math.inf) for item, each in zip(to_fit, first, strict=True)]
     places = tuple(float(r) for r in solution.thresholds)
     before: list[Array] = []
     for number in range(MOST_FITS):

@@ -13,6 +13,7 @@ from hystgen.identification import joint, pi, reduction
 from hystgen.identification.gpi import Fitted
 from hystgen.identification.pi import Errors, Solution, Weights
 from hystgen.identification.reduction import Course
+from hystgen.identification.start import STARTS, UNLIKE
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
@@ -279,15 +280,13 @@ SMALL_REACH = 0.1
 """Largest threshold, as a share of the drive range, below which a warning says that a record shows little
 hysteresis."""
 
-STARTS, UNLIKE = 8, 3.0
-"""Fewest samples of a start, and times the rms error of the rest above which its error shows a wrong history."""
-
 
 def about_model(
     solution: Solution, wanted: int | tuple[float, ...] | None, compared: Sequence[Course], own: Row
 ) -> list[str]:
     """Warnings about the model itself, one sentence each."""
-    reported = about_inverse(solution.weights, solution.fitted)
+    reported = solution.sense.sentences(int(np.count_nonzero(solution.weights[1:])))
+    reported += about_inverse(solution.weights, solution.fitted)
     low = min(item.drive_range[0] for item in compared)
     high = max(item.drive_range[1] for item in compared)
     if solution.reach < SMALL_REACH * (high - low):

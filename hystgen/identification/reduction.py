@@ -40,13 +40,26 @@ FOLDS = 4
 
 
 @dataclass(frozen=True)
+class Start:
+    """A start memory found by a fit (`start`).
+
+    `turns`: drive values that lead virgin plays to it; `uncertainty`: half the width of the 95 % interval of what it
+    adds to the output at the first sample, output units.
+    """
+
+    turns: tuple[float, ...]
+    uncertainty: float
+
+
+@dataclass(frozen=True)
 class Course:
     """The samples of one record that take part: drive and output from the record's start, compared over [first, last).
 
     The drive before `first` runs through the plays all the same, as it does where `y` is NaN: such a sample is not
-    compared. `history` are drive values visited before the record; None when it is not known. `begin`: where comparing
-    may begin, its start memory aside. `origin`: which record it is a part of, counted from 0, and at which of its
-    samples it begins. `stretches`: samples whose y was left out in a stretch, and not as isolated; None for none.
+    compared. `history` are drive values visited before the record; None when it is not known, where `start` is the
+    memory that was found instead, if one was sought. `begin`: where comparing may begin, its start memory aside.
+    `origin`: which record it is a part of, counted from 0, and at which of its samples it begins. `stretches`: samples
+    whose y was left out in a stretch, and not as isolated; None for none.
     """
 
     name: str
@@ -58,6 +71,12 @@ class Course:
     begin: int = 0
     origin: tuple[int, int] = (0, 0)
     stretches: NDArray[np.bool_] | None = None
+    start: Start | None = None
+
+    @property
+    def visited(self) -> tuple[float, ...] | None:
+        """Drive values that lead virgin plays to the start memory, known or found; None for neither."""
+        return self.start.turns if self.history is None and self.start is not None else self.history
 
     @property
     def used(self) -> int:
@@ -82,7 +101,7 @@ class Course:
 
     def resettled(self, largest: float) -> Course:
         """The course with no more of its start ignored than a largest threshold makes necessary."""
-        first = 0 if self.history is not None else settled(self.v[: self.last], largest)
+        first = 0 if self.visited is not None else settled(self.v[: self.last], largest)
         return replace(self, first=max(first, self.begin))
 
 
@@ -127,9 +146,21 @@ def _reached(v: Array) -> int:
 
 
 def travel(course: Course, threshold: float) -> float:
-    """Peak-to-peak movement of one play over the samples compared."""
+    """Peak-to-peak movement of one play over the samples compared.
+
+    Where these begin before the memory of that play is known, the lesser of the way up and the way down: while a drive
+    goes one way, a play behind an unknown start shows no more than a straight line.
+    """
     start = start_states(course.v, course.history, np.array([threshold]))[0]
-    return float(np.ptp(operators.play(course.v[: course.last], threshold, float(start))[course.first :]))
+    moved = operators.play(course.v[: course.last], threshold, float(start))[course.first :]
+    if course.first >= replace(course, start=None).resettled(threshold).first:
+        return float(np.ptp(moved))
+    return min(ways(moved))
+
+
+def ways(x: Array) -> tuple[float, float]:
+    """The longest ways up and down that a signal goes, turns in between left out of account."""
+    return float(np.max(x - np.minimum.accumulate(x))), float(np.max(np.maximum.accumulate(x) - x))
 
 
 def prediction(v: Array, history: Sequence[float] | None, thresholds: Array, weights: Array) -> Array:
@@ -170,7 +201,7 @@ Asked for in order, from sample 0; without rows where the samples are not compar
 
 def play_rows(course: Course, thresholds: Array) -> Source:
     """Rows of the plays of one course, far fewer than samples where the drive runs smoothly (`segment_rows`)."""
-    states = start_states(course.v, course.history, thresholds)
+    states = start_states(course.v, course.visited, thresholds)
 
     def rows(start: int, stop: int, compared: bool) -> Array:
         return segment_rows(course.v[start:stop], course.y[start:stop], thresholds, states, compared)

@@ -69,10 +69,12 @@ def read_records(
     delimiter: str | None = None,
     need: Sequence[str] = ("v", "y"),
     progress: bool = False,
+    points: bool = False,
 ) -> list[Record]:
     """Read several data files as `read_record` does; records that are in memory already are kept.
 
-    Samples in memory are called `record`, or `record 1`, `record 2`, .. where there are several.
+    Samples in memory are called `record`, or `record 1`, `record 2`, .. where there are several. `points`: samples
+    without a time are points taken one by one, and not refused.
 
     `progress`: says on stderr once how files were understood ("read as: .."), with a bar on a terminal when it takes
     more than a second. Raises RecordError with every problem in all files, ValueError and TypeError for other
@@ -91,7 +93,8 @@ def read_records(
                     _check_arrays(source)
                     record = source
                 elif isinstance(source, str | os.PathLike):
-                    record = _read(arguments.path("a record", source), columns, sample_time, delimiter, need, bar.tick)
+                    path = arguments.path("a record", source)
+                    record = _read(path, columns, sample_time, delimiter, need, bar.tick, points)
                 else:
                     name = f"record {unnamed.index(k) + 1}" if len(unnamed) > 1 else "record"
                     record = read_memory(source, name, columns, sample_time, need)
@@ -181,8 +184,9 @@ def _read(
     delimiter: str | None,
     need: Sequence[str],
     tick: Callable[[float], None],
+    points: bool,
 ) -> Record:
-    reading = Reading(file, columns or {}, sample_time, delimiter, tuple(need), tick)
+    reading = Reading(file, columns or {}, sample_time, delimiter, tuple(need), tick, points)
     mark = reading.delimiter
     if mark is not None and (len(mark) != 1 or mark in "\"'.\r\n" or mark.isalnum()):
         reading.problem(f'the delimiter "{printable(mark)}" is not usable; give one character such as ;')

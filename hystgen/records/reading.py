@@ -77,8 +77,8 @@ class Reading:
     """One file being read: the request, and the problems and notes about it.
 
     `delimiter`: what separates cells, None where the file has to show it; `fills`: of each column with numbers that
-    stand for no value which ones these are, in words; `read_as`: what was understood that the file does not say in the
-    plainest way.
+    stand for no value which ones these are, in words; `points`: whether it may be without a time; `read_as`: what was
+    understood that the file does not say in the plainest way.
     """
 
     def __init__(
@@ -89,12 +89,14 @@ class Reading:
         delimiter: str | None,
         need: tuple[str, ...],
         tick: Callable[[float], None],
+        points: bool = False,
     ) -> None:
         self.file = file
         self.columns = columns
         self.sample_time = sample_time
         self.delimiter = "\t" if delimiter in ("\\t", "tab") else delimiter
         self.need = need
+        self.points = points
         self.tick = tick
         self.problems: list[str] = []
         self.notes: list[str] = []
@@ -145,7 +147,7 @@ class Reading:
         `steps`: what the file says of its sample rate; it counts where there is neither a time nor `sample_time`.
         """
         finder = Finder(columns, self.columns, ignored, outside)
-        found = finder.find(self.need, self.sample_time is not None, steps)
+        found = finder.find(self.need, self.sample_time is not None or (self.points and not steps), steps)
         for text in finder.problems:
             self.problem(text, line)
         steps = finder.steps
@@ -310,6 +312,9 @@ def repaired(reading: Reading, table: Table) -> Record:
         )
     reading.refuse_if_any()
     t: Array
+    timed = "t" in columns or reading.sample_time is not None
+    if not timed:
+        reading.notes.append("no time: taken as points one by one; give --sample-time if it was recorded evenly")
     if "t" in columns:
         t = columns.pop("t")
         step = _step(reading, t)
@@ -319,7 +324,7 @@ def repaired(reading: Reading, table: Table) -> Record:
     v: Array = columns.pop("v", np.empty(0, dtype=np.float64))
     y = columns.pop("y", None)
     name, read_as = Path(reading.file).name, "; ".join(reading.read_as)
-    return Record(name, t, v, y, columns, step, tuple(reading.notes), table.units, read_as)
+    return Record(name, t, v, y, columns, step, tuple(reading.notes), table.units, read_as, timed)
 
 
 def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_], which: str) -> None:

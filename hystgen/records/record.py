@@ -19,7 +19,8 @@ class Record:
     column and none was needed); `y`: measured displacement or None; `extra`: further numeric columns by name;
     `sample_time`: median step of `t`; `notes`: what was repaired or left out, one sentence each; `units`: the units
     that the file gives, by column (`{"t": "s", "v": "V"}`), the numbers of `v` and `y` as they are in the file;
-    `read_as`: how the file was understood, empty where it is plain CSV or arrays under our names.
+    `read_as`: how the file was understood, empty where it is plain CSV or arrays under our names; `timed`: whether `t`
+    is a time, and no mere count of points taken one by one.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Record:
     notes: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
     read_as: str = ""
+    timed: bool = True
 
     def __repr__(self) -> str:
         span = f", {self.t[0]:.6g} to {self.t[-1]:.6g} s" if len(self) else ""

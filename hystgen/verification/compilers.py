@@ -12,6 +12,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -102,10 +103,11 @@ def _own(name: str) -> dict[str, str]:
     if not name.startswith("zig") or "ZIG_GLOBAL_CACHE_DIR" in os.environ:
         return {}
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    while not os.path.exists(home):  # it would be made
-        home = os.path.dirname(home) or "."
-    if os.path.isdir(home) and os.access(home, os.W_OK | os.X_OK):
-        return {}
+    # zig makes this folder, or waits for ever where that fails (under /proc, say): permissions alone do not show it
+    with contextlib.suppress(OSError):
+        os.makedirs(os.path.join(home, "zig"), exist_ok=True)
+        with tempfile.TemporaryFile(dir=os.path.join(home, "zig")):
+            return {}
     instead = contextlib.ExitStack()
     atexit.register(instead.close)
     return {"ZIG_GLOBAL_CACHE_DIR": str(instead.enter_context(writing.temporary()))}

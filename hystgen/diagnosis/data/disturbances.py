@@ -113,7 +113,7 @@ def steady(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
 
     An actuator answers with the lines of its drive, which are excluded, or it rings and fades.
     """
-    line = in_time(items, errors)
+    line = in_time(items, errors) if all(item.timed for item in items) else None
     if line is None or not isinstance(line.finding, Line):
         return None
     holds = 0

@@ -59,6 +59,8 @@ class Recent:
 class Item:
     """A record as it is compared: `y` is NaN where it is not; `history` the drive before it, None when unknown.
 
+    `timed`: whether its times are known. `turns`: drive values that lead virgin plays to the start memory that was
+    found in place of a history, if any.
     `session`: all records of a session on one time axis, if they are of one, and `part` this record's samples of it.
     `moved`: the last movements of the plays, which most numbers of a search do not change; `residuals`: the last errors
     before the free offsets are fitted; `errors`: the same behind that.
@@ -71,9 +73,16 @@ class Item:
     output_range: float
     session: Run | None = None
     part: slice = field(default_factory=lambda: slice(None))
+    turns: tuple[float, ...] | None = None
+    timed: bool = True
     moved: Recent = field(default_factory=lambda: Recent(*MOVEMENTS), init=False, repr=False, compare=False)
     residuals: Recent = field(default_factory=lambda: Recent(*DIFFERENCES), init=False, repr=False, compare=False)
     errors: Recent = field(default_factory=lambda: Recent(*COMPARISONS), init=False, repr=False, compare=False)
+
+    @property
+    def visited(self) -> tuple[float, ...] | None:
+        """Drive values that lead virgin plays to the start memory, known or found; None for neither."""
+        return self.turns if self.history is None else self.history
 
     @cached_property
     def known(self) -> NDArray[np.bool_]:
@@ -104,11 +113,18 @@ def rms(errors: Sequence[Array]) -> float:
 
 
 def compared(items: Sequence[Item]) -> tuple[int, int]:
-    """Samples that are compared, and samples recorded; the two ends of a record are two items."""
-    known: dict[str, Mask] = {}
+    """Samples that are compared, and samples recorded."""
+    found = [mask for _, mask in masks(items)]
+    return sum(int(np.count_nonzero(mask)) for mask in found), sum(map(len, found))
+
+
+def masks(items: Sequence[Item]) -> list[tuple[str, Mask]]:
+    """Name of each record and the samples of it that are compared; the two ends of a record are two items."""
+    found: dict[int, tuple[str, Mask]] = {}
     for item in items:
-        known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
-    return sum(int(np.count_nonzero(x)) for x in known.values()), sum(map(len, known.values()))
+        _, others = found.get(id(item.run), ("", np.zeros(len(item.known), dtype=bool)))
+        found[id(item.run)] = item.name, item.known | others
+    return list(found.values())
 
 
 class Model(Protocol):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.problems import counted
 from hystgen.chain import chain
-from hystgen.diagnosis.data.items import Item, Model, rms
+from hystgen.diagnosis.data.items import Item, Model, masks, rms
 from hystgen.diagnosis.data.signals import unresolved_edges
 from hystgen.diagnosis.findings.kinds import (
     DropOuts,
@@ -27,11 +27,11 @@ from hystgen.diagnosis.findings.kinds import (
 )
 from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Run
-from hystgen.identification import faults, pi, prepared
+from hystgen.identification import faults, pi, prepared, start
 from hystgen.identification.faults import runs_of
 from hystgen.identification.pi import IdentificationError
-from hystgen.identification.quality import STARTS, UNLIKE
 from hystgen.identification.reduction import Course, settled
+from hystgen.identification.start import STARTS, UNLIKE
 from hystgen.records import Record, no_value
 
 Array = NDArray[np.float64]
@@ -267,14 +267,19 @@ class Prepared:
 
 
 def prepare(
-    records: Sequence[Record], holdout: Sequence[Record], history: tuple[float, ...] | None, rest: float
+    records: Sequence[Record],
+    holdout: Sequence[Record],
+    history: tuple[float, ...] | None,
+    rest: float,
+    skip: float = 0.0,
 ) -> Prepared:
     """Items for the fits; without held-out records that can judge one in three is held out, or the end of each.
 
-    Raises IdentificationError, also where there is too little to compare.
+    `skip`: seconds at the start of every record that are not compared. Raises IdentificationError, also where there is
+    too little to compare.
     """
     notes: list[str] = []
-    held_courses, held_rails = _courses(holdout, history)
+    held_courses, held_rails = _courses(holdout, history, skip)
     if holdout and len(records) > 2 and not enough(held_courses):
         notes.append(too_little(held_courses, JUDGE))
         holdout = []
@@ -284,8 +289,8 @@ def prepare(
         records = [record for k, record in enumerate(records) if k not in aside]
         names = ", ".join(record.name for record in holdout)
         notes.append(f"no record was given that can judge: {names} set aside")
-        held_courses, held_rails = _courses(holdout, history)
-    fit_courses, fit_rails = _courses(records, history)
+        held_courses, held_rails = _courses(holdout, history, skip)
+    fit_courses, fit_rails = _courses(records, history, skip)
     if not enough(fit_courses):
         raise IdentificationError(too_little(fit_courses, "fit"))
     if holdout and not enough(held_courses):
@@ -294,6 +299,11 @@ def prepare(
         raise IdentificationError(too_little(fit_courses, f"fit and {JUDGE}", acceptance.SET_ASIDE))
     repaired: list[Finding] = [*fit_rails, *held_rails]
     prepared.mask_outliers(fit_courses, held_courses, None, 0.0)
+    fit_courses, held_courses, way = _begun(fit_courses, held_courses)
+    notes += way
+    for courses, what in ((fit_courses, "fit"), (held_courses, JUDGE)):
+        if courses and not any(course.used > acceptance.COMPARED_SAMPLES for course in courses):
+            raise IdentificationError(too_little(courses, what))
     for course, record in zip((*fit_courses, *held_courses), (*records, *holdout), strict=True):
         for channel, wrong, what in (
             ("v", np.flatnonzero(course.v != record.v), faults.BRIDGED),
@@ -312,6 +322,8 @@ def prepare(
         to_fit, held = parted(to_fit)
         share = f"{100 * acceptance.SET_ASIDE:g} %"
         notes.append(f"no record was given that can judge: the last {share} of each is set aside")
+    if not all(item.timed for item in (*to_fit, *held)):
+        notes.append("not every record has a time: effects that depend on it are not sought; give --sample-time")
     if not any(float(np.ptp(item.y[item.known])) > 0.0 for item in to_fit if item.known.any()):
         names = ", ".join(item.name for item in to_fit)
         raise IdentificationError(f"{names}: the measured output is constant where it is compared; check the sensor")
@@ -324,16 +336,28 @@ def prepare(
 
 
 def _courses(
-    records: Sequence[Record], history: tuple[float, ...] | None
+    records: Sequence[Record], history: tuple[float, ...] | None, skip: float
 ) -> tuple[list[Course], list[Saturated]]:
     """The records as they take part, and the samples left out at a converter's end."""
     courses, saturated = [], []
     for record in records:
-        course, ends = prepared.without_rails(prepared.course_of(record, history, 0))
+        course, ends = prepared.without_rails(prepared.course_of(record, history, prepared.samples_in(record, skip)))
         courses.append(course)
         for name, level, number in ends:
             saturated.append(Saturated(course.name, None, name, level, number))
     return courses, saturated
+
+
+def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Course], list[Course], list[str]]:
+    """The courses, with a start memory where without one too little could be compared for a name, and notes on the way
+    in which their loops run.
+
+    Elsewhere these are left out: what an effect does in its first seconds may look like a start memory.
+    """
+    begun = start.needed(to_fit, least=acceptance.FEW_COMPARED)
+    solution, _ = pi.solve(begun, None, 0.0)
+    begun_held = start.of_model(held, (), solution.thresholds, solution.weights, acceptance.FEW_COMPARED)
+    return begun, begun_held, solution.sense.sentences(len(solution.thresholds) - 1)
 
 
 def _without_faults(ready: Prepared) -> Prepared:
@@ -353,7 +377,8 @@ def _item(course: Course, record: Record, rest: float) -> Item:
     y[: course.first] = np.nan
     y[unresolved_edges(course.v)] = np.nan
     run = Run(np.ascontiguousarray(record.t, dtype=np.float64), course.v, dict(record.extra), rest)
-    return Item(course.name, run, y, course.history, course.output_range)
+    turns = None if course.start is None else course.start.turns
+    return Item(course.name, run, y, course.history, course.output_range, turns=turns, timed=record.timed)
 
 
 def _outliers(course: Course) -> NDArray[np.intp]:
@@ -385,14 +410,26 @@ JUDGE = "judge by"
 
 
 def enough(courses: Sequence[Course], share: float = 1.0) -> bool:
-    """Whether a share of any of them is enough to compare."""
-    return any(share * course.used > acceptance.COMPARED_SAMPLES for course in courses)
+    """Whether a share of any of them is enough to compare, if a start memory is found for it."""
+    return any(share * _comparable(course) > acceptance.COMPARED_SAMPLES for course in courses)
+
+
+def _comparable(course: Course) -> int:
+    """Number of samples that can be compared once a start memory is found, if it can be."""
+    known = np.isfinite(course.y[course.begin : course.last])
+    return int(np.count_nonzero(known)) if start.findable(course) else course.used
 
 
 def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
     """The message where there is not; `what`: the purpose they are too short for."""
     names = ", ".join(course.name for course in courses)
     most, least = max(course.used for course in courses), acceptance.COMPARED_SAMPLES / share
+    if all(start.findable(course) for course in courses) and not enough(courses, share):
+        most = max(_comparable(course) for course in courses)
+        return (
+            f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record, and more than "
+            f"{least:.0f} are needed; record more"
+        )
     return (
         f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, "
         f"whose memory is not known, and more than {least:.0f} are needed; give --history, "
@@ -402,11 +439,8 @@ def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
 
 def hardly_compared(items: Sequence[Item]) -> list[str]:
     """Notes on records that show nothing beside others that do, and on those that are mostly not compared."""
-    known: dict[str, NDArray[np.bool_]] = {}
-    for item in items:  # the two ends of a record are two items
-        known[item.name] = item.known | known.get(item.name, np.zeros(len(item.known), dtype=bool))
     notes = []
-    for name, compared in known.items():
+    for name, compared in masks(items):
         number = int(np.count_nonzero(compared))
         if number <= acceptance.COMPARED_SAMPLES:
             notes.append(
@@ -437,6 +471,18 @@ def set_aside(records: Sequence[Record]) -> list[int]:
     counts = [list(range(first, len(records), 3)) for first in (2, 1, 0)]
     others = [[*aside[:k], aside[k] - 1, *aside[k + 1 :]] for aside in counts for k in range(len(aside)) if aside[k]]
     return max(counts + others, key=shared)
+
+
+def with_ends(ready: Prepared) -> Prepared | None:
+    """The records with the end of each fitted one held out as well; None where they are, or are too short."""
+    ends = {id(item.run) for item in ready.to_fit} & {id(item.run) for item in ready.held}
+    longest = max(int(np.count_nonzero(item.known)) for item in ready.to_fit)
+    if ends or acceptance.SET_ASIDE * longest <= acceptance.COMPARED_SAMPLES:
+        return None
+    to_fit, held = parted(ready.to_fit)
+    share = f"{100 * acceptance.SET_ASIDE:g} %"
+    note = f"by the held-out records alone nothing could be named: the last {share} of each fitted record judges too"
+    return replace(ready, to_fit=to_fit, held=[*ready.held, *held], notes=[*ready.notes, note])
 
 
 def parted(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:

@@ -196,7 +196,7 @@ class Actuator:
         a = item.run.v
         for effect in self.at(Place.DRIVE):
             a = effect.drive(a, item.run)
-        course = reduction.Course(item.name, a, a, item.history, 0, len(a))
+        course = reduction.Course(item.name, a, a, item.visited, 0, len(a))
         course = joint.through_front(course, self.stages)
         start = reduction.start_states(course.v, course.history, self.thresholds)
         return course.v, item.run, self.thresholds, start

@@ -77,6 +77,7 @@ def about(items: Sequence[Item], thresholds: Array) -> About:
         float(sum(np.sum(np.abs(np.diff(item.run.v))) for item in items)),
         tuple(float(r) for r in thresholds),
         frozenset(columns),
+        timed=all(item.timed for item in items),
     )
 
 
@@ -93,7 +94,7 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
     for name, kind in kinds:
         if (name in there and not kind.repeatable) or not known.columns.issuperset(kind.columns):
             continue
-        if moved and kind.moves_plays():
+        if (moved and kind.moves_plays()) or (kind.timed and not known.timed):
             continue
         for candidate in kind.candidates(known):
             part = Part(name, candidate)

@@ -1,0 +1,142 @@
+"""Records without a history: start memories that are found, loops that run the other way, points without a time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from recordings import brute_output, brute_plays, noisy, record
+
+import hystgen
+from hystgen.identification import IdentificationError, start
+
+Array = NDArray[np.float64]
+
+PLACES = tuple(np.linspace(0.0, 36.0, 10).tolist())
+WEIGHTS = (1.0, *(0.2 * np.exp(-np.arange(9) / 4.0)).tolist())
+
+
+def legs(turns: list[float], step: float = 1.5) -> Array:
+    """A drive that goes straight from turn to turn."""
+    along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(turns)))])
+    return np.interp(np.arange(0.0, along[-1], step), along, turns)
+
+
+def growing() -> Array:
+    """Amplitudes that grow to the end around a drive that is not 0."""
+    return legs([45.0, *(x for k in range(1, 10) for x in (45.0 + 5.0 * k, 45.0 - 4.0 * k))])
+
+
+def never_twice() -> Array:
+    """Turns at random: no extreme is visited again, the largest and the least come late."""
+    return legs([50.0, 70.0, 35.0, 62.0, 20.0, 81.0, 44.0, 58.0, 12.0, 90.0, 31.0, 66.0, 5.0, 98.0, 60.0])
+
+
+class TestMemory:
+    @pytest.mark.parametrize("seed", range(8))
+    def test_turns_lead_virgin_plays_to_the_memory(self, seed: int) -> None:
+        rng = np.random.default_rng(seed)
+        r = np.concatenate([[0.0], np.cumsum(rng.uniform(0.1, 4.0, 9))])
+        slopes = np.clip(rng.uniform(-1.6, 1.6, 9), -1.0, 1.0)
+        states = rng.uniform(-30.0, 30.0) + np.concatenate([[0.0], np.cumsum(slopes * np.diff(r))])
+        turns = [*start.turns_of(r, states), float(states[0])]
+        assert brute_plays(turns, r, 0.0)[-1] == pytest.approx(states, abs=1e-9)
+
+    @pytest.mark.parametrize("before", [(), (100.0,), (110.0, -5.0), (-20.0, 75.0, 30.0)])
+    @pytest.mark.parametrize("drive", [growing, never_twice])
+    def test_costs_no_more_than_a_tenth(self, drive: object, before: tuple[float, ...]) -> None:
+        """Held-out error, on a record whose history is known, of models fitted with the true history and without."""
+        v = drive()  # type: ignore[operator]
+        memory = brute_plays([*before, v[0]], PLACES, 0.0)[-1]
+        y = noisy(brute_output(v, PLACES, WEIGHTS, memory), 0.2)
+        w = np.clip(legs([0.0, *np.random.default_rng(3).uniform(0.0, 100.0, 20)]), v.min(), v.max())
+        z = noisy(brute_output(w, PLACES, WEIGHTS, 0.0), 0.2, 4)
+        errors = []
+        for history in (before, None):
+            fit = hystgen.identify(record(v, y), history=history)
+            assert fit.rows[-1].ignored == 0
+            assert fit.parameters.input_range == (v.min(), v.max())
+            errors.append(np.std(fit.predict(record(w, z), history=[], free_offset=True) - z))
+        assert errors[1] <= 1.1 * errors[0]
+        assert fit.along(record(v, y), fit.used[0]) == pytest.approx(y, abs=1.2)
+        (found,) = fit.used[0].starts
+        assert found is not None
+        off = np.array(WEIGHTS) @ (brute_plays([*found.turns, v[0]], PLACES, 0.0)[-1] - memory)
+        assert abs(off) < max(5.0 * found.uncertainty, 1.0)
+
+    def test_of_plays_that_seldom_turn(self) -> None:
+        """The widest move down by a few volts at the end, and up once behind the unknown start."""
+        v = legs([0.0, 90.0, 30.0, 70.0, 20.0, 80.0, 40.0, 60.0, 3.0, 80.0, 10.0, 98.0, 0.0, 50.0])
+        places, weights = (0.0, 5.0, 15.0, 30.0, 41.0), (1.0, 0.2, 0.2, 0.15, 0.15)
+        fit = hystgen.identify(record(v, noisy(brute_output(v, places, weights, 0.0), 0.1)))
+        assert (fit.rows[-1].ignored, fit.used[0].starts[0] is None) == (0, False)
+        assert fit.rows[-1].rms < 0.15
+
+    def test_a_known_start_has_none(self) -> None:
+        v = growing()
+        fit = hystgen.identify(record(v, brute_output(v, PLACES, WEIGHTS, 0.0)), history=())
+        assert fit.used[0].starts == (None,)
+
+    def test_no_effect_is_named(self, tmp_path: Path) -> None:
+        v = growing()
+        y = noisy(brute_output(v, PLACES, WEIGHTS, brute_plays([100.0, v[0]], PLACES, 0.0)[-1]), 0.2)
+        hystgen.identify(record(v, y)).write(tmp_path / "a.yaml")
+        assert hystgen.diagnose(tmp_path / "a.yaml", record(v, y)).verdict == "nothing_missing"
+
+
+class TestHeldOutPart:
+    def test_growing_amplitudes_hold_out_a_part_inside(self) -> None:
+        """The last quarter goes far beyond what is fitted; the quarter before it does not."""
+        v = growing()
+        fit = hystgen.identify(record(v, noisy(brute_output(v, PLACES, WEIGHTS, 0.0), 0.2)))
+        fitted, held = fit.rows[:2]
+        assert (fitted.part, held.part) == ("fit", "held out")
+        assert held.samples == round(len(v) / 4)
+        assert fitted.samples == len(v) - held.samples
+        assert held.rms < 0.3
+
+
+class TestSense:
+    def test_clockwise_loops_are_told(self) -> None:
+        """A force ahead of its displacement; the exchanged columns are fitted."""
+        x = never_twice()
+        force = noisy(1.5 * x - brute_output(x, (0.0, 10.0), (0.0, 1.0), 50.0), 0.05)
+        fit = hystgen.identify(record(x, force))
+        assert any("the loops run clockwise" in text and "exchange the columns" in text for text in fit.warnings)
+        assert any("no hysteresis was found" in text for text in fit.warnings)
+        exchanged = hystgen.identify(record(force, x))
+        assert not any("clockwise" in text or "no hysteresis" in text for text in exchanged.warnings)
+        assert exchanged.rows[-1].rms < 0.1 * fit.rows[-1].rms * np.ptp(x) / np.ptp(force)
+
+    def test_falling_outputs_are_refused_with_what_to_do(self) -> None:
+        v = never_twice()
+        with pytest.raises(IdentificationError, match="change the sign of y"):
+            hystgen.identify(record(v, -brute_output(v, PLACES, WEIGHTS, 0.0)))
+
+
+class TestPoints:
+    def test_without_a_time(self, tmp_path: Path) -> None:
+        """120 points: fitted, and an effect that does not depend on time is found, none that does is sought."""
+        v = legs([20.0, 80.0, 0.0, 100.0, 10.0, 90.0, 20.0, 80.0, 0.0, 100.0], 6.0)
+        bent = 100.0 * np.expm1(v / 60.0) / np.expm1(100.0 / 60.0)
+        y = noisy(brute_output(bent, (0.0, 5.0, 15.0), (1.0, 0.4, 0.3), bent[0]), 0.2)
+        path = tmp_path / "points.csv"
+        path.write_text("v,y\n" + "\n".join(f"{a!r},{b!r}" for a, b in zip(v.tolist(), y.tolist(), strict=True)))
+        fit = hystgen.identify(path)
+        assert any("no time: taken as points" in text for text in fit.warnings)
+        fit.write(tmp_path / "a.yaml")
+        found = hystgen.diagnose(tmp_path / "a.yaml", path)
+        assert [each["name"] for each in found.content["effects"]][:1] in (["asymmetry"], ["noncongruent"])
+        assert any("effects that depend on it are not sought" in note for note in found.notes)
+
+
+def test_skip_is_in_seconds() -> None:
+    """Samples come every millisecond; the drive of those that are not compared counts."""
+    v = never_twice()
+    y = brute_output(v, PLACES, WEIGHTS, 0.0)
+    y[:100] = -500.0
+    fit = hystgen.identify(record(v, y), history=(), skip=0.1, thresholds=PLACES)
+    assert len(fit.used[0].skipped) == 100
+    assert fit.rows[-1].max < 1e-6
