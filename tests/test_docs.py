@@ -62,6 +62,9 @@ ELSEWHERE = {
         "test_own_effects.py::test_c_gives_the_same_bits_on_cores_and_beside_a_shared_run_time",
     "hystgen diagnose stage_x.yaml sweep.csv --holdout other.csv -o diagnosis/":
         "test_diagnosis.py::test_the_command",
+    "python examples/acquire -o acquired/": "test_session.py::test_from_a_plan_to_a_diagnosis_in_one_run",
+    "hystgen diagnose stage_x.yaml plan/recording.csv --session plan/session.json -o diagnosis/":
+        "test_session.py::test_the_command_of_the_plan_cuts_the_recording",
     "python examples/compensate_plants.py -o docs":
         "test_hysteretic_plants.py::test_the_page_of_the_plants_is_the_table_of_the_example",
 }  # fmt: skip
