@@ -118,6 +118,15 @@ typedef struct {
     hystgen_bend_curve_t inverse;
 } hystgen_bend_t;
 
+/* A piece of what a nonlinear dashpot yields: where it begins, the left shift that stretches it to
+   2^31, and the coefficients of a cubic in that, which leave out `lift` bits. */
+typedef struct {
+    uint32_t begin;
+    int32_t c[4];
+    uint8_t scale;
+    uint8_t lift;
+} hystgen_yield_t;
+
 /* Stops, and the slope beyond them. */
 typedef struct {
     int64_t lower;

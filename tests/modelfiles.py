@@ -107,7 +107,5 @@ CHAINS = {
 
 INVERSE_ALONE = ("viscous_twin",)
 
-FLOAT_ALONE = (
-    "heated", "viscous", "dilated", "bumpy", "dashpot", "soft_dashpot",
-)  # fmt: skip
-"""Those with own heat, or whose plays are bent or have a nonlinear dashpot, which fixed point does not have."""
+FLOAT_ALONE = ("heated",)
+"""Those with own heat, which fixed point does not have."""

@@ -103,7 +103,7 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
     wanted = Compensator(one.chain, one.parameters.emit.compensation.compensate).drives(exact, ends) / drive  # type: ignore[arg-type]
     left = np.abs(v - wanted)[: N - numbers.ahead]
     assert np.max(left) <= codes.inverse_error
-    assert bool(codes.condition) == (name in ("lagging", "quick", "straight", "everything", "wider"))
+    assert bool(codes.condition) == (name in ("lagging", "quick", "straight", "everything", "wider", "dilated"))
     if name not in BRANCHED and not codes.condition:
         assert np.max(left) <= codes.inverse_rounding
     if name not in INVERSE_ALONE:

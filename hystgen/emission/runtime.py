@@ -217,19 +217,17 @@ class Variant:
         if self.chain:
             slew = "chain_slew.c" if self.slew else "chain_free.c"
             delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
-            kept = () if self.moves == "dashpot" else ("moved_kept.c",)
-            bent = (f"moved_{self.moves}.c", *kept, f"bent_{self.bends}.c", "chain_moving.c")
-            searched = ("moved_searched_fixed.c",) if self.bends else ()
-            moving = ("stretched_fixed.c", f"moved_{self.moves}_fixed.c", *searched, "chain_moving_fixed.c")
-            plays: tuple[str, ...]
-            if not self.moves and not self.bends:
-                plays = ("chain_plays_fixed.c" if self.fixed else "chain_plays.c",)
-            elif self.fixed:
-                plays = moving
+            if not self.moves:
+                plays: tuple[str, ...] = ("chain_plays.c",)
+            elif not self.bends:
+                plays = ("stretch.c", f"relaxing_{kind}.c", "chain_relaxing.c")
             else:
-                plays = bent if self.bends else ("chain_relaxing.c",)
+                before = {"relaxing": ("stretch.c",), "dashpot": (f"yield_{kind}.c",)}.get(self.moves, ())
+                kept = () if self.moves == "dashpot" else ("moved_kept.c",)
+                bent = "bent_fixed.c" if self.fixed and self.bends != "none" else f"bent_{self.bends}.c"
+                plays = (*before, f"moved_{self.moves}.c", *kept, bent, "chain_moving.c", f"search_{kind}.c")
             finer = "chain_finer.c" if self.finer else "chain_whole.c"
-            return (start, f"loop_{front}.c", delay, slew, *plays, finer, f"chain_{kind}.c", "chain.c", *more)
+            return (start, f"loop_{front}.c", delay, slew, f"chain_{kind}.c", *plays, finer, "chain.c", *more)
         return (
             start,
             f"loop_{front}.c",

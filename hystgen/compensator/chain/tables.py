@@ -83,7 +83,4 @@ def refusals(
             yield from ((effect, reason) for reason in ageing.problems(effect, high - low))
     if operator != "inverse":
         yield from moving.beyond_forward(chain.cascade, parts.plays, seconds)
-    without = list(moving.problems(chain.cascade, parts.plays))
-    yield from without
-    if ARITHMETICS[arithmetic].fixed and not without:
-        yield from moving.beyond_fixed(parts.plays)
+    yield from moving.problems(chain.cascade, parts.plays)
