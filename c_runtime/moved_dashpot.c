@@ -8,9 +8,7 @@
 static hystgen_sum_t hystgen_change(unsigned int i, const hystgen_play_t *play, hystgen_sum_t w) {
     const hystgen_play_t r = hystgen_model_tables.threshold[i];
     const hystgen_sum_t x = play[0] + hystgen_seen(w - play[0]) - play[i];
-    const hystgen_sum_t gained = x > r    ? hystgen_yield(x - r)
-                                 : x < -r ? -hystgen_yield(-x - r)
-                                          : 0;
+    const hystgen_sum_t gained = x > r ? hystgen_yield(x - r) : x < -r ? -hystgen_yield(-x - r) : 0;
     return gained + play[HYSTGEN_N_PLAYS + i];
 }
 

@@ -106,6 +106,3 @@ CHAINS = {
 """Models with effects, every block and every kind of each; some can be emitted as an inverse alone."""
 
 INVERSE_ALONE = ("viscous_twin",)
-
-FLOAT_ALONE = ("heated",)
-"""Those with own heat, which fixed point does not have."""

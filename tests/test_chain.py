@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import BRANCHES, CHAINS, CREEP, FILES, FLOAT_ALONE, INVERSE_ALONE, chain
+from modelfiles import BRANCHES, CHAINS, CREEP, FILES, INVERSE_ALONE, chain
 from scipy.integrate import solve_ivp
 
 import hystgen
@@ -43,9 +43,8 @@ def model(name: str, text: str | None = None) -> Model:
     return Model(parse_parameters(text or CHAINS[name], f"{name}.yaml"))
 
 
-FIXED = [name for name in CHAINS if name not in FLOAT_ALONE]
 EVERY = [(name, arithmetic) for name in CHAINS for arithmetic in ("float32", "float64")] + [
-    (name, arithmetic) for name in FIXED for arithmetic in ("q31", "q15")
+    (name, arithmetic) for name in CHAINS for arithmetic in ("q31", "q15")
 ]
 
 
@@ -607,10 +606,6 @@ def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
     text = CHAINS["creeping"].replace("sample_time: 1.0e-3\n", "")
     with pytest.raises(EffectsError, match="needs sample_time"):
         emit_options(model("creeping", text))
-    for name in FLOAT_ALONE:
-        with pytest.raises(UnsupportedEffectsError, match="in fixed point there is no C for own heat"):
-            emit_options(model(name), arithmetic="q15", operator="inverse")
-    assert emit_options(model("heated"), arithmetic="q31", allow_partial=True).left_out
     with pytest.raises(UnsupportedEffectsError, match=r"of the 62010 codes .* moves the drive by 5.3 % of its range"):
         emit_options(model("straight"), arithmetic="q15")
     with pytest.raises(FormatError, match=r"slew_limit: 0\.819 drive codes a sample are less than one"):

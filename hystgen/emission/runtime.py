@@ -33,8 +33,8 @@ CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
 CHAIN_BLOCKS = (*(kind.file for kind in KINDS), "delay.c", "delay_float.c", "preview.c", "preview_float.c")
 FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
 FIXED_CHAIN_BLOCKS = (
-    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "mode_fixed.c",
-    "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c", "bend.c", "stops.c",
+    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "heat_fixed.c",
+    "mode_fixed.c", "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c", "bend.c", "stops.c",
 )  # fmt: skip
 """What models with effects have of their own, also beside a shared run time."""
 

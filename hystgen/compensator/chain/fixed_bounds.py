@@ -15,6 +15,7 @@ behind a memoryless part while nothing is limited, since there is nothing beyond
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -45,6 +46,7 @@ from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.resonance import fixed as resonance_fixed
 from hystgen.effects.resonance.compensator import ModeNumbers
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
+from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
 from hystgen.effects.thermal.fixed import GAIN_BITS
 
@@ -96,7 +98,7 @@ class Bounds:
     `bends`: there and back of each tanh; `ends`: of the output; `slowed`: share of its rates that a slew limit loses in
     whole codes; `drifted`: error of drifts in signals; `reached`: whether all that is asked in front of the plays can
     be led to; `largest_step`: as in `Compiled`; `finer`: bits of what arrives in front of the plays below their input;
-    `bumps`: of bent plays.
+    `bumps`: of bent plays; `heats`: errors of temperatures of own heat, degrees.
     """
 
     static: StaticModel
@@ -119,6 +121,7 @@ class Bounds:
     finer: int
     seconds: float
     bumps: Bumps
+    heats: list[float]
 
     @property
     def _fine(self) -> int:
@@ -197,7 +200,20 @@ class Bounds:
 
     def _gains(self) -> tuple[int, float]:
         """How many gains there are, and the error of each as a share of the output."""
-        return len(self.parts.ageing) + len(self.parts.thermal), 8.0 * 2.0**-GAIN_BITS
+        return len(self.parts.ageing) + len(self.parts.heat) + len(self.parts.thermal), 8.0 * 2.0**-GAIN_BITS
+
+    def _warmed(self, degrees: Sequence[float]) -> float:
+        """Change of the output, in codes, by errors of the temperatures of own heat."""
+        lsb = float(self.inner.output_lsb)
+        return math.fsum(
+            wrong * (abs(each.gain_per_degree) * self.sizes.still + abs(each.offset_per_degree) / lsb)
+            for wrong, each in zip(degrees, self.parts.heat, strict=True)
+        )
+
+    def _warmed_at_once(self) -> float:
+        """Change of the output, in codes, by the heat of one sample at the fastest rate."""
+        ends, way = self.static.input_range, self.largest_step
+        return self._warmed([thermal.most_at_once(each, ends, way, self.seconds) for each in self.parts.heat])
 
     def _saturation(self) -> tuple[float, float, float]:
         """Of what saturates: the slope of its inverse at the ends of the output, the error of the inverse, and that of
@@ -317,6 +333,7 @@ class Bounds:
             error = error * numbers.rest + self._creep(j)
         gains, share = self._gains()
         error = LARGEST_GAIN**gains * (error + gains * (share * self.sizes.still + self._signal))
+        error += LARGEST_GAIN**gains * self._warmed(self.heats)
         if self.parts.ageing:
             error += ageing.TABLE_ERROR * self.sizes.still
         for mode, size, row in zip(self.modes, self.sizes.modes, self.tables.mode, strict=True):
@@ -337,7 +354,7 @@ class Bounds:
             own = sum(missed(weight) * size + 0.5 * self._signal for weight in self.taps)
             error = error * math.fsum(map(abs, self.taps)) + own
         gains, share = self._gains()
-        late = self._late() * self.sizes.still
+        late = self._late() * self.sizes.still + self._warmed(self.heats) + self._warmed_at_once() / LEAST_GAIN
         error = (1.0 / LEAST_GAIN) ** gains * (error + gains * (share * self.sizes.still + self._signal) + late)
         whole = float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
         apart = self._plays(self.slowed * whole) if self.slowed else 0.0  # states behind drives that a rate holds

@@ -64,6 +64,7 @@ from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturati
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal import fixed as thermal_fixed
 from hystgen.effects.thermal.compensator import HeatTables
+from hystgen.effects.thermal.fixed import Heat
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
@@ -141,7 +142,7 @@ class _Builder:
             self._need(self._mode_tables, "resonance"),
             self._need(lambda: self._ageing(span), "ageing"),
             self._need(self._gains, "a temperature"),
-            HeatTables(np.zeros((0, 7), np.int64), np.zeros(0, np.int64)),
+            self._need(self._heat_tables, "own heat"),
             self._need(self._clock_tables, "drift"),
             OwnTables(np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64), 0),
             behind,
@@ -156,7 +157,7 @@ class _Builder:
             static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags,
             self.modes, sum(each.error for each in self.clocks), weights,
             self.bends, (self.low, self.high), slowed, self.reached, self._largest_step(), self.finer,
-            self.seconds, self.bumps,
+            self.seconds, self.bumps, [one.error for one in self.heats],
         )  # fmt: skip
         plays.limits[slots.HOLD] = bounds.hold()
         codes = Codes(
@@ -201,7 +202,7 @@ class _Builder:
         span = self._code(self.high - self.low)
         for _ in self.parts.ageing:
             size *= thermal.LARGEST_GAIN
-        for _ in self.parts.thermal:
+        for _ in (*self.parts.heat, *self.parts.thermal):
             size = size * thermal.LARGEST_GAIN + span
         still = size
         modes = []
@@ -223,7 +224,7 @@ class _Builder:
             undone.append(back)
         target = back * (math.fsum(map(abs, self.taps.weights.tolist())) if self.taps else 1.0) + 1.0
         asked = target
-        for _ in self.parts.thermal:
+        for _ in (*self.parts.heat, *self.parts.thermal):
             asked = (asked + span) / thermal.LEAST_GAIN
         for _ in self.parts.ageing:
             asked = asked / thermal.LEAST_GAIN
@@ -402,6 +403,20 @@ class _Builder:
         ]
         bits = thermal_fixed.GAIN_BITS - (self.about.code_bits - 2)
         return ageing_fixed.tables(rows, float(self.drive_lsb), bits)
+
+    @cached_property
+    def heats(self) -> list[Heat]:
+        """Own heat, of each effect."""
+        span, level = self.high - self.low, 2.0**self.bits / float(self.output_lsb)
+        largest, lsb = max(map(abs, self.inner.drive)), float(self.drive_lsb)
+        rows = [thermal.heat_numbers(each, span, self.seconds) for each in self.parts.heat]
+        return [thermal_fixed.heat(row, largest, lsb, level) for row in rows]
+
+    def _heat_tables(self) -> HeatTables:
+        ends, roundoff = self.static.input_range, 2.0**-thermal_fixed.GAIN_BITS
+        turns = [thermal.heat_turns(each, ends, self.seconds, roundoff) for each in self.parts.heat]
+        table = np.array([one.table for one in self.heats], dtype=np.int64)
+        return HeatTables(table.reshape(-1, thermal_fixed.DROP + 1), np.array(turns, dtype=np.int64))
 
     def _gains(self) -> Any:
         span = self.high - self.low
