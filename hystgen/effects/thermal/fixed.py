@@ -132,7 +132,7 @@ HEAT_KIND = Kind(
     memory="wiiw",
 )  # fmt: skip
 
-RATE, PER_SQUARE, PER_RISE, OFFSET_PER_RISE, HOTTEST, COARSE, LIFT, DROP = 0, 2, 4, 6, 8, 9, 10, 11
+RATE, PER_SQUARE, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, COARSE, LIFT, DROP = 0, 2, 4, 6, 8, 9, 10, 11
 RISE, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET = range(4)
 
 
@@ -189,7 +189,7 @@ def heat_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> None:
     warmer = times(size, n[PER_SQUARE], n[PER_SQUARE + 1]) << n[LIFT]
     s[j, RISE] = s[j, RISE] + (warmer - times(s[j, RISE] >> n[DROP], n[RATE], n[RATE + 1]))
     warm = s[j, RISE] >> n[DROP]
-    rise = n[HOTTEST] if warm > n[HOTTEST] else warm
+    rise = n[HOTTEST_RISE] if warm > n[HOTTEST_RISE] else warm
     gain = ONE + times(rise, n[PER_RISE], n[PER_RISE + 1])
     if gain < LEAST:
         gain = zero(gain) + LEAST
