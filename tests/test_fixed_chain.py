@@ -425,7 +425,7 @@ def test_bent_plays_contribute_what_the_model_has(name: str, arithmetic: str) ->
 @BOTH
 @pytest.mark.parametrize(("exponent", "ratio"), [(2.5, 5.0), (0.5, 2.0), (3.0, 2.0**28), (1.5, 0.1)])
 def test_what_a_dashpot_yields_in_fixed_point(exponent: float, ratio: float, arithmetic: str) -> None:
-    """Stretches over all decades against the exact law, to a thousandth of what it yields, and to a step; or to what the
+    """Stretches over all decades against the exact law, to a thousandth of what it yields and a step, or to what the
     least stretch that the table tells apart yields, or hardly anything in 2^28 steps. Never more than the stretch."""
     text = f"name: rate_dependence, shape: relaxation, time_constant: {ratio * T}, exponent: {exponent}"
     one = model(chain("yields", text))
