@@ -11,8 +11,7 @@ HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_moved_sum(const hystgen_play_t *pla
     unsigned int i;
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         const hystgen_sum_t z = hystgen_moved(i, play, w);
-        const bool rests = z >= play[i] && z <= play[i];
-        sum = sum + hystgen_model_tables.weight[i] * (rests ? bent[i] : hystgen_bent(i, z));
+        sum = sum + hystgen_model_tables.weight[i] * hystgen_contributed(i, play, bent, z);
     }
     return sum;
 }
@@ -25,8 +24,7 @@ static hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *b
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         const hystgen_sum_t z = hystgen_moved(i, play, w);
         const hystgen_sum_t rest = hystgen_left(i, z, w);
-        const bool rests = z >= play[i] && z <= play[i];
-        const hystgen_sum_t value = rests ? bent[i] : hystgen_bent(i, z);
+        const hystgen_sum_t value = hystgen_contributed(i, play, bent, z);
         sum = sum + hystgen_model_tables.weight[i] * value;
         bent[i] = rest >= z && rest <= z ? value : hystgen_bent(i, rest);
         hystgen_keep(i, play, w, rest);

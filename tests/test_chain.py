@@ -602,6 +602,19 @@ def test_what_has_no_inverse_is_refused_or_left_out_and_named(effect: str, reaso
     assert "part_creep" in emitted_files(one, allow_partial=True)["part.c"], "what there is stays"
 
 
+def test_bent_plays_may_be_too_steep_for_thresholds_that_grow_with_the_rate() -> None:
+    wider = "name: rate_dependence, betas: [1.09e-3, 0, 0, 0, 0, 0]"
+    for amplitude, refused in ((11.0, False), (13.0, True)):
+        bump = f"name: noncongruent, shape: centre, amplitude: {amplitude}, centre: 0, width: 2"
+        one = model("steep", chain("steep", wider, bump))
+        if not refused:
+            assert emit_options(one, operator="inverse").operator == "inverse"
+            continue
+        for arithmetic in ("float32", "q31"):
+            with pytest.raises(UnsupportedEffectsError, match=r"fall in a step as the drive rises, by 0\.0"):
+                emit_options(one, operator="inverse", arithmetic=arithmetic)
+
+
 def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
     text = CHAINS["creeping"].replace("sample_time: 1.0e-3\n", "")
     with pytest.raises(EffectsError, match="needs sample_time"):

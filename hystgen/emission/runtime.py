@@ -225,7 +225,9 @@ class Variant:
                 before = {"relaxing": ("stretch.c",), "dashpot": (f"yield_{kind}.c",)}.get(self.moves, ())
                 kept = () if self.moves == "dashpot" else ("moved_kept.c",)
                 bent = "bent_fixed.c" if self.fixed and self.bends != "none" else f"bent_{self.bends}.c"
-                plays = (*before, f"moved_{self.moves}.c", *kept, bent, "chain_moving.c", f"search_{kind}.c")
+                known = () if self.bends == "none" else ("bent_known.c",)
+                moved = (*before, f"moved_{self.moves}.c", *kept, bent, *known)
+                plays = (*moved, "chain_moving.c", f"search_{kind}.c")
             finer = "chain_finer.c" if self.finer else "chain_whole.c"
             return (start, f"loop_{front}.c", delay, slew, f"chain_{kind}.c", *plays, finer, "chain.c", *more)
         return (

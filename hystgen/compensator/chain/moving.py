@@ -127,19 +127,30 @@ class Bumps:
         return worst * 2.0 ** (self.lift - self.bits) + 0.5 * (len(self.curves) > 0)
 
 
-def problems(static: StaticModel, effects: Sequence[Effect]) -> Iterator[tuple[Effect, str]]:
-    """Which effects on plays the C cannot solve for, and why."""
+def problems(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
+    """Which effects on plays the C cannot solve for at steps of `seconds`, and why."""
     bending = [effect for effect in effects if effect.bends_plays()]
     yield from ((effect, "one effect bends the plays, and there is another one") for effect in bending[1:])
-    if bending and not (slope := least_slope(static, bending[:1])) > 0.0:
+    if not bending:
+        return
+    if not (slope := least_slope(static, bending[:1])) > 0.0:
         yield bending[0], f"somewhere the output falls as the drive rises, by {-slope:.3g} a unit: there is no inverse"
+    elif _dilated(static, effects, seconds) and not (slope := least_dilated(static, effects, seconds)) > 0.0:
+        what = "plays are so steep that with thresholds by rate the output may fall in a step as the drive rises"
+        yield bending[0], f"{what}, by {-slope:.3g} a unit: there is no inverse"
+
+
+def _dilated(static: StaticModel, effects: Sequence[Effect], seconds: float) -> bool:
+    """Whether thresholds grow with the rate as they are, without viscous plays in their place."""
+    r, p = np.array(static.pi.thresholds), np.array(static.pi.weights)
+    thresholds = [effect for effect in effects if isinstance(effect, ThresholdRate)]
+    return any(Movement(effect, r, p).by_threshold(seconds) for effect in thresholds)
 
 
 def beyond_forward(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
     """Thresholds that grow so fast with the rate that viscous plays stand in for them, in the inverse alone."""
-    r, p = np.array(static.pi.thresholds), np.array(static.pi.weights)
     for effect in effects:
-        if isinstance(effect, ThresholdRate) and not Movement(effect, r, p).by_threshold(seconds):
+        if isinstance(effect, ThresholdRate) and not _dilated(static, [effect], seconds):
             yield effect, "viscous plays stand in for it, which only the inverse may; emit the inverse alone"
 
 

@@ -81,4 +81,4 @@ def refusals(
             yield from ((effect, reason) for reason in ageing.problems(effect, high - low))
     if operator != "inverse":
         yield from moving.beyond_forward(chain.cascade, parts.plays, seconds)
-    yield from moving.problems(chain.cascade, parts.plays)
+    yield from moving.problems(chain.cascade, parts.plays, seconds)
