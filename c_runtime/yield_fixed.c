@@ -25,9 +25,9 @@ HYSTGEN_APART int64_t hystgen_yield(int64_t x) {
         high = before ? middle : high;
     }
     const hystgen_yield_t *piece = &hystgen_yields[low];
-    const int64_t h = (int64_t)((inside - piece->begin) << piece->scale);
+    const uint32_t h = (inside - piece->begin) << piece->scale;
     for (k = 4; k > 0; --k) {
-        y = piece->c[k - 1u] + ((y * h + ((int64_t)1 << 30)) >> 31);
+        y = piece->c[k - 1u] + ((y * (int64_t)h + ((int64_t)1 << 30)) >> 31);
     }
     y = y * ((int64_t)1 << piece->lift);
     return y > hystgen_yield_of(x) ? hystgen_yield_of(x) : y;

@@ -332,6 +332,8 @@ def _yields(
 ) -> list[tuple[int, ...]]:
     """Pieces of what stretches up to `end` yield, cubic between whole knots; the first one is straight."""
     knots = sorted({0, end + 1, *(x for x in begins if 0 < x <= end)})
+    while knots[-2] and dashpot.LONGEST * knots[-2] < end:  # beyond what the model's own table reaches
+        knots.insert(-1, int(dashpot.LONGEST) * knots[-2])
     while (wide := max(b - a for a, b in itertools.pairwise(knots))) > 2**30:
         k = next(i for i, (a, b) in enumerate(itertools.pairwise(knots)) if b - a == wide)
         knots.insert(k + 1, (knots[k] + knots[k + 1]) // 2)
