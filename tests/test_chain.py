@@ -85,7 +85,7 @@ def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
     ("name", "arithmetic"),
     [("everything", "float32"), ("viscous", "float32"), ("aged", "float32"),
      ("drifting_late", "float32"), ("heated", "float32"), ("everything", "q31"), ("everything", "q15"),
-     ("worn", "q15"), ("quick", "q15")],
+     ("worn", "q15"), ("quick", "q15"), ("soft_dashpot", "q31"), ("dilated", "q15"), ("heated", "q15")],
 )  # fmt: skip
 def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:
     cores = ["cortex-m4f", "cortex-m0plus", "cortex-m7", "cortex-m33", "rv32imac", "mips32"]

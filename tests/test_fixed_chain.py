@@ -232,6 +232,7 @@ def wild(rng: np.random.Generator, kinds: list[int], real: np.dtype[Any], n: int
     return op, x.astype(real)
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("name", CHAINS)
 @BOTH
 def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_path: Path) -> None:
