@@ -32,8 +32,6 @@ from hystgen.verification import comparison, emulator, sources, targets
 
 MOVED = ("dashpot", "polynomial", "centre")
 DOCS = Path(__file__).resolve().parents[1] / "docs"
-FLOAT_ALONE = ("dilated", "polynomial", "centre")
-"""Plays that fixed point does not have."""
 EFFECTS = {
     "creep": "name: creep, time_constants: [0.01, 0.03, 0.1, 0.3, 1, 3], "
     "weights: [0.01, 0.01, 0.01, 0.01, 0.01, 0.01]",
@@ -105,13 +103,12 @@ def main() -> None:
     cores = given.cores.split(",")
     sizes, costs = [], []
     with tempfile.TemporaryDirectory(prefix="hystgen-effects-") as place:
-        for arithmetic, about in ARITHMETICS.items():
+        for arithmetic in ARITHMETICS:
             base = measured(Path(place) / f"none-{arithmetic}", "", arithmetic, cores)
             least = measured(Path(place) / f"least-{arithmetic}", "gain", arithmetic, cores)
             ahead = measured(Path(place) / f"forward-{arithmetic}", "gain", arithmetic, cores, "forward")
-            if not about.fixed:
-                moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
-            for effect in ("any", *(each for each in EFFECTS if not (about.fixed and each in FLOAT_ALONE))):
+            moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
+            for effect in ("any", *EFFECTS):
                 folder = Path(place) / f"{effect}-{arithmetic}"
                 operator = OPERATORS.get(effect, "inverse")
                 measures = least if effect in ("any", "gain") else measured(folder, effect, arithmetic, cores, operator)

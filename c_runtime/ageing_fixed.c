@@ -58,16 +58,8 @@ static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_
     const int64_t next = self->high + (way >= 0 ? way : -way);
     self->high = next > t->last ? t->last : next;
     if (self->own) {
-        const int64_t half = (int64_t)1 << (HYSTGEN_GAIN_BITS - 1u);
-        int64_t inverse = self->inverse;
-        unsigned int i;
         self->gain = hystgen_ageing_gain(t, self->high);
-        for (i = 0; i < t->turns; ++i) {
-            const int64_t product = (self->gain * inverse + half) >> HYSTGEN_GAIN_BITS;
-            const int64_t more = 2 * HYSTGEN_GAIN_ONE - product;
-            inverse = (inverse * more + half) >> HYSTGEN_GAIN_BITS;
-        }
-        self->inverse = (int32_t)inverse;
+        self->inverse = hystgen_gain_followed(self->gain, self->inverse, t->turns);
     }
 }
 

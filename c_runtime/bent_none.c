@@ -1,7 +1,16 @@
 #include "hystgen_runtime.h"
 
-/* What play i contributes at z. */
-static hystgen_real_t hystgen_bent(unsigned int i, hystgen_real_t z) {
+/* What play i contributes at z: itself. */
+static inline hystgen_sum_t hystgen_bent(unsigned int i, hystgen_sum_t z) {
     (void)i;
+    return z;
+}
+
+/* The same, beside what is known of plays that rest. */
+static inline hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
+                                                const hystgen_sum_t *bent, hystgen_sum_t z) {
+    (void)i;
+    (void)play;
+    (void)bent;
     return z;
 }

@@ -51,3 +51,21 @@ static hystgen_signal_t hystgen_shared(hystgen_real_t share, hystgen_signal_t x)
     const hystgen_factor_t f = {(int32_t)share * ((int32_t)1 << HYSTGEN_SHARE_BITS), 31u};
     return hystgen_times(x, &f);
 }
+
+/* A sum of the plays, which has bits below those of a signal, as one. */
+static inline hystgen_signal_t hystgen_level(hystgen_sum_t sum) {
+    return hystgen_nearest(sum, HYSTGEN_LEVEL_DROP);
+}
+
+/* The sum that a signal asks of the plays, kept to what they can give. */
+static inline hystgen_sum_t hystgen_asked(hystgen_signal_t h) {
+    const hystgen_signal_t inside = h > HYSTGEN_LARGEST_LEVEL    ? HYSTGEN_LARGEST_LEVEL
+                                    : h < -HYSTGEN_LARGEST_LEVEL ? -HYSTGEN_LARGEST_LEVEL
+                                                                 : h;
+    return inside * ((hystgen_sum_t)1 << HYSTGEN_LEVEL_DROP);
+}
+
+/* A constant share of x. */
+static inline hystgen_sum_t hystgen_share_of(hystgen_sum_t x, const hystgen_factor_t *share) {
+    return hystgen_times(x, share);
+}

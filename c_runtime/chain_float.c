@@ -37,3 +37,17 @@ static inline hystgen_real_t hystgen_output_code(hystgen_signal_t y, unsigned in
 static inline hystgen_signal_t hystgen_shared(hystgen_real_t share, hystgen_signal_t x) {
     return share * x;
 }
+
+/* A sum of the plays as a signal, and the sum that a signal asks of them. */
+static inline hystgen_signal_t hystgen_level(hystgen_sum_t sum) {
+    return sum;
+}
+
+static inline hystgen_sum_t hystgen_asked(hystgen_signal_t h) {
+    return h;
+}
+
+/* A constant share of x. */
+static inline hystgen_sum_t hystgen_share_of(hystgen_sum_t x, const hystgen_real_t *share) {
+    return *share * x;
+}

@@ -2,29 +2,29 @@
 
 /* Operators of a model with effects: plays that move as in any other model. */
 
-/* The plays follow their input w. Returns their sum. */
-static hystgen_real_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_real_t w) {
-    hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
-    return hystgen_loop_output(&hystgen_model_tables, self->play);
+/* Sum of the plays as they are set. */
+static hystgen_signal_t hystgen_forward_started(const hystgen_forward_t *self) {
+    return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
+}
+
+/* Sum of the plays as they are set. */
+static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
+    return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_real_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_real_t w) {
+static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
     hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
-    return hystgen_loop_output(&hystgen_model_tables, self->play);
+    return hystgen_forward_started(self);
+}
+
+/* The plays follow their input w. Returns their sum. */
+static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
+    hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
+    return hystgen_inverse_started(self);
 }
 
 /* Input of the plays at which their sum is h. */
-static hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self, hystgen_real_t h) {
-    return hystgen_loop_solve(&hystgen_model_tables, self->play, h);
-}
-
-/* Sum of the plays as they are set. */
-static hystgen_real_t hystgen_forward_started(const hystgen_forward_t *self) {
-    return hystgen_loop_output(&hystgen_model_tables, self->play);
-}
-
-/* Sum of the plays as they are set. */
-static hystgen_real_t hystgen_inverse_started(const hystgen_inverse_t *self) {
-    return hystgen_loop_output(&hystgen_model_tables, self->play);
+static hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *self, hystgen_signal_t h) {
+    return hystgen_loop_solve(&hystgen_model_tables, self->play, hystgen_asked(h));
 }

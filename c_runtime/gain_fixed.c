@@ -20,6 +20,19 @@ static int32_t hystgen_gain_reciprocal(int32_t gain) {
     return (int32_t)((((int64_t)1 << 2u * HYSTGEN_GAIN_BITS) + gain / 2) / gain);
 }
 
+/* The same for a gain that has moved, from what it was before, by Newton's steps. */
+static int32_t hystgen_gain_followed(int32_t gain, int32_t before, unsigned int turns) {
+    const int64_t half = (int64_t)1 << (HYSTGEN_GAIN_BITS - 1u);
+    int64_t inverse = before;
+    unsigned int i;
+    for (i = 0; i < turns; ++i) {
+        const int64_t product = (gain * inverse + half) >> HYSTGEN_GAIN_BITS;
+        const int64_t more = 2 * HYSTGEN_GAIN_ONE - product;
+        inverse = (inverse * more + half) >> HYSTGEN_GAIN_BITS;
+    }
+    return (int32_t)inverse;
+}
+
 /* x times a gain. */
 static int64_t hystgen_gain_times(int64_t x, int32_t gain) {
     const hystgen_factor_t f = {gain, HYSTGEN_GAIN_BITS};

@@ -43,6 +43,13 @@ typedef struct {
 } hystgen_ageing_t;
 
 typedef struct {
+    int64_t rise; /* of the temperature */
+    int32_t gain;
+    int32_t inverse;
+    int64_t offset;
+} hystgen_heat_t;
+
+typedef struct {
     int64_t whole;  /* drift in signals, */
     int64_t part;   /* and the part of one, in units of the table */
     int64_t lead;   /* samples that the next reference is ahead */

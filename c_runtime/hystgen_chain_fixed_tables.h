@@ -91,6 +91,20 @@ typedef struct {
     uint8_t bits;  /* of a gain below a code that sets it */
 } hystgen_ageing_table_t;
 
+/* Own heat: degrees of a change of the drive's signed square in one step, what a step loses of
+   them, and the rise up to which gain and offset follow. */
+typedef struct {
+    hystgen_factor_t rate;
+    hystgen_factor_t per_square;
+    hystgen_factor_t per_degree;
+    hystgen_factor_t offset_per_degree;
+    int64_t hottest;
+    uint_least16_t turns; /* steps of Newton's to the reciprocal of a gain that has moved */
+    uint8_t coarse;       /* bits of a square that its product leaves out, */
+    uint8_t lift;         /* those of the temperature that this product does, */
+    uint8_t drop;         /* and those that products of the temperature do */
+} hystgen_heat_table_t;
+
 /* Drift over time: its change in the first sample, and what that changes by from sample to sample.
  */
 typedef struct {
@@ -117,6 +131,15 @@ typedef struct {
     hystgen_bend_curve_t forward;
     hystgen_bend_curve_t inverse;
 } hystgen_bend_t;
+
+/* A piece of what a nonlinear dashpot yields: where it begins, the left shift that stretches it to
+   2^31, and the coefficients of a cubic in that, which leave out `lift` bits. */
+typedef struct {
+    uint32_t begin;
+    int32_t c[4];
+    uint8_t scale;
+    uint8_t lift;
+} hystgen_yield_t;
 
 /* Stops, and the slope beyond them. */
 typedef struct {

@@ -1,12 +1,12 @@
 #include "hystgen_runtime.h"
 
 /* Play i has moved, and comes to rest at z, while the input of the plays goes to w. */
-static void hystgen_keep(unsigned int i, hystgen_real_t *play, hystgen_real_t w, hystgen_real_t z) {
+static void hystgen_keep(unsigned int i, hystgen_play_t *play, hystgen_play_t w, hystgen_sum_t z) {
     (void)w;
-    play[i] = z;
+    play[i] = (hystgen_play_t)z;
 }
 
 /* Play i rests at z. */
-static void hystgen_put(unsigned int i, hystgen_real_t *play, hystgen_real_t z) {
-    play[i] = z;
+static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_sum_t z) {
+    play[i] = (hystgen_play_t)z;
 }

@@ -27,6 +27,7 @@ from hystgen.plays import slots
 
 if TYPE_CHECKING:
     from hystgen.chain.chain import Chain
+    from hystgen.chain.settling import Settling
     from hystgen.compensator.chain.layout import ChainTables
     from hystgen.compensator.chained import Compensator
     from hystgen.compensator.layout import FixedTables, Tables
@@ -35,6 +36,9 @@ if TYPE_CHECKING:
 
 MOST_A_CODE = 0.01
 """[share of its range] The drive may move this far for one code of the reference; in fixed point more is noise."""
+
+SETTLED = 0.01
+"""Error within which the output has settled after a step, share of the final step, where none is given."""
 
 
 def cascade_of(parameters: Parameters) -> Cascade:
@@ -304,6 +308,20 @@ class Model:
         if np.any(np.diff(times) <= 0.0):
             raise EffectsError("t has to rise from sample to sample")
         return Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)
+
+    def settling(self, within: float = SETTLED) -> Settling:
+        """How long after a step of the drive over its range, up and down, the output stays close to its final value.
+
+        `within`: the error, share of the final step of the output. Found by simulating the steps with all effects, up
+        to an hour; drift and what follows a logged column are left out. Raises EffectsError where an effect of the
+        user's own fails on such a step.
+        """
+        from hystgen.chain.settling import settling
+
+        within = arguments.number("within", within, "the final step, as a share")
+        if not 0.0 < within < 1.0:
+            raise ValueError(f"within is a share of the final step between 0 and 1, not {within:g}; give 0.01 for 1 %")
+        return settling(self.chain, within)
 
     def inverse(self) -> InverseModel:
         """The compensator. Raises NotInvertibleError with the reasons and ranges, UnsupportedEffectsError."""

@@ -106,8 +106,3 @@ CHAINS = {
 """Models with effects, every block and every kind of each; some can be emitted as an inverse alone."""
 
 INVERSE_ALONE = ("viscous_twin",)
-
-FLOAT_ALONE = (
-    "heated", "viscous", "dilated", "bumpy", "dashpot", "soft_dashpot",
-)  # fmt: skip
-"""Those with own heat, or whose plays are bent or have a nonlinear dashpot, which fixed point does not have."""

@@ -89,7 +89,10 @@ FILES_AND_MODELS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "verify compiler": (lambda: hystgen.verify(MODEL, compiler="gcc"), TypeError, r"not 'gcc'; give \['gcc'\]"),
     "verify length": (lambda: hystgen.verify(MODEL, length="5"), TypeError, "length is a whole number of calls"),
     "verify nothing": (lambda: hystgen.verify(MODEL, length=0), ValueError, "from 1 on, not 0"),
-    "plan option": (lambda: hystgen.plan(MODEL, rate=3), TypeError, "did you mean max_rate"),
+    "plan option": (lambda: hystgen.plan(MODEL, maxrate=3), TypeError, "did you mean max_rate"),
+    "plan DAC": (lambda: hystgen.plan(MODEL, rate=50, dac_bits=16, dac_range="0,10"), TypeError, "numbers such as"),
+    "plan bits": (lambda: hystgen.plan(MODEL, rate=50, dac_bits=12.5, dac_range=(0, 9)), TypeError, "whole number of"),
+    "plan coding": (lambda: hystgen.plan(MODEL, rate=50, dac_coding="gray"), ValueError, "is none of straight"),
     "plan rate": (lambda: hystgen.plan(MODEL, max_rate="3"), TypeError, "max_rate is a number of input"),
     "plan a number": (lambda: hystgen.plan(3), TypeError, "or a parameter file, not 3"),
 }

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 from granted import granted_states
-from modelfiles import CHAINS, FLOAT_ALONE, INVERSE_ALONE, chain
+from modelfiles import CHAINS, INVERSE_ALONE, chain
 
 from hystgen.arithmetic import ARITHMETICS, factors
 from hystgen.basics import jit
 from hystgen.compensator import reference
-from hystgen.compensator.chain import tables
+from hystgen.compensator.chain import moving, moving_fixed, tables
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 from hystgen.compensator.chain.layout import Codes, Compiled
 from hystgen.compensator.chain.run import answers
@@ -25,6 +25,11 @@ from hystgen.compensator.chained import Compensator
 from hystgen.effects import Run
 from hystgen.effects.drift import fixed as drift
 from hystgen.effects.drift.model import CurvedDrift
+from hystgen.effects.rate_dependence import compensator as dashpot
+from hystgen.effects.rate_dependence.model import RelaxingPlays
+from hystgen.effects.thermal import compensator as thermal
+from hystgen.effects.thermal import fixed as thermal_fixed
+from hystgen.effects.thermal.model import SelfHeating
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
@@ -33,7 +38,6 @@ from hystgen.plays import slots
 from hystgen.verification import sources
 
 T, N = 1e-3, 1500
-FIXED = [name for name in CHAINS if name not in FLOAT_ALONE]
 BOTH = pytest.mark.parametrize("arithmetic", ["q31", "q15"])
 
 
@@ -89,7 +93,7 @@ BRANCHED = ("lagging", "aged", "everything", "relaxing")
 """Chains with two branches of the memoryless part: now and then fixed point takes the other one for a sample."""
 
 
-@pytest.mark.parametrize("name", FIXED)
+@pytest.mark.parametrize("name", CHAINS)
 @BOTH
 @pytest.mark.parametrize(("seed", "share"), [(11, 1.0), (12, 0.5)])
 def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: float) -> None:
@@ -103,7 +107,7 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
     wanted = Compensator(one.chain, one.parameters.emit.compensation.compensate).drives(exact, ends) / drive  # type: ignore[arg-type]
     left = np.abs(v - wanted)[: N - numbers.ahead]
     assert np.max(left) <= codes.inverse_error
-    assert bool(codes.condition) == (name in ("lagging", "quick", "straight", "everything", "wider"))
+    assert bool(codes.condition) == (name in ("lagging", "quick", "straight", "everything", "wider", "dilated"))
     if name not in BRANCHED and not codes.condition:
         assert np.max(left) <= codes.inverse_rounding
     if name not in INVERSE_ALONE:
@@ -129,7 +133,7 @@ def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
         assert np.max(np.abs(v - wanted)) <= codes.inverse_rounding < 1e-2 * numbers.tables.limits[slots.DRIVE_MAX]
 
 
-@pytest.mark.parametrize("name", [name for name in FIXED if name not in BRANCHED])
+@pytest.mark.parametrize("name", [name for name in CHAINS if name not in BRANCHED])
 @BOTH
 def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arithmetic: str) -> None:
     """Whatever is limited: each answer of the tables in float64, to which the drives are committed that were sent."""
@@ -228,7 +232,8 @@ def wild(rng: np.random.Generator, kinds: list[int], real: np.dtype[Any], n: int
     return op, x.astype(real)
 
 
-@pytest.mark.parametrize("name", FIXED)
+@pytest.mark.slow(one_in=2)
+@pytest.mark.parametrize("name", CHAINS)
 @BOTH
 def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_path: Path) -> None:
     """States stay within what their formats were chosen by, as the proof takes for granted."""
@@ -394,3 +399,80 @@ def test_the_selftest_goes_all_over_the_range(arithmetic: str) -> None:
     assert len(set(codes)) > 100
     assert max(codes) > 0.9 * most
     assert min(codes) < -0.9 * most
+
+
+@BOTH
+@pytest.mark.parametrize("name", ["bumpy", "viscous"])
+def test_bent_plays_contribute_what_the_model_has(name: str, arithmetic: str) -> None:
+    """Curves of polynomials against the effect's own formula, where plays can be."""
+    one = model(CHAINS[name])
+    numbers, _ = compiled(one, arithmetic)
+    static, t = one.cascade, numbers.tables
+    assert numbers.codes is not None
+    step = float(numbers.codes.drive_lsb) / 2 ** int(t.plays.limits[slots.FINE])
+    end = int(t.moving.bump.domain[0, 1])
+    degree = ARITHMETICS[arithmetic].degree
+    error = moving.bumps(static, numbers.parts.plays, step, end, degree).error
+    effect = next(each for each in one.effects if each.bends_plays())
+    z = np.random.default_rng(2).integers(-end, end, 400, endpoint=True)
+    n = static.pi.n
+    exact = effect.bent(np.tile(z * step, (n + 1, 1)), np.array(static.pi.thresholds)) / step
+    with jit.plain():
+        found = [[int(moving_fixed.bent(t.moving, t.plays, i, each)) for each in z] for i in range(1, n + 1)]
+    left = np.max(np.abs(np.array(found) - exact[1:]))
+    assert 0.05 * error < left <= error
+
+
+@BOTH
+@pytest.mark.parametrize(("exponent", "ratio"), [(2.5, 5.0), (0.5, 2.0), (3.0, 2.0**28), (1.5, 0.1)])
+def test_what_a_dashpot_yields_in_fixed_point(exponent: float, ratio: float, arithmetic: str) -> None:
+    """Stretches over all decades against the exact law, to a thousandth of what it yields and a step, or to what the
+    least stretch that the table tells apart yields, or hardly anything in 2^28 steps. Never more than the stretch."""
+    text = f"name: rate_dependence, shape: relaxation, time_constant: {ratio * T}, exponent: {exponent}"
+    one = model(chain("yields", text))
+    numbers, codes = compiled(one, arithmetic)
+    t, step = numbers.tables.moving, float(codes.drive_lsb) / 2 ** int(numbers.tables.plays.limits[slots.FINE])
+    effect, scale = one.effects[0], one.cascade.pi.thresholds[-1]
+    assert isinstance(effect, RelaxingPlays)
+    least = dashpot.LEAST_STRETCH * scale
+    for x in np.unique(np.geomspace(1, t.stretch, 300).astype(np.int64)):
+        law, slope = dashpot.yielded(effect, scale, T, float(x) * step)
+        with jit.plain():
+            found = int(moving_fixed.yields(t, x)) / 2.0**t.yield_bits * step
+        unit = 3.0 * step * 2.0 ** (int(t.yields[:, moving.YIELD_LIFT].max()) - t.yield_bits)
+        assert found <= x * step
+        stuck = dashpot.LEAST_YIELD * x * step
+        assert abs(found - law) <= dashpot.YIELD_ERROR * law + slope * (least + step) + unit + stuck
+
+
+@BOTH
+@pytest.mark.parametrize("bits", [0, 10, 28])
+def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int) -> None:
+    """Time constants up to 2^28 samples, against the same recursion in whole fractions of a degree's 2^100th."""
+    about = ARITHMETICS[arithmetic]
+    largest, lsb, seconds = about.code_max, 4.0 / about.code_max, 1e-3
+    effect = SelfHeating(
+        name="thermal", source="self_heating", time_constant=0.7 * seconds * 2.0**bits, heating=0.05,
+        gain_per_degree=-0.002, offset_per_degree=0.01,
+    )  # fmt: skip
+    row = thermal.heat_numbers(effect, 20.0, seconds)
+    one = thermal_fixed.heat(row, largest, lsb, 2.0**20)
+    t = thermal.HeatTables(np.array([one.table], dtype=np.int64), np.array([4]))
+    state = np.zeros((1, 5), dtype=np.int64)
+    rng = np.random.default_rng(bits)
+    v = np.cumsum(rng.integers(-largest // 50, largest // 50, 2000))
+    v = np.abs((v + largest) % (4 * largest) - 2 * largest) - largest
+    v[1000:] = v[1000]
+    rate, heated = Fraction(row[thermal.HEAT_RATE]), Fraction(row[thermal.PER_SQUARE]) * Fraction(lsb) ** 2
+    warmest = float(heated) * 2 * largest**2 / row[thermal.HEAT_RATE]
+    unit = 2.0 ** (math.ceil(math.log2(warmest)) - thermal_fixed.RISE_BITS)
+    rise, before, peak, worst = 0, 0, 0, 0.0
+    with jit.plain():
+        thermal_fixed.heat_reset(t, state, 0)
+        for each in v.tolist():
+            thermal_fixed.heat_move(t, state, 0, np.int64(before), np.int64(each))
+            way = abs(each * abs(each) - before * abs(before))
+            rise += round(way * heated * 2**100 - rise * rate)
+            worst = max(worst, abs(int(state[0, thermal_fixed.RISE]) * unit - rise / 2**100))
+            peak, before = max(peak, rise), each
+    assert worst <= one.error < 0.1 * peak / 2**100

@@ -61,9 +61,12 @@ UNITS = (
     ("relaxing", "q15", "loop"),
     ("wider", "q31", "loop"),
     ("viscous_twin", "q15", "loop"),
+    ("bumpy", "q15", "loop"),
+    ("soft_dashpot", "q31", "loop"),
     ("drifting", "float32", "loop"),
     ("drifting_late", "q15", "loop"),
     ("heated", "float64", "loop"),
+    ("heated", "q31", "loop"),
 )
 """Every file of `c_runtime/` is in one of them."""
 

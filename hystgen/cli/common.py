@@ -138,14 +138,17 @@ def keep_inputs(outputs: Iterable[str | Path | None], inputs: Iterable[str]) -> 
 
 
 def history_values(text: str | None) -> list[float] | None:
-    if text is None:
-        return None
+    return None if text is None else number_list("--history", text, "100,-100")
+
+
+def number_list(option: str, text: str, example: str) -> list[float]:
+    """The numbers of an option."""
     try:
         numbers = [float(part) for part in text.split(",")]
     except ValueError:
         numbers = [math.nan]
     if not all(map(math.isfinite, numbers)):
-        raise Failed(f"error: --history {text!r} is not a list of numbers; write --history 100,-100", 2)
+        raise Failed(f"error: {option} {text!r} is not a list of numbers; write {option} {example}", 2)
     return numbers
 
 

@@ -19,25 +19,32 @@ from hystgen.cli.common import (
     keep_inputs,
     load_model,
     matched,
+    number_list,
     params_argument,
     reading_options,
     record_options,
     skip_option,
 )
 
+PLAYED = ("rate", "dac_bits", "dac_range", "dac_coding")
+"""Options of a plan that is played at one rate."""
 
-def _plan(params: str, output: str, effects: Sequence[str], max_rate: float | None, sample_time: float | None) -> None:
+
+def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> None:
     """Write the drive records that a diagnosis needs; prints the files and the command to run on the measured ones."""
     from hystgen.basics import drawing
     from hystgen.report.plan import plan
 
     def run() -> None:
         drawing.require()
-        planned = plan(params, effects=effects, max_rate=max_rate, sample_time=sample_time)
+        planned = plan(params, effects=effects, **options)
         keep_inputs([Path(output) / name for name in planned.names], [params, *effects])
         for sentence in planned.defaults:
             console.note(sentence)
         console.note(planned.sentence())
+        if planned.dac is not None:
+            unit, (top, bottom) = planned.parameters.units.input, planned.history
+            console.note(planned.dac.sentence(f" {unit}" if unit else "", top - bottom))
         for path in planned.write(output):
             console.say(str(path))
         console.note(f"then run: {planned.command(output)}")
@@ -55,24 +62,44 @@ def _plan(params: str, output: str, effects: Sequence[str], max_rate: float | No
 )  # fmt: skip
 @click.option("--plan", is_flag=True, help="write the drive records to measure, and a page that explains them")
 @click.option("--max-rate", type=float, help="with --plan: fastest change of the drive, input units per second")
+@click.option("--rate", type=float, metavar="HZ", help="with --plan: all drives at this rate of a converter, in order")
+@click.option("--dac-bits", type=int, help="with --rate: codes for a DAC of so many bits")
+@click.option(
+    "--dac-range", metavar="LOW,HIGH", help="drive at the lowest code and one above the highest, amplifier included"
+)
+@click.option(
+    "--dac-coding", type=click.Choice(["straight", "twos-complement"]), help="of the codes  [default: straight]"
+)
+@click.option(
+    "--session", type=click.Path(), help="session.json of a plan: DATA is one recording of it all"
+)
 @effects_option
 @record_options
 @skip_option
 def diagnose(
     params: str, data: tuple[str, ...], output: str | None, holdout: tuple[str, ...], effects: tuple[str, ...],
-    plan: bool, max_rate: float | None, history: str | None, rest: float, skip: float, **reading: Any,
+    plan: bool, max_rate: float | None, session: str | None, history: str | None, rest: float, skip: float,
+    **reading: Any,
 ) -> None:
     """Find what a model is missing: where it disagrees with records, the missing effect, the model with it added.
 
     Example: hystgen diagnose stage_x.yaml slow.csv steps.csv --holdout other.csv -o diagnosis/
 
     Example: hystgen diagnose --plan stage_x.yaml --max-rate 5000 -o plan/
+
+    Example: hystgen diagnose --plan stage_x.yaml --rate 1000 --dac-bits 16 --dac-range 0,150 -o plan/
+
+    Example: hystgen diagnose stage_x.yaml plan/recording.csv --session plan/session.json -o diagnosis/
     """
     if output is None:
         what = "the drives, as in -o plan/" if plan else "what is found, as in -o diagnosis/"
         raise click.UsageError(f"Missing option '-o': give a folder for {what}")
+    played = {name: reading.pop(name) for name in PLAYED}
     if plan:
-        unused = {"DATA": data, "--holdout": holdout, "--history": history, "--rest": rest, "--skip": skip}
+        unused = {
+            "DATA": data, "--holdout": holdout, "--history": history, "--rest": rest, "--skip": skip,
+            "--session": session,
+        }  # fmt: skip
         unused |= {f"--{option}": reading[option] for option in ("columns", "delimiter")}
         given = [option for option, value in unused.items() if value]
         if given:
@@ -80,30 +107,48 @@ def diagnose(
                 f"--plan comes before anything is measured: leave out {', '.join(given)}, or leave out --plan to "
                 "diagnose records"
             )
-        _plan(params, output, effects, max_rate, reading["sample_time"])
+        asked = {"max_rate": max_rate, "sample_time": reading["sample_time"], **played}
+        asked = {name: value for name, value in asked.items() if value is not None}
+        if "dac_coding" in asked and "dac_bits" not in asked:
+            raise click.UsageError("--dac-coding is for codes; give --dac-bits and --dac-range with it")
+        if "dac_range" in asked:
+            asked["dac_range"] = number_list("--dac-range", asked["dac_range"], "0,150")
+        _plan(params, output, effects, **asked)
         return
     if not data:
         raise click.UsageError("Missing argument 'DATA...'; --plan writes drive records to measure")
-    if max_rate is not None:
-        raise click.UsageError("--max-rate is for drives; give --plan with it")
-    from hystgen import diagnosis
+    for option, value in {"max_rate": max_rate, **played}.items():
+        if value is not None:
+            raise click.UsageError(f"--{option.replace('_', '-')} is for drives; give --plan with it")
+    if session is not None:
+        said = [name for name, value in (("--holdout", holdout), ("--history", history), ("--rest", rest)) if value]
+        if said or len(data) != 1:
+            what = f"leave out {', '.join(said)}, which it says" if said else f"give one, not {len(data)}"
+            raise click.UsageError(f"--session is for one recording of the whole session; {what}")
+    from hystgen import diagnosis, records
     from hystgen.basics import drawing, extras, writing
     from hystgen.effects import load_user_effects
+    from hystgen.planning.session import Session
     from hystgen.report import diagnosis as report
 
     model = load_model(params, effects)
     guarded(params, partial(extras.require_fit, "diagnose", plot=True))
     guarded(params, drawing.require)
-    keep_inputs([Path(output) / name for name in diagnosis.Diagnosis.FILES], (params, *data, *holdout))
+    inputs = (params, *data, *holdout, *([session] if session else []))
+    keep_inputs([Path(output) / name for name in diagnosis.Diagnosis.FILES], inputs)
     guarded(output, partial(writing.check_files, Path(output), diagnosis.Diagnosis.FILES))
-    visited = history_values(history)
-    how = reading_options(**reading)
+    how: dict[str, Any] = {"holdout": list(holdout), "history": history_values(history), "rest": rest, "skip": skip}
+    read_as = reading_options(**reading)
 
     def run() -> None:
         own = [kind for path in effects for kind in load_user_effects(path)]
-        found = report.diagnose(
-            model, list(data), holdout=list(holdout), history=visited, rest=rest, skip=skip, effects=own, **how
-        )
+        to_fit: list[Any] = list(data)
+        if session is not None:
+            played = Session.read(session)
+            (recording,) = records.read_records(to_fit, **read_as)
+            to_fit, held = played.cut(recording)
+            how.update(holdout=held, history=played.history, rest=played.rest)
+        found = report.diagnose(model, to_fit, effects=own, **how, **read_as)
         for note in (*found.notes, *found.warnings):
             console.note(f"warning: {note}")
         console.say(found.sentence())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from functools import partial
 
 import click
@@ -13,22 +14,39 @@ from hystgen.cli.common import effects_option, guarded, keep_inputs, load_model,
 @click.command()
 @params_argument
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of loop, loading curve and inverse")
+@click.option(
+    "--settle-within", type=float, metavar="PERCENT",
+    help="error within which the output has settled, percent of a step  [default: 1]",
+)
+@click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the properties for programs")
 @effects_option
-def show(params: str, plot: str | None, effects: tuple[str, ...]) -> None:
-    """Print what a model can do: ranges, slopes, loop width, invertible or why not.
+def show(
+    params: str, plot: str | None, settle_within: float | None, json_file: str | None, effects: tuple[str, ...]
+) -> None:
+    """Print what a model can do: ranges, slopes, loop width, settling after a step, invertible or why not.
 
     Example: hystgen show stage_x.yaml --plot stage_x.svg
     """
-    from hystgen.basics import drawing
+    from hystgen.basics import drawing, writing
+    from hystgen.model import SETTLED
     from hystgen.report import properties
 
+    within = SETTLED if settle_within is None else settle_within / 100.0
+    if not 0.0 < within < 1.0:
+        raise click.BadParameter("give percent of a step, above 0 and below 100", param_hint="'--settle-within'")
     model = load_model(params, effects)
+    keep_inputs([plot, json_file], [params])
     if plot:
-        keep_inputs([plot], [params])
         guarded(params, partial(drawing.check_path, plot))
-    console.say(guarded(params, lambda: properties.properties(model)))
+    if json_file:
+        guarded(json_file, partial(writing.check_writable, json_file))
+    console.say(guarded(params, lambda: properties.properties(model, within)))
     for warning in properties.warnings(model):
         console.note(f"warning: {warning}")
+    if json_file:
+        text = guarded(params, lambda: json.dumps(properties.facts(model, within), indent=2, allow_nan=False)) + "\n"
+        guarded(json_file, partial(writing.write_atomically, json_file, text))
+        console.say(json_file)
     if plot:
         guarded(params, lambda: model.plot(plot))
         console.say(plot)

@@ -150,7 +150,8 @@ class Builder:
     """The steps of `build`, each with what the ones before it found.
 
     `given`: which LSB was asked for; `beyond`: spans of their input by which plays may be asked for more than the drive
-    gives, and `led`: whether what arrives in front of the memoryless part has bits below a drive code, as behind a lag.
+    gives, and `led`: whether what arrives in front of the memoryless part has bits below a drive code, as behind a lag;
+    `bent`: most that an effect adds to what a play contributes, in units of its input.
     """
 
     def __init__(
@@ -162,13 +163,14 @@ class Builder:
         given: tuple[bool, bool],
         beyond: int = 0,
         led: bool = False,
+        bent: float = 0.0,
     ) -> None:
         self.cascade, self.arithmetic, self.engine = cascade, arithmetic, engine
         self.code_max = ARITHMETICS[arithmetic].code_max
         self.play_bits = ARITHMETICS[arithmetic].play_bits
         self.drive_lsb, self.output_lsb = lsb
         self.given = dict(zip(("drive_lsb", "output_lsb"), given, strict=True))
-        self.beyond, self.led = beyond, led
+        self.beyond, self.led, self.bent = beyond, led, bent
         self.invertible = not cascade.inverse_problems()
         self.refused: list[tuple[Path, str]] = []
 
@@ -358,6 +360,7 @@ class Builder:
         offset = Fraction(self.cascade.output_offset) / self.output_lsb
         largest = max(map(abs, self.hull)) + 1
         travel = self.play[1] - self.play[0]
+        bent = math.ceil(Fraction(self.bent) / self.step)
         low_bits = ARITHMETICS[self.arithmetic].low_bits
         finer = self._finer("output_lsb")
         for i, g in enumerate(gain):
@@ -373,7 +376,7 @@ class Builder:
             slope = [nearest(s * 2**bits) for s in sums]
             weight = [b - a for a, b in itertools.pairwise(slope)]
             lift = [0, *itertools.accumulate(p * r for p, r in zip(weight, self.threshold, strict=True))]
-            span = largest + 2 * self.threshold[-1] + self.beyond * travel
+            span = largest + 2 * self.threshold[-1] + self.beyond * travel + bent
             bound = slope[-1] * span + 2 * lift[-1] + abs(nearest(offset * 2**bits)) + ((self.code_max + 1) << bits)
             held = slope[-1] * (largest + self.threshold[-1]) + abs(nearest(offset * 2**bits))
             if slope[-1] <= TABLE_MAX and bound < 2**SUM_BITS and held < 2 ** (31 + low_bits):

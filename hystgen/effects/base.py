@@ -260,6 +260,11 @@ class Effect(BaseModel):
         """What else `hystgen show` says of the effect in a model of these thresholds, one line each."""
         return []
 
+    @property
+    def dead_time(self) -> float:
+        """DRIVE: s that pass before anything is seen of a change of the drive."""
+        return 0.0
+
     def drive(self, a: Array, run: Run) -> Array:
         """DRIVE: the drive (N,) behind the effect."""
         return a

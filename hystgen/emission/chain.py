@@ -25,6 +25,7 @@ from hystgen.compensator.chain.layout import (
     Compiled,
 )
 from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
+from hystgen.effects.bend import Bends
 from hystgen.effects.drift import compensator as drift
 from hystgen.effects.drift import fixed as drift_fixed
 from hystgen.effects.kinds import Constants, Kind
@@ -140,26 +141,31 @@ def saturation(t: ChainTables, j: int, name: str, prefix: str) -> dict[str, Any]
         return {"kind": "stops", "arrays": [text], "table": f"&hystgen_behind_{j + 1}", "limited": ""}
     arrays, ends = [], []
     for which, direction in ((2 * j, "there"), (2 * j + 1, "back")):
-        here = int(behind.first[which])
-        rows = slice(here, here + int(behind.pieces[which]))
-        arrays += [
-            table("int32_t", f"{own}_{direction}_knot", list(behind.knot[rows])),
-            table("uint8_t", f"{own}_{direction}_scale", list(behind.scale[rows])),
-            table("int32_t", f"{own}_{direction}_coefficient", list(behind.coefficient[rows].ravel())),
-        ]
-        pointers = ", ".join(f"{own}_{direction}_{part}" for part in ("knot", "scale", "coefficient"))
-        counts = (behind.domain[which, 1], behind.pieces[which], behind.coefficient.shape[1] - 1, *behind.scaled[which])
-        ends.append(f"    {{{pointers},\n     {_entries(counts)}}}")
+        more, entries = _curve(behind.bends, which, f"{own}_{direction}")
+        arrays += more
+        ends.append(f"    {{{entries}}}")
     arrays.append(f"static const {prefix}_bend_t {own} = {{\n" + ",\n".join(ends) + ",\n};\n")
     return {"kind": "bend", "arrays": arrays, "table": f"&hystgen_behind_{j + 1}", "limited": ", limited"}
+
+
+def _curve(t: Bends, which: int, own: str) -> tuple[list[str], str]:
+    """The tables of a curve in fixed point, and what stands between the braces of the curve itself."""
+    here = int(t.first[which])
+    rows = slice(here, here + int(t.pieces[which]))
+    arrays = [
+        table("int32_t", f"{own}_knot", list(t.knot[rows])),
+        table("uint8_t", f"{own}_scale", list(t.scale[rows])),
+        table("int32_t", f"{own}_coefficient", list(t.coefficient[rows].ravel())),
+    ]
+    pointers = ", ".join(f"{own}_{part}" for part in ("knot", "scale", "coefficient"))
+    counts = (t.domain[which, 1], t.pieces[which], t.coefficient.shape[1] - 1, *t.scaled[which])
+    return arrays, f"{pointers},\n     {_entries(counts)}"
 
 
 MOVES = ("play", "dilated", "relaxing", "dashpot")
 BENDS = ("none", "polynomial", "centre")
 """Files of the run time that say how plays move and are bent, by the codes of `hystgen.compensator.chain.moving`."""
 
-
-SCANNED = "scanned"
 
 SETTINGS = {
     "push": slots.OP_PUSH,
@@ -173,9 +179,10 @@ SETTINGS = {
 
 
 def plays(t: ChainTables) -> tuple[str, str]:
-    """How plays move and are bent; empty where engine loop has them."""
+    """How plays move and are bent; empty where engine loop has them, and bends where they are solved for one after the
+    other."""
     if t.moving.scanned:
-        return SCANNED, ""
+        return MOVES[t.moving.moves], ""
     return (MOVES[t.moving.moves], BENDS[t.moving.bends]) if t.moving.used else ("", "")
 
 
@@ -215,25 +222,44 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
     return arrays, [*constants, *counts]
 
 
-def _fixed_moving(t: FixedMovingTables, prefix: str, inverse: bool) -> list[str]:
-    """Tables of plays that depend on the rate in fixed point."""
-    kind = f"static const {prefix}_factor_t {prefix}"
-    if not t.scanned:
-        names = ("late", "kept") if t.moves == moving.RELAXING else ("wider",)
-        return [
-            constant(f"{prefix}_factor_t {prefix}_{name}[{len(rows)}]", [f"    {_entries(row, 'f')}," for row in rows])
-            for name, rows in zip(names, (t.first, t.second), strict=False)
+def _fixed_moving(t: FixedMovingTables, prefix: str, inverse: bool) -> tuple[list[str], list[tuple[str, str, str]]]:
+    """Tables and numbers of plays that an effect moves or bends in fixed point."""
+    factor_t = f"{prefix}_factor_t {prefix}"
+    numbers = [("LARGEST_INPUT", operand(t.farthest), "of the plays, for a search")]
+    if t.scanned:
+        arrays = [
+            f"static const {factor_t}_relaxing_{name} = {{{_entries(rows[1], 'f')[1:-1]}}};\n"
+            for name, rows in (("late", t.first), ("kept", t.second))
         ]
-    factors = [
-        f"{kind}_relaxing_{name} = {{{_entries(rows[1], 'f')[1:-1]}}};\n"
-        for name, rows in (("late", t.first), ("kept", t.second))
+        if inverse:
+            arrays += [
+                table("int32_t", f"{prefix}_relaxing_slope", list(t.relaxed.slope)),
+                table("uint32_t", f"{prefix}_relaxing_reciprocal", list(t.relaxed.reciprocal)),
+                table("uint8_t", f"{prefix}_relaxing_shift", list(t.relaxed.shift)),
+            ]
+        return arrays, numbers
+    names = {moving.RELAXING: ("late", "kept"), moving.DILATED: ("wider",)}.get(t.moves, ())
+    arrays = [
+        constant(f"{factor_t}_{name}[{len(rows)}]", [f"    {_entries(row, 'f')}," for row in rows])
+        for name, rows in zip(names, (t.first, t.second), strict=False)
     ]
-    return factors if not inverse else [
-        *factors,
-        table("int32_t", f"{prefix}_relaxing_slope", list(t.relaxed.slope)),
-        table("uint32_t", f"{prefix}_relaxing_reciprocal", list(t.relaxed.reciprocal)),
-        table("uint8_t", f"{prefix}_relaxing_shift", list(t.relaxed.shift)),
-    ]  # fmt: skip
+    if t.moves == moving.DASHPOT:
+        rows = ",\n".join(f"    {{{_entries(row, 'rcrr')}}}" for row in t.yields)
+        arrays.append(f"static const {prefix}_yield_t {prefix}_yields[{len(t.yields)}] = {{\n{rows},\n}};\n")
+        arrays.append(f"static const {factor_t}_seen_share = {{{_entries(t.seen, 'f')[1:-1]}}};\n")
+        numbers += [
+            ("YIELDS", f"{len(t.yields)}u", "pieces of what a dashpot yields"),
+            ("YIELD_BITS", f"{t.yield_bits}u", "of a yield below a step of the plays' input"),
+            ("STRETCH", operand(t.stretch), "of a play, up to which there are any"),
+        ]
+    if t.bends != moving.STRAIGHT:
+        curves = [_curve(t.bump, k, f"{prefix}_bump_{k + 1}") for k in range(len(t.bump.pieces))]
+        arrays += [text for texts, _ in curves for text in texts]
+        rows = ",\n".join(f"    {{{entries}}}" for _, entries in curves)
+        arrays.append(f"static const {prefix}_bend_curve_t {prefix}_bump[{len(curves)}] = {{\n{rows},\n}};\n")
+        arrays.append(table("uint16_t", f"{prefix}_bump_of", list(t.bump_of)))
+        numbers.append(("BUMP_BITS", f"{t.bump_bits}u", "of what a bent play adds below a step of its input"))
+    return arrays, numbers
 
 
 @dataclass(frozen=True)
@@ -290,13 +316,13 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         constants.append(("WAITED", operand(t.delay.share[0]), "part of the step after the oldest that is over"))
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
     constants += _fixed_constants(t) if t.fixed else []
-    if isinstance(t.moving, FixedMovingTables):
-        arrays += _fixed_moving(t.moving, prefix, "inverse" in operators) if t.moving.used else []
-        constants.append(("LARGEST_INPUT", operand(t.moving.farthest), "of the plays, for a search"))
-    elif t.moving.used:
-        more, numbers = _moving(t.moving, prefix)
+    if t.moving.used:
+        more, numbers = (
+            _fixed_moving(t.moving, prefix, "inverse" in operators)
+            if isinstance(t.moving, FixedMovingTables) else _moving(t.moving, prefix)
+        )  # fmt: skip
         arrays, constants = arrays + more, constants + numbers
-    searched = t.moving.used and not t.moving.scanned and not t.fixed
+    searched = t.moving.used and not t.moving.scanned
     n = len(t.threshold) - 1
     kept = n * (t.moving.moves == moving.DASHPOT)
     fields = {op: instance(op, t, own[op], n, kept, searched) for op in operators}
@@ -351,7 +377,7 @@ def instance(op: str, t: ChainTables, blocks: Sequence[Block], plays: int, kept:
           else []),
         Field("status", "status"),
         Field("play", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept),
-        *([Field("real", "bent", "what each contributes", plays + 1)] if moving else []),
+        *([Field("signal", "bent", "what each contributes", plays + 1)] if moving else []),
     ]  # fmt: skip
 
 

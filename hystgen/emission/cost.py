@@ -75,8 +75,8 @@ class Cost:
         return f"{small} bytes on a Cortex-M0+, {large} on a Cortex-M4F"
 
 
-_SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "uint8_t": 1, "int64_t": 8, "sum_t": 8,
-          "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
+_SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "uint16_t": 2, "uint8_t": 1, "int64_t": 8,
+          "sum_t": 8, "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
 
 
 _MEMBER = re.compile(r"(unsigned int|\w+) \w+((?:\[[^\]]+\])*)(?: : (\d+))?")
@@ -159,7 +159,9 @@ def _constants(
     bend = layout.struct(table, table, table, (4, 4), count, *3 * [(1, 1)])
     behind = {
         "factor_t": factor,
+        "bend_curve_t": bend,
         "bend_t": layout.struct(bend, bend),
+        "yield_t": layout.struct((4, 4), (16, 4), (1, 1), (1, 1)),
         "stops_t": layout.struct(*2 * [(8, 8)], factor, factor),
     }
     structs = {
@@ -230,7 +232,7 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     forward = sum(each.products[0] for each in everything) + (1 + t.fixed) * bool(t.delay.samples)
     absorbed, solved = (sum(each.products[way] for each in inverse) for way in (0, 1))
     if t.fixed:
-        stages = 2 * (len(kinds) - envelopes) + envelopes * t.behind.coefficient.shape[1]
+        stages = 2 * (len(kinds) - envelopes) + envelopes * t.behind.bends.coefficient.shape[1]
         viscous = 4 * (len(t.threshold) - 1) * t.moving.used
         return {
             "forward": forward + stages + viscous,

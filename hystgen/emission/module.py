@@ -68,13 +68,13 @@ def files(
     made[header] = render(
         "module.h.j2",
         values,
-        banner=_banner(values, header, what[options.operator] + f" of {name}", values.details),
+        banner=banner_of(values, header, what[options.operator] + f" of {name}", values.details),
         implementation=implementation if single else "",
     )
     if not single:
         source = f"{name}.c"
         made[source] = render(
-            "module.c.j2", values, banner=_banner(values, source, f"see {header}"), implementation=implementation
+            "module.c.j2", values, banner=banner_of(values, source, f"see {header}"), implementation=implementation
         )
     if shared:
         made.update(runtime_files(options.arithmetic))
@@ -85,7 +85,7 @@ def files(
         (".c", "recorded samples and their exact answers", []),
     ):
         file = f"{name}_selftest{ending}"
-        top = _banner(values, file, about, details)
+        top = banner_of(values, file, about, details)
         made[file] = render(f"selftest{ending}.j2", values, banner=top, operators=operators)
     return {file: seal(_tidy(fit(text))) for file, text in made.items()}
 
@@ -119,7 +119,7 @@ def _tidy(text: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _banner(values: SimpleNamespace, file: str, what: str, details: Sequence[str] = ()) -> str:
+def banner_of(values: SimpleNamespace, file: str, what: str, details: Sequence[str] = ()) -> str:
     width = WIDTH - len(" * ")
     lines = []
     for line in details:
@@ -166,7 +166,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
         f"{file}.h": render(
             "runtime.h.j2",
             values,
-            banner=_banner(values, f"{file}.h", f"kernels shared by all {arithmetic} models"),
+            banner=banner_of(values, f"{file}.h", f"kernels shared by all {arithmetic} models"),
             build=whole(*family.build),
             typedefs=[(family.real, "real_t"), *((kind, own) for own, kind in family.types.items())],
             types=runtime.all_types((*family.states, *family.tables), prefix, family),
@@ -175,7 +175,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
         f"{file}.c": render(
             "runtime.c.j2",
             values,
-            banner=_banner(values, f"{file}.c", f"see {file}.h"),
+            banner=banner_of(values, f"{file}.c", f"see {file}.h"),
             implementation="\n".join([whole(*family.opening), whole(*family.soft(kernels), "apart.h"), kernels]),
         ),
     }

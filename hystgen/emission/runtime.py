@@ -33,8 +33,8 @@ CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
 CHAIN_BLOCKS = (*(kind.file for kind in KINDS), "delay.c", "delay_float.c", "preview.c", "preview_float.c")
 FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
 FIXED_CHAIN_BLOCKS = (
-    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "mode_fixed.c",
-    "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c", "bend.c", "stops.c",
+    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "heat_fixed.c",
+    "mode_fixed.c", "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c", "bend.c", "stops.c",
 )  # fmt: skip
 """Files that models with effects carry themselves, even with a shared run time."""
 
@@ -217,19 +217,19 @@ class Variant:
         if self.chain:
             slew = "chain_slew.c" if self.slew else "chain_free.c"
             delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
-            kept = () if self.moves == "dashpot" else ("moved_kept.c",)
-            bent = (f"moved_{self.moves}.c", *kept, f"bent_{self.bends}.c", "chain_moving.c")
-            searched = ("moved_searched_fixed.c",) if self.bends else ()
-            moving = ("stretched_fixed.c", f"moved_{self.moves}_fixed.c", *searched, "chain_moving_fixed.c")
-            plays: tuple[str, ...]
-            if not self.moves and not self.bends:
-                plays = ("chain_plays_fixed.c" if self.fixed else "chain_plays.c",)
-            elif self.fixed:
-                plays = moving
+            if not self.moves:
+                plays: tuple[str, ...] = ("chain_plays.c",)
+            elif not self.bends:
+                plays = ("stretch.c", f"relaxing_{kind}.c", "chain_relaxing.c")
             else:
-                plays = bent if self.bends else ("chain_relaxing.c",)
+                before = {"relaxing": ("stretch.c",), "dashpot": (f"yield_{kind}.c",)}.get(self.moves, ())
+                kept = () if self.moves == "dashpot" else ("moved_kept.c",)
+                bent = "bent_fixed.c" if self.fixed and self.bends != "none" else f"bent_{self.bends}.c"
+                known = () if self.bends == "none" else ("bent_known.c",)
+                moved = (*before, f"moved_{self.moves}.c", *kept, bent, *known)
+                plays = (*moved, "chain_moving.c", f"search_{kind}.c")
             finer = "chain_finer.c" if self.finer else "chain_whole.c"
-            return (start, f"loop_{front}.c", delay, slew, *plays, finer, f"chain_{kind}.c", "chain.c", *more)
+            return (start, f"loop_{front}.c", delay, slew, f"chain_{kind}.c", *plays, finer, "chain.c", *more)
         return (
             start,
             f"loop_{front}.c",

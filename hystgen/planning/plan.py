@@ -15,7 +15,7 @@ import os
 import random
 import shlex
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from decimal import Decimal
 from functools import partial
 from pathlib import PurePath
@@ -26,6 +26,9 @@ from numpy.typing import NDArray
 
 from hystgen.basics import arguments
 from hystgen.basics.problems import PlanError
+from hystgen.planning import converter, header, session
+from hystgen.planning.converter import Codes, Dac
+from hystgen.planning.session import Part, Session
 
 if TYPE_CHECKING:
     from hystgen.parameters.files import Parameters
@@ -74,18 +77,30 @@ LONGEST_MOVE = 60.0
 MEASURED = "measured"
 """Folder of the measured records beside the drives."""
 
+WHOLE, CODES, RECORDING = "session.csv", "session_codes.txt", "recording.csv"
+"""Files of a session at one rate: its drives, its codes, and where its recording is looked for."""
+
+MOST_SAMPLES = 10_000_000
+"""Most samples of a session at one rate: about 500 MB of text."""
+
 
 @dataclass(frozen=True)
 class Drive:
-    """A record to be measured: `t` (N,) in s of the session, `v` (N,) in input units; `shows`: catalogue names."""
+    """A record to be measured: `t` (N,) in s of the session, `v` (N,) in input units; `shows`: catalogue names.
+
+    `corner_time`: s from each sample that was drawn to the next, at one rate with others on a straight line between;
+    `codes` (N,): what a converter is given for `v`, None without one.
+    """
 
     name: str
     purpose: str
     shows: tuple[str, ...]
     held_out: bool
     sample_time: float
+    corner_time: float
     t: Array
     v: Array
+    codes: Codes | None = None
 
     @property
     def fastest(self) -> float:
@@ -99,7 +114,8 @@ class Plan:
 
     `source`, `effects`: files of the model and of the user's own effects; `history`: drive values visited before every
     record; `rest`: seconds of pause before each; `max_rate`: input/s; `defaults`: a sentence for each of these that was
-    chosen here.
+    chosen here. `session`: where the records are in one drive at one rate, which is `whole`, with codes of `dac`; None
+    where no rate was given. `stretches` of it: numbers of steps between samples that were drawn, and ticks of each.
     """
 
     parameters: Parameters
@@ -111,11 +127,16 @@ class Plan:
     max_rate: float
     sample_time: float
     defaults: tuple[str, ...]
+    session: Session | None = None
+    whole: Drive | None = None
+    dac: Dac | None = None
+    stretches: tuple[tuple[int, int], ...] = ()
 
     @property
     def duration(self) -> float:
         """Seconds from the first to the last sample."""
-        return float(self.drives[-1].t[-1] - self.drives[0].t[0])
+        first = self.drives[0] if self.whole is None else self.whole
+        return float(self.drives[-1].t[-1] - first.t[0])
 
     @property
     def samples(self) -> int:
@@ -125,7 +146,9 @@ class Plan:
     @property
     def names(self) -> tuple[str, ...]:
         """The files that `write` makes."""
-        return (*(drive.name for drive in self.drives), "plan.html")
+        codes = (CODES, header.file(self.parameters)) if self.dac else ()
+        whole = () if self.whole is None else (WHOLE, *codes, session.FILE)
+        return (*(drive.name for drive in self.drives), *whole, "plan.html")
 
     def sentence(self) -> str:
         """Number of records and samples, and the time they take."""
@@ -136,24 +159,54 @@ class Plan:
         )
 
     def command(self, folder: str | os.PathLike[str]) -> str:
-        """The command line that diagnoses the measured records, those in `folder`/measured."""
+        """The command line that diagnoses the measured records, those in `folder`/measured, or the one recording."""
         home = PurePath(os.fspath(folder))
+        own = [word for path in self.effects for word in ("--effects", path)]
+        out = ["-o", (home / "diagnosis").as_posix()]
+        if self.session is not None:
+            cut = ["--session", (home / session.FILE).as_posix()]
+            recording = (home / RECORDING).as_posix()
+            return shlex.join(["hystgen", "diagnose", self.source, recording, *cut, *own, *out])
         files = {drive.name: (home / MEASURED / drive.name).as_posix() for drive in self.drives}
         words = ["hystgen", "diagnose", self.source]
         words += [files[drive.name] for drive in self.drives if not drive.held_out]
         for drive in self.drives:
             words += ["--holdout", files[drive.name]] if drive.held_out else []
-        for path in self.effects:
-            words += ["--effects", path]
-        words += [f"--history={','.join(map(repr, self.history))}", f"--rest={self.rest!r}"]
-        return shlex.join([*words, "-o", (home / "diagnosis").as_posix()])
+        words += [*own, f"--history={','.join(map(repr, self.history))}", f"--rest={self.rest!r}"]
+        return shlex.join([*words, *out])
 
     def tables(self) -> dict[str, str]:
-        """Names and text of the CSV files, columns t and v."""
+        """Names and text of the files but the page: CSV of t, v and, with a converter, code; of a session all of it."""
         from hystgen.records import columns_text, headers
 
-        header = headers(("t", "v"), {"t": "s", "v": self.parameters.units.input})
-        return {drive.name: columns_text(header, (drive.t, drive.v)) for drive in self.drives}
+        names = ("t", "v") if self.dac is None else ("t", "v", "code")
+        top = headers(names, {"t": "s", "v": self.parameters.units.input})
+
+        def text(drive: Drive) -> str:
+            return columns_text(top, (drive.t, drive.v, *(() if drive.codes is None else (drive.codes,))))
+
+        made = {drive.name: text(drive) for drive in self.drives}
+        if self.session is None or self.whole is None:
+            return made
+        made[WHOLE] = text(self.whole)
+        if self.dac is not None and self.whole.codes is not None:
+            codes = self.whole.codes
+            made[CODES] = "\n".join(map(str, codes.tolist())) + "\n"
+            made[header.file(self.parameters)] = header.header(
+                self.parameters, self.session, self.dac, codes, self.stretches, self._options()
+            )
+        return {**made, session.FILE: self.session.to_json()}
+
+
+    def _options(self) -> str:
+        """Of the command line that makes the same session."""
+        said = [f"--max-rate {self.max_rate!r}"]
+        if self.session is not None:
+            said.append(f"--rate {self.session.rate!r}")
+        if self.dac is not None:
+            dac = self.dac
+            said.append(f"--dac-bits {dac.bits} --dac-range={dac.low!r},{dac.high!r} --dac-coding {dac.coding}")
+        return " ".join(said)
 
 
 @arguments.checked
@@ -162,6 +215,10 @@ def plan(
     *,
     max_rate: float | None = None,
     sample_time: float | None = None,
+    rate: float | None = None,
+    dac_bits: int | None = None,
+    dac_range: Sequence[float] | None = None,
+    dac_coding: str = converter.CODINGS[0],
     effects: Sequence[str | os.PathLike[str]] = (),
 ) -> Plan:
     """The drive records that make all effects of the catalogue separable.
@@ -169,7 +226,13 @@ def plan(
     `source`: a `Model` or a parameter file, with `effects`, files of effects of the user's own; `max_rate`: the
     fastest that the drive may change, input/s (default: the whole range in `FULL_SCALE` sample times); `sample_time`:
     shortest time between samples, s (default: the file's, else `SAMPLE_TIME`). Every drive stays inside `input_range`
-    and below `max_rate`. Raises ParameterError, PlanError with every problem.
+    and below `max_rate`.
+
+    `rate`: the one sample rate of a converter, Hz, in place of `sample_time`: every drive has a sample a tick, and all
+    are parts of one session, with the rests between them. `dac_bits`, `dac_range` and `dac_coding` say how its codes
+    are made (see `Dac`); drives are then what the codes give, and pass `max_rate` by no more than a code.
+
+    Raises ParameterError, PlanError with every problem.
     """
     from hystgen.model import Model, as_model, load
 
@@ -180,16 +243,27 @@ def plan(
         max_rate = arguments.real("max_rate", max_rate, "input units per second")
     if sample_time is not None:
         sample_time = arguments.real("sample_time", sample_time, "seconds")
-    given = (("max rate", max_rate, "input units per second"), ("sample time", sample_time, "seconds"))
+    if rate is not None:
+        rate = arguments.real("rate", rate, "samples per second")
+    given = (
+        ("max rate", max_rate, "input units per second"),
+        ("sample time", sample_time, "seconds"),
+        ("rate", rate, "samples per second"),
+    )
     problems = [
         f"the {name} {value!r} is no number above 0; give {unit}"
         for name, value, unit in given
         if value is not None and not 0.0 < value < math.inf
     ]
+    if rate is not None and sample_time is not None:
+        problems.append("a rate is one over a sample time; give one of both")
+    dac = _dac(rate, dac_bits, dac_range, dac_coding, problems)
     if problems:
         raise PlanError(problems)
     defaults = []
-    if sample_time is None:
+    if rate is not None:
+        sample_time = 1.0 / rate
+    elif sample_time is None:
         sample_time = file.sample_time or SAMPLE_TIME
         whose = "the parameter file's" if file.sample_time else "chosen here, since the parameter file has none"
         defaults.append(f"The sample time of {sample_time:g} s is {whose}; --sample-time gives another.")
@@ -202,23 +276,121 @@ def plan(
             "amplifier or stage must not see that, plan again with --max-rate."
         )
     grid = Grid.over(low, high)
+    top, bottom = grid.values((grid.high, grid.low))
+    if dac is not None and (problems := list(dac.problems(bottom, top))):
+        raise PlanError(problems)
     tempo = Tempo.of(grid, max_rate, sample_time)
-    drives, tick = [], 0
-    for number, record in enumerate(RECORDS, 1):
-        every = record.every(tempo)
-        codes = _written(record, grid, tempo, every)
-        ticks = [tick + every * k for k in range(len(codes))]
+    written = [(record, every := record.every(tempo), _written(record, grid, tempo, every)) for record in RECORDS]
+    player = None if rate is None else _Player.of(grid, tempo, rate, dac, [(len(c) - 1) * e for _, e, c in written])
+    drives, tick = [], 0 if player is None else player.first
+    for number, (record, every, nodes) in enumerate(written, 1):
+        v, codes = (np.array(grid.values(nodes)), None) if player is None else player.played(nodes, every)
+        step = every if player is None else 1
+        ticks = range(tick, tick + step * len(v), step)
         tick = ticks[-1] + tempo.rest
         drives.append(
             Drive(
                 f"{number:02d}_{record.name}.csv", record.purpose, record.shows, record.held_out,
-                tempo.seconds(every), np.array([tempo.seconds(k) for k in ticks]), np.array(grid.values(codes)),
+                tempo.seconds(step), tempo.seconds(every), np.array([tempo.seconds(k) for k in ticks]), v, codes,
             )
         )  # fmt: skip
-    top, bottom = grid.values((grid.high, grid.low))
     rest = tempo.seconds(tempo.rest)
     own = tuple(os.fspath(path) for path in effects)
-    return Plan(file, named, own, tuple(drives), (top, bottom), rest, max_rate, sample_time, tuple(defaults))
+    made = Plan(file, named, own, tuple(drives), (top, bottom), rest, max_rate, sample_time, tuple(defaults))
+    return made if player is None else player.session(made)
+
+
+def _dac(
+    rate: float | None, bits: int | None, ends: Sequence[float] | None, coding: str, problems: list[str]
+) -> Dac | None:
+    """The converter that is asked for; what is missing for it goes to `problems`."""
+    arguments.choice("dac_coding", coding, converter.CODINGS)
+    if bits is None and ends is None:
+        return None
+    if bits is None or ends is None:
+        problems.append("codes of a DAC need its bits and its range, the drive at its lower and upper end; give both")
+        return None
+    if rate is None:
+        problems.append("codes of a DAC are for one rate; give the rate at which it is played, Hz")
+    low_high = arguments.numbers("dac_range", ends, "[0, 150]")
+    if len(low_high) != 2:
+        problems.append(f"the DAC range has {len(low_high)} numbers; give two, the drive at its lower and upper end")
+        return None
+    return Dac(arguments.whole("dac_bits", bits, "bits", 1), *low_high, coding)
+
+
+@dataclass(frozen=True)
+class _Player:
+    """A converter at one rate: its ticks between the samples of a drive, and all drives in one session.
+
+    `nodes`, `every`: the lead-in that makes the history true; `first`: tick at which the first record begins.
+    """
+
+    grid: Grid
+    tempo: Tempo
+    rate: float
+    dac: Dac | None
+    nodes: list[int]
+    every: int
+
+    @classmethod
+    def of(cls, grid: Grid, tempo: Tempo, rate: float, dac: Dac | None, lengths: Sequence[int]) -> _Player:
+        """`lengths`: of the records, ticks. Raises PlanError for more samples than a file should have."""
+        every = tempo.every_of(1.0, SLOW_SAMPLES)
+        made = cls(grid, tempo, rate, dac, _lead_in(grid, tempo, every), every)
+        samples = made.first + sum(lengths) + (len(lengths) - 1) * tempo.rest + 1
+        if samples > MOST_SAMPLES:
+            unit = 10.0 ** math.floor(math.log10(rate * MOST_SAMPLES / samples))
+            fits = unit * math.floor(rate * MOST_SAMPLES / samples / unit)
+            what = f"at {rate:g} Hz the session has {samples} samples, more than {MOST_SAMPLES}"
+            raise PlanError([f"{what}; give a rate of {fits:g} Hz or less"])
+        return made
+
+    @property
+    def first(self) -> int:
+        return (len(self.nodes) - 1) * self.every + self.tempo.rest
+
+    def played(self, nodes: Sequence[int], every: int) -> tuple[Array, Codes | None]:
+        """Drives and codes at every tick of samples that are `every` ticks apart."""
+        if self.dac is None:
+            return np.array(self.grid.values(converter.filled(nodes, every).tolist())), None
+        codes = converter.filled(self.dac.codes(self.grid.values(nodes)), every)
+        return self.dac.drives(codes), codes
+
+    def session(self, plan: Plan) -> Plan:
+        """The plan with its drives as one."""
+        parts, at, stretches = [], self.first, [(len(self.nodes) - 1, self.every)]
+        lead = self.played(self.nodes, self.every)
+        pieces = [lead]
+        for drive in plan.drives:
+            hold = at - sum(len(v) for v, _ in pieces)
+            before, code = pieces[-1]
+            pieces.append((np.repeat(before[-1:], hold), None if code is None else np.repeat(code[-1:], hold)))
+            pieces.append((drive.v, drive.codes))
+            parts.append(Part(drive.name, at, len(drive.v), drive.held_out))
+            every = round(drive.corner_time / drive.sample_time)
+            stretches += [(1, self.tempo.rest), ((len(drive.v) - 1) // every, every)]
+            at += len(drive.v) - 1 + self.tempo.rest
+        v = np.concatenate([each for each, _ in pieces])
+        codes = None if self.dac is None else np.concatenate([each for _, each in pieces if each is not None])
+        t = np.array([self.tempo.seconds(k) for k in range(len(v))])
+        top, bottom = (float(self.played([code], 1)[0][0]) for code in (self.grid.high, self.grid.low))
+        rise = session.crossing(t, v, 0.5 * (top + bottom))
+        assert rise is not None
+        dac = None if self.dac is None else asdict(self.dac)
+        where = Session(self.rate, len(v), (top, bottom), plan.rest, rise, tuple(parts), dac)
+        whole = Drive(WHOLE, "", (), False, plan.sample_time, plan.sample_time, t, v, codes)
+        return replace(
+            plan, history=(top, bottom), session=where, whole=whole, dac=self.dac, stretches=tuple(stretches)
+        )
+
+
+def _lead_in(grid: Grid, tempo: Tempo, every: int) -> list[int]:
+    """Moves to the top and the bottom, the history of the first record, slow enough for any stage."""
+    course = Course(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), 2 * MOVE)
+    course.hold(EDGE)
+    _ends(course, 2 * MOVE)
+    return course.rounded()
 
 
 def lasting(seconds: float) -> str:
@@ -377,10 +549,15 @@ def _written(record: Kind, grid: Grid, tempo: Tempo, every: int) -> list[int]:
     course = Course(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), pace)
     course.hold(EDGE)
     record.draw(course)
+    _ends(course, pace)
+    return course.rounded()
+
+
+def _ends(course: Course, pace: float) -> None:
+    """Moves to the top and the bottom: the history of the record that comes next."""
     course.go(1.0, pace)
     course.go(0.0, pace)
     course.hold(EDGE)
-    return course.rounded()
 
 
 def _triangles(course: Course) -> None:

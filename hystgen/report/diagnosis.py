@@ -19,6 +19,7 @@ from hystgen.diagnosis.findings.result import Diagnosis, NamedEffect, Result
 from hystgen.diagnosis.search.acceptance import is_noise
 from hystgen.report.diagnosis_figures import ALTERNATIVES, CAPTIONS, FIGURES, NARROW, WIDE
 from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, page
+from hystgen.report.properties import settling
 
 if TYPE_CHECKING:
     from hystgen.effects.base import Effect
@@ -59,6 +60,7 @@ def html(found: Diagnosis, parameters_text: str) -> str:
     sections = [
         Section("How the gap shrinks", [figures["gap"], *_refitted(result), _noise(result)]),
         Section("What was found", _found(result, found.parameters.model.effects, found.not_emitted())),
+        Section("Settling", [Text(f"The output of the model with the effects is {settling(found.model)}.")]),
         Section("What is left", _left(result)),
         Section("Faults of the data", _faults(result)),
         Section("Before and after, on held-out records", [figures["overlay"]]),

@@ -10,9 +10,12 @@ from typing import Any
 
 from hystgen.basics import drawing, writing
 from hystgen.basics.drawing import label
+from hystgen.basics.problems import counted
 from hystgen.basics.version import __version__
+from hystgen.planning import header
 from hystgen.planning import plan as planning
-from hystgen.planning.plan import EDGE, MEASURED, Drive, lasting
+from hystgen.planning.plan import CODES, EDGE, MEASURED, RECORDING, WHOLE, Drive, lasting
+from hystgen.planning.session import FILE as SESSION
 from hystgen.report.html import Figure, Listing, Section, Table, Text, page
 
 WIDE, NARROW = (9.0, 5), (4.2, 3)
@@ -31,7 +34,7 @@ class Plan(planning.Plan):
         Raises PlotError without matplotlib, OSError.
         """
         made = {**self.tables(), "plan.html": html(self, folder)}
-        return writing.write_files(Path(folder), {name: text.encode("utf-8") for name, text in made.items()})
+        return writing.write_files(Path(folder), {name: made[name].encode("utf-8") for name in self.names})
 
 
 @functools.wraps(planning.plan)
@@ -48,7 +51,7 @@ def html(plan: Plan, folder: str | os.PathLike[str]) -> str:
     home = os.fspath(folder).rstrip("/\\")
     lead = [
         Text(f"Drives that separate all effects. {plan.sentence()}"),
-        Text(f"When the measured records are in {home}/{MEASURED}, run:", plan.command(folder)),
+        Text(f"When {_measured(plan, home)}, run:", plan.command(folder)),
     ]
     sections = [
         Section("What to do", [Listing(_steps(plan, home))]),
@@ -68,9 +71,17 @@ def _rate(plan: Plan, rate: float) -> str:
     return f"{rate:.4g}{_unit(plan) or ' 1'}/s"
 
 
+def _measured(plan: Plan, home: str) -> str:
+    if plan.session is not None:
+        return f"the recording of the session is {home}/{RECORDING}"
+    return f"the measured records are in {home}/{MEASURED}"
+
+
 def _steps(plan: Plan, home: str) -> list[str]:
     unit = _unit(plan)
     top, bottom = (f"{value:g}{unit}" for value in plan.history)
+    if plan.session is not None:
+        return _played(plan, home, top, bottom)
     return [
         f"Before the first record go to {top}, then to {bottom}. Every record ends with the same two moves, so "
         f"--history={','.join(map(repr, plan.history))} is true of all.",
@@ -82,6 +93,32 @@ def _steps(plan: Plan, home: str) -> list[str]:
         "Let v be the drive as measured at the time of y. A generator that holds each value until the next is half a "
         "sample late, and a commanded v would show that as a delay.",
     ]
+
+
+def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
+    """What to do with a session at one rate."""
+    session, samples = plan.session, plan.session.samples if plan.session else 0
+    assert session is not None
+    said = [
+        f"Go to {bottom} slowly, then play {WHOLE} at {session.rate:g} Hz to its end: {samples} samples in "
+        f"{lasting(plan.duration)}. It goes to {top} and {bottom} first, which is the history of the first record, and "
+        f"rests {plan.rest:g} s before each.",
+        f"Record drive and displacement all the while into one file, {home}/{RECORDING}, with columns t, v and y, at "
+        "this rate or another. It may start before the drive does; the two are aligned by the first rise.",
+        f"{SESSION} says at which sample each record begins, and which are held out: the recording is cut by it.",
+        "Let v be the drive as measured at the time of y. A converter that holds each value until the next is half a "
+        "sample late, and a commanded v would show that as a delay.",
+    ]
+    if plan.dac is not None:
+        size, corners = samples * plan.dac.bytes, header.nodes(plan.stretches)
+        said.insert(
+            1,
+            f"{CODES} has the same as one code a line: {samples} codes, {size / 1e6:.3g} MB of memory at "
+            f"{counted(plan.dac.bytes, 'byte')} each. The files of the single records have their codes in the column "
+            f"code. For firmware {header.file(plan.parameters)} has the {len(corners)} codes between which the drive "
+            f"is straight, {len(corners) * plan.dac.bytes / 1e3:.3g} kB.",
+        )
+    return said
 
 
 def _times(plan: Plan) -> Table:
@@ -106,15 +143,16 @@ def _purpose(drive: Drive) -> str:
 
 
 def _kept(plan: Plan) -> list[str]:
-    top, bottom = (f"{value:g}{_unit(plan)}" for value in plan.history)
-    return [
-        *plan.defaults,
-        f"No record goes below {bottom} or above {top}, and none changes faster than {_rate(plan, plan.max_rate)}.",
-    ]
+    unit = _unit(plan)
+    top, bottom = (f"{value:g}{unit}" for value in plan.history)
+    steps = "" if plan.dac is None else ", steps of one code aside"
+    kept = f"No record goes below {bottom} or above {top}, and none changes faster than "
+    resolution = [] if plan.dac is None else [plan.dac.sentence(unit, plan.history[0] - plan.history[1])]
+    return [*plan.defaults, f"{kept}{_rate(plan, plan.max_rate)}{steps}.", *resolution]
 
 
 def _limits(plan: Plan) -> list[str]:
-    fast, fastest = min(drive.sample_time for drive in plan.drives), max(drive.fastest for drive in plan.drives)
+    fast, fastest = min(drive.corner_time for drive in plan.drives), max(drive.fastest for drive in plan.drives)
     said = [
         f"Cannot be seen: a slew limit above {_rate(plan, fastest)}, since no record is faster.",
         f"Cannot be seen: a resonance above {1.0 / (EDGE * fast):.3g} Hz, and lags and delays far below {fast:.3g} s, "

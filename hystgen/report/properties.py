@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import decimal
+import math
 from typing import Any
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics.problems import FormatError, counted, percent
+from hystgen.basics.problems import EffectsError, FormatError, counted, percent
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.bounds import error_bounds
 from hystgen.emission.calls import emit_options
 from hystgen.front.dead_zone.model import DeadZone
-from hystgen.model import Model
+from hystgen.model import SETTLED, Model
 
 HARD_RATIO = 1e6
 
@@ -21,8 +22,11 @@ WIDE = 0.05
 UP = decimal.Context(prec=3, rounding=decimal.ROUND_CEILING)
 
 
-def properties(model: Model) -> str:
-    """The text of `hystgen show`: ranges, slopes, loop width, invertible or why not, error bounds."""
+def properties(model: Model, within: float = SETTLED) -> str:
+    """The text of `hystgen show`: ranges, slopes, loop width, settling, invertible or why not, error bounds.
+
+    `within`: error of settling, share of a step.
+    """
     c, p = model.cascade, model.parameters
     pi = c.pi
     drive, output = (f" {unit}" if unit else "" for unit in (p.units.input, p.units.output))
@@ -45,9 +49,11 @@ def properties(model: Model) -> str:
             f"density            loading curve within {_most(curve)}{output}, output of any history within "
             f"{_most(history)}{output}"
         )
+    lines.append(f"settling           {settling(model, within)}")
     problems = c.inverse_problems()
     if model.effects:
-        lines += ["effects            the lines above are those of the model without them", *_effects(model)]
+        said = "effects            the lines above but settling are those of the model without them"
+        lines += [said, *_effects(model)]
     elif problems:
         lines += ["inverse            none:", *(f"    {problem}" for problem in problems)]
         lines += _fixed(model, drive, output)
@@ -68,6 +74,38 @@ def properties(model: Model) -> str:
     if not model.effects and (words := cost(model)):
         lines.append(f"cost of the C      {words}")
     return "\n".join(lines)
+
+
+def facts(model: Model, within: float = SETTLED) -> dict[str, Any]:
+    """The same for programs, without error bounds and cost: `hystgen show --json`."""
+    c, p = model.cascade, model.parameters
+    problems = c.inverse_problems()
+    try:
+        settled = model.settling(within).content()
+    except EffectsError as error:
+        settled = {"not_known": str(error)}
+    return {
+        "hystgen": 1,
+        "name": model.name,
+        "units": {"input": p.units.input, "output": p.units.output},
+        "plays": c.pi.n,
+        "drive_range": list(c.input_range),
+        "output_range": list(c.output_range),
+        "loop_width": c.pi.width,
+        "slopes": [float(slope) for slope in c.pi.slopes],
+        "slope_ratio": c.slope_ratio if math.isfinite(c.slope_ratio) else None,
+        "inverse": {"exists": not problems, "problems": problems},
+        "effects": [effect.model_dump(mode="json") for effect in model.effects],
+        "settling": settled,
+    }
+
+
+def settling(model: Model, within: float = SETTLED) -> str:
+    """Settling of the model in a sentence, or why it is not known."""
+    try:
+        return model.settling(within).sentence(model.parameters.units.output)
+    except EffectsError as error:
+        return f"not known: {error}"
 
 
 def cost(model: Model) -> str:

@@ -15,6 +15,7 @@ behind a memoryless part while nothing is limited, since there is nothing beyond
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -24,7 +25,16 @@ from hystgen.arithmetic.factors import lifted
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER
 from hystgen.compensator.chain.layout import ChainTables, Parts
-from hystgen.compensator.chain.moving import DILATED, least_dilated
+from hystgen.compensator.chain.moving import (
+    DASHPOT,
+    DILATED,
+    PLAIN,
+    Bumps,
+    least_dilated,
+    least_slope,
+    steepest_bend,
+    yield_error,
+)
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, upward
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.creep import compensator as creep
@@ -32,9 +42,11 @@ from hystgen.effects.creep import fixed as creep_fixed
 from hystgen.effects.creep.compensator import CreepNumbers
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag import fixed as lag_fixed
+from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.resonance import fixed as resonance_fixed
 from hystgen.effects.resonance.compensator import ModeNumbers
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
+from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
 from hystgen.effects.thermal.fixed import GAIN_BITS
 
@@ -85,7 +97,8 @@ class Bounds:
 
     `bends`: there and back of each tanh; `ends`: of the output; `slowed`: share of its rates that a slew limit loses in
     whole codes; `drifted`: error of drifts in signals; `reached`: whether all that is asked in front of the plays can
-    be led to; `largest_step`: as in `Compiled`; `finer`: bits of what arrives in front of the plays below their input.
+    be led to; `largest_step`: as in `Compiled`; `finer`: bits of what arrives in front of the plays below their input;
+    `bumps`: of bent plays; `heats`: errors of temperatures of own heat, degrees.
     """
 
     static: StaticModel
@@ -107,6 +120,8 @@ class Bounds:
     largest_step: float
     finer: int
     seconds: float
+    bumps: Bumps
+    heats: list[float]
 
     @property
     def _fine(self) -> int:
@@ -185,7 +200,20 @@ class Bounds:
 
     def _gains(self) -> tuple[int, float]:
         """How many gains there are, and the error of each as a share of the output."""
-        return len(self.parts.ageing) + len(self.parts.thermal), 8.0 * 2.0**-GAIN_BITS
+        return len(self.parts.ageing) + len(self.parts.heat) + len(self.parts.thermal), 8.0 * 2.0**-GAIN_BITS
+
+    def _warmed(self, degrees: Sequence[float]) -> float:
+        """Change of the output, in codes, by errors of the temperatures of own heat."""
+        lsb = float(self.inner.output_lsb)
+        return math.fsum(
+            wrong * (abs(each.gain_per_degree) * self.sizes.still + abs(each.offset_per_degree) / lsb)
+            for wrong, each in zip(degrees, self.parts.heat, strict=True)
+        )
+
+    def _warmed_at_once(self) -> float:
+        """Change of the output, in codes, by the heat of one sample at the fastest rate."""
+        ends, way = self.static.input_range, self.largest_step
+        return self._warmed([thermal.most_at_once(each, ends, way, self.seconds) for each in self.parts.heat])
 
     def _saturation(self) -> tuple[float, float, float]:
         """Of what saturates: the slope of its inverse at the ends of the output, the error of the inverse, and that of
@@ -241,39 +269,58 @@ class Bounds:
             for (m, shift), (n, second) in zip(t.first[1:].tolist(), t.second[1:].tolist(), strict=True)
         ]
 
+    @cached_property
+    def _bent(self) -> float:
+        """Largest change of what a play contributes for one of the play."""
+        return 1.0 + steepest_bend(self.static, self.parts.plays) if self.bumps.curves else 1.0
+
     def _moved(self) -> float:
-        """What roundings, and contacts inside a step, make of the sum of plays that depend on the rate, in codes."""
+        """What roundings, and contacts inside a step, make of the sum of plays that an effect moves or bends, in
+        codes."""
         t = self.tables.moving
         if not t.used:
             return 0.0
         travel, step = float(self.inner.hull[1] - self.inner.hull[0]), float(self.inner.step)
         plays = []
         for first, second in self._shares:
-            if t.moves == DILATED:
+            if t.moves == DASHPOT:
+                plays.append(2.0 * step + self._dashpot(step))
+            elif t.moves == DILATED:
                 plays.append((1.0 + 2.0**-30 * first * travel) * step)
-            elif first < 1.0:
+            elif t.moves != PLAIN and first < 1.0:
                 wrong = 2.0 * travel * (2.0**-30 * (first + second))
                 plays.append((1.0 + wrong) / first * step + 0.25 * self.largest_step)
             else:
-                plays.append(step)
+                plays.append(step * (t.moves != PLAIN))
         slopes = 0.5 * len(t.relaxed.slope) * 2.0**-self.inner.bits * travel * t.scanned
-        found = math.fsum(abs(p) * play for p, play in zip(self.static.pi.weights[1:], plays, strict=True))
+        slopes += len(plays) * 2.0**-self.inner.bits * self.bumps.largest  # weights, of what a bend adds
+        each = (self._bent * play + self.bumps.error * step for play in plays)
+        found = math.fsum(abs(p) * play for p, play in zip(self.static.pi.weights[1:], each, strict=True))
         return float(found / float(self.inner.output_lsb) + slopes)
+
+    def _dashpot(self, step: float) -> float:
+        """How far plays with a nonlinear dashpot can be from where they are in the model, by its table and by where on
+        its way an input counts as standing still."""
+        t, way = self.tables.moving, self.largest_step
+        effect, scale = next(filter(dashpot.nonlinear, self.parts.plays)), self.static.pi.thresholds[-1]
+        seen = float(t.seen[0]) / 2.0 ** int(t.seen[1])
+        return yield_error(t, effect, scale, self.seconds, step, way) + seen * way
 
     @cached_property
     def _steepest(self) -> float:
         """Largest change of the sum of the plays for one of their input, at all samples."""
-        if self.tables.moving.moves != DILATED:
-            return float(self.static.pi.slopes[-1])
         first, *others = map(abs, self.static.pi.weights)
-        more = (p * (1.0 + 2.0 * wider) for p, (wider, _) in zip(others, self._shares, strict=True))
-        return float(first + math.fsum(more))
+        dilated = self.tables.moving.moves == DILATED
+        if not dilated and not self.bumps.curves:
+            return float(self.static.pi.slopes[-1])
+        more = (p * (1.0 + 2.0 * wider * dilated) for p, (wider, _) in zip(others, self._shares, strict=True))
+        return float(first + self._bent * math.fsum(more))
 
     def _plays(self, arriving: float) -> float:
         """Error of the sum of the plays for one of what arrives in front of the memoryless part, in output codes."""
         steep = self.static.front_slopes[1] * self._steepest / float(self.inner.output_lsb)
         level = 0.5 * self._signal if self.drop else 0.0
-        return float(self.inner.sum_error()) + self._moved() + steep * arriving * self._arriving + level
+        return self._bent * float(self.inner.sum_error()) + self._moved() + steep * arriving * self._arriving + level
 
     def forward(self) -> float:
         """In output codes."""
@@ -286,6 +333,7 @@ class Bounds:
             error = error * numbers.rest + self._creep(j)
         gains, share = self._gains()
         error = LARGEST_GAIN**gains * (error + gains * (share * self.sizes.still + self._signal))
+        error += LARGEST_GAIN**gains * self._warmed(self.heats)
         if self.parts.ageing:
             error += ageing.TABLE_ERROR * self.sizes.still
         for mode, size, row in zip(self.modes, self.sizes.modes, self.tables.mode, strict=True):
@@ -306,7 +354,7 @@ class Bounds:
             own = sum(missed(weight) * size + 0.5 * self._signal for weight in self.taps)
             error = error * math.fsum(map(abs, self.taps)) + own
         gains, share = self._gains()
-        late = self._late() * self.sizes.still
+        late = self._late() * self.sizes.still + self._warmed(self.heats) + self._warmed_at_once() / LEAST_GAIN
         error = (1.0 / LEAST_GAIN) ** gains * (error + gains * (share * self.sizes.still + self._signal) + late)
         whole = float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
         apart = self._plays(self.slowed * whole) if self.slowed else 0.0  # states behind drives that a rate holds
@@ -334,9 +382,14 @@ class Bounds:
     def _gain(self) -> float:
         """Largest change of the drive in front of the memoryless part for one of the plays' sum."""
         if self.tables.moving.moves == DILATED:  # for plays that have seen the same drives
-            return 1.0 / least_dilated(self.static, self.parts.plays, self.seconds) / self.static.front_slopes[0]
+            least = least_dilated(self.static, self.parts.plays, self.seconds)
+            if self.bumps.curves:
+                least = min(least, 0.5 * least_slope(self.static, self.parts.plays))
+            return 1.0 / least / self.static.front_slopes[0]
         if self.tables.moving.used:  # as in floating point: each play is stretched further than it would be
-            return 2.0 / self.static.pi.weights[0] / self.static.front_slopes[0]
+            bent = bool(self.bumps.curves)
+            least = least_slope(self.static, self.parts.plays) if bent else self.static.pi.weights[0]
+            return 2.0 / least / self.static.front_slopes[0]
         return float(self.inner.gain())
 
     def _led(self, error: float) -> float:

@@ -10,7 +10,6 @@ is called in whatever order; what does not fit is refused.
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Callable
 from fractions import Fraction
@@ -44,8 +43,10 @@ from hystgen.compensator.chain.layout import (
     output_range,
     taps_of,
 )
+from hystgen.compensator.chain.moving import Bumps
 from hystgen.compensator.chain.own import OwnTables
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, lsbs, nearest
+from hystgen.effects import bend
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing import fixed as ageing_fixed
 from hystgen.effects.creep import compensator as creep
@@ -63,6 +64,7 @@ from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturati
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal import fixed as thermal_fixed
 from hystgen.effects.thermal.compensator import HeatTables
+from hystgen.effects.thermal.fixed import Heat
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
@@ -87,7 +89,7 @@ STEEP = 4.0
 def build(
     chain: Chain, arithmetic: str, seconds: float, how: Compensation, lsb: tuple[float | None, float | None]
 ) -> Compiled:
-    """The model in 'q31' or 'q15' at steps of `seconds`, whose effects on plays have no `moving.beyond_fixed`.
+    """The model in 'q31' or 'q15' at steps of `seconds`, whose effects have no `tables.refusals`.
 
     Raises FormatError when a given LSB does not fit the type, or a signal or a constant the arithmetic.
     """
@@ -116,7 +118,8 @@ class _Builder:
         plain = dataclasses.replace(static, output_offset=0.0)
         inner = (self.drive_lsb, self.output_lsb)
         beyond, self.reached = self._beyond() if self.lags else (0, True)
-        self.inner = Builder(plain, self.arithmetic, "loop", inner, self.given, beyond, bool(self.lags))
+        bent = moving.largest_bend(static, self.parts.plays)
+        self.inner = Builder(plain, self.arithmetic, "loop", inner, self.given, beyond, bool(self.lags), bent)
         plays, _ = self.inner.build()
         room = LARGEST.bit_length() - 2 - math.ceil(math.log2(self.sizes.largest))
         if room < 1:
@@ -132,14 +135,14 @@ class _Builder:
         tables = ChainTables(
             plays,
             limits,
-            self._need(lambda: self._moving(plays), "rate_dependence"),
+            self._need(lambda: self._moving(plays), "effects on plays"),
             self._need(self._lags, "a lag"),
             self._need(self._creep_tables, "creep"),
             self._need(self._delay, "a delay"),
             self._need(self._mode_tables, "resonance"),
             self._need(lambda: self._ageing(span), "ageing"),
             self._need(self._gains, "a temperature"),
-            HeatTables(np.zeros((0, 7), np.int64), np.zeros(0, np.int64)),
+            self._need(self._heat_tables, "own heat"),
             self._need(self._clock_tables, "drift"),
             OwnTables(np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64), 0),
             behind,
@@ -147,17 +150,14 @@ class _Builder:
             np.array(self._numbers(), dtype=np.int64),
             int(bool(self.parts.slew)),
         )
-        max_rate, slowed = fastest(static, self.parts, self.seconds, self.how), 0.0
-        if self.parts.slew:
-            slowed = max(1.0 - math.floor(rate) / float(rate) for rate in self.rates())
-            max_rate = min(max_rate, math.floor(min(self.rates())) * float(self.drive_lsb) / self.seconds)
-        step = min(max_rate * self.seconds, span)
+        slowed = max((1.0 - math.floor(rate) / float(rate) for rate in self.rates()), default=0.0)
+        max_rate = self._max_rate()
         weights = self.taps.weights.tolist() if self.taps else []
         bounds = Bounds(
             static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags,
             self.modes, sum(each.error for each in self.clocks), weights,
-            self.bends, (self.low, self.high), slowed, self.reached, step, self.finer,
-            self.seconds,
+            self.bends, (self.low, self.high), slowed, self.reached, self._largest_step(), self.finer,
+            self.seconds, self.bumps, [one.error for one in self.heats],
         )  # fmt: skip
         plays.limits[slots.HOLD] = bounds.hold()
         codes = Codes(
@@ -192,6 +192,7 @@ class _Builder:
         """The signals behind the plays."""
         static, slack = self.static, 1.0 + 2.0**-20
         w = max(*map(abs, static.play_range), *map(abs, static.pi.start))
+        w += moving.largest_bend(static, self.parts.plays)
         size = plays = self._code(math.fsum(static.pi.weights) * w) * slack + 1.0
         creeps = []
         for each in self.creeps:
@@ -201,7 +202,7 @@ class _Builder:
         span = self._code(self.high - self.low)
         for _ in self.parts.ageing:
             size *= thermal.LARGEST_GAIN
-        for _ in self.parts.thermal:
+        for _ in (*self.parts.heat, *self.parts.thermal):
             size = size * thermal.LARGEST_GAIN + span
         still = size
         modes = []
@@ -223,7 +224,7 @@ class _Builder:
             undone.append(back)
         target = back * (math.fsum(map(abs, self.taps.weights.tolist())) if self.taps else 1.0) + 1.0
         asked = target
-        for _ in self.parts.thermal:
+        for _ in (*self.parts.heat, *self.parts.thermal):
             asked = (asked + span) / thermal.LEAST_GAIN
         for _ in self.parts.ageing:
             asked = asked / thermal.LEAST_GAIN
@@ -246,7 +247,8 @@ class _Builder:
         low, high = self.static.play_range
         most = self.sizes.asked * float(self.output_lsb) / self.static.pi.slopes[-1]
         spans = math.ceil((most + max(abs(low), abs(high))) / (high - low)) + 1
-        return min(spans, BEYOND), spans <= BEYOND
+        straight = not any(effect.bends_plays() for effect in self.parts.plays)  # bent ones are straight beyond
+        return min(spans, BEYOND), spans <= BEYOND and straight
 
     # ------------------------------------------------------------ constants
 
@@ -256,7 +258,20 @@ class _Builder:
         return int(max(map(abs, self.inner.hull)) + self.inner.margin)
 
     def _moving(self, plays: Any) -> Any:
-        return moving.build_fixed(plays, self.static, self.parts.plays, self.seconds, self._farthest)
+        step = float(self.inner.step)
+        return moving.build_fixed(
+            plays, self.static, self.parts.plays, self.seconds, self._farthest, self.bumps, step, self._largest_step()
+        )
+
+    @cached_property
+    def bumps(self) -> Bumps:
+        """What bent plays contribute beyond themselves."""
+        end = max(map(abs, self.inner.hull))
+        try:
+            return moving.bumps(self.static, self.parts.plays, float(self.inner.step), end, self.about.degree)
+        except FormatError:
+            self._refuse("noncongruent: plays are bent too sharply within their range")
+            raise
 
     def _limits(self, plays: Any) -> Any:
         """Those of the whole chain."""
@@ -286,18 +301,32 @@ class _Builder:
         found[2], found[3] = self.slew(span)
         found[4] = round(VERIFIED_SHARE * (self.about.code_max + 1))
         found[LEVEL_BITS], found[LEVEL_DROP] = self.bits, self.drop
-        found[LARGEST_LEVEL] = min(self.inner.slope[-1] * self._farthest >> self.drop, LARGEST)
+        most = self._farthest + math.ceil(self.bumps.largest)
+        found[LARGEST_LEVEL] = min(self.inner.slope[-1] * most >> self.drop, LARGEST)
         found[LEAST_CODE] = self.inner.drive[0] - 2 * span
         found[MOST_CODE] = self.inner.drive[1] + 2 * span
         found[SHARE_BITS] = 31 - self.about.code_bits
         found[DRIVE_BITS], found[ARRIVING_BITS] = self.inner.fine + self.finer, self.finer
         return found
 
-    def rates(self) -> tuple[Fraction, Fraction]:
-        """Drive codes by which the drive may rise and fall in one step."""
+    def _max_rate(self) -> float:
+        """As in `Compiled`, for rates in whole codes."""
+        found = fastest(self.static, self.parts, self.seconds, self.how)
+        whole = (math.floor(rate) * float(self.drive_lsb) / self.seconds for rate in self.rates())
+        return min(found, *whole) if self.parts.slew else found
+
+    def _largest_step(self) -> float:
+        """As in `Compiled`."""
+        low, high = self.static.input_range
+        return min(self._max_rate() * self.seconds, high - low)
+
+    def rates(self) -> tuple[Fraction, ...]:
+        """Drive codes by which the drive may rise and fall in one step, where anything limits that."""
+        if not self.parts.slew:
+            return ()
         pairs = [(each.rate, each.falling_rate) for each in self.parts.slew]
         rising, falling = (min(each) for each in zip(*pairs, strict=True))
-        return tuple(Fraction(x * self.seconds) / self.drive_lsb for x in (rising, falling))  # type: ignore[return-value]
+        return tuple(Fraction(x * self.seconds) / self.drive_lsb for x in (rising, falling))
 
     def slew(self, span: int) -> tuple[int, int]:
         """The same in whole codes."""
@@ -375,6 +404,20 @@ class _Builder:
         bits = thermal_fixed.GAIN_BITS - (self.about.code_bits - 2)
         return ageing_fixed.tables(rows, float(self.drive_lsb), bits)
 
+    @cached_property
+    def heats(self) -> list[Heat]:
+        """Own heat, of each effect."""
+        span, level = self.high - self.low, 2.0**self.bits / float(self.output_lsb)
+        largest, lsb = max(map(abs, self.inner.drive)), float(self.drive_lsb)
+        rows = [thermal.heat_numbers(each, span, self.seconds) for each in self.parts.heat]
+        return [thermal_fixed.heat(row, largest, lsb, level) for row in rows]
+
+    def _heat_tables(self) -> HeatTables:
+        ends, roundoff = self.static.input_range, 2.0**-thermal_fixed.GAIN_BITS
+        turns = [thermal.heat_turns(each, ends, self.seconds, roundoff) for each in self.parts.heat]
+        table = np.array([one.table for one in self.heats], dtype=np.int64)
+        return HeatTables(table.reshape(-1, thermal_fixed.DROP + 1), np.array(turns, dtype=np.int64))
+
     def _gains(self) -> Any:
         span = self.high - self.low
         rows = [thermal.numbers(each, span) for each in self.parts.thermal]
@@ -420,40 +463,32 @@ class _Builder:
                 scaled += [(0, 0), (0, 0)]
             pieces.append(row)
         each = [[] if one is None else one.pieces for one in curves]
-        flat = list(itertools.chain.from_iterable(each))
-
-        def whole(values: Any, columns: int = 0) -> Any:
-            found = np.array(values, dtype=np.int64)
-            return found.reshape(-1, columns) if columns else found
-
-        first = [0, *itertools.accumulate(map(len, each))][: len(each)]
+        found = bend.bends(each, domain, scaled, self.about.degree)
         return Saturations(
-            whole(kinds), whole(pieces, 6), whole([one.knot for one in flat]),
-            whole([one.coefficients for one in flat], self.about.degree + 1), whole([one.scale for one in flat]),
-            whole(first), whole([len(one) for one in each]), whole(domain, 2), whole(scaled, 2),
-        )  # fmt: skip
+            np.array(kinds, dtype=np.int64), np.array(pieces, dtype=np.int64).reshape(-1, 6), found
+        )
 
     def _bends(self, level: float, size: float, back: float) -> tuple[Bend, Bend]:
         """The curves of a tanh for inputs up to `size` codes, and those that lead back up to `back`."""
         scale = 2.0**self.bits
 
-        def bend(function: Callable[[float], float], most: float, value: float) -> Bend:
+        def curve(function: Callable[[float], float], most: float, value: float) -> Bend:
             drop = max(0, math.ceil(math.log2(most * scale)) - BEND_BITS)
             lift = max(0, math.ceil(math.log2(value * scale)) - BEND_BITS)
             end = math.floor(most * scale / 2.0**drop)
             into, out = 2.0**drop / scale, scale / 2.0**lift
             allowed = max(0.5, out / 64.0)
             try:
-                curve = FixedCurve(lambda x: function(x * into) * out, (-end, end), [], self.about.degree, allowed)
+                found = FixedCurve(lambda x: function(x * into) * out, (-end, end), [], self.about.degree, allowed)
             except FormatError:
                 self._refuse("saturation bends too sharply within the output's range")
-            return Bend(curve, drop, lift)
+            return Bend(found, drop, lift)
 
         envelope = TanhEnvelope((level, 1.0 / level, 0.0, 0.0))
         far = float(envelope.forward(back))
         return (
-            bend(lambda x: float(envelope.forward(x)), size, min(level, size)),
-            bend(lambda y: float(envelope.inverse(y)), far, back),
+            curve(lambda x: float(envelope.forward(x)), size, min(level, size)),
+            curve(lambda y: float(envelope.inverse(y)), far, back),
         )
 
 

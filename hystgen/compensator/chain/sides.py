@@ -14,7 +14,6 @@ from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.own import OwnTables
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.thermal.compensator import heat_absorb, heat_solve
 from hystgen.plays.slots import Reals
 
 Function = Callable[..., Any]
@@ -133,7 +132,7 @@ def sides_of(blocks: Blocks, drives: Sequence[OwnBlock], outputs: Sequence[OwnBl
     ageing_absorb, ageing_solve = (
         _each(_tabled(blocks.ageing.ageing_absorb)), _back(_tabled(blocks.ageing.ageing_solve))
     )  # fmt: skip
-    heats_absorb, heats_solve = _each(_tabled(heat_absorb)), _back(_tabled(heat_solve))
+    heats_absorb, heats_solve = _each(_tabled(blocks.thermal.heat_absorb)), _back(_tabled(blocks.thermal.heat_solve))
     gain_absorb, gain_solve = _each(_tabled(blocks.thermal.gain_absorb)), _back(_tabled(blocks.thermal.gain_solve))
     mode_rest, mode_absorb = _each(_tabled(mode.mode_rest)), _each(mode.mode_absorb)
 

@@ -23,7 +23,6 @@ from hystgen.effects.ageing.compensator import AgeingState
 from hystgen.effects.creep.compensator import CreepState
 from hystgen.effects.delay.compensator import Waiting, delay_put, delay_rest
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.thermal.compensator import heat_move, heat_reset
 from hystgen.plays import loop
 from hystgen.plays.loop import (
     ANSWER,
@@ -78,7 +77,7 @@ class ChainState(NamedTuple):
     creep: CreepState
     ageing: AgeingState
     gain: Reals  # (k, 3)
-    heat: Reals  # (k, 5)
+    heat: Reals  # (k, 5), in fixed point the last one is not used
     clock: Reals  # (k, 3), in fixed point (k, 5)
     mode: Reals  # (k, 3), of the forward operator
     waiting: Waiting  # of the forward operator
@@ -132,6 +131,7 @@ def made_of(
     ageing, thermal = blocks.ageing, blocks.thermal
     ageing_move, ageing_set, ageing_set_travel = ageing.ageing_move, ageing.ageing_set, ageing.ageing_set_travel
     gain_reset, gain_heat = thermal.gain_reset, thermal.gain_heat
+    heat_reset, heat_move = thermal.heat_reset, thermal.heat_move
     drift = blocks.drift
     clock_start, clock_tick, clock_drift = drift.clock_start, drift.clock_tick, drift.clock_drift
     LEAD, MOST_AHEAD, ONE = drift.LEAD, drift.MOST_AHEAD, drift.ONE

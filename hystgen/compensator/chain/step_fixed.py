@@ -10,6 +10,7 @@ from typing import Any
 from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_fixed
+from hystgen.compensator.chain import moving_fixed
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
     DRIVE_BITS,
@@ -22,10 +23,9 @@ from hystgen.compensator.chain.layout import (
     TRAVEL_BITS,
     ChainTables,
 )
-from hystgen.compensator.chain.moving import PLAIN, fixed_moved_follow, fixed_moved_input
 from hystgen.compensator.chain.preview import Line
 from hystgen.compensator.chain.sides import Blocks
-from hystgen.compensator.chain.step import MOVING, ChainState, Codes
+from hystgen.compensator.chain.step import ChainState, Codes
 from hystgen.compensator.layout import FixedTables
 from hystgen.effects.ageing import fixed as ageing
 from hystgen.effects.creep import fixed as creep
@@ -36,8 +36,7 @@ from hystgen.effects.resonance import fixed as resonance
 from hystgen.effects.saturation.fixed import saturated, unsaturated
 from hystgen.effects.thermal import fixed as thermal
 from hystgen.front import curve
-from hystgen.plays.fixed import loop_solve, nearest, over_slope
-from hystgen.plays.loop import loop_absorb, loop_output
+from hystgen.plays.fixed import nearest, over_slope
 from hystgen.plays.slots import CODE_MAX, OUTPUT_CLAMPED, Reals, zero
 
 # ---------------------------------------------------------------- front_none.c, front_curve.c or front_two_curves.c
@@ -55,39 +54,6 @@ def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
     if t.fronts:
         return curve.front_inverse(t, w, ascending)
     return w, 0
-
-
-# ---------------------------------------------------------------- chain_plays_fixed.c or chain_moving_fixed.c
-
-
-@jit
-def started(t: ChainTables, s: ChainState) -> Any:
-    """The sum of the plays as they are set."""
-    return nearest(loop_output(t.plays, s.plays), t.number[LEVEL_DROP])
-
-
-@jit
-def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
-    """The plays follow their input w; their sum."""
-    if t.moving.moves != PLAIN and s.flags[MOVING]:
-        total = fixed_moved_follow(t.moving, t.plays.threshold, t.plays.weight, s.plays, w)
-        return nearest(total, t.number[LEVEL_DROP])
-    loop_absorb(t.plays, s.plays, w)
-    return started(t, s)
-
-
-@jit
-def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
-    """Input of the plays at which their sum is h."""
-    inside = h
-    if inside > t.number[LARGEST_LEVEL]:
-        inside = t.number[LARGEST_LEVEL]
-    elif inside < -t.number[LARGEST_LEVEL]:
-        inside = -t.number[LARGEST_LEVEL]
-    if t.moving.moves != PLAIN and s.flags[MOVING]:
-        given = inside << t.number[LEVEL_DROP]
-        return fixed_moved_input(t.moving, t.plays.threshold, t.plays.weight, s.plays, given)
-    return loop_solve(t.plays, s.plays, inside << t.number[LEVEL_DROP])
 
 
 # ---------------------------------------------------------------- chain_finer.c or chain_whole.c
@@ -193,7 +159,7 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:
 
 BLOCKS = Blocks(
     lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, fixed_delayed,
-    (front_forward, front_inverse), (follow, started, inverse_input), finer,
+    (front_forward, front_inverse), moving_fixed.PLAYS, finer,
 )  # fmt: skip
 CODES = Codes(
     step_fixed.finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared

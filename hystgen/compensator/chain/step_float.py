@@ -6,19 +6,11 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_float
+from hystgen.compensator.chain import moving_float
 from hystgen.compensator.chain.layout import ChainTables, Stages
-from hystgen.compensator.chain.moving import (
-    PLAIN,
-    STRAIGHT,
-    moved_follow,
-    moved_input,
-    moved_rest,
-    relaxing_follow,
-    relaxing_input,
-)
 from hystgen.compensator.chain.preview import preview_target
 from hystgen.compensator.chain.sides import Blocks
-from hystgen.compensator.chain.step import MOVING, ChainState, Codes
+from hystgen.compensator.chain.step import ChainState, Codes
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.delay.compensator import delayed
@@ -27,49 +19,6 @@ from hystgen.effects.lag import compensator as lag
 from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.front.compensator import front_forward, front_inverse
-from hystgen.plays.loop import loop_absorb, loop_output, loop_solve
-
-# ---------------------------------------------------------------- chain_plays.c, chain_relaxing.c or chain_moving.c
-
-
-@jit
-def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
-    """The plays follow their input w; their sum."""
-    if t.moving.moves == PLAIN and t.moving.bends == STRAIGHT:
-        loop_absorb(t.plays, s.plays, w)
-        return loop_output(t.plays, s.plays)
-    r, p = t.plays.threshold, t.plays.weight
-    if t.moving.scanned:
-        if s.flags[MOVING]:
-            return relaxing_follow(t.moving, r, p, s.plays, w)
-        loop_absorb(t.plays, s.plays, w)
-        return loop_output(t.plays, s.plays)
-    if s.flags[MOVING]:
-        return moved_follow(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, w)
-    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, w)
-
-
-@jit
-def started(t: ChainTables, s: ChainState) -> Any:
-    """The sum of the plays as they are set."""
-    if t.moving.scanned or (t.moving.moves == PLAIN and t.moving.bends == STRAIGHT):
-        return loop_output(t.plays, s.plays)
-    r, p = t.plays.threshold, t.plays.weight
-    return moved_rest(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, s.plays.play[0])
-
-
-@jit
-def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
-    """Input of the plays at which their sum is h."""
-    if t.moving.moves == PLAIN and t.moving.bends == STRAIGHT:
-        return loop_solve(t.plays, s.plays, h)
-    r, p = t.plays.threshold, t.plays.weight
-    if t.moving.scanned:
-        if s.flags[MOVING]:
-            return relaxing_input(t.moving, r, p, s.plays, h)
-        return loop_solve(t.plays, s.plays, h)
-    return moved_input(t.moving, t.plays.tanh, r, p, s.plays, s.lost, s.bent, s.flags[MOVING] != 0, h)
-
 
 # ---------------------------------------------------------------- chain_float.c
 
@@ -112,6 +61,6 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:  # noqa: ARG001  as in fi
 
 BLOCKS = Blocks(
     lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, delayed,
-    (front_forward, front_inverse), (follow, started, inverse_input), finer,
+    (front_forward, front_inverse), moving_float.PLAYS, finer,
 )  # fmt: skip
 CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)

@@ -65,8 +65,6 @@ def refusals(
             )
         elif effect.name == "thermal" and not effect.columns and not isinstance(effect, SelfHeating):
             yield effect, "the heat of loops, open loop: its temperature drifts with the room's; measure it"
-        elif ARITHMETICS[arithmetic].fixed and isinstance(effect, SelfHeating):
-            yield effect, "in fixed point there is no C for own heat; use float32"
         elif ARITHMETICS[arithmetic].fixed and effect.block:
             yield effect, "an effect of your own, whose block is in floating point; use float32"
         elif isinstance(effect, SelfHeating):
@@ -83,7 +81,4 @@ def refusals(
             yield from ((effect, reason) for reason in ageing.problems(effect, high - low))
     if operator != "inverse":
         yield from moving.beyond_forward(chain.cascade, parts.plays, seconds)
-    without = list(moving.problems(chain.cascade, parts.plays))
-    yield from without
-    if ARITHMETICS[arithmetic].fixed and not without:
-        yield from moving.beyond_fixed(parts.plays)
+    yield from moving.problems(chain.cascade, parts.plays, seconds)

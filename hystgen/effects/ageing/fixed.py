@@ -15,7 +15,7 @@ from hystgen.effects.ageing import compensator as floating
 from hystgen.effects.ageing.compensator import GAIN, HIGH, INVERSE, LAST, AgeingState, AgeingTables
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.thermal.fixed import GAIN_BITS, LARGEST, LEAST, ONE, reciprocal
+from hystgen.effects.thermal.fixed import GAIN_BITS, LARGEST, LEAST, ONE, followed, reciprocal
 from hystgen.plays.slots import zero
 
 SHARE_BITS = 20
@@ -130,13 +130,8 @@ def ageing_move(t: AgeingTables, s: AgeingState, j: int, way: Any) -> None:
     s.block[j, HIGH] = following
     if s.own[j]:
         gain = ageing_gain(t, j, following)
-        inverse = s.block[j, INVERSE]
-        half = 1 << (GAIN_BITS - 1)
-        for _ in range(t.turns[j]):
-            product = (gain * inverse + half) >> GAIN_BITS
-            inverse = (inverse * (2 * ONE - product) + half) >> GAIN_BITS
+        s.block[j, INVERSE] = followed(gain, s.block[j, INVERSE], t.turns[j])
         s.block[j, GAIN] = gain
-        s.block[j, INVERSE] = inverse
 
 
 @jit

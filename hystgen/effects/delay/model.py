@@ -29,6 +29,11 @@ class Delay(Effect):
     compensated: ClassVar[Compensated] = "none without preview"
     compensation: ClassVar[str] = "the reference is read ahead of its time; without preview the motion is late"
 
+    @property
+    def dead_time(self) -> float:
+        """The time itself."""
+        return self.time
+
     def drive(self, a: Array, run: Run) -> Array:
         """The drive `time` seconds earlier."""
         return np.asarray(np.interp(run.t - self.time, run.t, a)) if self.time else a

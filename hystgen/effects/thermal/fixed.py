@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,15 @@ from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.thermal import compensator as floating
-from hystgen.effects.thermal.compensator import GAIN, INVERSE, LARGEST_GAIN, LEAST_GAIN, OFFSET
+from hystgen.effects.thermal.compensator import (
+    GAIN,
+    INVERSE,
+    LARGEST_GAIN,
+    LEAST_GAIN,
+    OFFSET,
+    HeatTables,
+)
+from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
 GAIN_BITS = 29
@@ -57,6 +67,17 @@ def reciprocal(gain: Any) -> Any:
 
 
 @jit
+def followed(gain: Any, before: Any, turns: Any) -> Any:
+    """The same for a gain that has moved, from what it was before, by Newton's steps."""
+    half = 1 << (GAIN_BITS - 1)
+    inverse = before
+    for _ in range(turns):
+        product = (gain * inverse + half) >> GAIN_BITS
+        inverse = (inverse * (2 * ONE - product) + half) >> GAIN_BITS
+    return inverse
+
+
+@jit
 def gain_reset(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  as in floating point
     """The gain of the parameter file: none."""
     s[j, GAIN] = ONE
@@ -96,3 +117,96 @@ def gain_solve(s: Reals, j: int, y: Any) -> Any:
 def gain_absorb(s: Reals, j: int, x: Any) -> Any:
     """The output for the input x."""
     return times(x, s[j, GAIN], GAIN_BITS) + s[j, OFFSET]
+
+
+# ---------------------------------------------------------------- heat_fixed.c
+
+RISE_BITS = 59
+"""Bits of the largest rise of the temperature that a drive can make."""
+
+SQUARE_BITS = 50
+"""Bits of a change of the drive's square, and of a temperature, in a product."""
+
+HEAT_KIND = Kind(
+    "heat", counts=("turns", "coarse", "lift", "drop"), reading=(), own=("solve", "absorb"), letters="ffffw",
+    memory="wiiw",
+)  # fmt: skip
+
+RATE, PER_SQUARE, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, COARSE, LIFT, DROP = 0, 2, 4, 6, 8, 9, 10, 11
+RISE, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET = range(4)
+
+
+@dataclass(frozen=True)
+class Heat:
+    """Own heat in fixed point: its table, and how far the temperature can be from the model's, degrees."""
+
+    table: tuple[int, ...]
+    error: float
+
+
+def heat(numbers: tuple[float, ...], largest: int, lsb: float, level: float) -> Heat:
+    """For `numbers` as `heat_numbers` has them, drives up to `largest` codes of `lsb`, and `level` signals a unit of
+    the output. Raises OverflowError."""
+    rate, per_square, per_degree, offset_per_degree, hottest, *_ = numbers
+    most = 2 * largest * largest  # change of the square, codes
+    coarse = max(0, most.bit_length() - SQUARE_BITS)
+    per_code = per_square * lsb * lsb
+    warmest = max(per_code * most / rate, 1e-300)
+    unit = math.ldexp(1.0, math.ceil(math.log2(warmest)) - RISE_BITS)  # degrees
+    drop = RISE_BITS - SQUARE_BITS
+    kept = unit * 2.0**drop
+    heating = per_code * 2.0**coarse / unit
+    lift = max(0, math.frexp(heating)[1] - 9)
+    rows = (rate * 2.0**drop, heating / 2.0**lift, per_degree * kept * ONE, offset_per_degree * kept * level)
+    factors = [part for x in rows for part in factor(x)]
+    rounding = unit * (2.0**lift + 1.0) + 0.5 * per_code * 2.0**coarse * (coarse > 0)
+    error = rounding / rate + 2.0 * kept + min(warmest, hottest) * 2.0**-29
+    return Heat((*factors, min(round(hottest / kept), 1 << SQUARE_BITS), coarse, lift, drop), error)
+
+
+def heat_constants(t: HeatTables) -> Iterator[Constants]:
+    """The numbers of each block."""
+    for row, turns in zip(t.number, map(int, t.turns), strict=True):
+        counts = (turns, *map(int, row[COARSE:]))
+        yield Constants(HEAT_KIND, row[:COARSE], (12 + 2 * turns, 2), counts=counts)
+
+
+@jit
+def heat_reset(t: HeatTables, s: Reals, j: int) -> None:  # noqa: ARG001  as in floating point
+    """As warm as its surroundings."""
+    s[j, RISE] = zero(s[j, RISE])
+    s[j, HEAT_GAIN] = ONE
+    s[j, HEAT_INVERSE] = ONE
+    s[j, HEAT_OFFSET] = zero(s[j, RISE])
+
+
+@jit
+def heat_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> None:
+    """The drive has moved to v."""
+    n = t.number[j]
+    way = (v * v if v >= 0 else -(v * v)) - (before * before if before >= 0 else -(before * before))
+    size = nearest(way if way >= 0 else -way, n[COARSE])
+    warmer = times(size, n[PER_SQUARE], n[PER_SQUARE + 1]) << n[LIFT]
+    s[j, RISE] = s[j, RISE] + (warmer - times(s[j, RISE] >> n[DROP], n[RATE], n[RATE + 1]))
+    warm = s[j, RISE] >> n[DROP]
+    rise = n[HOTTEST_RISE] if warm > n[HOTTEST_RISE] else warm
+    gain = ONE + times(rise, n[PER_RISE], n[PER_RISE + 1])
+    if gain < LEAST:
+        gain = zero(gain) + LEAST
+    elif gain > LARGEST:
+        gain = zero(gain) + LARGEST
+    s[j, HEAT_OFFSET] = times(rise, n[OFFSET_PER_RISE], n[OFFSET_PER_RISE + 1])
+    s[j, HEAT_INVERSE] = followed(gain, s[j, HEAT_INVERSE], t.turns[j])
+    s[j, HEAT_GAIN] = gain
+
+
+@jit
+def heat_solve(s: Reals, j: int, y: Any) -> Any:
+    """The input that gives the output y."""
+    return times(y - s[j, HEAT_OFFSET], s[j, HEAT_INVERSE], GAIN_BITS)
+
+
+@jit
+def heat_absorb(s: Reals, j: int, x: Any) -> Any:
+    """The output for the input x."""
+    return times(x, s[j, HEAT_GAIN], GAIN_BITS) + s[j, HEAT_OFFSET]

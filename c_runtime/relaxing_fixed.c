@@ -1,8 +1,8 @@
 #include "hystgen_runtime.h"
 
-/* Viscous plays with one time constant, in fixed point. A play is kept as where it would come to
-   rest (`play`); see chain_relaxing.c. A stretch gains less than half a step of the plays' input
-   where a play is within the time constant's samples of rest: it stays. */
+/* Viscous plays with one time constant, in fixed point; see relaxing_float.c. A stretch gains less
+   than half a step of the plays' input where a play is within the time constant's samples of rest:
+   it stays. */
 
 /* Where play i rests, as near to the one before as their thresholds are: rounding must not pass. */
 static hystgen_play_t hystgen_beside(const hystgen_play_t *play, unsigned int i, int64_t rest) {
@@ -17,16 +17,17 @@ static hystgen_play_t hystgen_beside(const hystgen_play_t *play, unsigned int i,
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_play_t w) {
+static hystgen_sum_t hystgen_relaxing_follow(hystgen_play_t *play, hystgen_play_t w) {
     const hystgen_tables_t *t = &hystgen_model_tables;
     hystgen_sum_t sum = (hystgen_sum_t)t->weight[0] * w;
     unsigned int i;
     for (i = 1; i <= t->n; ++i) {
         const int32_t r = t->threshold[i];
-        const int64_t z =
-            play[i] + hystgen_stretched((int64_t)w - play[i], r, &hystgen_relaxing_late);
+        const int64_t on = hystgen_stretch((int64_t)w - play[i], r);
+        const int64_t z = play[i] + hystgen_times(on, &hystgen_relaxing_late);
+        const int64_t left = hystgen_times(hystgen_stretch(w - z, r), &hystgen_relaxing_kept);
         sum += t->weight[i] * z;
-        play[i] = hystgen_beside(play, i, z + hystgen_stretched(w - z, r, &hystgen_relaxing_kept));
+        play[i] = hystgen_beside(play, i, z + left);
     }
     play[0] = w;
     return sum;
@@ -34,7 +35,7 @@ static hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_play_t w
 
 /* Input of the plays at which their sum is `sum`. Of viscous plays none is stretched with their
    input where play 1 rests; from there on they are solved for like others, with smaller slopes. */
-static hystgen_reach_t hystgen_moved_input(hystgen_play_t *play, hystgen_sum_t sum) {
+static hystgen_reach_t hystgen_relaxing_input(hystgen_play_t *play, hystgen_sum_t sum) {
     play[0] = play[1];
     return hystgen_loop_solve(&hystgen_relaxing_tables, play, sum);
 }

@@ -1,0 +1,41 @@
+#include "hystgen_runtime.h"
+
+/* Gain and offset of the actuator's own heat in fixed point, from the drives that were applied. The
+   temperature has as many bits as fit 64, so that the slowest one does not stall. */
+
+static void hystgen_heat_init(hystgen_heat_t *self) {
+    self->rise = 0;
+    self->gain = (int32_t)HYSTGEN_GAIN_ONE;
+    self->inverse = (int32_t)HYSTGEN_GAIN_ONE;
+    self->offset = 0;
+}
+
+/* The square of a drive, with its sign. */
+static int64_t hystgen_heat_square(hystgen_real_t v) {
+    const int64_t square = (int64_t)v * v;
+    return v >= 0 ? square : -square;
+}
+
+/* The drive has moved to v, from `before`. */
+HYSTGEN_APART void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *self,
+                                     hystgen_real_t before, hystgen_real_t v) {
+    const int64_t way = hystgen_heat_square(v) - hystgen_heat_square(before);
+    const int64_t size = hystgen_nearest(way >= 0 ? way : -way, t->coarse);
+    const int64_t heat = hystgen_times(size, &t->per_square) * ((int64_t)1 << t->lift);
+    self->rise += heat - hystgen_times(self->rise >> t->drop, &t->rate);
+    const int64_t warm = self->rise >> t->drop;
+    const int64_t rise = warm > t->hottest ? t->hottest : warm;
+    self->gain = hystgen_gain_inside(HYSTGEN_GAIN_ONE + hystgen_times(rise, &t->per_degree));
+    self->offset = hystgen_times(rise, &t->offset_per_degree);
+    self->inverse = hystgen_gain_followed(self->gain, self->inverse, t->turns);
+}
+
+/* The input that gives the output y. */
+static int64_t hystgen_heat_solve(const hystgen_heat_t *self, int64_t y) {
+    return hystgen_gain_times(y - self->offset, self->inverse);
+}
+
+/* The output for the input x. */
+static int64_t hystgen_heat_absorb(const hystgen_heat_t *self, int64_t x) {
+    return hystgen_gain_times(x, self->gain) + self->offset;
+}

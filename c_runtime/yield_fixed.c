@@ -1,0 +1,39 @@
+#include "hystgen_runtime.h"
+
+/* What a yield moves a play by, and the other way round. */
+static inline int64_t hystgen_moved_by(int64_t yield) {
+    return hystgen_nearest(yield, HYSTGEN_YIELD_BITS);
+}
+
+static inline int64_t hystgen_yield_of(int64_t moved) {
+    return moved * ((int64_t)1 << HYSTGEN_YIELD_BITS);
+}
+
+/* What a play with a nonlinear dashpot that is stretched by x, not negative, gains of it in a step,
+   with HYSTGEN_YIELD_BITS bits below a step of the plays' input: pieces of cubics in fixed point,
+   as hystgen_curve has them, each with the bits that its values leave out; never more than x. */
+HYSTGEN_APART int64_t hystgen_yield(int64_t x) {
+    const uint32_t inside = x > HYSTGEN_STRETCH ? (uint32_t)HYSTGEN_STRETCH : (uint32_t)x;
+    unsigned int low = 0;
+    unsigned int high = HYSTGEN_YIELDS;
+    int64_t y = 0;
+    unsigned int k;
+    while (high - low > 1u) {
+        const unsigned int middle = (low + high) / 2;
+        const bool before = inside < hystgen_yields[middle].begin;
+        low = before ? low : middle;
+        high = before ? middle : high;
+    }
+    const hystgen_yield_t *piece = &hystgen_yields[low];
+    const uint32_t h = (inside - piece->begin) << piece->scale;
+    for (k = 4; k > 0; --k) {
+        y = piece->c[k - 1u] + ((y * (int64_t)h + ((int64_t)1 << 30)) >> 31);
+    }
+    y = y * ((int64_t)1 << piece->lift);
+    return y > hystgen_yield_of(x) ? hystgen_yield_of(x) : y;
+}
+
+/* The part of a step's way at whose end its input counts as standing still. */
+static inline int64_t hystgen_seen(int64_t way) {
+    return hystgen_times(way, &hystgen_seen_share);
+}

@@ -1,0 +1,203 @@
+"""How long the output takes to settle after a step of the drive."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.basics.problems import percent
+from hystgen.chain.chain import Chain
+from hystgen.effects.base import Effect, Place, Run
+
+Array = NDArray[np.float64]
+
+EDGE = 1e-9
+"""s of the step itself, far below what any amplifier or converter does."""
+
+HORIZON = 3600.0
+"""s for which the answer to the step is followed: whoever waits for longer drives no faster than creep."""
+
+FOREVER = 1e15
+"""s after which everything has come to rest; the filters take steps of any length."""
+
+A_DECADE = 8
+"""Samples a decade of time from which the refinement starts."""
+
+CLOSE, FINE = 0.03, 3e-4
+"""Shares of the error and of the step by which the output may leave the straight line between two samples."""
+
+GOLDEN = 0.381966011250105
+"""Where in a stretch the output is compared with the straight line: halves may be whole periods, all of them."""
+
+GRADED = 4.0
+"""Most times by which a stretch between samples may be longer than its neighbour: an oscillation that happens to
+cross zero at the test point of one stretch is found from the next."""
+
+NARROWEST = 1e-6
+"""Share of the time since the step below which no stretch is split: an edge behind a delay stays an edge."""
+
+MOST_SAMPLES = 2**18
+"""Most samples of an answer; a mode whose damping is 0.001 takes a third of them."""
+
+MOSTLY = 0.5
+"""An effect is the main reason if the answer without it settles in this share of the time or less."""
+
+
+@dataclass(frozen=True)
+class Settling:
+    """Time after a step of the drive over the whole of its range until the output stays close to its final value.
+
+    `within`: the error, share of the final step of the output; `error`: the same in output units; `up`, `down`: s
+    after a step to the upper and to the lower end of the range, 0 where the output is there at once, inf where it was
+    not within `followed` seconds; `because`: the effect, or the effects, that take the time; `left_out`: effects that
+    move the output whatever the drive does.
+    """
+
+    within: float
+    error: float
+    up: float
+    down: float
+    followed: float
+    because: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+    @property
+    def seconds(self) -> float:
+        """The longer of the two times, s."""
+        return max(self.up, self.down)
+
+    def content(self) -> dict[str, Any]:
+        """The fields as JSON has them; times that are not finite are None."""
+        content = asdict(self)
+        return content | {key: content[key] if math.isfinite(content[key]) else None for key in ("up", "down")}
+
+    def sentence(self, unit: str | None = None) -> str:
+        """Error, time and reason; `unit`: of the output."""
+        close = f"within {percent(self.within, '.3g')} of a step over the drive range"
+        close += f" ({self.error:.3g}{f' {unit}' if unit else ''})"
+        without = f"; {' and '.join(self.left_out)} not counted" if self.left_out else ""
+        why = " and ".join(self.because)
+        if self.seconds == 0.0:
+            reason = f"{why} moves it by less" if why else "no effect of the model takes time"
+            return f"{close} at once: {reason}{without}"
+        if math.isinf(self.seconds):
+            return f"{close} not within {self.followed:.4g} s{f', because of {why}' if why else ''}{without}"
+        each = f"{_time(self.up)} upwards, {_time(self.down)} downwards"
+        alike = _time(self.up) == _time(self.down)
+        because = f", mostly because of {why}" if why else ""
+        return f"{close} after {_time(self.seconds) if alike else each}{because}{without}"
+
+
+def _time(seconds: float) -> str:
+    if seconds >= 1000.0:
+        return f"{seconds:.0f} s"
+    for size, unit in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds * 1e9:.3g} ns"
+
+
+def settling(chain: Chain, within: float) -> Settling:
+    """Settling of a chain after a step over its input range, in both directions.
+
+    Before the step the drive has gone over the range and back, and everything is at rest. Effects that are added to the
+    output, or that follow a column of the record, do not answer to the drive and are left out.
+    """
+    answering = [effect for effect in chain.effects if effect.place is not Place.ADDED and not effect.columns]
+    left_out = tuple(dict.fromkeys(effect.name for effect in chain.effects if effect not in answering))
+    low, high = chain.cascade.input_range
+
+    def both(effects: list[Effect]) -> tuple[_Answer, _Answer]:
+        moved = Chain(chain.cascade, effects)
+        return _Answer.of(moved, low, high, within), _Answer.of(moved, high, low, within)
+
+    up, down = both(answering)
+    names = tuple(dict.fromkeys(effect.name for effect in answering if effect.timed))
+    seconds = max(up.seconds, down.seconds)
+    because = names
+    if len(names) > 1 and seconds > 0.0:
+        left = {
+            name: max(each.seconds for each in both([effect for effect in answering if effect.name != name]))
+            for name in names
+        }
+        main = min(names, key=lambda name: left[name])
+        if left[main] <= MOSTLY * seconds and math.isfinite(left[main]):
+            because = (main,)
+    return Settling(
+        within, within * max(up.size, down.size), up.seconds, down.seconds, min(up.followed, down.followed), because,
+        left_out,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """An answer to a step: s until it has settled, its final size, and for how many s it was followed."""
+
+    seconds: float
+    size: float
+    followed: float
+
+    @classmethod
+    def of(cls, chain: Chain, begin: float, end: float, within: float) -> _Answer:
+        dead = sum(effect.dead_time for effect in chain.effects)
+        times, left, size = _left(chain, begin, end, within, dead)
+        outside = np.flatnonzero(np.abs(left) > within * size)
+        if not len(outside):
+            return cls(dead, size, HORIZON)
+        k = int(outside[-1])
+        if k + 1 == len(times) or len(times) > MOST_SAMPLES:
+            return cls(math.inf, size, float(times[k]))
+        inner, outer = abs(float(left[k + 1])), abs(float(left[k]))
+        if left[k] * left[k + 1] < 0.0:
+            inner = -inner
+        share = (outer - within * size) / (outer - inner)
+        seconds = float(times[k] + share * (times[k + 1] - times[k]))
+        # Up to here the edge itself still moves, or plays that wait for its end
+        return cls(seconds if seconds > dead + 2.0 * EDGE else dead, size, HORIZON)
+
+
+def _left(chain: Chain, begin: float, end: float, within: float, dead: float) -> tuple[Array, Array, float]:
+    """Times (N,) since the step from its arrival on, what the output is from its final value there, the final step.
+
+    `dead`: s after which the step arrives.
+
+    The chain is exact for a drive that is straight between samples, but behind a filter the next block takes a curve as
+    straight too: every stretch inside which the output leaves the straight line is split there, until none does.
+    """
+    decades = math.log10(HORIZON / EDGE)
+    times = dead + np.geomspace(EDGE, HORIZON, round(A_DECADE * decades) + 1)
+    split = np.ones(len(times) - 1, dtype=bool)
+    while True:
+        middle = (times[:-1] + GOLDEN * np.diff(times))[split]
+        new = np.concatenate([np.zeros(len(times), dtype=bool), np.ones(len(middle), dtype=bool)])
+        order = np.argsort(np.concatenate([times, middle]), kind="stable")
+        times, new = np.concatenate([times, middle])[order], new[order]
+        left, size = _answered(chain, begin, end, times, dead)
+        if len(times) > MOST_SAMPLES:
+            return times, left, size
+        at = np.flatnonzero(new)
+        straight = (1.0 - GOLDEN) * left[at - 1] + GOLDEN * left[at + 1]
+        off = np.abs(left[at] - straight) > min(CLOSE * within, FINE) * size
+        split = np.zeros(len(times) - 1, dtype=bool)
+        split[at[off] - 1] = split[at[off]] = True
+        wide, outside = np.diff(times), np.abs(left) > 0.5 * within * size
+        loud = outside[:-1] | outside[1:]
+        split[:-1] |= loud[1:] & (wide[:-1] > GRADED * wide[1:])
+        split[1:] |= loud[:-1] & (wide[1:] > GRADED * wide[:-1])
+        split &= wide > NARROWEST * (times[1:] - dead)
+        if not split.any():
+            return times, left, size
+
+
+def _answered(chain: Chain, begin: float, end: float, times: Array, dead: float) -> tuple[Array, float]:
+    """What the output is from its final value at some times after a step, and the size of the final step."""
+    edge = [EDGE, dead] if dead > EDGE else []
+    t = np.concatenate([[-3.0 * FOREVER, -2.0 * FOREVER, -FOREVER, 0.0], edge, times, [FOREVER]])
+    v = np.where(t > 0.0, end, begin)
+    v[0] = end
+    (y,) = chain.simulate([Run(t, v)])
+    return y[4 + len(edge) : -1] - y[-1], abs(float(y[-1] - y[3]))

@@ -1,0 +1,187 @@
+"""How plays move and are bent in floating point: `c_runtime/moved_*.c`, `bent_*.c` and `relaxing_float.c`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.compensator.chain.layout import ChainTables
+from hystgen.compensator.chain.moving import (
+    BUMP,
+    CENTRE,
+    DASHPOT,
+    DILATED,
+    HALF,
+    INVERSE_SCALE,
+    INVERSE_WIDTH,
+    LARGEST_INPUT,
+    LEAST_INPUT,
+    MIDDLE,
+    POLYNOMIAL,
+    RELAXING,
+    SCALE,
+    SEEN,
+    TANH_CENTRE,
+    MovingTables,
+    stretch,
+)
+from hystgen.compensator.chain.moving_plays import Kind, operators
+from hystgen.compensator.chain.step import ChainState
+from hystgen.front.tanh.kernels import tanh
+from hystgen.plays.loop import State, loop_solve
+from hystgen.plays.slots import Reals
+
+
+@jit
+def yields(t: MovingTables, x: Any) -> Any:
+    """What a play that is stretched by x, not negative, gains of it in a step."""
+    low = 0
+    high = len(t.yields)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x < t.yields[middle, 0]:
+            high = middle
+        else:
+            low = middle
+    on = x - t.yields[low, 0]
+    return ((t.yields[low, 4] * on + t.yields[low, 3]) * on + t.yields[low, 2]) * on + t.yields[low, 1]
+
+
+@jit
+def change(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
+    """How far play i with a nonlinear dashpot moves while the input of the plays goes to w."""
+    x = s.play[0] + (w - s.play[0]) * t.number[SEEN] - s.play[i]
+    gained = r[0]
+    if x > r[i]:
+        gained = yields(t, x - r[i])
+    elif x < -r[i]:
+        gained = -yields(t, -x - r[i])
+    return gained + lost[i]
+
+
+@jit
+def moved(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
+    """Play i once the input of the plays has gone to w."""
+    q = s.play[i]
+    if t.moves == DASHPOT:
+        return q + change(t, r, i, s, lost, w)
+    if t.moves == RELAXING:
+        return q + t.first[i] * stretch(w - q, r[i])
+    threshold = r[i]
+    if t.moves == DILATED:
+        before = s.play[0]
+        way = w - before if w > before else before - w
+        threshold = r[i] + t.first[i] * way
+    low = w - threshold
+    high = w + threshold
+    upper = high if q > high else q
+    return low if upper < low else upper
+
+
+@jit
+def left(t: MovingTables, r: Reals, i: int, z: Any, w: Any) -> Any:
+    """Where play i comes to rest from z with its input held at w, as far as one more step goes."""
+    if t.moves == RELAXING:
+        return z + t.second[i] * stretch(w - z, r[i])
+    return z
+
+
+@jit
+def keep(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any, z: Any) -> None:
+    """Play i has moved, and comes to rest at z, while the input of the plays goes to w."""
+    if t.moves == DASHPOT:
+        lost[i] = change(t, r, i, s, lost, w) - (z - s.play[i])
+    s.play[i] = z
+
+
+@jit
+def put(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, z: Any) -> None:
+    """Play i rests at z."""
+    if t.moves == DASHPOT:
+        lost[i] = r[0]
+    s.play[i] = z
+
+
+@jit
+def bent(t: MovingTables, plays: Any, i: int, z: Any) -> Any:
+    """What play i contributes at z."""
+    if t.bends == POLYNOMIAL:
+        x = z * t.number[INVERSE_SCALE]
+        total = z - z
+        for k in range(t.curve.shape[1] - 1, -1, -1):
+            total = (total + t.curve[i, k]) * x
+        return z + t.number[SCALE] * (total * x)
+    if t.bends == CENTRE:
+        x = (z - t.number[MIDDLE]) * t.number[INVERSE_WIDTH]
+        return z + t.number[BUMP] * (tanh(x, plays.tanh) + t.number[TANH_CENTRE])
+    return z
+
+
+@jit
+def relaxing_follow(t: MovingTables, plays: Any, s: State, w: Any) -> Any:
+    """Viscous plays of one time constant follow their input w; their sum."""
+    r, p = plays.threshold, plays.weight
+    total = p[0] * w
+    for i in range(1, len(r)):
+        z = s.play[i] + t.first[1] * stretch(w - s.play[i], r[i])
+        total = total + p[i] * z
+        s.play[i] = z + t.second[1] * stretch(w - z, r[i])
+    s.play[0] = w
+    return total
+
+
+@jit
+def relaxing_input(t: MovingTables, plays: Any, s: State, h: Any) -> Any:
+    """Input of viscous plays at which their sum is h: of none at first, then of those stretched on the way there."""
+    r, p = plays.threshold, plays.weight
+    rest = r[0]
+    for i in range(1, len(r)):
+        rest = rest + p[i] * s.play[i]
+    rest = h - rest
+    w = rest * t.inverse[0]
+    rising = w > s.play[1]
+    for i in range(1, len(r)):
+        first = s.play[i] + r[i] if rising else s.play[i] - r[i]
+        if w <= first if rising else w >= first:
+            break
+        rest = rest + t.share[i] * first
+        w = rest * t.inverse[i]
+        if w < first if rising else w > first:
+            w = first
+    return w
+
+
+def search(sum_at: Callable[..., Any]) -> Callable[..., Any]:
+    """`search_float.c`, with what the plays give at an input."""
+
+    @jit
+    def searched(t: ChainTables, s: ChainState, h: Any) -> Any:
+        """Input of the plays at which their sum is h, by halves between where it is and the farthest."""
+        number = t.moving.number
+        here = s.plays.play[0]
+        total = sum_at(t, s, here)
+        if total == h:
+            return here
+        low = here if total < h else number[LEAST_INPUT]
+        high = number[LARGEST_INPUT] if total < h else here
+        for _ in range(t.moving.halves):
+            w = low + (high - low) * number[HALF]
+            if sum_at(t, s, w) < h:
+                low = w
+            else:
+                high = w
+        return high
+
+    return searched
+
+
+@jit(inline=True)
+def same(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in fixed point
+    """A sum of the plays as a signal, and a signal as a sum."""
+    return x
+
+
+PLAYS = operators(
+    Kind(same, same, loop_solve, relaxing_follow, relaxing_input, moved, left, keep, put, bent, search)
+)

@@ -1,0 +1,68 @@
+"""Curves between signals in fixed point, as pieces of polynomials: `c_runtime/bend.c`."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from hystgen.basics.jit import jit
+from hystgen.front.curve import curve
+from hystgen.plays.fixed import nearest
+from hystgen.plays.slots import Reals
+
+
+class Piece(Protocol):
+    """A piece of a curve, as of `hystgen.compensator.fixed_tables.FixedCurve`."""
+
+    @property
+    def knot(self) -> int: ...
+    @property
+    def scale(self) -> int: ...
+    @property
+    def coefficients(self) -> tuple[int, ...]: ...
+
+
+class Bends(NamedTuple):
+    """Curves as in `hystgen.compensator.layout.FixedTables`, (k,); `scaled` (k, 2): bits of a signal that an argument
+    leaves out, and those that a value does."""
+
+    knot: Reals
+    coefficient: Reals
+    scale: Reals
+    first: Reals
+    pieces: Reals
+    domain: Reals
+    scaled: Reals
+
+
+def bends(
+    pieces: Sequence[Sequence[Piece]], domain: Sequence[Any], scaled: Sequence[Any], degree: int
+) -> Bends:
+    """The tables of curves; none has pieces that are not called for."""
+    flat = list(itertools.chain.from_iterable(pieces))
+    first = [0, *itertools.accumulate(map(len, pieces))][: len(pieces)]
+
+    def whole(values: Any, columns: int = 0) -> Any:
+        found = np.array(values, dtype=np.int64)
+        return found.reshape(-1, columns) if columns else found
+
+    return Bends(
+        whole([one.knot for one in flat]), whole([one.coefficients for one in flat], degree + 1),
+        whole([one.scale for one in flat]), whole(first), whole([len(each) for each in pieces]),
+        whole(domain, 2), whole(scaled, 2),
+    )  # fmt: skip
+
+
+@jit
+def bend(t: Bends, which: int, x: Any) -> tuple[Any, int]:
+    """The value of a curve at x, and whether x had to be limited to its ends."""
+    argument = nearest(x, t.scaled[which, 0])
+    inside = argument
+    if inside < t.domain[which, 0]:
+        inside = t.domain[which, 0]
+    elif inside > t.domain[which, 1]:
+        inside = t.domain[which, 1]
+    return curve(t, which, inside) << t.scaled[which, 1], 1 if inside != argument else 0

@@ -1,0 +1,95 @@
+"""The digital-to-analogue converter that plays drives: bits, range and coding."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Codes = NDArray[np.int64]
+
+CODINGS = ("straight", "twos-complement")
+"""How codes are written: straight (offset) binary from 0 up, or two's complement with 0 in the middle of the range."""
+
+FEWEST_BITS, MOST_BITS = 8, 32
+
+FEWEST_CODES = 100
+"""Codes between the lowest and the highest drive: at fewer a code is more than the margin that drives keep."""
+
+
+@dataclass(frozen=True)
+class Dac:
+    """A converter as the drive sees it, amplifier included.
+
+    `low`: drive at the lowest code; `high`: drive one code above the highest, the reference of the data sheet times the
+    gain: `drive = low + k (high - low)/2^bits`, k = 0 .. 2^bits - 1. `coding`: one of `CODINGS`; k is written as it is,
+    or less 2^(bits-1).
+    """
+
+    bits: int
+    low: float
+    high: float
+    coding: str = CODINGS[0]
+
+    @property
+    def lsb(self) -> float:
+        """Drive by which one code moves it."""
+        return (self.high - self.low) / 2.0**self.bits
+
+    @property
+    def zero(self) -> int:
+        """The k that is written as 0."""
+        return 2 ** (self.bits - 1) if self.coding == CODINGS[1] else 0
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of a code in memory."""
+        return 1 if self.bits <= 8 else 2 if self.bits <= 16 else 4
+
+    def codes(self, drives: ArrayLike) -> Codes:
+        """The codes (N,) nearest to drives (N,)."""
+        k = np.floor((np.asarray(drives, dtype=np.float64) - self.low) / self.lsb + 0.5)
+        return k.astype(np.int64) - self.zero
+
+    def drives(self, codes: ArrayLike) -> NDArray[np.float64]:
+        """The drives (N,) that codes (N,) give."""
+        return self.low + (np.asarray(codes) + self.zero) * self.lsb
+
+    def problems(self, low: float, high: float) -> Iterator[str]:
+        """What is wrong with it for drives from `low` to `high`."""
+        if not FEWEST_BITS <= self.bits <= MOST_BITS:
+            yield f"a DAC of {self.bits} bits; give {FEWEST_BITS} to {MOST_BITS}"
+            return
+        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
+            yield f"the DAC range {self.low:g} to {self.high:g} does not rise; give its lower end first"
+            return
+        top = self.high - self.lsb
+        if low < self.low or high > top:
+            yield (
+                f"the DAC gives {self.low:g} to {top:g}, and the drives need {low:g} to {high:g}; give the range behind"
+                " the amplifier, or narrow input_range"
+            )
+        elif (high - low) / self.lsb < FEWEST_CODES:
+            yield (
+                f"a code of the DAC is {self.lsb:.3g}, and the drives span {high - low:.3g}: fewer than {FEWEST_CODES} "
+                "codes; narrow the range of the DAC, or give it more bits"
+            )
+
+    def sentence(self, unit: str, span: float) -> str:
+        """Its resolution, for drives over `span`; `unit`: of the drive, with a space before it, or empty."""
+        how = "straight binary" if self.coding == CODINGS[0] else "two's complement"
+        return (
+            f"Drives are codes of a DAC of {self.bits} bits over {self.low:g} to {self.high:g}{unit}, {how}: a code is "
+            f"{self.lsb:.4g}{unit}, {100.0 * self.lsb / span:.2g} % of the drives' span, and they lie at most one code "
+            "from the straight lines between turning points."
+        )
+
+
+def filled(codes: ArrayLike, every: int) -> Codes:
+    """Codes (N,) that are `every` ticks apart, at every tick: whole numbers nearest to the straight lines between."""
+    nodes = np.asarray(codes, dtype=np.int64)
+    steps = np.diff(nodes)[:, None] * (2 * np.arange(every)) + every
+    return np.append((nodes[:-1, None] + steps // (2 * every)).ravel(), nodes[-1])
