@@ -132,6 +132,21 @@ class TestPoints:
         assert any("effects that depend on it are not sought" in note for note in found.notes)
 
 
+    @pytest.mark.parametrize("name", ["Time", "timestamp", "Zeit [ms]"])
+    def test_a_time_by_another_name_is_one(self, tmp_path: Path, name: str) -> None:
+        path = tmp_path / "named.csv"
+        path.write_text(f"{name},v,y\n" + "\n".join(f"{0.5 * k},{k % 7},{k % 7}" for k in range(40)))
+        (record,) = hystgen.records.read_records([path], points=True)
+        assert record.timed
+        assert record.sample_time == pytest.approx(5e-4 if "ms" in name else 0.5)
+
+    def test_a_further_column_may_be_the_time(self, tmp_path: Path) -> None:
+        path = tmp_path / "further.csv"
+        path.write_text("k,v,y\n" + "\n".join(f"{k},{k % 7},{k % 7}" for k in range(40)))
+        with pytest.raises(hystgen.records.RecordError, match=r'there is no column "t" among k, v, y; give --sample'):
+            hystgen.identify(path)
+
+
 def test_skip_is_in_seconds() -> None:
     """Samples come every millisecond; the drive of those that are not compared counts."""
     v = never_twice()

@@ -385,11 +385,14 @@ class Finder:
         self._several: dict[str, list[Column]] = {}
         self._asked: set[str] = set()
 
-    def find(self, need: Sequence[str], timed: bool, steps: Sequence[Step] = ()) -> dict[str, Column]:
+    def find(
+        self, need: Sequence[str], timed: bool, steps: Sequence[Step] = (), points: bool = False
+    ) -> dict[str, Column]:
         """Our names to columns.
 
         `need`: ours that must be there; `timed`: the user gives the sample time, so that the file need not have a time;
-        `steps`: what the file says of it, which counts only where it has no time.
+        `steps`: what the file says of it, which counts only where it has no time; `points`: nor need it have one where
+        there is no further column that might be one.
         """
         found: dict[str, Column] = {}
         wanted = dict.fromkeys([*need, *STANDARD, *self.mapping])
@@ -409,6 +412,8 @@ class Finder:
                 continue
             if ours == "t" and "t" not in self.mapping and "t" not in self._asked:
                 self.steps = [step for step in steps if step.belongs(c.name for c in found.values())]
+                if points and len(found) == len(self.columns):
+                    continue
             if ours not in self._asked and ours not in self._several and not (ours == "t" and self.steps):
                 self._missing(ours, self.mapping.get(ours, ours))
         self._name_together(found)

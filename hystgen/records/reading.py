@@ -149,7 +149,7 @@ class Reading:
         `steps`: what the file says of its sample rate; it counts where there is neither a time nor `sample_time`.
         """
         finder = Finder(columns, self.columns, ignored, outside)
-        found = finder.find(self.need, self.sample_time is not None or (self.points and not steps), steps)
+        found = finder.find(self.need, self.sample_time is not None, steps, self.points)
         for text in finder.problems:
             self.problem(text, line)
         steps = finder.steps
