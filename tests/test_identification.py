@@ -584,7 +584,7 @@ class TestFigures:
         made = record(v, brute_output(v, THRESHOLDS, WEIGHTS, 0.0))
         ramp = np.linspace(20.0, 60.0, 300)
         fit = hystgen.identify([made, record(ramp, 0.1 * ramp, "ramp")])
-        assert "ramp: only 1 samples are left once its start memory is known; it hardly counts" in fit.warnings
+        assert "ramp: only 1 sample is left once its start memory is known; it hardly counts" in fit.warnings
 
     def test_predict(self) -> None:
         history = (90.0, 10.0)
