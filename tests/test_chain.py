@@ -80,11 +80,12 @@ def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
     assert {row.operator for row in report.rows} >= ({"inverse"} if operator(name) == "inverse" else {"forward"})
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "arithmetic"),
     [("everything", "float32"), ("viscous", "float32"), ("aged", "float32"),
-     ("drifting_late", "float32"), ("heated", "float32"), ("everything", "q31"), ("everything", "q15"),
+     ("drifting_late", "float32"), ("heated", "float32"), ("everything", "q15"), ("everything", "q31"),
      ("worn", "q15"), ("quick", "q15"), ("soft_dashpot", "q31"), ("dilated", "q15"), ("heated", "q15")],
 )  # fmt: skip
 def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:

@@ -463,6 +463,7 @@ def test_compiled_float64_gives_the_bits_of_the_reference(compiler: str | None) 
     check_inverse(compiled, error_bounds(within(STAGE, compiled.drive), "float64", "corners").rounding)
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("name", ["listed", "two_branches"])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("operator", ["inverse", "forward"])

@@ -291,6 +291,7 @@ def test_compiles_clean_and_alone(name: str, operator: str, layout: str, tmp_pat
                     assert not kinds & {"U", "D", "d", "B", "b"}, symbols
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", ["listed", "mixed"])

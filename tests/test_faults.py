@@ -365,6 +365,7 @@ def scaled(channel: str, factor: float) -> Callable[[Array, Array], tuple[Array,
 class TestSizes:
     """Whatever the numbers, a model or one message, and nothing else on stderr."""
 
+    @pytest.mark.slow(one_in=2)
     @pytest.mark.parametrize("command", ["identify", "diagnose"])
     @pytest.mark.parametrize(
         ("channel", "factor", "code"),

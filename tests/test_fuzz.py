@@ -17,7 +17,7 @@ from hystgen.verification import compilers
 
 pytestmark = pytest.mark.thorough
 
-SECONDS = float(os.environ.get("HYSTGEN_FUZZ_SECONDS", "10"))
+SECONDS = float(os.environ.get("HYSTGEN_FUZZ_SECONDS", "6"))
 """Of fuzzing a module; `make fuzz` takes longer."""
 
 needs_clang = pytest.mark.skipif(

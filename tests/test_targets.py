@@ -546,6 +546,7 @@ def test_at_a_limit_of_the_drive(n: int, bench: ModuleType, tmp_path: Path) -> N
     assert counts.max() <= made.worst(case)[0].max <= bench.GOALS[n][bench.FROM_0]
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize(
     ("name", "arithmetic", "engine"),
     [

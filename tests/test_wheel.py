@@ -218,7 +218,8 @@ def test_what_needs_an_extra_names_it_and_leaves_nothing(command: list[str], pyt
     (tmp_path / "plain.csv").write_text("t,v,y\n" + "".join(f"{k},{k % 5},{k % 5}\n" for k in range(200)))
     before = tree(tmp_path)
     done = run(python.with_name("hystgen"), *command, folder=tmp_path, code=2)
-    assert re.fullmatch(r"error: \w+ needs scipy, numba, .*; install the extra with: .*\[fit\]\S*\n", done.stderr)
+    hint = r"install the extras? with: .*\[fit(,plot)?\]\S*\n"
+    assert re.fullmatch(rf"error: \w+ needs scipy, numba, .*; {hint}", done.stderr)
     assert tree(tmp_path) == before
 
 
