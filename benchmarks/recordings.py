@@ -31,6 +31,8 @@ from hystgen.records import Record, read_record
 Array = NDArray[np.float64]
 
 PLAYS, LEVELS, LAGS = 16, 16, 32
+"""Sizes of the baselines, not chosen by any error: as many plays as levels of the plane of relays; samples of the drive
+before the present one, 0.16 s of the records of the P-885."""
 
 REPORTED = {
     "loops run clockwise": "clockwise",
