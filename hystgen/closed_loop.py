@@ -38,7 +38,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import extras
-from hystgen.basics.checks import finite
+from hystgen.basics.arguments import finite
 from hystgen.cascade import PI, Cascade, InverseCascade
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.reference import Session

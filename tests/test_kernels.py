@@ -37,7 +37,7 @@ SUFFIX = {"float32": "f32", "float64": "f64"}
 CTYPE = {"float32": "float", "float64": "double"}
 BITS = {"float32": np.uint32, "float64": np.uint64}
 MAX_ULP = {"tanh": kernels.TANH_MAX_ULP, "atanh": kernels.ATANH_MAX_ULP}
-TABLES = {"tanh": kernels.tanh_tables, "atanh": kernels.atanh_tables}
+TABLES = {"tanh": kernels.TANH_TABLES, "atanh": kernels.ATANH_TABLES}
 WARNINGS = ["-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wshadow"]
 WARNINGS += ["-Wundef", "-Wcast-qual", "-Wvla", "-Werror"]
 C_WARNINGS = ["-Wmissing-prototypes", "-Wstrict-prototypes"]
@@ -182,7 +182,7 @@ def compiled(kernel: str) -> SimpleNamespace:
 def numba_values(kernel: str, x: np.ndarray) -> np.ndarray:
     """The kernel in Python, compiled."""
     y = np.empty_like(x)
-    compiled(kernel).apply(x, TABLES[kernel](x.dtype), y)
+    compiled(kernel).apply(x, TABLES[kernel][x.dtype.name], y)
     return y
 
 
@@ -197,7 +197,7 @@ def all_kinds(name: str) -> np.ndarray:
     dtype = np.dtype(name).type
     edges = []
     for kernel in KERNELS:
-        t = TABLES[kernel](dtype)
+        t = TABLES[kernel][np.dtype(dtype).name]
         edges += [*t.bound, *t.center, *(t.knot if kernel == "tanh" else t.offset), dtype(1)]
     edges += [dtype(1) - dtype(2.0**-k) for k in range(1, 54)]
     near = np.array(edges, dtype=dtype).view(BITS[name])[:, None] + np.arange(-50, 51).astype(BITS[name])
@@ -241,7 +241,7 @@ def test_plain_python_equals_c_bit_for_bit(
 ) -> None:
     x = all_kinds(name)
     x = np.concatenate([x[:: len(x) // 4000], x[-5:]])
-    t = TABLES[kernel](name)
+    t = TABLES[kernel][name]
     plain = [getattr(kernels, kernel).py_func(v, t) for v in x]
     assert all(type(v) is x.dtype.type for v in plain)
     assert_same_bits(x, getattr(c_kernels(any_compiler(), name), kernel)(x), np.array(plain, x.dtype))
@@ -251,7 +251,7 @@ def test_plain_python_equals_c_bit_for_bit(
 @pytest.mark.parametrize("kernel", KERNELS)
 def test_numba_keeps_the_format(kernel: str, name: str) -> None:
     function = numba.njit(getattr(kernels, kernel).py_func)
-    function(np.dtype(name).type(0.3), TABLES[kernel](name))
+    function(np.dtype(name).type(0.3), TABLES[kernel][name])
     assert [str(s.return_type) for s in function.nopython_signatures] == [name]
 
 
@@ -265,7 +265,7 @@ def sweep(
     last = np.float32(9.5) if kernel == "tanh" else np.float32(1) - np.float32(2.0**-24)
     end = int(last.view(np.uint32)) + 1
     c = getattr(c_kernels(any_compiler(), "float32"), kernel)
-    t = TABLES[kernel](np.float32)
+    t = TABLES[kernel]["float32"]
 
     def part(start: int) -> tuple[float, int, int, int]:
         stop = min(start + (block + 1) * stride, end)  # one shared with the next block, for the comparison of y
@@ -298,7 +298,7 @@ def test_float32_error_on_every_argument(c_kernels: Callable[..., SimpleNamespac
 def float64_arguments(kernel: str) -> Iterator[float]:
     """Over 20 000 positive ones: where the kernel branches, near 1/2 and 1, tiny, and spread out."""
     rng = np.random.default_rng(7)
-    t = TABLES[kernel](np.float64)
+    t = TABLES[kernel]["float64"]
     # the worst that about 10^9 random arguments showed
     yield {"tanh": 0.55080469212778527, "atanh": 0.7501587944095236}[kernel]
     if kernel == "tanh":
@@ -354,7 +354,7 @@ def test_zero_and_subnormal_arguments_come_back(name: str, kernel: str) -> None:
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_tanh_saturates_where_it_rounds_to_one(name: str) -> None:
-    t = kernels.tanh_tables(name)
+    t = kernels.TANH_TABLES[name]
     last = t.bound[1]
     x = np.array([last, last * 2, np.finfo(name).max, np.inf], name)
     assert numba_values("tanh", x).tolist() == [1.0] * 4
@@ -378,15 +378,9 @@ def test_float64_never_falls(x: float, ulps: int) -> None:
     for kernel, start in (("tanh", x), ("atanh", math.tanh(x))):
         if abs(start) < 1:
             step = ulps * math.ulp(start)
-            t = TABLES[kernel](np.float64)
+            t = TABLES[kernel]["float64"]
             function = getattr(kernels, kernel).py_func
             assert function(np.float64(start), t) <= function(np.float64(start + step), t)
-
-
-def test_other_formats_are_refused() -> None:
-    for tables in TABLES.values():
-        with pytest.raises(ValueError, match="not for float16"):
-            tables(np.float16)
 
 
 # --- numbers ----------------------------------------------------------------------------------------------------------
@@ -406,7 +400,7 @@ def fit_coefficients() -> ModuleType:
 @pytest.mark.parametrize("name", FORMATS)
 def test_python_tables_are_those_of_the_fit(name: str, kernel: str) -> None:
     fitted = getattr(fit_coefficients(), f"{kernel}_tables")(name)
-    tables = TABLES[kernel](name)._asdict()
+    tables = TABLES[kernel][name]._asdict()
     assert set(tables) - set(fitted) <= {"one", "power", "number"}
     for key, values in fitted.items():
         assert tables[key].dtype == name
@@ -421,7 +415,7 @@ def text_of(value: Any) -> str:
 @pytest.mark.parametrize("name", FORMATS)
 def test_literals_in_c_are_those_of_python(name: str, kernel: str) -> None:
     text = re.sub(r"/\*.*?\*/", "", source(kernel, name).read_text(), flags=re.DOTALL)
-    tables = TABLES[kernel](name)
+    tables = TABLES[kernel][name]
     number = r"(?<![\w.])-?\d+\.\d*(?:e[+-]?\d+)?f?(?![\w.])|(?<![\w.])-?\d+e[+-]?\d+f?(?![\w.])"
     found = re.findall(rf"const hystgen_real_t hystgen_{kernel}_(\w+)((?:\[\d+\])+) = \{{(.*?)\}};", text, re.DOTALL)
     arrays = {key: re.findall(number, body) for key, _, body in found}

@@ -16,7 +16,7 @@ from hystgen.compensator.bounds import error_bounds, largest_sum
 from hystgen.compensator.reference import Session
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.plays import memory
+from hystgen.plays import play_sum
 
 U = 2.0**-53  # what one rounding may add, as a share of its result
 
@@ -495,7 +495,7 @@ def test_inverse_memory_follows_the_forward_memory() -> None:
     u = 2 * np.sin(np.linspace(0, 9, 300))
     v = model.inverse().simulate(u)
     np.testing.assert_allclose(v, Cascade(model).inverse().simulate(u), atol=1e-13)
-    assert memory.is_admissible(model.inverse().start, model.inverse().thresholds, 1e-12)
+    assert play_sum.is_admissible(model.inverse().start, model.inverse().thresholds, 1e-12)
 
 
 def test_breaks_that_only_the_descending_branch_reaches_count() -> None:

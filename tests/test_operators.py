@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.plays import elastoplastic, memory, operators
+from hystgen.plays import elastoplastic, operators, play_sum
 
 U = 2.0**-53
 """What one rounding of a double changes at most, relatively."""
@@ -196,13 +196,13 @@ def test_thresholds_that_plays_cannot_have(thresholds: object) -> None:
 @given(st.lists(numbers, min_size=5, max_size=5))
 def test_projected_memory_is_admissible(requested: list[float]) -> None:
     thresholds = [0, 0.5, 1, 2, 4]
-    states, moved = memory.project(requested, thresholds)
+    states, moved = play_sum.project(requested, thresholds)
     size = max(4.0, *map(abs, requested))
-    assert memory.is_admissible(states, thresholds, 3 * U * size)  # of a sum, and of a difference of two
+    assert play_sum.is_admissible(states, thresholds, 3 * U * size)  # of a sum, and of a difference of two
     assert states[1] == requested[1]
     if not moved:  # but by the eight units in the last place that decimal numbers may miss their sums by
         np.testing.assert_allclose(states[1:], requested[1:], rtol=0, atol=16 * U * size)
-    assert memory.project(states, thresholds)[0] == states
+    assert play_sum.project(states, thresholds)[0] == states
 
 
 def test_memory_map_and_back() -> None:
@@ -212,7 +212,7 @@ def test_memory_map_and_back() -> None:
     q = np.concatenate([[1 / p[0]], -p[1:] / (c[1:] * c[:-1])])
     v = np.sin(np.linspace(0, 9, 200)) * 2
     s = operators.plays(v, r)[:, -1]
-    np.testing.assert_allclose(memory.through(memory.through(s, p), q), s, atol=1e-14)
+    np.testing.assert_allclose(play_sum.through(play_sum.through(s, p), q), s, atol=1e-14)
 
 
 @given(signals, radii, st.lists(st.floats(0, 3), min_size=4, max_size=4))

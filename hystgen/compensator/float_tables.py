@@ -294,8 +294,8 @@ def build_float(
         **_corners(cascade, dtype, limits[: slots.OFFSET + 1] if bounded and not cascade.stages else None, seen),
         engine=slots.CORNERS if engine == "corners" else slots.LOOP,
         branches=int(cascade.branches_differ),
-        tanh=kernels.tanh_tables(dtype),
-        atanh=kernels.atanh_tables(dtype),
+        tanh=kernels.TANH_TABLES[arithmetic],
+        atanh=kernels.ATANH_TABLES[arithmetic],
     )
     for kind, first in zip(kinds, firsts, strict=True):
         if kind == slots.TANH:

@@ -29,7 +29,7 @@ from hystgen.identification.gpi import Fitted
 from hystgen.identification.pi import IdentificationError, rounded
 from hystgen.identification.quality import Row
 from hystgen.identification.reduction import Course
-from hystgen.plays import memory
+from hystgen.plays import play_sum
 from hystgen.records import SHORTEST, Record, Source, agreed_units, read_records, several
 
 if TYPE_CHECKING:
@@ -440,7 +440,7 @@ def _start(r: NDArray[np.float64], history: tuple[float, ...] | None) -> float |
     """The start memory to write: after the history, or virgin; one number where all plays agree."""
     if history is None or len(r) < 2:
         return 0.0
-    states, _ = memory.project(reduction.start_states(np.zeros(1), history, r).tolist(), r.tolist())
+    states, _ = play_sum.project(reduction.start_states(np.zeros(1), history, r).tolist(), r.tolist())
     return states[0] if len(set(states)) == 1 else list(states)
 
 

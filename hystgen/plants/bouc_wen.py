@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hystgen.basics.checks import Array, finite, positive, signal
+from hystgen.basics.arguments import Array, finite, finite_samples, positive
 from hystgen.basics.jit import jit
 from hystgen.plants import integration
 
@@ -106,12 +106,12 @@ class BoucWen:
 
     def simulate(self, v: ArrayLike) -> Array:
         """Force (N,) at the displacements `v` (N,); needs no time."""
-        samples = signal(v)
+        samples = finite_samples(v)
         return self.alpha * self.k * samples + (1.0 - self.alpha) * self.k * self.D * self.hysteretic(samples)
 
     def hysteretic(self, v: ArrayLike) -> Array:
         """The hysteretic variable z (N,) at the displacements `v` (N,)."""
-        samples = signal(v)
+        samples = finite_samples(v)
         z = np.empty_like(samples)
         p = tuple(float(x) for x in (self.A, self.beta, self.gamma, self.n, self.D))
         if self.n in (1.0, 2.0):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hystgen.basics.checks import Array, finite, positive, signal
+from hystgen.basics.arguments import Array, finite, finite_samples, positive
 from hystgen.basics.jit import jit
 from hystgen.plants import integration
 from hystgen.plants.integration import Slope
@@ -58,7 +58,7 @@ class Duhem:
 
     def simulate(self, v: ArrayLike) -> Array:
         """Output (N,) at the inputs `v` (N,); needs no time."""
-        return integration.integrate(signal(v), float(self.start), self.rising, self.falling, float(self.scale))
+        return integration.integrate(finite_samples(v), float(self.start), self.rising, self.falling, float(self.scale))
 
 
 @jit
@@ -111,7 +111,7 @@ class Dahl:
 
     def simulate(self, v: ArrayLike) -> Array:
         """Friction force (N,) at the displacements `v` (N,); needs no time."""
-        samples = signal(v)
+        samples = finite_samples(v)
         out = np.empty_like(samples)
         start, sigma, limit, exponent = map(float, (self.start, self.sigma, self.limit, self.exponent))
         _dahl(samples, 0.0, start, sigma, limit, exponent, out)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from hystgen.basics import extras
-from hystgen.basics.checks import Array
+from hystgen.basics.arguments import Array
 
 Slope = Callable[[float, float], float]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
-from hystgen.basics.checks import Array, finite, positive, signal
+from hystgen.basics.arguments import Array, finite, finite_samples, positive
 from hystgen.plants import integration
 
 
@@ -60,7 +60,7 @@ class JilesAtherton:
     def simulate(self, v: ArrayLike) -> Array:
         """Magnetization M (N,) at the fields `v` (N,), both in A/m; needs no time."""
         up, down = (functools.partial(self._slope, sign) for sign in (1.0, -1.0))
-        return integration.integrate(signal(v), 0.0, up, down, self.Ms)
+        return integration.integrate(finite_samples(v), 0.0, up, down, self.Ms)
 
     def _slope(self, sign: float, v: float, m: float) -> float:
         argument = (v + self.alpha * m) / self.a

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hystgen.basics.checks import Array, finite, numbers, positive, signal, whole
+from hystgen.basics.arguments import Array, finite, finite_numbers, finite_samples, positive, whole_from
 from hystgen.basics.jit import jit
 
 
@@ -44,7 +44,7 @@ class KrasnoselskiiPokrovskii:
         if not -1.0 <= self.start <= 1.0:
             raise ValueError(f"start has to lie between -1 and 1, not at {self.start}")
         for name in ("lower", "upper", "weights"):
-            object.__setattr__(self, name, numbers(getattr(self, name), name))
+            object.__setattr__(self, name, finite_numbers(getattr(self, name), name))
         if not len(self.lower) == len(self.upper) == len(self.weights):
             raise ValueError(
                 f"{len(self.lower)} lower and {len(self.upper)} upper places but {len(self.weights)} weights"
@@ -62,7 +62,7 @@ class KrasnoselskiiPokrovskii:
         an array of as many weights, or one for all, in output units. Raises ValueError.
         """
         finite(low=low, high=high)
-        whole(2, divisions=divisions)
+        whole_from(2, divisions=divisions)
         if not low < high:
             raise ValueError(f"low = {low} has to be below high = {high}")
         places = np.linspace(low, high, divisions + 1)[:-1]
@@ -73,7 +73,7 @@ class KrasnoselskiiPokrovskii:
 
     def simulate(self, v: ArrayLike) -> Array:
         """Output (N,) at the inputs `v` (N,); needs no time."""
-        samples = signal(v)
+        samples = finite_samples(v)
         out = np.zeros_like(samples)
         for p1, p2, weight in zip(self.lower, self.upper, self.weights, strict=True):
             _add_kernel(samples, p1, p2, float(self.ramp), weight, float(self.start), out)

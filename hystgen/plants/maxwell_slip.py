@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from hystgen.basics.checks import Array, finite, numbers, signal
+from hystgen.basics.arguments import Array, finite, finite_numbers, finite_samples
 from hystgen.cascade import PI
 from hystgen.plays import operators
 
@@ -29,8 +29,8 @@ class MaxwellSlip:
 
     def __post_init__(self) -> None:
         finite(spring=self.spring)
-        stiffnesses = numbers(self.stiffnesses, "stiffnesses")
-        slip_forces = numbers(self.slip_forces, "slip_forces")
+        stiffnesses = finite_numbers(self.stiffnesses, "stiffnesses")
+        slip_forces = finite_numbers(self.slip_forces, "slip_forces")
         if len(stiffnesses) != len(slip_forces):
             raise ValueError(f"{len(stiffnesses)} stiffnesses but {len(slip_forces)} slip forces")
         if min(stiffnesses) <= 0.0 or min(slip_forces) <= 0.0 or self.spring < 0.0:
@@ -40,7 +40,7 @@ class MaxwellSlip:
 
     def simulate(self, v: ArrayLike) -> Array:
         """Force (N,) at the displacements `v` (N,); needs no time."""
-        samples = signal(v)
+        samples = finite_samples(v)
         force = self.spring * samples
         for stiffness, slip in zip(self.stiffnesses, self.slip_forces, strict=True):
             force += stiffness * operators.stop(samples, slip / stiffness)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.checks import Array, finite, numbers, signal
+from hystgen.basics.arguments import Array, finite, finite_numbers, finite_samples
 from hystgen.basics.jit import jit
 
 Places = NDArray[np.int64]
@@ -64,7 +64,7 @@ class EverettTable:
     values: Sequence[Sequence[float]]
 
     def __post_init__(self) -> None:
-        edges = numbers(self.edges, "edges")
+        edges = finite_numbers(self.edges, "edges")
         if len(edges) < 2 or any(b <= a for a, b in itertools.pairwise(edges)):
             raise ValueError("edges rise strictly and are at least two")
         given = list(self.values) if np.iterable(self.values) else []
@@ -72,7 +72,7 @@ class EverettTable:
             raise ValueError(f"{len(edges)} edges but {len(given)} rows")
         if any(np.shape(row) != (len(edges),) for row in given):
             raise ValueError(f"every row has {len(edges)} values")
-        below = [numbers(row[: i + 1], "values up to the diagonal") for i, row in enumerate(given)]
+        below = [finite_numbers(row[: i + 1], "values up to the diagonal") for i, row in enumerate(given)]
         if any(row[-1] != 0.0 for row in below):
             raise ValueError("an Everett table is 0 on the diagonal, where alpha = beta")
         rows = tuple((*row, *[0.0] * (len(edges) - len(row))) for row in below)
@@ -131,7 +131,7 @@ class Preisach:
         finite(low=self.low, high=self.high, offset=self.offset)
         if not self.low < self.high:
             raise ValueError(f"low = {self.low} has to be below high = {self.high}")
-        object.__setattr__(self, "history", numbers(self.history, "history") if len(self.history) else ())
+        object.__setattr__(self, "history", finite_numbers(self.history, "history") if len(self.history) else ())
         places = np.linspace(self.low, self.high, 33)
         alpha, beta = np.meshgrid(places, places, indexing="ij")
         inside = alpha >= beta
@@ -146,7 +146,7 @@ class Preisach:
 
     def simulate(self, v: ArrayLike) -> Array:
         """Output (N,) at the inputs `v` (N,); needs no time."""
-        samples = signal(v)
+        samples = finite_samples(v)
         before = [self.low, *self.history]
         path = np.clip(np.concatenate([before, samples]), self.low, self.high)
         corner, change, out = np.empty(len(path), dtype=np.int64), np.zeros(len(path)), np.empty(len(path))

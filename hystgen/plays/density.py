@@ -32,7 +32,7 @@ from functools import cache, cached_property
 from itertools import pairwise
 from typing import Any
 
-from hystgen.basics.checks import finite, positive, whole
+from hystgen.basics.arguments import finite, positive, whole_from
 from hystgen.basics.quantities import MAX_PLAYS
 
 MAX_FORMULA = 1000
@@ -303,7 +303,7 @@ class Density:
         Raises ValueError for other numbers, DensityError for cells so narrow that thresholds coincide.
         """
         finite(p0=p0)
-        whole(1, n=n)
+        whole_from(1, n=n)
         thresholds, weights = [0.0], [p0]
         worst = total = start = mass = moment = _context().mpf(0)
         for i in range(1, n + 1):

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.checks import finite, signal
+from hystgen.basics.arguments import finite, finite_samples
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ def parallel(stress: ArrayLike, modulus: float, yield_stress: float, strain: flo
     """
     _check(modulus, yield_stress)
     finite(strain=strain)
-    applied = signal(stress)
+    applied = finite_samples(stress)
     strains, plastic = np.empty_like(applied), np.empty_like(applied)
     for k, sigma in enumerate(applied.tolist()):
         borne = sigma - modulus * strain
@@ -73,7 +73,7 @@ def series(strain: ArrayLike, modulus: float, yield_stress: float, plastic_strai
     """
     _check(modulus, yield_stress)
     finite(plastic_strain=plastic_strain)
-    applied = signal(strain)
+    applied = finite_samples(strain)
     stresses, plastic = np.empty_like(applied), np.empty_like(applied)
     for k, epsilon in enumerate(applied.tolist()):
         trial = modulus * (epsilon - plastic_strain)

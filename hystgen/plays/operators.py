@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.checks import samples
+from hystgen.basics.arguments import samples
 from hystgen.basics.jit import jit
 
 Array = NDArray[np.float64]

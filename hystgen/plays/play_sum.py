@@ -1,4 +1,4 @@
-"""The play sum of Prandtl-Ishlinskii models and its analytic inverse, as a frozen object."""
+"""The play sum of Prandtl-Ishlinskii models, its memory and its analytic inverse, as a frozen object."""
 
 from __future__ import annotations
 
@@ -12,11 +12,58 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.checks import numbers
+from hystgen.basics.arguments import finite_numbers
 from hystgen.basics.problems import NotInvertibleError, counted
-from hystgen.plays import memory
 
 Array = NDArray[np.float64]
+
+
+# The memory of the plays. After any input the states satisfy |s_i - s_(i-1)| <= r_i - r_(i-1) with s_0 = w, the input
+# of the plays. A state list that breaks this cannot have come from any history, and the inverse is not exact with it.
+
+
+def project(requested: float | Sequence[float], thresholds: Sequence[float]) -> tuple[tuple[float, ...], bool]:
+    """The admissible start memory nearest to the requested one, and whether it had to be changed.
+
+    `requested`: one number for all plays, or n+1 numbers of which entry 0 (the input) is ignored. Going up from play
+    1, which is kept, each play is moved into reach of the one before. The result starts with `s_0 = s_1`.
+    Raises ValueError for a list of the wrong length.
+    """
+    n = len(thresholds) - 1
+    if isinstance(requested, int | float):
+        return (float(requested),) * (n + 1), False
+    if len(requested) != n + 1:
+        raise ValueError(f"initial_state has {len(requested)} entries, the model needs {n + 1}")
+    if n == 0:
+        return (float(requested[0]),), False
+    states = [float(requested[1])]
+    for i in range(2, n + 1):
+        reach = thresholds[i] - thresholds[i - 1]
+        states.append(min(max(float(requested[i]), states[-1] - reach), states[-1] + reach))
+    # decimal numbers miss their sums by rounding: that is no projection
+    grain = 8 * np.finfo(np.float64).eps
+    moved = any(
+        abs(a - float(b)) > grain * max(abs(a), abs(float(b)), r)
+        for a, b, r in zip(states, requested[1:], thresholds[1:], strict=True)
+    )
+    return (states[0], *states), moved
+
+
+def is_admissible(states: Sequence[float], thresholds: Sequence[float], tolerance: float = 0.0) -> bool:
+    """Whether the states could have come from some history."""
+    steps = np.abs(np.diff(np.asarray(states, dtype=np.float64)))
+    return bool(np.all(steps <= np.diff(np.asarray(thresholds, dtype=np.float64)) + tolerance))
+
+
+def through(states: Sequence[float], weights: Sequence[float]) -> Array:
+    """States of the inverse's plays for states of the model's: `zeta_i = C_i s_i + sum over g > i of p_g s_g`.
+
+    `C_i = p_0 + ... + p_i`. With the weights of the inverse the same rule leads back.
+    """
+    s = np.asarray(states, dtype=np.float64)
+    p = np.asarray(weights, dtype=np.float64)
+    above = np.concatenate([np.cumsum((p * s)[::-1])[::-1][1:], [0.0]])
+    return np.asarray(np.cumsum(p) * s + above)
 
 
 @dataclass(frozen=True)
@@ -35,18 +82,18 @@ class PlaySum:
     projected: bool = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        thresholds = numbers(self.thresholds, "thresholds")
-        weights = numbers(self.weights, "weights")
+        thresholds = finite_numbers(self.thresholds, "thresholds")
+        weights = finite_numbers(self.weights, "weights")
         if thresholds[0] != 0.0 or any(b <= a for a, b in itertools.pairwise(thresholds)):
             raise ValueError("thresholds start with 0 and rise strictly")
         if len(weights) != len(thresholds):
             raise ValueError(f"{counted(len(thresholds), 'threshold')} but {counted(len(weights), 'weight')}")
         requested: float | tuple[float, ...]
         if isinstance(self.initial_state, int | float):
-            (requested,) = numbers([self.initial_state], "the initial state")
+            (requested,) = finite_numbers([self.initial_state], "the initial state")
         else:
-            requested = numbers(self.initial_state, "initial states")
-        start, projected = memory.project(requested, thresholds)
+            requested = finite_numbers(self.initial_state, "initial states")
+        start, projected = project(requested, thresholds)
         for name, value in (
             ("thresholds", thresholds),
             ("weights", weights),
@@ -66,7 +113,7 @@ class PlaySum:
         `x`: N + 1 points from 0, strictly rising, in input units; `phi`: the curve there, from 0, in output units; the
         last slope goes on beyond the last point. The thresholds are the first N points. Raises ValueError otherwise.
         """
-        points, curve = numbers(np.asarray(x).tolist(), "x"), numbers(np.asarray(phi).tolist(), "phi")
+        points, curve = finite_numbers(np.asarray(x).tolist(), "x"), finite_numbers(np.asarray(phi).tolist(), "phi")
         if len(points) != len(curve) or len(points) < 2:
             raise ValueError("a loading curve has as many values as points, at least two")
         if points[0] != 0.0 or curve[0] != 0.0 or not np.all(np.diff(points) > 0.0):
@@ -119,4 +166,4 @@ class PlaySum:
         p, r, c = self.weights, self.thresholds, self.slopes
         z = [math.fsum(p[g] * (r[i] - r[g]) for g in range(i)) for i in range(self.n + 1)]
         q = [1.0 / p[0], *(-p[i] / (c[i] * c[i - 1]) for i in range(1, self.n + 1))]
-        return type(self)(z, q, tuple(memory.through(self.start, p).tolist()))
+        return type(self)(z, q, tuple(through(self.start, p).tolist()))

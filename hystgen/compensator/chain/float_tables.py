@@ -44,8 +44,9 @@ from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 
 
-def _behind(parts: Parts, dtype: Any) -> Stages:
+def _behind(parts: Parts, arithmetic: str) -> Stages:
     """The stages of saturation: an envelope, or three straight pieces."""
+    dtype = ARITHMETICS[arithmetic].computed.type
     kinds: list[int] = []
     firsts: list[int] = []
     sizes: list[int] = []
@@ -71,7 +72,7 @@ def _behind(parts: Parts, dtype: Any) -> Stages:
         data += [1.0 / give if give else 0.0, 1.0, 1.0 / give if give else 0.0]
     kind, first, size = (np.array(each, dtype=np.int64) for each in (kinds, firsts, sizes))
     numbers = np.array(data, dtype=dtype)
-    return Stages(kind, first, size, numbers, kernels.tanh_tables(dtype), kernels.atanh_tables(dtype))
+    return Stages(kind, first, size, numbers, kernels.TANH_TABLES[arithmetic], kernels.ATANH_TABLES[arithmetic])
 
 
 def _ageing(parts: Parts, span: float, reals: Callable[[Any, str], NDArray[Any]], roundoff: float) -> AgeingTables:
@@ -163,7 +164,7 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> C
         _heat(parts, static.input_range, span, seconds, reals, float(np.finfo(dtype).eps) / 2),
         reals([drift.numbers(each, seconds, span, ahead) for each in parts.drift], "drift").reshape(-1, 8),
         own.build(drives, outputs, reals),
-        _behind(parts, dtype),
+        _behind(parts, arithmetic),
         reals(taps.weights if taps else [], "weights of the preview"),
         reals([static.output_offset, span, rising, falling, VERIFIED_SHARE], "offset or rates"),
         int(bool(rates)),

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.checks import numbers
+from hystgen.basics.arguments import finite_numbers
 from hystgen.basics.problems import NotInvertibleError, counted
 
 Array = NDArray[np.float64]
@@ -39,8 +39,8 @@ class DeadZone:
     weights: Sequence[float]
 
     def __post_init__(self) -> None:
-        thresholds = numbers(self.thresholds, "thresholds")
-        weights = numbers(self.weights, "weights")
+        thresholds = finite_numbers(self.thresholds, "thresholds")
+        weights = finite_numbers(self.weights, "weights")
         if any(b <= a for a, b in itertools.pairwise(thresholds)) or 0.0 not in thresholds:
             raise ValueError("dead-zone thresholds rise strictly and contain 0")
         if len(weights) != len(thresholds):

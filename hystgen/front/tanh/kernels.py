@@ -8,7 +8,7 @@ C files' comments, the numbers are those of `c_runtime/fit_coefficients.py`.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -17,18 +17,17 @@ from hystgen.basics.jit import jit
 
 __all__ = [
     "ATANH_MAX_ULP",
+    "ATANH_TABLES",
     "TANH_MAX_ULP",
+    "TANH_TABLES",
     "AtanhTables",
     "TanhTables",
     "atanh",
-    "atanh_tables",
     "tanh",
-    "tanh_tables",
 ]
 
 Real = np.floating[Any]
 Reals = npt.NDArray[Real]
-T = TypeVar("T")
 
 #: Worst error of `tanh` and `atanh` in ulp of the true value: float32 over all arguments, float64 a bound.
 TANH_MAX_ULP = {"float32": 0.78, "float64": 0.86}
@@ -134,29 +133,6 @@ def atanh(x: Real, t: AtanhTables) -> Real:
     start = t.row[j * (degree + 1)] - t.row[i * (degree + 1)]
     y: Real = t.number[k] * t.half_log2[0] + (start + (e * upper - d * lower))
     return -y if x < 0 else y
-
-
-def tanh_tables(dtype: npt.DTypeLike) -> TanhTables:
-    """Constants of `tanh` for float32 or float64; read-only arrays, the same ones at every call.
-
-    Raises ValueError for any other format.
-    """
-    return _of_format(_TANH, dtype)
-
-
-def atanh_tables(dtype: npt.DTypeLike) -> AtanhTables:
-    """Constants of `atanh` for float32 or float64; read-only arrays, the same ones at every call.
-
-    Raises ValueError for any other format.
-    """
-    return _of_format(_ATANH, dtype)
-
-
-def _of_format(tables: dict[str, T], dtype: npt.DTypeLike) -> T:
-    name = np.dtype(dtype).name
-    if name not in tables:
-        raise ValueError(f"tanh and atanh exist for float32 and float64, not for {name}")
-    return tables[name]
 
 
 def _array(values: list[float], dtype: npt.DTypeLike) -> Reals:
@@ -302,5 +278,8 @@ _ATANH_FLOAT64 = _atanh_tables(
     ],
 )
 
-_TANH = {"float32": _TANH_FLOAT32, "float64": _TANH_FLOAT64}
-_ATANH = {"float32": _ATANH_FLOAT32, "float64": _ATANH_FLOAT64}
+TANH_TABLES = {"float32": _TANH_FLOAT32, "float64": _TANH_FLOAT64}
+"""Constants of `tanh` in each format; read-only arrays."""
+
+ATANH_TABLES = {"float32": _ATANH_FLOAT32, "float64": _ATANH_FLOAT64}
+"""Constants of `atanh` in each format; read-only arrays."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.basics.checks import numbers
+from hystgen.basics.arguments import finite_numbers
 from hystgen.front.tanh import kernels
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ class TanhEnvelope:
 
     def __post_init__(self) -> None:
         for name, value in (("ascending", self.ascending), ("descending", self.descending or self.ascending)):
-            branch = numbers(value, f"the {name} branch's a0 .. a3")
+            branch = finite_numbers(value, f"the {name} branch's a0 .. a3")
             if len(branch) != 4 or not branch[0] * branch[1] > 0.0:
                 raise ValueError(f"the {name} branch has four numbers a0 .. a3 with a0 a1 > 0")
             object.__setattr__(self, name, branch)
@@ -47,7 +47,7 @@ class TanhEnvelope:
         """Value of the branch at x. A single float is computed alike on every machine."""
         a0, a1, a2, a3 = self.branch(ascending)
         if isinstance(x, float):
-            tables = kernels.tanh_tables(np.float64)
+            tables = kernels.TANH_TABLES["float64"]
             return np.asarray(a0 * float(kernels.tanh.py_func(np.float64(a1 * x + a2), tables)) + a3)
         return np.asarray(a0 * np.tanh(a1 * np.asarray(x, dtype=np.float64) + a2) + a3)
 
@@ -58,7 +58,7 @@ class TanhEnvelope:
         a0, a1, a2, a3 = self.branch(ascending)
         edge = float(np.nextafter(1.0, 0.0))
         if isinstance(y, float):
-            tables = kernels.atanh_tables(np.float64)
+            tables = kernels.ATANH_TABLES["float64"]
             argument = min(max((y - a3) / a0, -edge), edge)
             return np.asarray((float(kernels.atanh.py_func(np.float64(argument), tables)) - a2) / a1)
         arguments = np.clip((np.asarray(y, dtype=np.float64) - a3) / a0, -edge, edge)
@@ -73,7 +73,7 @@ class TanhEnvelope:
         a0, a1, a2, _ = self.branch(ascending)
         ends = sorted((a1 * low + a2, a1 * high + a2))
         nearest = min(max(0.0, ends[0]), ends[1])
-        tables = kernels.tanh_tables(np.float64)
+        tables = kernels.TANH_TABLES["float64"]
 
         def slope(argument: float) -> float:
             t = float(kernels.tanh.py_func(np.float64(argument), tables))
