@@ -30,8 +30,8 @@ from hystgen.records.hdf5 import read_hdf5, read_mat_73
 from hystgen.records.memory import Columns, in_memory
 from hystgen.records.memory import read as read_memory
 from hystgen.records.parquet import read_parquet
-from hystgen.records.reading import SHORTEST, CountingFile, Reading, Table, repaired
-from hystgen.records.record import LARGEST, Record, no_value
+from hystgen.records.reading import LARGEST, SHORTEST, CountingFile, Reading, Table, no_value, repaired
+from hystgen.records.record import Record
 from hystgen.records.tdms import read_tdms
 from hystgen.records.writing import columns_text, write_columns
 
