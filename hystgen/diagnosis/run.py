@@ -23,7 +23,7 @@ from hystgen.diagnosis.search import acceptance, fits, hypothesis, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome
-from hystgen.effects.base import Place
+from hystgen.effects.base import Effect, Place
 from hystgen.identification import P0_FLOOR, quality, stage_content
 from hystgen.identification.fit import visited
 from hystgen.identification.pi import DIGITS, DUST, FALLS, IdentificationError, Weights, rounded
@@ -31,7 +31,6 @@ from hystgen.records import Record, Source, read_records, several
 
 if TYPE_CHECKING:
     from hystgen.cascade import Cascade
-    from hystgen.effects.base import Effect
     from hystgen.model import ModelSource
     from hystgen.parameters.files import Parameters
 
@@ -79,7 +78,6 @@ def diagnose(
     <Diagnosis example_1: nothing_missing>
     """
     from hystgen.basics.progress import Progress
-    from hystgen.effects import Effect
     from hystgen.model import as_model
 
     model = as_model(parameters)
