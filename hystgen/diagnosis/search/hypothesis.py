@@ -473,6 +473,11 @@ def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> 
     return Structure(places, front, parts), np.concatenate([shape, *(part.candidate.start for part in parts)])
 
 
+def without_front(base: Structure, start: Array) -> tuple[Structure, Array]:
+    """A structure without its front, and where its search starts."""
+    return replace(base, front=Kept()), start[len(base.front.straight) :]
+
+
 def nominal_weights(cascade: Cascade, structure: Structure) -> Array | None:
     """The nominal weights at the structure's nearest thresholds; None behind a front, which has a scale of its own."""
     if cascade.stages:

@@ -28,6 +28,9 @@ from hystgen.identification.quality import correlation_time
 
 Array = NDArray[np.float64]
 
+FRONTS = "asymmetry", "saturation"
+"""Names of effects that are a front."""
+
 
 # Merit of an effect, and the choice among several similar ones -----------------------------------------------
 
@@ -361,6 +364,11 @@ class Outcome:
     withdrawn: tuple[str, ...] = ()
 
     @property
+    def bends(self) -> bool:
+        """Whether one of the effects is a front."""
+        return any(each.name in FRONTS for each in self.found)
+
+    @property
     def not_separable(self) -> tuple[tuple[str, str], ...]:
         """Effects that were found, each with one that it may be instead."""
         return tuple((each.name, rival) for each in self.found for rival in each.rivals)
@@ -378,6 +386,11 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array 
         starts.append(nominal)
     found = [fits.fit(base, quick, start, p) for p in starts]
     return min(found, key=lambda each: rms(each.errors(quick)))
+
+
+def better(one: Fitted, other: Fitted, items: Sequence[Item]) -> bool:
+    """Whether one fit predicts records better than another by enough to count."""
+    return rms(one.errors(items)) < (1.0 - acceptance.BETTER) * rms(other.errors(items))
 
 
 def again(fitted: Fitted, ready: Prepared) -> Fitted:
@@ -708,6 +721,6 @@ def _less(now: Fitted, name: str) -> tuple[Structure, Array] | None:
     if len(parts) < len(now.structure.parts):
         kept = tuple(part for part, _ in parts)
         return replace(now.structure, parts=kept), np.concatenate([front_shape, *(x for _, x in parts)])
-    if name in ("asymmetry", "saturation") and len(front_shape):
+    if name in FRONTS and len(front_shape):
         return replace(now.structure, front=Kept()), np.concatenate([np.empty(0), *numbers])
     return None
