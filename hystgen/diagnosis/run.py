@@ -95,8 +95,9 @@ def diagnose(
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress, points=True)
     before = None if history is None else visited(history)
     with parallel.one_thread(), Progress(STEPS, progress, "diagnosing") as bar:
-        first = hypothesis.as_given(model.cascade, given)
-        usable, odd = preparing.checked(read, lambda record: hypothesis.predicted(record, *first, before))
+        first = selection.as_given(model.cascade, given)
+        predict = partial(hypothesis.predicted, actuator=first.actuator, weights=first.weights, history=before)
+        usable, odd = preparing.checked(read, predict)
         to_fit, to_hold = (
             [record for record in group if record is not None]
             for group in (usable[: len(fitted)], usable[len(fitted) :])
@@ -105,7 +106,8 @@ def diagnose(
             model.cascade, given, to_fit or read[: len(fitted)], to_hold, rest, skip, effects, lambda: bar.tick(1)
         )
         done, wrong = task.with_history(before, unit)
-        found, made = selection.invertible(done.found, done.records, P0_FLOOR)
+        found = selection.no_worse_than(first, done.found, done.records)
+        found, made = selection.invertible(found, done.records, P0_FLOOR)
         ready = done.cleaned.clean
         extended = _extended(model.parameters, model.cascade, found, ready, effects)
         result = result_of(
@@ -113,7 +115,7 @@ def diagnose(
             ready,
             done.noise,
             found,
-            Errors(*(rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held))),
+            Errors(*(rms(first.errors(group)) for group in (ready.to_fit, ready.held))),
             [*odd, *([] if wrong is None else [wrong]), *done.cleaned.lines],
             done.records.one_loop,
             _inverse(extended, made),
@@ -171,7 +173,7 @@ class _Task:
         return done, wrong
 
     def _begun(self, history: History) -> tuple[Prepared, Refit, Refit | None]:
-        """The records as they are compared, how the nominal model is refitted to such records, and without its front."""
+        """The records as they are compared, how the nominal model is refitted to such, and without its front if any."""
         ready = preparing.prepare(self.to_fit, self.held, history, self.rest, self.skip)
         base, start = hypothesis.structure_of(self.cascade, self.given, ready)
         weights = hypothesis.nominal_weights(self.cascade, base)

@@ -541,9 +541,10 @@ def _through(places: Array, nominal: Sequence[float]) -> Array:
     return np.asarray(np.unique(moved))
 
 
-def as_given(cascade: Cascade, given: Sequence[Effect]) -> tuple[Actuator, Array]:
-    """The nominal model unchanged, and its weights."""
-    return Actuator(np.array(cascade.pi.thresholds), cascade.stages, tuple(given)), np.array(cascade.pi.weights)
+def as_given(cascade: Cascade, given: Sequence[Effect]) -> tuple[Structure, Array]:
+    """The nominal model unchanged, without free numbers, and its weights."""
+    places = np.array(cascade.pi.thresholds)
+    return Structure(places, Kept(cascade.stages), tuple(map(kept, given))), np.array(cascade.pi.weights)
 
 
 def predicted(record: Record, actuator: Actuator, weights: Array, history: tuple[float, ...] | None) -> Array:
