@@ -3,10 +3,10 @@
     python benchmarks/recordings.py FOLDER [--only NAME ...] [-o docs/recordings.csv]
 
 `FOLDER` has the recordings of `SETS`, columns t, v, y, which are of others and not part of this project. Errors are rms
-with a free offset, in % of the range of the held-out output, over the samples that `identify` compares. Baselines, by
-least squares: a straight line; 16 plays with weights of either sign; 16 x 16 relays of Preisach's; a cubic beside the
-plays; `LAGS` past samples of the drive beside the plays. `diagnosed`: behind `diagnose`, which begins with the model of
-`auto`; `s`: its time. `best`: the best baseline over `diagnosed`.
+with a free offset, in % of the range of the held-out output, over the samples that both `identify` and `diagnose`
+compare. Baselines, by least squares: a straight line; 16 plays with weights of either sign; 16 x 16 relays of
+Preisach's; a cubic beside the plays; `LAGS` past samples of the drive beside the plays. `diagnosed`: behind `diagnose`,
+which begins with the model of `auto`; `s`: its time. `best`: the best baseline over `diagnosed`.
 """
 
 from __future__ import annotations
@@ -210,24 +210,29 @@ def row(name: str, folder: Path) -> dict[str, str]:
             fits[kind] = hystgen.identify(to_fit, model=kind, holdout=to_hold, skip=of.skip)
         except IdentificationError as failure:
             found["says"] = str(failure)
-            continue
-        (held,) = [each for each in fits[kind].rows if (each.part, each.model) == ("held out", "written")]
-        found[kind] = f"{100.0 * held.rms / held.output_range:.3g}"
     if "auto" not in fits:
         return found
     used = fits["auto"].used
     fitted = [Compared(r, u.compared) for r, u in zip(to_fit, used[: len(to_fit)], strict=True)]
-    held_out = [Compared(r, u.compared) for r, u in zip(to_hold, used[len(to_fit) :], strict=True)]
-    others = {key: baseline(columns, fitted, held_out) for key, columns in BASELINES.items()}
-    found |= {key: f"{value:.3g}" for key, value in others.items()}
-    began = time.perf_counter()
+    began, diagnosis, signals = time.perf_counter(), None, []
     try:
         diagnosis = hystgen.diagnose(fits["auto"].model, to_fit, holdout=to_hold, skip=of.skip)
+        found["s"] = f"{time.perf_counter() - began:.1f}"
+        signals = [each for each in diagnosis.signals if each.held_out][: len(to_hold)]  # ends of fitted ones follow
     except IdentificationError as failure:
-        return found | {"says": str(failure)}
-    found["s"] = f"{time.perf_counter() - began:.1f}"
-    largest = max(float(np.ptp(each.y[each.compared])) for each in held_out)
-    after = 100.0 * diagnosis.content["gap"]["after"]["holdout"] / largest
+        found["says"] = str(failure)
+    held_out = []
+    for k, (record, each) in enumerate(zip(to_hold, used[len(to_fit) :], strict=True)):
+        both = each.compared & np.isfinite(signals[k].after) if signals else each.compared
+        held_out.append(Compared(record, both))
+    for kind, fit in fits.items():
+        outputs = [fit.along(r, u) for r, u in zip(to_hold, fit.used[len(to_fit) :], strict=True)]
+        found[kind] = f"{error(held_out, outputs):.3g}"
+    others = {key: baseline(columns, fitted, held_out) for key, columns in BASELINES.items()}
+    found |= {key: f"{value:.3g}" for key, value in others.items()}
+    if diagnosis is None:
+        return found
+    after = error(held_out, [each.y - signal.after for each, signal in zip(held_out, signals, strict=True)])
     found["diagnosed"], found["best"] = f"{after:.3g}", f"{min(others.values()) / after:.2f}"
     found["names"] = " ".join(each["name"] for each in diagnosis.content["effects"]) or "-"
     found["says"] = "; ".join([*fits["auto"].warnings, diagnosis.sentence()])

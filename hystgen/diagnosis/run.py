@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 History = tuple[float, ...] | None
+Refit = Callable[[Prepared], Fitted]
 
 STEPS = 120
 """Fits of a diagnosis, about, for the progress bar."""
@@ -92,8 +93,9 @@ def diagnose(
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress, points=True)
     before = None if history is None else visited(history)
     with parallel.one_thread(), Progress(STEPS, progress, "diagnosing") as bar:
-        first = hypothesis.as_given(model.cascade, given)
-        usable, odd = preparing.checked(read, lambda record: hypothesis.predicted(record, *first, before))
+        first = selection.as_given(model.cascade, given)
+        predict = partial(hypothesis.predicted, actuator=first.actuator, weights=first.weights, history=before)
+        usable, odd = preparing.checked(read, predict)
         to_fit, to_hold = (
             [record for record in group if record is not None]
             for group in (usable[: len(fitted)], usable[len(fitted) :])
@@ -102,7 +104,8 @@ def diagnose(
             model.cascade, given, to_fit or read[: len(fitted)], to_hold, rest, skip, effects, lambda: bar.tick(1)
         )
         done, wrong = task.with_history(before, unit)
-        found, made = selection.invertible(done.found, done.records, P0_FLOOR)
+        found = selection.no_worse_than(first, done.found, done.records)
+        found, made = selection.invertible(found, done.records, P0_FLOOR)
         ready = done.cleaned.clean
         extended = _extended(model.parameters, model.cascade, found, ready, effects)
         result = result_of(
@@ -110,25 +113,33 @@ def diagnose(
             ready,
             done.noise,
             found,
-            Errors(*(rms([first[0].error(item, first[1]) for item in group]) for group in (ready.to_fit, ready.held))),
+            Errors(*(rms(first.errors(group)) for group in (ready.to_fit, ready.held))),
             [*odd, *([] if wrong is None else [wrong]), *done.cleaned.lines],
             done.records.one_loop,
             _inverse(extended, made),
         )
     notes = [f"{record.name}: {note}" for record in read for note in record.notes]
     notes += [*quality.repeated(read[: len(fitted)], read[len(fitted) :]), *ready.notes]
-    notes += done.cleaned.notes(unit)
+    notes += [*done.cleaned.notes(unit), *done.notes]
     return Diagnosis(result, extended, tuple(notes), _signals(ready, found))
+
+
+NO_FRONT = "the memoryless part of the model was left out: held-out records are predicted better without it"
 
 
 @dataclass(frozen=True)
 class _Done:
-    """A finished search, with the records that it was over."""
+    """A finished search, with the records that it was over, and what else is to be said of it."""
 
     cleaned: Cleaned
     noise: NoiseFloor
     records: Records
     found: Outcome
+    notes: tuple[str, ...] = ()
+
+    def noting(self, note: str) -> _Done:
+        """The same with a note more."""
+        return replace(self, notes=(*self.notes, note))
 
 
 @dataclass(frozen=True)
@@ -159,30 +170,50 @@ class _Task:
                 raise IdentificationError(f"{wrong.sentence(unit)}, and without it {error}") from None
         return done, wrong
 
-    def _begun(self, history: History) -> tuple[Prepared, Callable[[Prepared], Fitted]]:
-        """The records as they are compared, and how the nominal model is refitted to such records."""
+    def _begun(self, history: History) -> tuple[Prepared, Refit, Refit | None]:
+        """The records as they are compared, how the nominal model is refitted to such, and without its front if any."""
         ready = preparing.prepare(self.to_fit, self.held, history, self.rest, self.skip)
         base, start = hypothesis.structure_of(self.cascade, self.given, ready)
         weights = hypothesis.nominal_weights(self.cascade, base)
-        return ready, lambda ready: selection.refit(base, ready.to_fit, start, weights)
+        bare = hypothesis.without_front(base, start) if self.cascade.stages else None
+        return (
+            ready,
+            lambda ready: selection.refit(base, ready.to_fit, start, weights),
+            None if bare is None else lambda ready: selection.refit(bare[0], ready.to_fit, bare[1]),
+        )
 
     def _foreign(self, history: History) -> OtherHistory | None:
         """The finding about a history to which the model can be bent, and should not be."""
         if history is None:
             return None
-        ready, refit = self._begun(history)
+        ready, refit, _ = self._begun(history)
         try:
-            others, refit_others = self._begun(None)
+            others, refit_others, _ = self._begun(None)
         except IdentificationError:  # everything that is compared depends on it
             return None
         return preparing.bends(ready.to_fit, refit(ready), refit_others(others))
 
     def _searched(self, history: History) -> _Done:
+        """The search from the nominal model, or without its front where that misleads it.
+
+        A front fitted to one loop may follow what an effect does there. Where held-out records are predicted better
+        without it, it has to do better in the end than the names that are found without it.
+        """
+        ready, refit, bare = self._begun(history)
+        if bare is not None and selection.better(bare(ready), refit(ready), ready.held):
+            without = self._thorough(ready, bare)
+            if without.found.found and not without.found.bends:
+                return without.noting(NO_FRONT)
+            done = self._thorough(ready, refit)
+            better = selection.better(without.found.fitted, done.found.fitted, ready.held)
+            return without.noting(NO_FRONT) if better else done
+        return self._thorough(ready, refit)
+
+    def _thorough(self, ready: Prepared, refit: Refit) -> _Done:
         """The search, and another where nothing could be named though much is left.
 
         In that one the end of each fitted record judges too: the held-out records may not show what these do.
         """
-        ready, refit = self._begun(history)
         done = self._search(ready, refit)
         left = rms(done.found.fitted.errors(done.records.to_fit))
         if done.found.found or acceptance.is_noise(left, done.noise.rms):
@@ -191,7 +222,7 @@ class _Task:
         again = None if more is None else self._search(more, refit)
         return done if again is None or not again.found.found else again
 
-    def _search(self, ready: Prepared, refit: Callable[[Prepared], Fitted]) -> _Done:
+    def _search(self, ready: Prepared, refit: Refit) -> _Done:
         refitted = refit(ready)
         cleaned = disturbances.taken_out(Cleaned(ready, ready), refitted, refit)
         if cleaned.lines:

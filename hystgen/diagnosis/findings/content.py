@@ -102,6 +102,7 @@ REFUSALS = {
     "unsure": "neither held-out nor fitted records are sure of it (p = {value:.1g}, at most {limit:g} is needed)",
     "small": "it removes {value:.0%} of the gap, and a name needs {limit:.0%}",
     "most": "the effects found leave {value:.3g}{unit} rms, most of {limit:.3g}{unit}",
+    "given": "the effects found leave {value:.3g}{unit} rms, and the model as given {limit:.3g}{unit}",
     "few": "{value:.0%} of the samples were compared, and a name needs {limit:.0%}",
     "other": "another shape does better, or as well with fewer numbers",
 }

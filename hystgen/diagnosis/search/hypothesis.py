@@ -473,6 +473,11 @@ def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> 
     return Structure(places, front, parts), np.concatenate([shape, *(part.candidate.start for part in parts)])
 
 
+def without_front(base: Structure, start: Array) -> tuple[Structure, Array]:
+    """A structure without its front, and where its search starts."""
+    return replace(base, front=Kept()), start[len(base.front.straight) :]
+
+
 def nominal_weights(cascade: Cascade, structure: Structure) -> Array | None:
     """The nominal weights at the structure's nearest thresholds; None behind a front, which has a scale of its own."""
     if cascade.stages:
@@ -536,9 +541,10 @@ def _through(places: Array, nominal: Sequence[float]) -> Array:
     return np.asarray(np.unique(moved))
 
 
-def as_given(cascade: Cascade, given: Sequence[Effect]) -> tuple[Actuator, Array]:
-    """The nominal model unchanged, and its weights."""
-    return Actuator(np.array(cascade.pi.thresholds), cascade.stages, tuple(given)), np.array(cascade.pi.weights)
+def as_given(cascade: Cascade, given: Sequence[Effect]) -> tuple[Structure, Array]:
+    """The nominal model unchanged, without free numbers, and its weights."""
+    places = np.array(cascade.pi.thresholds)
+    return Structure(places, Kept(cascade.stages), tuple(map(kept, given))), np.array(cascade.pi.weights)
 
 
 def predicted(record: Record, actuator: Actuator, weights: Array, history: tuple[float, ...] | None) -> Array:

@@ -14,19 +14,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen import effects
+from hystgen.cascade import Cascade
 from hystgen.diagnosis.data.items import Item, everything, rms, thinned
 from hystgen.diagnosis.data.preparing import Prepared
-from hystgen.diagnosis.search import acceptance, fits
+from hystgen.diagnosis.search import acceptance, fits, hypothesis
 from hystgen.diagnosis.search.acceptance import apart, is_noise
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Structure
 from hystgen.diagnosis.search.screening import Option, Records, Tried, free_numbers
+from hystgen.effects.base import Effect
 from hystgen.identification import joint
 from hystgen.identification.joint import Kept
 from hystgen.identification.pi import Weights
 from hystgen.identification.quality import correlation_time
 
 Array = NDArray[np.float64]
+
+FRONTS = "asymmetry", "saturation"
+"""Names of effects that are a front."""
 
 
 # Merit of an effect, and the choice among several similar ones -----------------------------------------------
@@ -57,8 +62,8 @@ class Refusal:
     """Why an effect that was tried has no name: the number that it fell short by, and the limit of that.
 
     `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
-    fitted ones], `small` [share of the gap], `most` [rms left], `few` [share of samples], `other`: another shape was
-    chosen.
+    fitted ones], `small` [share of the gap], `most` [rms left], `given` [rms left], `few` [share of samples], `other`:
+    another shape was chosen.
     """
 
     why: str
@@ -361,9 +366,20 @@ class Outcome:
     withdrawn: tuple[str, ...] = ()
 
     @property
+    def bends(self) -> bool:
+        """Whether one of the effects is a front."""
+        return any(each.name in FRONTS for each in self.found)
+
+    @property
     def not_separable(self) -> tuple[tuple[str, str], ...]:
         """Effects that were found, each with one that it may be instead."""
         return tuple((each.name, rival) for each in self.found for rival in each.rivals)
+
+
+def as_given(cascade: Cascade, given: Sequence[Effect]) -> Fitted:
+    """The nominal model unchanged; its rms error is not known."""
+    structure, weights = hypothesis.as_given(cascade, given)
+    return Fitted(structure, np.empty(0), weights, math.nan)
 
 
 def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array | None = None) -> Fitted:
@@ -378,6 +394,32 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array 
         starts.append(nominal)
     found = [fits.fit(base, quick, start, p) for p in starts]
     return min(found, key=lambda each: rms(each.errors(quick)))
+
+
+def no_worse_than(given: Fitted, outcome: Outcome, records: Records) -> Outcome:
+    """The outcome, or the model as given where that predicts held-out records better.
+
+    A refit that does worse there is no better model; where effects were named, it has to be worse by enough to count.
+    """
+    least, found = records.residual(given), outcome.fitted
+    if not (better(given, found, records.held) if outcome.found else least < records.residual(found)):
+        return outcome
+    if not outcome.found:
+        return replace(outcome, fitted=given)
+    refused = Refusal("given", records.residual(found), least)
+    return replace(_withdrawn(outcome, given, refused), withdrawn=())  # they explain something, if not enough
+
+
+def _withdrawn(outcome: Outcome, fitted: Fitted, refused: Refusal) -> Outcome:
+    """The outcome with another model, and without its effects."""
+    withdrawn = tuple(dict.fromkeys(each.name for each in outcome.found))
+    ranked = [tuple(replace(each, refused=each.refused or refused) for each in tried) for tried in outcome.rankings]
+    return Outcome(outcome.refitted, fitted, (), tuple(ranked), withdrawn)
+
+
+def better(one: Fitted, other: Fitted, items: Sequence[Item]) -> bool:
+    """Whether one fit predicts records better than another by enough to count."""
+    return rms(one.errors(items)) < (1.0 - acceptance.BETTER) * rms(other.errors(items))
 
 
 def again(fitted: Fitted, ready: Prepared) -> Fitted:
@@ -442,9 +484,7 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
         now, found = _finished(now, found, records)
         refused = borne_out(now, none, records)
         if refused is not None:
-            withdrawn = tuple(dict.fromkeys(each.name for each in found))
-            ranked = [tuple(replace(each, refused=each.refused or refused) for each in tried) for tried in rankings]
-            return Outcome(refitted, none, (), tuple(ranked), withdrawn)
+            return _withdrawn(Outcome(refitted, now, tuple(found), tuple(rankings)), none, refused)
     return Outcome(refitted, now, tuple(found), tuple(rankings))
 
 
@@ -708,6 +748,6 @@ def _less(now: Fitted, name: str) -> tuple[Structure, Array] | None:
     if len(parts) < len(now.structure.parts):
         kept = tuple(part for part, _ in parts)
         return replace(now.structure, parts=kept), np.concatenate([front_shape, *(x for _, x in parts)])
-    if name in ("asymmetry", "saturation") and len(front_shape):
+    if name in FRONTS and len(front_shape):
         return replace(now.structure, front=Kept()), np.concatenate([np.empty(0), *numbers])
     return None
