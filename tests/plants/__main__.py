@@ -46,7 +46,7 @@ def main(words: list[str] | None = None) -> int:
     judge.add_argument("results", type=Path)
     judge.add_argument("--json", type=Path, metavar="F")
     follow = commands.add_parser("track", help="how well plants follow a reference behind compensators")
-    follow.add_argument("effects", nargs="*", metavar="EFFECT", help="default: all that need nothing from outside")
+    follow.add_argument("effects", nargs="*", metavar="EFFECT", help="or `pairs`; default: each of EFFECTS alone")
     follow.add_argument("--seeds", type=_seeds, default=range(5), metavar="A:B")
     follow.add_argument("--jobs", type=int, default=1)
     given = parser.parse_args(words)

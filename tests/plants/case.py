@@ -120,7 +120,7 @@ def make(kind: str, seed: int, samples: int = SMALL, given: Sequence[session.Giv
         np.random.Generator(np.random.PCG64(s))
         for s in np.random.SeedSequence([KINDS.index(kind), seed, samples]).spawn(6)
     ]
-    names, fault = _contents(kind, seed)
+    names, fault = contents(kind, seed)
     stage, hysteresis, rich, session_time = _set_up(streams[0], kind, names, fault, samples, seed, given)
     course = refit.track(stage)
     span_out = stage.bench.span_out
@@ -175,7 +175,7 @@ def make(kind: str, seed: int, samples: int = SMALL, given: Sequence[session.Giv
     )
 
 
-def _contents(kind: str, seed: int) -> tuple[list[str], str | None]:
+def contents(kind: str, seed: int) -> tuple[list[str], str | None]:
     """Names of the effects, and of a foreign fault."""
     kinds = catalogue()
     names = sorted(kinds)

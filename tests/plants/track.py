@@ -10,6 +10,7 @@ that `identify` finds, and of the model that `diagnose` writes, with the ratio o
 
 from __future__ import annotations
 
+import itertools
 import json
 import shutil
 import subprocess
@@ -25,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import labels
-from .case import REPORT, SMALL, Case, catalogue, make
+from .case import REPORT, SMALL, Case, catalogue, contents, make
 from .run import COMMAND
 from .session import FINER, Planned
 
@@ -37,6 +38,9 @@ EFFECTS = (
 )  # fmt: skip
 """Effects that are looked at: drift is one of the clock, and a sensor's nonlinearity no error of the stage."""
 
+PAIRS = "pairs"
+"""Plants with two of these."""
+
 FAST = ("lag", "rate_dependence", "resonance", "delay", "slew_limit")
 """Those that are looked at at the rate of the bench's fast records."""
 
@@ -46,13 +50,16 @@ LENGTH, SWEEP = 3000, 400
 SLOWEST = 60
 """Samples of the fastest half wave of a reference."""
 
+GOOD = 2.0, 0.05
+"""A good compensator leaves at most this multiple of the held-out residual, or this many per cent."""
+
 INSIDE = 0.1
 """Share of the output over the range of the drive that a reference stays away from its ends."""
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """What one plant left, rms in per cent of the reference's range; `named`: whether its effect was."""
+    """What one plant left, rms in per cent of the reference's range; `named`: whether its effects were."""
 
     effect: str
     seed: int
@@ -66,6 +73,11 @@ class Tracked:
     @property
     def ratio(self) -> float:
         return self.whole / self.plays
+
+    @property
+    def good(self) -> bool:
+        multiple, least = GOOD
+        return self.whole <= max(multiple * self.holdout, least)
 
 
 def reference(rng: np.random.Generator, low: float, high: float) -> Array:
@@ -116,12 +128,21 @@ def answer(case: Case, drive: Array, room: Array, rate: float) -> Array:
     return stage.sampled(case.plant.respond(stage, case.session), planned)[LENGTH:]
 
 
-def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
-    """One plant with one effect; `seed` counts within the block of reports."""
+def plant(effect: str, seed: int, samples: int = SMALL) -> Case:
+    """The case of one effect, or of a pair of them; `seed` counts within the block of reports."""
+    if effect == PAIRS:
+        fits = (k for k in itertools.count(REPORT) if set(contents("pair", k)[0]) <= set(EFFECTS))
+        return make("pair", next(itertools.islice(fits, seed, None)), samples)
     number = sorted(catalogue()).index(effect) + len(catalogue()) * seed
-    case = make("single", REPORT + _aligned(number), samples)
-    assert case.plant.effects[0].name == effect
-    rate = case.session.bench.rates[1 if effect in FAST else 0]
+    return make("single", REPORT + _aligned(number), samples)
+
+
+def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
+    """One plant with one effect, or with a pair of them."""
+    case = plant(effect, seed, samples)
+    names = [each.name for each in case.plant.effects]
+    assert effect in (PAIRS, *names)
+    rate = case.session.bench.rates[1 if set(names) & set(FAST) else 0]
     with tempfile.TemporaryDirectory() as place:
         home = labels.write(case, Path(place), with_rivals=False)
         session = json.loads((home / "session.json").read_text())
@@ -149,7 +170,7 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
         for name in ("plain", "whole"):
             with (home / f"{name}.yaml").open("a") as file:
                 file.write(f"sample_time: {1.0 / rate!r}\n")
-                if name == "whole" and effect == "thermal":  # which may be the drive's own heat
+                if name == "whole" and "thermal" in names:  # which may be the drive's own heat
                     file.write("emit:\n  compensation: {compensate: [self_heating]}\n")
             _call(home, "simulate", f"{name}.yaml", "reference.csv", "--operator", "inverse", "--arithmetic", "float32",
                   "-o", f"{name}.csv")  # fmt: skip
@@ -161,8 +182,11 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
     named = [entry["name"] for entry in found["effects"]]
     alike = {name for pair in found["not_separable"] if set(pair) & set(named) for name in pair}
     holdout = 100.0 * found["gap"]["after"]["holdout"] / (high - low)
-    return Tracked(effect, seed, effect in {*named, *alike}, left["line"], left["plain"], left["whole"], holdout,
-                   ", ".join(named) or found["verdict"])  # fmt: skip
+    words = ", ".join(named) or found["verdict"]
+    if effect == PAIRS:
+        words = f"{words} ({', '.join(names)})"
+    return Tracked(effect, seed, set(names) <= {*named, *alike}, left["line"], left["plain"], left["whole"], holdout,
+                   words)  # fmt: skip
 
 
 def _aligned(number: int) -> int:
@@ -197,6 +221,9 @@ def table(rows: Sequence[Tracked]) -> Iterator[str]:
         ratios = [row.ratio for row in rows if row.effect == effect and row.named]
         if ratios:
             yield f"{effect:16} median {np.median(ratios):.3f}, largest {max(ratios):.3f} of {len(ratios)} named"
+    multiple, least = GOOD
+    good = sum(row.good for row in rows)
+    yield f"{good} of {len(rows)} leave at most {multiple:g} times the held-out residual, or {least:g} %"
     yield "rms about the mean, % of the reference's range; *: another name was found, or none"
 
 
