@@ -234,14 +234,14 @@ def row(name: str, folder: Path) -> dict[str, str]:
         return found
     after = error(held_out, [each.y - signal.after for each, signal in zip(held_out, signals, strict=True)])
     found["diagnosed"], found["best"] = f"{after:.3g}", f"{min(others.values()) / after:.2f}"
-    found["names"] = " ".join(each["name"] for each in diagnosis.content["effects"]) or "-"
+    found["names"] = " ".join(each["name"] for each in diagnosis.content["effects"])
     found["says"] = "; ".join([*fits["auto"].warnings, diagnosis.sentence()])
     return found
 
 
 def reported(says: str) -> str:
     """What is said of recordings, in short."""
-    return ", ".join(short for text, short in REPORTED.items() if text in says) or "-"
+    return ", ".join(short for text, short in REPORTED.items() if text in says)
 
 
 def main() -> int:
@@ -263,7 +263,7 @@ def main() -> int:
         with options.output.open("w", encoding="ascii", newline="") as file:
             table = csv.writer(file, lineterminator="\n")
             table.writerow(head)
-            table.writerows([[each.get(key, "-") for key in head] for each in lines])
+            table.writerows([[each.get(key, "") for key in head] for each in lines])
     return 0
 
 

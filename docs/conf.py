@@ -17,6 +17,7 @@ release = version = __version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_click", "sphinx_copybutton", "breathe", "generated"]
 myst_heading_anchors = 3
 default_role = "code"  # docstrings have names in single backquotes
+smartquotes = False  # options keep their two dashes, and can be copied
 autodoc_typehints = "none"  # signatures have them
 autodoc_member_order = "bysource"
 breathe_default_project = "emitted"

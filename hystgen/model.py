@@ -133,7 +133,10 @@ class Model:
             return
         names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
         if self.parameters.sample_time is None:
-            raise EffectsError(f"C for a model with effects ({names}) needs sample_time in the parameter file")
+            raise EffectsError(
+                f"C for a model with effects ({names}) needs sample_time in the parameter file; add "
+                "`sample_time: 1.0e-4`, the time between two calls of step in s"
+            )
         if refused := self.refusals(operator, arithmetic):
             raise UnsupportedEffectsError(
                 "not in the C: " + "; ".join(f"{effect.name}: {reason}" for effect, reason in refused)

@@ -245,13 +245,9 @@ def start(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder that pages begin with."""
     folder = tmp_path_factory.mktemp("pages")
     shutil.copytree(ROOT / "examples", folder / "examples", ignore=shutil.ignore_patterns("__pycache__", "out"))
-    shutil.copytree(folder / "examples" / "my_effect", folder / "my_effect")
-    for name in ("units", "holdout", "diagnosis"):
-        (folder / name).mkdir()
-    for name in ("sweep.csv", "units/a.csv", "units/b.csv"):
-        shutil.copy(ROOT / "examples" / "stage_recording.csv", folder / name)
-    for name in ("other.csv", "held_out.csv", "holdout/a.csv", "holdout/b.csv"):
-        shutil.copy(ROOT / "examples" / "stage_holdout.csv", folder / name)
+    (folder / "diagnosis").mkdir()
+    shutil.copy(ROOT / "examples" / "stage_recording.csv", folder / "sweep.csv")
+    shutil.copy(ROOT / "examples" / "stage_holdout.csv", folder / "other.csv")
     units = {"input": "V", "output": "um"}
     fit = hystgen.identify(folder / "sweep.csv", holdout=[folder / "other.csv"], name="stage_x", units=units)
     fit.write(folder / "stage_x.yaml")

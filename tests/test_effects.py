@@ -1201,7 +1201,10 @@ def test_commands_that_do_not_cover_effects_name_them(run: Callable[..., tuple[i
     ):  # fmt: skip
         code, said, err = run(*words)
         assert (code, said) == (2, "")
-        assert err == "error: C for a model with effects (lag, slew_limit) needs sample_time in the parameter file"
+        assert err == (
+            "error: C for a model with effects (lag, slew_limit) needs sample_time in the parameter file; add "
+            "`sample_time: 1.0e-4`, the time between two calls of step in s"
+        )
         assert not out.exists()
     path.write_text(path.read_text() + "sample_time: 1.0e-3\n")
     code, said, err = run("emit", path, "-o", out, "--engine", "corners")

@@ -226,6 +226,23 @@ class TestCommand:
             "error: the sample time nan is no number above 0; give seconds",
         ]
 
+    @pytest.mark.parametrize(
+        ("dac", "problems"),
+        [
+            ({"dac_bits": 4, "dac_range": (150.0, 0.0)}, ["for one rate", "a DAC of 4 bits", "150 to 0 does not rise"]),
+            ({"dac_bits": 40}, ["for one rate", "its bits and its range", "a DAC of 40 bits"]),
+            ({"dac_range": (9.0, 1.0), "rate": 50.0}, ["its bits and its range", "9 to 1 does not rise"]),
+            ({"dac_bits": 4, "dac_range": (1, 2, 3), "rate": 0.0}, ["the rate 0.0", "has 3 numbers", "a DAC of 4"]),
+        ],
+    )
+    def test_every_problem_of_a_converter_at_once(
+        self, tmp_path: Path, dac: dict[str, Any], problems: list[str]
+    ) -> None:
+        with pytest.raises(PlanError) as refused:
+            hystgen.plan(file_of(tmp_path), **dac)
+        assert len(refused.value.problems) == len(problems)
+        assert all(said in found for said, found in zip(problems, refused.value.problems, strict=True))
+
     def test_a_range_too_narrow_for_its_numbers(self, tmp_path: Path) -> None:
         with pytest.raises(PlanError, match="too narrow"):
             made(tmp_path, 1e9, 1e9 + 1.0)

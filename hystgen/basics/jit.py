@@ -35,9 +35,9 @@ R = TypeVar("R")
 # Python because there is no numba
 announce: Callable[[str], None] | None = None
 
-ONCE = "compiling for this machine, once: about 20 s, for C of models with effects 40 s"
+ONCE = "compiling for this machine, once for each part in use: up to 20 s, for C of models with effects 40 s"
 EVERY_TIME = (
-    "compiling for this machine: about 20 s, for C of models with effects 40 s, every time, since no folder for "
+    "compiling for this machine: up to 20 s, for C of models with effects 40 s, every time, since no folder for "
     "the result can be written to; set NUMBA_CACHE_DIR to one that can"
 )
 

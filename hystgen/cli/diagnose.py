@@ -52,7 +52,7 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
     guarded(params, run)
 
 
-@click.command(cls=Judging)
+@click.command(cls=Judging, short_help="Name the effects that a model is missing.")
 @params_argument
 @data_argument(required=False)
 @click.option("-o", "output", type=click.Path(file_okay=False), help="folder for what is found, or planned")

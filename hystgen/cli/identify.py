@@ -34,7 +34,7 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
     return dict(zip(("input", "output"), units, strict=True))
 
 
-@click.command(cls=Judging)
+@click.command(cls=Judging, short_help="Fit a model to measured records.")
 @data_argument(required=False)
 @click.option("-o", "output", required=True, type=click.Path(), help="parameter file to write; with --batch a folder")
 @click.option("--batch", multiple=True, metavar="PATTERN", help="'units/*.csv', a file or a folder: one unit a file")

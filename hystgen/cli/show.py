@@ -11,7 +11,7 @@ from hystgen.basics import console
 from hystgen.cli.common import effects_option, guarded, keep_inputs, load_model, params_argument
 
 
-@click.command()
+@click.command(short_help="Print what a model can do and what its C costs.")
 @params_argument
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of loop, loading curve and inverse")
 @click.option(

@@ -32,7 +32,7 @@ def _write_record(target: Path, header: list[str], columns: dict[str, Any]) -> N
     records.write_columns(target, header, list(columns.values()))
 
 
-@click.command()
+@click.command(short_help="Run a model, or its inverse, over records.")
 @params_argument
 @data_argument(required=True)
 @click.option("-o", "output", type=click.Path(), help="CSV file, or a folder for several; default: standard output")

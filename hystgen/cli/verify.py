@@ -25,7 +25,7 @@ from hystgen.cli.common import (
 from hystgen.verification.targets import NAMES as TARGETS
 
 
-@click.command()
+@click.command(short_help="Compare the emitted C with the reference, bit by bit.")
 @params_argument
 @operator_option
 @arithmetic_option

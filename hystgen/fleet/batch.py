@@ -252,7 +252,7 @@ def _expanded(source: str) -> list[Path]:
         found = [path] if path.is_file() else [Path(name) for name in glob.glob(source, recursive=True)]
     found = sorted(file for file in found if file.is_file())
     if not found:
-        raise FileNotFoundError(f"no file matches {source}")
+        raise FileNotFoundError(f"no file matches {source}; give the recordings, one a unit, as a pattern in quotes")
     return found
 
 

@@ -59,12 +59,10 @@ class Dac:
         return self.low + (np.asarray(codes) + self.zero) * self.lsb
 
     def problems(self, low: float, high: float) -> Iterator[str]:
-        """What is wrong with it for drives from `low` to `high`."""
-        if not FEWEST_BITS <= self.bits <= MOST_BITS:
-            yield f"a DAC of {self.bits} bits; give {FEWEST_BITS} to {MOST_BITS}"
-            return
-        if not (math.isfinite(self.low) and math.isfinite(self.high) and self.low < self.high):
-            yield f"the DAC range {self.low:g} to {self.high:g} does not rise; give its lower end first"
+        """Everything that is wrong with it for drives from `low` to `high`."""
+        own = [*wrong_bits(self.bits), *wrong_range(self.low, self.high)]
+        yield from own
+        if own:
             return
         top = self.high - self.lsb
         if low < self.low or high > top:
@@ -86,6 +84,18 @@ class Dac:
             f"{self.lsb:.4g}{unit}, {100.0 * self.lsb / span:.2g} % of the drives' span, and they lie at most one code "
             "from the straight lines between turning points."
         )
+
+
+def wrong_bits(bits: int) -> Iterator[str]:
+    """What is wrong with the number of bits of a converter."""
+    if not FEWEST_BITS <= bits <= MOST_BITS:
+        yield f"a DAC of {bits} bits; give {FEWEST_BITS} to {MOST_BITS}"
+
+
+def wrong_range(low: float, high: float) -> Iterator[str]:
+    """What is wrong with the range of a converter."""
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        yield f"the DAC range {low:g} to {high:g} does not rise; give its lower end first"
 
 
 def filled(codes: ArrayLike, every: int) -> Codes:

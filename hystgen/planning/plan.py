@@ -197,7 +197,6 @@ class Plan:
             )
         return {**made, session.FILE: self.session.to_json()}
 
-
     def _options(self) -> str:
         """Of the command line that makes the same session."""
         said = [f"--max-rate {self.max_rate!r}"]
@@ -257,7 +256,12 @@ def plan(
     ]
     if rate is not None and sample_time is not None:
         problems.append("a rate is one over a sample time; give one of both")
+    low, high = file.input_range
+    grid = Grid.over(low, high)
+    top, bottom = grid.values((grid.high, grid.low))
     dac = _dac(rate, dac_bits, dac_range, dac_coding, problems)
+    if dac is not None:
+        problems += dac.problems(bottom, top)
     if problems:
         raise PlanError(problems)
     defaults = []
@@ -267,7 +271,6 @@ def plan(
         sample_time = file.sample_time or SAMPLE_TIME
         whose = "the parameter file's" if file.sample_time else "chosen here, since the parameter file has none"
         defaults.append(f"The sample time of {sample_time:g} s is {whose}; --sample-time gives another.")
-    low, high = file.input_range
     if max_rate is None:
         max_rate = (high - low) / (FULL_SCALE * sample_time)
         unit = f" {file.units.input}/s" if file.units.input else "/s"
@@ -275,10 +278,6 @@ def plan(
             f"The rate limit of {max_rate:.4g}{unit} was chosen here: the whole range in {FULL_SCALE} sample times. If "
             "amplifier or stage must not see that, plan again with --max-rate."
         )
-    grid = Grid.over(low, high)
-    top, bottom = grid.values((grid.high, grid.low))
-    if dac is not None and (problems := list(dac.problems(bottom, top))):
-        raise PlanError(problems)
     tempo = Tempo.of(grid, max_rate, sample_time)
     written = [(record, every := record.every(tempo), _written(record, grid, tempo, every)) for record in RECORDS]
     player = None if rate is None else _Player.of(grid, tempo, rate, dac, [(len(c) - 1) * e for _, e, c in written])
@@ -307,16 +306,22 @@ def _dac(
     arguments.choice("dac_coding", coding, converter.CODINGS)
     if bits is None and ends is None:
         return None
-    if bits is None or ends is None:
-        problems.append("codes of a DAC need its bits and its range, the drive at its lower and upper end; give both")
-        return None
     if rate is None:
         problems.append("codes of a DAC are for one rate; give the rate at which it is played, Hz")
-    low_high = arguments.numbers("dac_range", ends, "[0, 150]")
-    if len(low_high) != 2:
+    if bits is None or ends is None:
+        problems.append("codes of a DAC need its bits and its range, the drive at its lower and upper end; give both")
+    if bits is not None:
+        bits = arguments.whole("dac_bits", bits, "bits", 1)
+    low_high = None if ends is None else arguments.numbers("dac_range", ends, "[0, 150]")
+    if low_high is not None and len(low_high) != 2:
         problems.append(f"the DAC range has {len(low_high)} numbers; give two, the drive at its lower and upper end")
-        return None
-    return Dac(arguments.whole("dac_bits", bits, "bits", 1), *low_high, coding)
+        low_high = None
+    if bits is not None and low_high is not None:
+        return Dac(bits, *low_high, coding)
+    # What is there is judged all the same
+    problems += () if bits is None else converter.wrong_bits(bits)
+    problems += () if low_high is None else converter.wrong_range(*low_high)
+    return None
 
 
 @dataclass(frozen=True)

@@ -139,7 +139,7 @@ def records(found: Diagnosis, width: float) -> Any:
     axes.plot(values[1], places, "o", color=AFTER, markersize=6, label=_last(found))
     axes.axvline(found.result.noise_floor, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
     axes.set_yticks(places, [f"{each.name}{' (held out)' if each.held_out else ''}" for each in shown])
-    axes.invert_yaxis()
+    axes.set_ylim(len(shown) - 0.5, -0.5)  # half a place beyond the first and the last
     _range(axes, [*values[0], *values[1], found.result.noise_floor])
     axes.set(xlabel=label("rms error", found.result.unit))
     drawing.legend_above(axes, 3)

@@ -178,7 +178,7 @@ def _drives(plan: Plan, width: float, columns: int) -> Any:
         axes.plot(scale * seconds, drive.v[chosen], color=JUDGE if drive.held_out else FIT, linewidth=0.8)
         number, _, name = drive.name.removesuffix(".csv").partition("_")
         axes.set_title(f"{number} {name.replace('_', ' ')}", fontsize=8.5)
-        axes.set_xlabel(unit, fontsize=8, labelpad=1)
+        axes.set_xlabel(f"time ({unit})", fontsize=8, labelpad=1)
         axes.tick_params(labelsize=7.5)
     for axes in list(grid.flat)[len(plan.drives) :]:
         axes.set_axis_off()

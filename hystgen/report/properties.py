@@ -30,18 +30,21 @@ def properties(model: Model, within: float = SETTLED) -> str:
     c, p = model.cascade, model.parameters
     pi = c.pi
     drive, output = (f" {unit}" if unit else "" for unit in (p.units.input, p.units.output))
+    # Behind a front the input of the plays has no unit
+    play = "" if c.stages else drive
+    slope = f"{output}/{p.units.input}" if play and output else ""
     fronts = ["dead zone" if isinstance(stage, DeadZone) else "tanh envelope" for stage in c.stages]
     lines = [
         f"{model.name}: {counted(pi.n, 'play')}" + (f" behind {', '.join(fronts)}" if fronts else ""),
         *([p.description] if p.description else []),
         f"drive range        {c.input_range[0]:.6g} to {c.input_range[1]:.6g}{drive}",
-        f"input of the plays {c.play_range[0]:.6g} to {c.play_range[1]:.6g}",
+        f"input of the plays {c.play_range[0]:.6g} to {c.play_range[1]:.6g}{play}",
         f"output range       {c.output_range[0]:.6g} to {c.output_range[1]:.6g}{output}"
         " (every drive history in range from the start memory)",
-        f"loop width         {pi.width:.6g} (input of the plays, full width, large loops)",
-        "slopes             " + ", ".join(f"{s:.6g}" for s in pi.slopes[:8]) + (", ..." if pi.n > 7 else ""),
+        f"loop width         {pi.width:.6g}{play} (input of the plays, full width, large loops)",
+        "slopes             " + ", ".join(f"{s:.6g}" for s in pi.slopes[:8]) + (", ..." if pi.n > 7 else "") + slope,
         f"slope ratio        {c.slope_ratio:.6g} (largest slope of the model over its smallest)",
-        f"start memory       {'projected to the admissible set' if pi.projected else 'as given'}",
+        f"start memory       {'projected to the admissible set' if pi.projected else 'as in the parameter file'}",
     ]
     curve, history = p.model.pi.density_error, p.model.pi.density_output_error
     if curve is not None and history is not None:

@@ -194,7 +194,7 @@ class Diagnosis:
         parts = [*self._limits(), self._finding()]
         ends = dict.fromkeys(effect.name for effect in self.result.effects if effect.at_an_end)
         if ends:
-            parts.append(f"A number of {', '.join(ends)} is at an end of its range: its shape is not certain")
+            parts.append(f"A parameter of {', '.join(ends)} is at a limit of its range: the shape is not certain")
         wrong = kinds.faults(self.result.unexplained)
         if wrong:
             parts.append(f"The data have faults: {wrong}")
