@@ -34,7 +34,7 @@ Call = Callable[..., tuple[int, str, str]]
 STAGE = '''"""An amplifier."""
 from typing import ClassVar, Literal
 import numpy as np
-from hystgen.effects import Effect, OwnBlock, Place
+from hystgen.effects import Effect, OwnBlock, Place, product
 
 RATE, INVERSE_RATE = range(2)
 
@@ -46,10 +46,10 @@ def resting(t, y):
     return y
 
 def solve(t, s, y):
-    return s[0] + (y - s[0]) * t[INVERSE_RATE]
+    return s[0] + product(t[INVERSE_RATE], y - s[0])
 
 def absorb(t, s, x):
-    s[0] = s[0] + t[RATE] * (x - s[0])
+    s[0] = s[0] + product(t[RATE], x - s[0])
     return s[0]
 
 class Follower(Effect):
@@ -73,39 +73,42 @@ class Follower(Effect):
 STAGE_C = """#include "hystgen_runtime.h"
 
 typedef struct {
-    hystgen_real_t rate;
-    hystgen_real_t inverse_rate;
+    hystgen_number_t rate;
+    hystgen_number_t inverse_rate;
 } hystgen_user_follower_table_t;
 
 typedef struct {
-    hystgen_real_t reached;
+    hystgen_signal_t reached;
 } hystgen_user_follower_t;
 
-static hystgen_real_t hystgen_user_follower_rest(const hystgen_user_follower_table_t *t,
-                                                 hystgen_user_follower_t *self, hystgen_real_t x)
+static hystgen_signal_t hystgen_user_follower_rest(const hystgen_user_follower_table_t *t,
+                                                   hystgen_user_follower_t *self,
+                                                   hystgen_signal_t x)
 {
     (void)t;
     self->reached = x;
     return x;
 }
 
-static hystgen_real_t hystgen_user_follower_resting(const hystgen_user_follower_table_t *t,
-                                                    hystgen_real_t y)
+static hystgen_signal_t hystgen_user_follower_resting(const hystgen_user_follower_table_t *t,
+                                                      hystgen_signal_t y)
 {
     (void)t;
     return y;
 }
 
-static hystgen_real_t hystgen_user_follower_solve(const hystgen_user_follower_table_t *t,
-                                                  hystgen_user_follower_t *self, hystgen_real_t y)
+static hystgen_signal_t hystgen_user_follower_solve(const hystgen_user_follower_table_t *t,
+                                                    hystgen_user_follower_t *self,
+                                                    hystgen_signal_t y)
 {
-    return self->reached + (y - self->reached) * t->inverse_rate;
+    return self->reached + hystgen_product(&t->inverse_rate, y - self->reached);
 }
 
-static hystgen_real_t hystgen_user_follower_absorb(const hystgen_user_follower_table_t *t,
-                                                   hystgen_user_follower_t *self, hystgen_real_t x)
+static hystgen_signal_t hystgen_user_follower_absorb(const hystgen_user_follower_table_t *t,
+                                                     hystgen_user_follower_t *self,
+                                                     hystgen_signal_t x)
 {
-    self->reached = self->reached + t->rate * (x - self->reached);
+    self->reached = self->reached + hystgen_product(&t->rate, x - self->reached);
     return self->reached;
 }
 """
@@ -271,17 +274,17 @@ def test_without_a_compensator_it_is_refused_by_name(tmp_path: Path, run: Call) 
 
 
 TABLE = "hystgen_user_follower_table_t"
-STEP, MEMORY, VOID = "self->reached + t->rate", "hystgen_real_t reached;", "    (void)t;\n    self"
-SECOND = "typedef struct {\n    hystgen_real_t reached"
-RATES = "hystgen_real_t rate;\n    hystgen_real_t inverse_rate;"
+STEP, MEMORY, VOID = "self->reached + hystgen_product", "hystgen_signal_t reached;", "    (void)t;\n    self"
+SECOND = "typedef struct {\n    hystgen_signal_t reached"
+RATES = "hystgen_number_t rate;\n    hystgen_number_t inverse_rate;"
 BAD_C = {
     "number": (STEP, f"0.5f * {STEP}", ":36: a number with a fraction; put it in the table"),
-    "division": ("* t->inverse_rate", "/ t->rate", ":30: a division; put the reciprocal in the table"),
+    "division": ("y - self->reached)", "y / self->reached)", ":30: a division; put the reciprocal in the table"),
     "directive": (SECOND, f"#include <math.h>\n{SECOND}", ":8: a line of the preprocessor; only #include"),
     "call": ("return self->reached;", "return sin(self->reached);", ":37: sin is called, and is not in the file"),
-    "type": (MEMORY, "double reached;", ":9: double; write hystgen_real_t"),
+    "type": (MEMORY, "double reached;", ":9: double; write hystgen_signal_t"),
     "field": (MEMORY, "hystgen_real_t seen;", ":8: hystgen_user_follower_t is declared otherwise; write typedef"),
-    "swapped": (RATES, "hystgen_real_t inverse_rate;\n    hystgen_real_t rate;", f":3: {TABLE} is declared otherwise"),
+    "swapped": (RATES, "hystgen_number_t inverse_rate;\n    hystgen_number_t rate;", f":3: {TABLE} is declared otherwise"),
     "global": (SECOND, f"static int count;\n{SECOND}", ":8: 'static int count;' belongs to no type"),
     "verb": ("follower_absorb(", "follower_absrb(", ":1: has no hystgen_user_follower_absorb; write static"),
     "comment": (VOID, "    (void)t; /* open\n    self", ":15: a comment that does not end"),
@@ -289,6 +292,7 @@ BAD_C = {
     "long": (VOID, f"    (void)t; /* {95 * 'x'} */\n    self", ":15: 114 columns, more than 100"),
     "letters": (VOID, "    (void)t; /* \u00e9 */\n    self", ":15: '\u00e9' is no printable ASCII"),
     "end": ("    return self->reached;\n}\n", "    return self->reached;\n}\nint x", ":39: 'int x' belongs to no type"),
+    "bare": ("hystgen_product(&t->rate, x - self->reached)", "t->rate * (x - self->reached)", ":36: t->rate by itself"),
     "foreign": ("self->reached = x;", "self->reached = hystgen_tanh(x);", ":16: hystgen_tanh is not in the file"),
     "escape": ("    (void)t;\n    return y;", "    (void)t; }\nint y(void) {\n    return 0;", ":24: 'int y(void)"),
 }  # fmt: skip
@@ -313,12 +317,14 @@ def test_a_missing_c_file_is_named(tmp_path: Path, run: Call) -> None:
     assert "follower.c: cannot be read (No such file" in err
 
 
-SOLVED, NUMBERS = "    return s[0] + (y", "return [rate, 1.0 / rate]"
+SOLVED, NUMBERS = "    return s[0] + product", "return [rate, 1.0 / rate]"
 PRECISE = "is of another precision than the C's; put it in the table"
 BAD_PYTHON = {
-    "number": (SOLVED, "    return 1.0 * s[0] + (y", f":16: the number 1.0 in solve {PRECISE}"),
-    "named number": (SOLVED, "    return RATE + (y", f":16: the number RATE in solve {PRECISE}"),
-    "call": ("    return s[0] + (y - s[0])", "    return np.abs(y - s[0])", ":16: solve has np.abs"),
+    "number": (SOLVED, "    return 1.0 + s[0] + product", f":16: the number 1.0 in solve {PRECISE}"),
+    "named number": (SOLVED, "    return RATE + product", f":16: the number RATE in solve {PRECISE}"),
+    "call": ("    return s[0] + product", "    return np.abs(s[0]) + product", ":16: solve has np.abs(s[0]); write it"),
+    "times": (SOLVED, "    return s[0] * s[0] + product", ":16: solve has s[0] * s[0]; write it with +, -, product"),
+    "product": ("y - s[0])", "y - s[0]) + product(y, s[0])", ":16: solve has product(y, s[0]); give a number of the"),
     "place": ("Place.DRIVE", "Place.OUTPUT", "class Follower has place output, for which it has to define mapped"),
     "side": ("order: ClassVar[int] = 2", "order: ClassVar[int] = 0", "in front of the slew limit; give it an order"),
     "name": ("user:follower", "user:My-Follower", "user:My-Follower cannot name it in C"),
@@ -327,9 +333,9 @@ BAD_PYTHON = {
     "numbers": (NUMBERS, "return [rate]", "2 finite numbers were expected, rate, inverse_rate"),
     "infinite": (NUMBERS, "return [rate, np.inf]", "2 finite numbers were expected"),
     "fails": (NUMBERS, "return [rate, 1 / 0]", "failed in numbers: ZeroDivisionError"),
-    "not linear": ("    return s[0]\n\nclass", "    return s[0] * s[0]\n\nclass", "its block is not linear"),
+    "not linear": ("    return s[0]\n\nclass", "    return s[0] + t[RATE]\n\nclass", "its block is not linear"),
     "moves at rest": ("    s[0] = x\n", "    s[0] = x + x\n", "does not stay where rest leaves it"),
-    "other at rest": ("(t, y):\n    return y", "(t, y):\n    return y * t[RATE]", "one undoes the other"),
+    "other at rest": ("(t, y):\n    return y", "(t, y):\n    return product(t[RATE], y)", "one undoes the other"),
     "gain": ("    return s[0]\n\nclass", "    return s[0] + s[0]\n\nclass", "does not stay where rest leaves it"),
     "grows": ("- np.exp(", "- 3.0 * np.exp(", "its block keeps"),
 }  # fmt: skip
@@ -354,16 +360,16 @@ STYLES = {
     "in one line": STAGE_C.replace("\n{\n    (void)t;\n    return y;\n}", " { (void)t; return y; }"),
     "braces behind": re.sub(r"\n {20,}", "\n    ", STAGE_C).replace(")\n{", ") {"),
     "a helper": STAGE_C.replace(
-        "static hystgen_real_t hystgen_user_follower_absorb(",
-        "/* The rest of the way. */\nstatic hystgen_real_t\n"
-        "hystgen_user_follower_way(hystgen_real_t a, hystgen_real_t b)\n"
+        "static hystgen_signal_t hystgen_user_follower_absorb(",
+        "/* The rest of the way. */\nstatic hystgen_signal_t\n"
+        "hystgen_user_follower_way(hystgen_signal_t a, hystgen_signal_t b)\n"
         "{\n    /* from b to a */\n    return a -\n        b; /* either sign */\n}\n\n"
-        "static hystgen_real_t hystgen_user_follower_absorb(", 1,
-    ).replace("t->rate * (x - self->reached)", "t->rate * hystgen_user_follower_way(x, self->reached)"),
+        "static hystgen_signal_t hystgen_user_follower_absorb(", 1,
+    ).replace("&t->rate, x - self->reached", "&t->rate, hystgen_user_follower_way(x, self->reached)"),
     "a loop": STAGE_C.replace(
-        "    self->reached = self->reached + t->rate",
+        "    self->reached = self->reached + hystgen_product",
         "    unsigned int i;\n    for (i = 0; i < 3u; ++i) {\n        if (i == 2u)\n            break;\n    }\n"
-        "    self->reached = self->reached + t->rate",
+        "    self->reached = self->reached + hystgen_product",
     ),
     "windows": STAGE_C.replace("\n", "\r\n"),
 }  # fmt: skip
@@ -440,5 +446,4 @@ def test_a_block_says_what_it_does_to_signals() -> None:
 def test_emit_options_take_it(tmp_path: Path) -> None:
     one = hystgen.load(written(tmp_path, DROOP), [EXAMPLE])
     assert emit_options(one).left_out == ()
-    with pytest.raises(UnsupportedEffectsError, match="whose block is in floating point; use float32"):
-        emit_options(one, arithmetic="q15")
+    assert emit_options(one, arithmetic="q15").left_out == ()

@@ -8,12 +8,13 @@ samples are bounded mode by mode: `sum |C A^k B| <= sum |c_j b_j|/(1 - |lambda_j
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.jit import jit
 from hystgen.effects import own
 from hystgen.effects.base import Array, Effect, Place
 from hystgen.effects.kinds import Constants
@@ -25,12 +26,14 @@ million samples: their quotient is what a difference of states loses."""
 
 
 class OwnTables(NamedTuple):
-    """Blocks in front of the plays, then those behind: `number` (m,), those of each from `first` (k + 1) on; the memory
-    of each from `place` (k + 1) on; `ahead`: how many stand in front."""
+    """Blocks in front of the plays, then those behind: `number` (m,), in fixed point (m, 4), those of each from `first`
+    (k + 1) on; the memory of each from `place` (k + 1) on; `bits` (k,): of its signals below those of the chain, in
+    fixed point; `ahead`: how many stand in front."""
 
     first: Counts
     number: Reals
     place: Counts
+    bits: Counts
     ahead: int
 
 
@@ -182,8 +185,8 @@ def linear(effect: Effect, seconds: float) -> Linear:
     return Linear(effect, one.table, systems[0], systems[1], rest, one.state.copy())
 
 
-def problems(effect: Effect, seconds: float) -> Iterator[str]:
-    """Why the C cannot have the block of an effect."""
+def problems(effect: Effect, seconds: float, fixed: bool) -> Iterator[str]:
+    """Why the C cannot have the block of an effect, in fixed point or else in floating point."""
     assert effect.block is not None
     one = linear(effect, seconds)
     if not _adds_up(one, seconds):
@@ -212,6 +215,23 @@ def problems(effect: Effect, seconds: float) -> Iterator[str]:
             f"in front of the plays a drive at rest has to pass as it is, and none may overshoot; it passes "
             f"{one.rest:g} of it at rest and up to {one.forward.largest:g} on the way"
         )
+    elif fixed and not one.exact:
+        yield (
+            "its solve does not give the input for which absorb returns the output asked for, and fixed point bounds its "
+            "numbers by that; use float32"
+        )
+    elif fixed and not _stays_for_solve(effect, seconds):
+        yield "its solve changes the memory, which fixed point bounds by what absorb and rest do; leave that to absorb"
+
+
+def _stays_for_solve(effect: Effect, seconds: float) -> bool:
+    """Whether solve leaves the memory as it is."""
+    instance = own.Instance(effect)
+    instance.advance(seconds)
+    before = np.random.default_rng(0).normal(size=len(instance.state))
+    instance.state[:] = before
+    instance.solve(1.0)
+    return bool(np.all(instance.state == before))
 
 
 def _adds_up(one: Linear, seconds: float) -> bool:
@@ -240,6 +260,7 @@ def build(drives: Sequence[Linear], outputs: Sequence[Linear], reals: Any) -> Ow
         np.cumsum([0, *(len(each.numbers) for each in every)]).astype(np.int64),
         reals(np.concatenate([np.empty(0), *(each.numbers for each in every)]), "numbers of effects of your own"),
         np.cumsum([0, *(len(each.settled) for each in every)]).astype(np.int64),
+        np.zeros(len(every), dtype=np.int64),
         len(drives),
     )
 
@@ -250,5 +271,25 @@ def constants(t: OwnTables, kinds: Sequence[type[Effect]]) -> list[Constants]:
     for j, effect in enumerate(kinds):
         assert effect.block is not None
         row = t.number[t.first[j] : t.first[j + 1]]
-        found.append(Constants(own.kind(effect), row, effect.block.products))
+        kind, products = own.kind(effect), effect.block.products
+        if row.ndim > 1:  # fixed point, where a product takes two
+            absorb, solve = products
+            found.append(Constants(kind, row.ravel(), (2 * absorb, 2 * solve), bits=int(t.bits[j])))
+        else:
+            found.append(Constants(replace(kind, letters="", memory=""), row, products))
     return found
+
+
+# ---------------------------------------------------------------- product_float.c
+
+
+@jit(inline=True)
+def product(number: Any, x: Any) -> Any:
+    """A number of the table times x."""
+    return number * x
+
+
+@jit(inline=True)
+def passed(t: OwnTables, j: int, x: Any) -> Any:  # noqa: ARG001  as in fixed point
+    """A signal of the chain is one of block j, and the other way round."""
+    return x
