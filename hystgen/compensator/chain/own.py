@@ -67,6 +67,11 @@ class System:
         lost, vectors, back = self._modes()
         return np.asarray((np.abs(self.c @ vectors) * lost) @ np.abs(back))
 
+    def once(self) -> Array:
+        """Largest output (n,) that a disturbance of each state makes at any later sample."""
+        _, vectors, back = self._modes()
+        return np.asarray(np.abs(self.c @ vectors) @ np.abs(back))
+
     def before(self) -> float:
         """Largest output that inputs within 1 up to the sample before make."""
         lost, vectors, back = self._modes()
@@ -114,18 +119,26 @@ class Linear:
         lost = np.array([each.error for each in state])
         begun = np.array(sizes, dtype=object)
         _apply(self.effect, "rest", shares, begun, Rounded(size, 0.0, u))
-        lost = lost + np.array([each.error for each in begun])
-        forward = y.error + float(self.forward.after() @ lost)
+        started = self.forward.once() @ np.array([each.error for each in begun])
+        forward = y.error + float(self.forward.after() @ lost + started)
         asked = Rounded(self.forward.largest * size, 0.0, u)
         x = _apply(self.effect, "solve", shares, np.array(sizes, dtype=object), asked)
         return forward, self.passed(forward, x.error)
 
     def passed(self, error: float, own: float = 0.0) -> float:
-        """Error of the input for one of the output, and for roundings `own` of solve."""
-        before, now = self.forward.before(), abs(self.forward.d)
-        if self.exact and before < now:  # whatever is limited or committed on the way
-            return (error / now + own) / (1.0 - before / now)
-        return self.backward.largest * error + own * (1.0 + self.backward.largest * self.forward.largest)
+        """Error of the input for one of the output, and for roundings `own` of solve.
+
+        Limits let an error of the input through in part, or not at all: a single state then comes to lie between what
+        either way makes of it, and what inputs before make of an output smaller than the present one does is a
+        contraction of errors of the input.
+        """
+        before, now, back = self.forward.before(), abs(self.forward.d), self.backward
+        bounds = []
+        if self.exact and len(self.settled) == 1:
+            bounds.append(back.largest * error + own * (1.0 + back.before() * now))
+        if self.exact and before < now:
+            bounds.append((error / now + own) / (1.0 - before / now))
+        return min(bounds, default=back.largest * error + own * (1.0 + back.largest * self.forward.largest))
 
     def _shares(self, u: float) -> NDArray[Any]:
         return np.array([Rounded(abs(each), u * abs(each), u) for each in self.numbers.tolist()], dtype=object)

@@ -109,9 +109,10 @@ class _Trace:
         assert block is not None
         begun, moved = state(), state()
         rest, now = block.rest(numbers, begun, given), block.absorb(numbers, moved, given)
-        lost = np.array([a.error + b.error for a, b in zip(begun, moved, strict=True)])
+        started, lost = (np.array([each.error for each in states]) for states in (begun, moved))
         back = [block.solve(numbers, state(), asked), block.resting(numbers, asked)]
-        output = max(rest.error, now.error) + float(self.linear.forward.after() @ lost)
+        forward = self.linear.forward
+        output = max(rest.error, now.error) + float(forward.after() @ lost + forward.once() @ started)
         return [each.seen for each in numbers], most[0], output, max(each.error for each in back)
 
 
