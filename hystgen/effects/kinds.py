@@ -98,7 +98,7 @@ class OwnBlock:
     solve: Callable[[Any, Any, Any], Any]
     absorb: Callable[[Any, Any, Any], Any]
 
-    def compiled(self, verb: str, arithmetic: Jit[..., Any]) -> Jit[..., Any]:
+    def compiled(self, verb: str, arithmetic: Callable[..., Any]) -> Jit[..., Any]:
         """A function for the bit reference, with the product of an arithmetic in place of `product`."""
         function = getattr(self, verb)
         names = function.__globals__

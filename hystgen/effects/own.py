@@ -192,7 +192,7 @@ def _of_function(verb: str, function: Any) -> Iterator[str]:
         place = f"{file}:{first + getattr(node, 'lineno', 1) - 1}"
         if id(node) in places and isinstance(node, ast.Name | ast.Constant | ast.BinOp | ast.Add | ast.Sub | ast.Load):
             continue
-        called = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and known.get(node.func.id, node.func.id)
+        called = known.get(_called(node), _called(node))
         named = isinstance(node, ast.Name) and isinstance(known.get(node.id), int | float)
         if isinstance(node, ast.Constant) or named:
             what = ast.unparse(node)
@@ -211,6 +211,11 @@ def _of_function(verb: str, function: Any) -> Iterator[str]:
                 f"{place}: {verb} has {ast.unparse(node) or type(node).__name__}; write it with +, -, "
                 "product(t[..], ..) and `for .. in range(..)`"
             )
+
+
+def _called(node: ast.AST) -> str:
+    """The name of the function that a call names, or nothing."""
+    return node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
 
 
 def _of_table(call: Any, t: str) -> bool:

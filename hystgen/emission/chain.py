@@ -85,9 +85,11 @@ class Block:
         given = [self.table] * (own in self.kind.reading) + [f"&self->{self.name}"] * (own != "resting")
         if own in ("rest", "absorb"):
             given += [f"self->{field.name}" for field in self.fields[1:]]
-        bits = self.constants.bits
-        called = f"hystgen_{self.kind.name}_{own}({', '.join([*given, f'{x} * ((hystgen_signal_t)1 << {bits}u)' if bits else x])})"
-        return f"hystgen_nearest({called}, {bits}u)" if bits else called
+        name, bits = f"hystgen_{self.kind.name}_{own}", self.constants.bits
+        if not bits:
+            return f"{name}({', '.join([*given, x])})"
+        finer = f"{x} * ((hystgen_signal_t)1 << {bits}u)"
+        return f"hystgen_nearest({name}({', '.join([*given, finer])}), {bits}u)"
 
     def arrays(self, prefix: str) -> list[str]:
         """Its table, behind that of its rows where it has any."""

@@ -1,8 +1,9 @@
 """The C of an effect of the user's own: its file, checked, as pieces of the run time.
 
 The file is the user's own code and is carried as it stands, with the model's name in front of its own. It may contain
-what blocks of `c_runtime/` contain: two types, of the numbers and of the memory, named as in Python, and four functions,
-with further static functions that they call. Written with `hystgen_product` it is the same for every arithmetic. The language is not checked: `hystgen verify` shows what compiles, and to which bits.
+what blocks of `c_runtime/` contain: two types, of the numbers and of the memory, named as in Python, and four
+functions, with further static functions that they call. Written with `hystgen_product` it is the same for every
+arithmetic. The language is not checked: `hystgen verify` shows what compiles, and to which bits.
 """
 
 from __future__ import annotations
@@ -169,7 +170,7 @@ def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int,
         for number, each in enumerate(code.split("\n")):
             place = text.count("\n", 0, at) + 1 + number
             for used in set(_NAME.findall(each)) - functions - wanted.keys() - GIVEN:
-                yield place, f"{used} is not in the file; a block has what stands in its file, {', '.join(sorted(GIVEN))}"
+                yield place, f"{used} is not in the file; a block has that, and {', '.join(sorted(GIVEN))}"
             for number in re.findall(r"(?<!&)\bt->(\w+)", each):
                 yield place, f"t->{number} by itself; write hystgen_product(&t->{number}, ..)"
             for called in re.findall(r"(\w+) ?\(", each):

@@ -162,7 +162,8 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
     moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own[: t.own.ahead])
     static = compiled.static
     forward = static.front_slopes[1] * math.fsum(abs(p) for p in static.pi.weights) * moved
-    if emitted and (len(t.lag.exact) or t.own.ahead) and static.branches_differ:  # what arrives comes to rest on either branch
+    followed = len(t.lag.exact) or t.own.ahead
+    if emitted and followed and static.branches_differ:  # what arrives comes to rest on either branch
         forward += static.pi.slopes[-1] * static.branch_gap
     size = sizes.plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
     roundings = []

@@ -99,10 +99,11 @@ class Bend:
 class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
-    `ahead`, `behind`: blocks of the user's own in front of the plays and behind; `bends`: there and back of each tanh; `ends`: of the output; `slowed`: share of its rates that a slew limit loses in
-    whole codes; `drifted`: error of drifts in signals; `reached`: whether all that is asked in front of the plays can
-    be led to; `largest_step`: as in `Compiled`; `finer`: bits of what arrives in front of the plays below their input;
-    `bumps`: of bent plays; `heats`: errors of temperatures of own heat, degrees.
+    `ahead`, `behind`: blocks of the user's own in front of the plays and behind; `bends`: there and back of each tanh;
+    `ends`: of the output; `slowed`: share of its rates that a slew limit loses in whole codes; `drifted`: error of
+    drifts in signals; `reached`: whether all that is asked in front of the plays can be led to; `largest_step`: as in
+    `Compiled`; `finer`: bits of what arrives in front of the plays below their input; `bumps`: of bent plays; `heats`:
+    errors of temperatures of own heat, degrees.
     """
 
     static: StaticModel

@@ -230,8 +230,8 @@ def problems(effect: Effect, seconds: float, fixed: bool) -> Iterator[str]:
         )
     elif fixed and not one.exact:
         yield (
-            "its solve does not give the input for which absorb returns the output asked for, and fixed point bounds its "
-            "numbers by that; use float32"
+            "its solve does not give the input for which absorb returns the output asked for, and fixed point bounds "
+            "its numbers by that; use float32"
         )
     elif fixed and not _stays_for_solve(effect, seconds):
         yield "its solve changes the memory, which fixed point bounds by what absorb and rest do; leave that to absorb"

@@ -99,11 +99,14 @@ class _Trace:
         absorb and of solve."""
         most = [0.0]
         numbers = [_Number(*each) for each in zip(self.linear.numbers.tolist(), rows, strict=True)]
-        given, asked = (_Traced(size * 2.0**bits, 0.0, most).made(size * 2.0**bits, 0.0) for size in (self.given, self.asked))
-        sizes = (self.given * 2.0**bits * self.linear.sizes()).tolist()
+
+        def signal(size: float) -> _Traced:
+            return _Traced(0.0, 0.0, most).made(size * 2.0**bits, 0.0)
 
         def state() -> Any:
-            return np.array([given.made(size, 0.0) for size in sizes], dtype=object)
+            return np.array([signal(size) for size in (self.given * self.linear.sizes()).tolist()], dtype=object)
+
+        given, asked = signal(self.given), signal(self.asked)
 
         block = self.linear.effect.block
         assert block is not None
