@@ -8,6 +8,14 @@ typedef struct {
     uint8_t shift;
 } hystgen_factor_t;
 
+/* What a block of the user's own multiplies with: a factor, and the bits that a product leaves out
+   of its argument and of its result. */
+typedef struct {
+    hystgen_factor_t factor;
+    uint8_t drop;
+    uint8_t lift;
+} hystgen_number_t;
+
 /* A state of creep: what it will give at the next sample goes to weight times the input by its
  * rate.
  */

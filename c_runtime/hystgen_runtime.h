@@ -59,6 +59,7 @@ typedef hystgen_sum_t hystgen_travel_t;
 typedef hystgen_real_t hystgen_signal_t;
 typedef hystgen_real_t hystgen_fine_t;
 typedef hystgen_real_t hystgen_travel_t;
+typedef hystgen_real_t hystgen_number_t;
 #define HYSTGEN_FINE_MIN HYSTGEN_DRIVE_MIN
 #define HYSTGEN_FINE_MAX HYSTGEN_DRIVE_MAX
 #define hystgen_clamp_fine hystgen_clamp_drive

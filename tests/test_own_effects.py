@@ -14,10 +14,12 @@ import pytest
 from modelfiles import CREEP, PLAYS, head
 
 import hystgen
+from hystgen.basics import jit
 from hystgen.basics.problems import EffectsError, UnsupportedEffectsError
 from hystgen.compensator.chain import blocks, bounds, own, tables
 from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
+from hystgen.compensator.reference import answers as computed
 from hystgen.effects import Run, load_user_effects
 from hystgen.effects.kinds import Kind
 from hystgen.emission import runtime
@@ -34,7 +36,7 @@ Call = Callable[..., tuple[int, str, str]]
 STAGE = '''"""An amplifier."""
 from typing import ClassVar, Literal
 import numpy as np
-from hystgen.effects import Effect, OwnBlock, Place
+from hystgen.effects import Effect, OwnBlock, Place, product
 
 RATE, INVERSE_RATE = range(2)
 
@@ -46,10 +48,10 @@ def resting(t, y):
     return y
 
 def solve(t, s, y):
-    return s[0] + (y - s[0]) * t[INVERSE_RATE]
+    return s[0] + product(t[INVERSE_RATE], y - s[0])
 
 def absorb(t, s, x):
-    s[0] = s[0] + t[RATE] * (x - s[0])
+    s[0] = s[0] + product(t[RATE], x - s[0])
     return s[0]
 
 class Follower(Effect):
@@ -73,39 +75,42 @@ class Follower(Effect):
 STAGE_C = """#include "hystgen_runtime.h"
 
 typedef struct {
-    hystgen_real_t rate;
-    hystgen_real_t inverse_rate;
+    hystgen_number_t rate;
+    hystgen_number_t inverse_rate;
 } hystgen_user_follower_table_t;
 
 typedef struct {
-    hystgen_real_t reached;
+    hystgen_signal_t reached;
 } hystgen_user_follower_t;
 
-static hystgen_real_t hystgen_user_follower_rest(const hystgen_user_follower_table_t *t,
-                                                 hystgen_user_follower_t *self, hystgen_real_t x)
+static hystgen_signal_t hystgen_user_follower_rest(const hystgen_user_follower_table_t *t,
+                                                   hystgen_user_follower_t *self,
+                                                   hystgen_signal_t x)
 {
     (void)t;
     self->reached = x;
     return x;
 }
 
-static hystgen_real_t hystgen_user_follower_resting(const hystgen_user_follower_table_t *t,
-                                                    hystgen_real_t y)
+static hystgen_signal_t hystgen_user_follower_resting(const hystgen_user_follower_table_t *t,
+                                                      hystgen_signal_t y)
 {
     (void)t;
     return y;
 }
 
-static hystgen_real_t hystgen_user_follower_solve(const hystgen_user_follower_table_t *t,
-                                                  hystgen_user_follower_t *self, hystgen_real_t y)
+static hystgen_signal_t hystgen_user_follower_solve(const hystgen_user_follower_table_t *t,
+                                                    hystgen_user_follower_t *self,
+                                                    hystgen_signal_t y)
 {
-    return self->reached + (y - self->reached) * t->inverse_rate;
+    return self->reached + hystgen_product(&t->inverse_rate, y - self->reached);
 }
 
-static hystgen_real_t hystgen_user_follower_absorb(const hystgen_user_follower_table_t *t,
-                                                   hystgen_user_follower_t *self, hystgen_real_t x)
+static hystgen_signal_t hystgen_user_follower_absorb(const hystgen_user_follower_table_t *t,
+                                                     hystgen_user_follower_t *self,
+                                                     hystgen_signal_t x)
 {
-    self->reached = self->reached + t->rate * (x - self->reached);
+    self->reached = self->reached + hystgen_product(&t->rate, x - self->reached);
     return self->reached;
 }
 """
@@ -183,6 +188,9 @@ def test_c_gives_the_same_bits_on_cores_and_beside_a_shared_run_time(tmp_path: P
     assert report.ok, report.table()
     report = hystgen.verify(one, operator="both", layout="shared-runtime", compiler=["gcc"], length=500)
     assert report.ok, report.table()
+    for arithmetic in ("q31", "q15"):
+        report = hystgen.verify(one, arithmetic, "both", targets=["cortex-m0plus", "cortex-m4f"], target_length=150)
+        assert report.ok, report.table()
 
 
 @pytest.mark.parametrize("arithmetic", ["float32", "float64"])
@@ -197,6 +205,48 @@ def test_errors_stay_within_the_bounds_that_follow_from_the_functions(tmp_path: 
         y = answers(compiled, Run(run.t, v), False).astype(float)
         assert np.max(np.abs(y - one.simulate(v))) <= bound.forward
         assert bound.inverse < (0.1 if arithmetic == "float32" else 1e-9)
+
+
+FIXED = {
+    "droop": (DROOP,),
+    "fast droop": ("name: user:droop, share: 0.3, time_constant: 5.0e-3",),
+    "slow droop": ("name: user:droop, share: 0.3, time_constant: 50",),
+    "follower": (FOLLOWER,),
+    "slow follower": ("name: user:follower, bandwidth: 30", CREEP),
+    "both": (DROOP, FOLLOWER, CREEP, "name: saturation, level: 12"),
+}
+
+
+@pytest.mark.parametrize("effects", FIXED.values(), ids=list(FIXED))
+@pytest.mark.parametrize("arithmetic", ["q31", "q15"])
+def test_fixed_point_stays_within_its_bounds(tmp_path: Path, arithmetic: str, effects: tuple[str, ...]) -> None:
+    """Against double precision, for smooth references and for jumps from one end of the output to the other."""
+    one = hystgen.load(written(tmp_path, *effects), [EXAMPLE, outside(tmp_path)])
+    compiled = tables.build(one.chain, arithmetic, T)
+    codes, limits = compiled.codes, compiled.tables.limits
+    assert codes is not None
+    low, high, most = (float(limits[k]) for k in (slots.OUTPUT_MIN, slots.OUTPUT_MAX, slots.CODE_MAX))
+    drive, displacement = float(codes.drive_lsb), float(codes.output_lsb)
+    n = 200
+    t, op = np.arange(n) * T, np.full(n, slots.OP_STEP, dtype=np.uint8)
+    phase = np.cumsum(np.random.default_rng(6).uniform(0.0, 0.04, n))
+    for shape in (0.5 * np.sin(phase), np.sign(np.sin(3.0 * phase))):
+        u = np.rint(0.5 * (low + high) + 0.5 * (high - low) * shape)
+        v = computed(compiled.tables, True, op, u, compiled=False)[0].astype(float)
+        ends = float(limits[slots.DRIVE_MIN]) * drive, float(limits[slots.DRIVE_MAX]) * drive
+        wanted = Compensator(one.chain).drives(Run(t, u * displacement), ends)
+        assert np.max(np.abs(v - wanted / drive)) <= codes.inverse_error < 1e-2 * (high - low)
+        y = computed(compiled.tables, False, op, v, compiled=False)[0].astype(float)
+        exact = np.clip(one.simulate(v * drive, t=t) / displacement, -most - 1.0, most)
+        assert np.max(np.abs(y - exact)) <= codes.forward_error < 64.0
+
+
+@pytest.mark.parametrize("arithmetic", ["q31", "q15"])
+def test_c_gives_the_bits_of_the_reference_in_fixed_point(tmp_path: Path, arithmetic: str) -> None:
+    with jit.plain():
+        report = hystgen.verify(both(tmp_path, CREEP), arithmetic, "both", compiler=["gcc"], length=20)
+    assert report.ok, report.table()
+    assert {row.operator for row in report.rows} == {"inverse", "forward"}
 
 
 def test_the_noise_gain_is_that_of_an_impulse(tmp_path: Path) -> None:
@@ -271,26 +321,27 @@ def test_without_a_compensator_it_is_refused_by_name(tmp_path: Path, run: Call) 
 
 
 TABLE = "hystgen_user_follower_table_t"
-STEP, MEMORY, VOID = "self->reached + t->rate", "hystgen_real_t reached;", "    (void)t;\n    self"
-SECOND = "typedef struct {\n    hystgen_real_t reached"
-RATES = "hystgen_real_t rate;\n    hystgen_real_t inverse_rate;"
+STEP, MEMORY, VOID = "self->reached + hystgen_product", "hystgen_signal_t reached;", "    (void)t;\n    self"
+SECOND = "typedef struct {\n    hystgen_signal_t reached"
+RATES = "hystgen_number_t rate;\n    hystgen_number_t inverse_rate;"
 BAD_C = {
-    "number": (STEP, f"0.5f * {STEP}", ":36: a number with a fraction; put it in the table"),
-    "division": ("* t->inverse_rate", "/ t->rate", ":30: a division; put the reciprocal in the table"),
+    "number": (STEP, f"0.5f * {STEP}", ":39: a number with a fraction; put it in the table"),
+    "division": ("y - self->reached)", "y / self->reached)", ":32: a division; put the reciprocal in the table"),
     "directive": (SECOND, f"#include <math.h>\n{SECOND}", ":8: a line of the preprocessor; only #include"),
-    "call": ("return self->reached;", "return sin(self->reached);", ":37: sin is called, and is not in the file"),
-    "type": (MEMORY, "double reached;", ":9: double; write hystgen_real_t"),
+    "call": ("return self->reached;", "return sin(self->reached);", ":40: sin is called, and is not in the file"),
+    "type": (MEMORY, "double reached;", ":9: double; write hystgen_signal_t"),
     "field": (MEMORY, "hystgen_real_t seen;", ":8: hystgen_user_follower_t is declared otherwise; write typedef"),
-    "swapped": (RATES, "hystgen_real_t inverse_rate;\n    hystgen_real_t rate;", f":3: {TABLE} is declared otherwise"),
+    "swapped": (RATES, RATES.replace("rate", "other_rate", 1), f":3: {TABLE} is declared otherwise"),
     "global": (SECOND, f"static int count;\n{SECOND}", ":8: 'static int count;' belongs to no type"),
     "verb": ("follower_absorb(", "follower_absrb(", ":1: has no hystgen_user_follower_absorb; write static"),
-    "comment": (VOID, "    (void)t; /* open\n    self", ":15: a comment that does not end"),
-    "slashes": (VOID, "    (void)t; // unused\n    self", ":15: a comment with //; write /* */"),
-    "long": (VOID, f"    (void)t; /* {95 * 'x'} */\n    self", ":15: 114 columns, more than 100"),
-    "letters": (VOID, "    (void)t; /* \u00e9 */\n    self", ":15: '\u00e9' is no printable ASCII"),
-    "end": ("    return self->reached;\n}\n", "    return self->reached;\n}\nint x", ":39: 'int x' belongs to no type"),
-    "foreign": ("self->reached = x;", "self->reached = hystgen_tanh(x);", ":16: hystgen_tanh is not in the file"),
-    "escape": ("    (void)t;\n    return y;", "    (void)t; }\nint y(void) {\n    return 0;", ":24: 'int y(void)"),
+    "comment": (VOID, "    (void)t; /* open\n    self", ":16: a comment that does not end"),
+    "slashes": (VOID, "    (void)t; // unused\n    self", ":16: a comment with //; write /* */"),
+    "long": (VOID, f"    (void)t; /* {95 * 'x'} */\n    self", ":16: 114 columns, more than 100"),
+    "letters": (VOID, "    (void)t; /* \u00e9 */\n    self", ":16: '\u00e9' is no printable ASCII"),
+    "end": ("    return self->reached;\n}\n", "    return self->reached;\n}\nint x", ":42: 'int x' belongs to no type"),
+    "bare": ("hystgen_product(&t->rate, x - self->reached)", "t->rate * (x - self->reached)", ":39: t->rate by itself"),
+    "foreign": ("self->reached = x;", "self->reached = hystgen_tanh(x);", ":17: hystgen_tanh is not in the file"),
+    "escape": ("    (void)t;\n    return y;", "    (void)t; }\nint y(void) {\n    return 0;", ":25: 'int y(void)"),
 }  # fmt: skip
 
 
@@ -313,12 +364,14 @@ def test_a_missing_c_file_is_named(tmp_path: Path, run: Call) -> None:
     assert "follower.c: cannot be read (No such file" in err
 
 
-SOLVED, NUMBERS = "    return s[0] + (y", "return [rate, 1.0 / rate]"
+SOLVED, NUMBERS = "    return s[0] + product", "return [rate, 1.0 / rate]"
 PRECISE = "is of another precision than the C's; put it in the table"
 BAD_PYTHON = {
-    "number": (SOLVED, "    return 1.0 * s[0] + (y", f":16: the number 1.0 in solve {PRECISE}"),
-    "named number": (SOLVED, "    return RATE + (y", f":16: the number RATE in solve {PRECISE}"),
-    "call": ("    return s[0] + (y - s[0])", "    return np.abs(y - s[0])", ":16: solve has np.abs"),
+    "number": (SOLVED, "    return 1.0 + s[0] + product", f":16: the number 1.0 in solve {PRECISE}"),
+    "named number": (SOLVED, "    return RATE + product", f":16: the number RATE in solve {PRECISE}"),
+    "call": ("    return s[0] + product", "    return np.abs(s[0]) + product", ":16: solve has np.abs(s[0]); write it"),
+    "times": (SOLVED, "    return s[0] * s[0] + product", ":16: solve has s[0] * s[0]; write it with +, -, product"),
+    "product": ("y - s[0])", "y - s[0]) + product(y, s[0])", ":16: solve has product(y, s[0]); give a number of the"),
     "place": ("Place.DRIVE", "Place.OUTPUT", "class Follower has place output, for which it has to define mapped"),
     "side": ("order: ClassVar[int] = 2", "order: ClassVar[int] = 0", "in front of the slew limit; give it an order"),
     "name": ("user:follower", "user:My-Follower", "user:My-Follower cannot name it in C"),
@@ -327,9 +380,9 @@ BAD_PYTHON = {
     "numbers": (NUMBERS, "return [rate]", "2 finite numbers were expected, rate, inverse_rate"),
     "infinite": (NUMBERS, "return [rate, np.inf]", "2 finite numbers were expected"),
     "fails": (NUMBERS, "return [rate, 1 / 0]", "failed in numbers: ZeroDivisionError"),
-    "not linear": ("    return s[0]\n\nclass", "    return s[0] * s[0]\n\nclass", "its block is not linear"),
+    "not linear": ("    return s[0]\n\nclass", "    return s[0] + t[RATE]\n\nclass", "its block is not linear"),
     "moves at rest": ("    s[0] = x\n", "    s[0] = x + x\n", "does not stay where rest leaves it"),
-    "other at rest": ("(t, y):\n    return y", "(t, y):\n    return y * t[RATE]", "one undoes the other"),
+    "other at rest": ("(t, y):\n    return y", "(t, y):\n    return product(t[RATE], y)", "one undoes the other"),
     "gain": ("    return s[0]\n\nclass", "    return s[0] + s[0]\n\nclass", "does not stay where rest leaves it"),
     "grows": ("- np.exp(", "- 3.0 * np.exp(", "its block keeps"),
 }  # fmt: skip
@@ -350,20 +403,43 @@ def test_a_wrong_block_is_refused_by_name(tmp_path: Path, run: Call, wrong: str)
     assert not (tmp_path / "out").exists()
 
 
+SOFT = ("    return s[0] + product(t[INVERSE_RATE], y - s[0])", "    return y")  # the drive itself
+ONLY_FLOAT = {
+    "another input": ([SOFT], "its solve does not give the input for which absorb returns the output asked for"),
+    "memory": ([("def solve(t, s, y):", "def solve(t, s, y):\n    s[1] = y"), ('("reached",)', '("reached", "asked")'),
+                ("    s[0] = x\n    return x", "    s[0] = x\n    s[1] = x\n    return x"),
+                ("    return s[0]\n\nclass", "    s[1] = s[0]\n    return s[0]\n\nclass")],
+               "its solve changes the memory, which fixed point bounds by what absorb and rest do"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", ONLY_FLOAT)
+def test_what_only_floating_point_takes_is_refused_elsewhere(tmp_path: Path, what: str) -> None:
+    changes, said = ONLY_FLOAT[what]
+    python = STAGE
+    for before, after in changes:
+        assert before in python
+        python = python.replace(before, after)
+    one = hystgen.load(written(tmp_path, FOLLOWER), [outside(tmp_path, python)])
+    assert not one.refusals("inverse", "float32")
+    ((_, reason),) = one.refusals("inverse", "q15")
+    assert said in reason
+
+
 STYLES = {
     "in one line": STAGE_C.replace("\n{\n    (void)t;\n    return y;\n}", " { (void)t; return y; }"),
     "braces behind": re.sub(r"\n {20,}", "\n    ", STAGE_C).replace(")\n{", ") {"),
     "a helper": STAGE_C.replace(
-        "static hystgen_real_t hystgen_user_follower_absorb(",
-        "/* The rest of the way. */\nstatic hystgen_real_t\n"
-        "hystgen_user_follower_way(hystgen_real_t a, hystgen_real_t b)\n"
+        "static hystgen_signal_t hystgen_user_follower_absorb(",
+        "/* The rest of the way. */\nstatic hystgen_signal_t\n"
+        "hystgen_user_follower_way(hystgen_signal_t a, hystgen_signal_t b)\n"
         "{\n    /* from b to a */\n    return a -\n        b; /* either sign */\n}\n\n"
-        "static hystgen_real_t hystgen_user_follower_absorb(", 1,
-    ).replace("t->rate * (x - self->reached)", "t->rate * hystgen_user_follower_way(x, self->reached)"),
+        "static hystgen_signal_t hystgen_user_follower_absorb(", 1,
+    ).replace("&t->rate, x - self->reached", "&t->rate,\n        hystgen_user_follower_way(x, self->reached)"),
     "a loop": STAGE_C.replace(
-        "    self->reached = self->reached + t->rate",
+        "    self->reached = self->reached + hystgen_product",
         "    unsigned int i;\n    for (i = 0; i < 3u; ++i) {\n        if (i == 2u)\n            break;\n    }\n"
-        "    self->reached = self->reached + t->rate",
+        "    self->reached = self->reached + hystgen_product",
     ),
     "windows": STAGE_C.replace("\n", "\r\n"),
 }  # fmt: skip
@@ -440,5 +516,4 @@ def test_a_block_says_what_it_does_to_signals() -> None:
 def test_emit_options_take_it(tmp_path: Path) -> None:
     one = hystgen.load(written(tmp_path, DROOP), [EXAMPLE])
     assert emit_options(one).left_out == ()
-    with pytest.raises(UnsupportedEffectsError, match="whose block is in floating point; use float32"):
-        emit_options(one, arithmetic="q15")
+    assert emit_options(one, arithmetic="q15").left_out == ()

@@ -23,7 +23,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from hystgen.effects import About, Candidate, Effect, OwnBlock, Place, Run, decays, follow
+from hystgen.effects import About, Candidate, Effect, OwnBlock, Place, Run, decays, follow, product
 
 # The block: y = h - X, where X follows share * h. For h straight between two samples
 # X_k = X_(k-1) + (early h_(k-1) + late h_k - rate X_(k-1)), of which all but late h_k is known beforehand.
@@ -33,25 +33,27 @@ LEAKED, BEFORE = range(2)
 
 def rest(t: Any, s: Any, x: Any) -> Any:
     """Everything has settled at the input x; the output."""
-    s[LEAKED] = t[SHARE] * x
+    s[LEAKED] = product(t[SHARE], x)
     s[BEFORE] = x
-    return t[REST] * x
+    return product(t[REST], x)
 
 
 def resting(t: Any, y: Any) -> Any:
     """The input of the settled output y."""
-    return y * t[INVERSE_REST]
+    return product(t[INVERSE_REST], y)
 
 
 def solve(t: Any, s: Any, y: Any) -> Any:
     """The input that gives the output y at this sample; moves nothing."""
-    ahead = s[LEAKED] + (t[EARLY] * s[BEFORE] - t[RATE] * s[LEAKED])
-    return (y + ahead) * t[INVERSE_SLOPE]
+    leaking = product(t[EARLY], s[BEFORE])
+    change = leaking - product(t[RATE], s[LEAKED])
+    return product(t[INVERSE_SLOPE], y + (s[LEAKED] + change))
 
 
 def absorb(t: Any, s: Any, x: Any) -> Any:
     """The input is x at this sample; the output."""
-    s[LEAKED] = s[LEAKED] + ((t[EARLY] * s[BEFORE] + t[LATE] * x) - t[RATE] * s[LEAKED])
+    leaking = product(t[EARLY], s[BEFORE]) + product(t[LATE], x)
+    s[LEAKED] = s[LEAKED] + (leaking - product(t[RATE], s[LEAKED]))
     s[BEFORE] = x
     return x - s[LEAKED]
 

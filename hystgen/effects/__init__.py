@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from hystgen.effects.base import decays as decays
     from hystgen.effects.base import follow as follow
     from hystgen.effects.kinds import OwnBlock as OwnBlock
+    from hystgen.effects.kinds import product as product
     from hystgen.effects.user import load_user_effects as load_user_effects
 
 _FIRST = (
@@ -56,6 +57,7 @@ _PLACES = {
     "decays": "base",
     "follow": "base",
     "load_user_effects": "user",
+    "product": "kinds",
 }
 
 __all__ = [
@@ -69,6 +71,7 @@ __all__ = [
     "decays",
     "follow",
     "load_user_effects",
+    "product",
     "shapes",
 ]
 

@@ -6,11 +6,12 @@ import ast
 import functools
 import inspect
 import textwrap
+import types
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Jit, jit
 
 VERBS = ("rest", "resting", "solve", "absorb")
 """The verbs of every block: settle at an input, give the input of a settled output, solve for an input, absorb one."""
@@ -38,7 +39,8 @@ class Kind:
     that it has; without `rest` it settles as it absorbs, without `resting` it rests as it solves.
 
     In fixed point numbers are of several types: `letters` are those of the table, `memory` those of its memory, f for a
-    factor, which takes two numbers, w for 64 bits, i for 32, c for four of these in an array, and b for 8.
+    factor, which takes two numbers, n for a number of the user's own, which takes four, w for 64 bits, i for 32, c for
+    four of these in an array, and b for 8.
     """
 
     name: str
@@ -65,13 +67,19 @@ class Kind:
 @dataclass(frozen=True)
 class Constants:
     """The numbers of one block: of its table (n,), rows (m, k) and counts; `products`: multiplications of absorb and of
-    solve."""
+    solve; `bits`: of its signals below those of the chain, where it computes with finer ones."""
 
     kind: Kind
     table: Any
     products: tuple[int, int]
     rows: Any = ()
     counts: tuple[int, ...] = ()
+    bits: int = 0
+
+
+def product(number: Any, x: Any) -> Any:
+    """A number of a block's table times x, in a block of the user's own; its C is `hystgen_product(&t->number, x)`."""
+    return number * x
 
 
 @dataclass(frozen=True)
@@ -90,18 +98,28 @@ class OwnBlock:
     solve: Callable[[Any, Any, Any], Any]
     absorb: Callable[[Any, Any, Any], Any]
 
-    @functools.cached_property
-    def compiled(self) -> dict[str, Any]:
-        """The functions for the bit reference."""
-        return {verb: jit(getattr(self, verb)) for verb in VERBS}
+    def compiled(self, verb: str, arithmetic: Callable[..., Any]) -> Jit[..., Any]:
+        """A function for the bit reference, with the product of an arithmetic in place of `product`."""
+        function = getattr(self, verb)
+        names = function.__globals__
+        replaced = {name: arithmetic for name, value in names.items() if value is product}
+        twin = types.FunctionType(
+            function.__code__, {**names, **replaced}, function.__name__, function.__defaults__, function.__closure__
+        )
+        return jit(twin)
 
     @functools.cached_property
     def products(self) -> tuple[int, int]:
-        """Multiplications that absorb and solve are written with."""
-        texts = [ast.parse(textwrap.dedent(inspect.getsource(each))) for each in (self.absorb, self.solve)]
-        absorb, solve = (sum(isinstance(node, ast.Mult) for node in ast.walk(text)) for text in texts)
-        return absorb, solve
+        """Products that absorb and solve are written with."""
+        return _products(self.absorb), _products(self.solve)
 
     def verbs(self) -> Iterator[tuple[str, Any]]:
         """Names and functions."""
         return ((verb, getattr(self, verb)) for verb in VERBS)
+
+
+def _products(function: Callable[..., Any]) -> int:
+    text = ast.parse(textwrap.dedent(inspect.getsource(function)))
+    names = {name for name, value in function.__globals__.items() if value is product}
+    called = (node.func for node in ast.walk(text) if isinstance(node, ast.Call))
+    return sum(isinstance(each, ast.Name) and each.id in names for each in called)

@@ -6,8 +6,8 @@
     def absorb(t, s, x): ...    the input is x at this sample; returns the output
 
 `t` are the block's numbers and `s` is its memory, arrays that these functions index. They run as they stand in double
-precision, and compiled as the bit reference of the C, so that they are written with +, -, * and numbers from `t` alone:
-a number written out would be of another precision than the C computes in.
+precision, and compiled as the bit reference of the C in each arithmetic, so that they are written with +, - and
+`product(t[..], ..)` alone: a number written out would be of another precision than the C computes in.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ import numpy as np
 from hystgen.basics.names import KEYWORDS
 from hystgen.basics.problems import EffectsError
 from hystgen.effects.base import Array, Effect, Place
-from hystgen.effects.kinds import Kind, OwnBlock
+from hystgen.effects.kinds import Kind, OwnBlock, product
 
 ARGUMENTS = {"rest": 3, "resting": 2, "solve": 3, "absorb": 3}
 """How many arguments each function takes."""
@@ -42,7 +42,9 @@ WORD = re.compile(r"[a-z][a-z0-9_]{0,30}")
 def kind(effect: type[Effect]) -> Kind:
     """The name of an effect's block in the C."""
     assert effect.block is not None
-    return Kind(f"user_{_name(effect).partition(':')[2]}", effect.block.table, effect.block.state)
+    table, state = effect.block.table, effect.block.state
+    name = f"user_{_name(effect).partition(':')[2]}"
+    return Kind(name, table, state, letters=len(table) * "n", memory=len(state) * "w")
 
 
 def source(effect: type[Effect]) -> Path:
@@ -160,8 +162,8 @@ def check(effect: type[Effect]) -> None:
 
 
 ALLOWED = (
-    ast.FunctionDef, ast.arguments, ast.arg, ast.Assign, ast.Return, ast.Expr, ast.BinOp, ast.Add, ast.Sub, ast.Mult,
-    ast.UnaryOp, ast.USub, ast.Name, ast.Load, ast.Store, ast.Subscript, ast.For, ast.Call, ast.Constant,
+    ast.FunctionDef, ast.arguments, ast.arg, ast.Assign, ast.Return, ast.Expr, ast.BinOp, ast.UnaryOp, ast.USub,
+    ast.Name, ast.Load, ast.Store, ast.Subscript, ast.For, ast.Call, ast.Constant,
 )  # fmt: skip
 """Names and operations that the functions may use."""
 
@@ -190,13 +192,33 @@ def _of_function(verb: str, function: Any) -> Iterator[str]:
         place = f"{file}:{first + getattr(node, 'lineno', 1) - 1}"
         if id(node) in places and isinstance(node, ast.Name | ast.Constant | ast.BinOp | ast.Add | ast.Sub | ast.Load):
             continue
-        ranged = isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "range"
+        called = known.get(_called(node), _called(node))
         named = isinstance(node, ast.Name) and isinstance(known.get(node.id), int | float)
         if isinstance(node, ast.Constant) or named:
             what = ast.unparse(node)
             yield f"{place}: the number {what} in {verb} is of another precision than the C's; put it in the table"
-        elif not isinstance(node, ALLOWED) or (isinstance(node, ast.Call) and not ranged):
+        elif called is product:
+            if not _of_table(node, tree.args.args[0].arg):
+                yield f"{place}: {verb} has {ast.unparse(node)}; give a number of the table first, product(t[..], ..)"
+        elif isinstance(node, ast.operator):
+            continue  # named with what it is an operator of
+        elif (
+            not isinstance(node, ALLOWED)
+            or (isinstance(node, ast.BinOp) and not isinstance(node.op, ast.Add | ast.Sub))
+            or (isinstance(node, ast.Call) and called != "range")
+        ):
             yield (
-                f"{place}: {verb} has {ast.unparse(node) or type(node).__name__}; write it with +, -, *, `for .. in "
-                "range(..)` and numbers of the table"
+                f"{place}: {verb} has {ast.unparse(node) or type(node).__name__}; write it with +, -, "
+                "product(t[..], ..) and `for .. in range(..)`"
             )
+
+
+def _called(node: ast.AST) -> str:
+    """The name of the function that a call names, or nothing."""
+    return node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+
+
+def _of_table(call: Any, t: str) -> bool:
+    """Whether the first of two factors is a number of the table `t`."""
+    first = call.args[0] if len(call.args) == 2 and not call.keywords else None
+    return isinstance(first, ast.Subscript) and isinstance(first.value, ast.Name) and first.value.id == t

@@ -85,7 +85,11 @@ class Block:
         given = [self.table] * (own in self.kind.reading) + [f"&self->{self.name}"] * (own != "resting")
         if own in ("rest", "absorb"):
             given += [f"self->{field.name}" for field in self.fields[1:]]
-        return f"hystgen_{self.kind.name}_{own}({', '.join([*given, x])})"
+        name, bits = f"hystgen_{self.kind.name}_{own}", self.constants.bits
+        if not bits:
+            return f"{name}({', '.join([*given, x])})"
+        finer = f"{x} * ((hystgen_signal_t)1 << {bits}u)"
+        return f"hystgen_nearest({name}({', '.join([*given, finer])}), {bits}u)"
 
     def arrays(self, prefix: str) -> list[str]:
         """Its table, behind that of its rows where it has any."""
@@ -124,6 +128,8 @@ def _entries(values: Any, letters: str = "") -> str:
     for letter in letters or len(values) * "r":
         if letter == "f":
             found.append(f"{{{literal(next(rest))}, {next(rest)}}}")
+        elif letter == "n":
+            found.append(f"{{{_entries([next(rest), next(rest)], 'f')}, {next(rest)}, {next(rest)}}}")
         elif letter == "c":
             found.append(f"{{{', '.join(literal(next(rest)) for _ in range(4))}}}")
         else:

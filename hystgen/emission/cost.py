@@ -126,7 +126,8 @@ _LETTERS = {"w": (8, 8), "i": (4, 4), "c": (16, 4), "b": (1, 1)}
 
 def _block_structs(kinds: Iterable[Kind], real: tuple[int, int], layout: Layout) -> dict[str, tuple[int, int]]:
     """Sizes and alignments of the tables of a chain's blocks."""
-    sizes = {**_LETTERS, "f": layout.struct((4, 4), (1, 1))}
+    factor = layout.struct((4, 4), (1, 1))
+    sizes = {**_LETTERS, "f": factor, "n": layout.struct(factor, (1, 1), (1, 1))}
 
     def made_of(numbers: Kind | Rows) -> list[tuple[int, int]]:
         return [sizes[letter] for letter in numbers.letters] or len(numbers.table) * [real]

@@ -1,8 +1,9 @@
 """The C of an effect of the user's own: its file, checked, as pieces of the run time.
 
 The file is the user's own code and is carried as it stands, with the model's name in front of its own. It may contain
-what blocks of `c_runtime/` contain: two types of real numbers, named as in Python, and four functions, with further
-static functions that they call. The language is not checked: `hystgen verify` shows what compiles, and to which bits.
+what blocks of `c_runtime/` contain: two types, of the numbers and of the memory, named as in Python, and four
+functions, with further static functions that they call. Written with `hystgen_product` it is the same for every
+arithmetic. The language is not checked: `hystgen verify` shows what compiles, and to which bits.
 """
 
 from __future__ import annotations
@@ -28,10 +29,13 @@ CALLED = frozenset(["if", "for", "while", "switch", "return", "sizeof"])
 """Words before a parenthesis that call nothing."""
 
 REFUSED = {
-    "float": "hystgen_real_t", "double": "hystgen_real_t", "extern": "nothing", "volatile": "nothing",
+    "float": "hystgen_signal_t", "double": "hystgen_signal_t", "extern": "nothing", "volatile": "nothing",
     "asm": "C", "union": "struct", "goto": "a loop", "register": "nothing", "auto": "a type",
 }  # fmt: skip
 """Words that a file may not contain, and what to write instead."""
+
+GIVEN = frozenset(["hystgen_signal_t", "hystgen_number_t", "hystgen_product"])
+"""Names of the run time that a file may use."""
 
 
 def pieces(t: ChainTables) -> tuple[list[Piece], list[Piece]]:
@@ -165,8 +169,10 @@ def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int,
             yield line, f"{piece.name} is none of the block's types, and no function {own_name}_..; leave it out"
         for number, each in enumerate(code.split("\n")):
             place = text.count("\n", 0, at) + 1 + number
-            for used in set(_NAME.findall(each)) - functions - wanted.keys() - {"hystgen_real_t"}:
-                yield place, f"{used} is not in the file; a block has what stands in its file"
+            for used in set(_NAME.findall(each)) - functions - wanted.keys() - GIVEN:
+                yield place, f"{used} is not in the file; a block has that, and {', '.join(sorted(GIVEN))}"
+            for number in re.findall(r"(?<!&)\bt->(\w+)", each):
+                yield place, f"t->{number} by itself; write hystgen_product(&t->{number}, ..)"
             for called in re.findall(r"(\w+) ?\(", each):
                 if called not in CALLED and called not in functions and not _NAME.fullmatch(called):
                     yield place, f"{called} is called, and is not in the file; a block calls its own functions"
@@ -180,12 +186,12 @@ def _bare(declared: str) -> str:
 def _declared(kind: Kind) -> Iterator[tuple[str, str]]:
     """Names of types and functions of a block, and how they are declared."""
     name = f"hystgen_{kind.name}"
-    for own_type, members in ((f"{name}_table_t", kind.table), (f"{name}_t", kind.state)):
-        yield own_type, f"typedef struct {{ {' '.join(f'hystgen_real_t {each};' for each in members)} }} {own_type};"
+    for own_type, member, names in ((f"{name}_table_t", "number", kind.table), (f"{name}_t", "signal", kind.state)):
+        yield own_type, f"typedef struct {{ {' '.join(f'hystgen_{member}_t {each};' for each in names)} }} {own_type};"
     for verb in VERBS:
         memory = "" if verb == "resting" else f"{name}_t *self, "
         x = "x" if verb in ("rest", "absorb") else "y"
-        arguments = f"const {name}_table_t *t, {memory}hystgen_real_t {x}"
-        yield f"{name}_{verb}", f"static hystgen_real_t {name}_{verb}({arguments})"
+        arguments = f"const {name}_table_t *t, {memory}hystgen_signal_t {x}"
+        yield f"{name}_{verb}", f"static hystgen_signal_t {name}_{verb}({arguments})"
 
 

@@ -30,11 +30,14 @@ FLOAT_KERNELS = (
     "loop_solve.c",
 )
 CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
-CHAIN_BLOCKS = (*(kind.file for kind in KINDS), "delay.c", "delay_float.c", "preview.c", "preview_float.c")
+CHAIN_BLOCKS = (
+    *(kind.file for kind in KINDS), "delay.c", "delay_float.c", "preview.c", "preview_float.c", "product_float.c",
+)  # fmt: skip
 FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
 FIXED_CHAIN_BLOCKS = (
     "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "heat_fixed.c",
     "mode_fixed.c", "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c", "bend.c", "stops.c",
+    "product_fixed.c",
 )  # fmt: skip
 """Files that models with effects carry themselves, even with a shared run time."""
 
@@ -48,6 +51,9 @@ FINE = {
     "hystgen_clamp_fine": "hystgen_clamp_drive",
 }  # fmt: skip
 """Names of numbers finer than a drive code in such a model, and what they stand for elsewhere."""
+
+NUMBER = "hystgen_number_t"
+"""What a block of the user's own multiplies with, in floating point a number like any other."""
 
 FIXED_KERNELS = (
     "over_slope.c",
@@ -99,7 +105,7 @@ class Family:
         """Names in code that models with and without effects share, and their meaning here."""
         if self.chain and self.fixed:
             return SIGNALS
-        return dict.fromkeys(SIGNALS, "hystgen_real_t") | FINE
+        return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE
 
     @property
     def chain_types(self) -> tuple[str, ...]:

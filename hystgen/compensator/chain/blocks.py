@@ -29,12 +29,12 @@ KINDS = (
 def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constants]]:
     """The blocks of an operator in front of the plays, from the drive on, and those behind them."""
     modes = (resonance_fixed if t.fixed else resonance).constants(t.mode) if operator == "forward" else ()
+    given = own.constants(t.own, t.own_effects) if isinstance(t, OwnChainTables) else []
+    ahead, behind = given[: t.own.ahead], given[t.own.ahead :]
     if t.fixed:
         heats = thermal_fixed.heat_constants(t.heat)
         gains = [*ageing_fixed.constants(t.ageing), *heats, *thermal_fixed.constants(t.gain)]
-        return [*lag_fixed.constants(t.lag)], [*creep_fixed.constants(t.creep), *gains, *modes]
-    given = own.constants(t.own, t.own_effects) if isinstance(t, OwnChainTables) else []
-    ahead, behind = given[: t.own.ahead], given[t.own.ahead :]
+        return [*lag_fixed.constants(t.lag), *ahead], [*creep_fixed.constants(t.creep), *behind, *gains, *modes]
     gains = [*ageing.constants(t.ageing), *thermal.heat_constants(t.heat), *thermal.constants(t.gain)]
     return [*lag.constants(t.lag), *ahead], [*creep.constants(t.creep), *behind, *gains, *modes]
 

@@ -162,7 +162,8 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
     moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own[: t.own.ahead])
     static = compiled.static
     forward = static.front_slopes[1] * math.fsum(abs(p) for p in static.pi.weights) * moved
-    if emitted and len(t.lag.exact) and static.branches_differ:  # what arrives comes to rest on either branch
+    followed = len(t.lag.exact) or t.own.ahead
+    if emitted and followed and static.branches_differ:  # what arrives comes to rest on either branch
         forward += static.pi.slopes[-1] * static.branch_gap
     size = sizes.plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
     roundings = []
@@ -210,11 +211,14 @@ def _lags(compiled: Compiled, error: float, u: float, same: bool) -> float:
     return error
 
 
-def _seen_by_creep(compiled: Compiled) -> float:
-    """Error that the states of creep, which see the sum of the plays, make of an error of their target."""
+def _seen(compiled: Compiled) -> float:
+    """Error that the states of creep and of the user's own blocks, which see the sum of the plays, make of an error of
+    their target."""
     t, found = compiled.tables.creep, 1.0
     for j, slope in enumerate(t.block[:, creep.SLOPE].astype(float).tolist()):
         found *= slope * _creep(compiled, j, 0.0, 0.0)[1]
+    for each in compiled.own[compiled.tables.own.ahead :]:
+        found *= each.passed(0.0, 1.0)
     return max(found, 1.0)
 
 
@@ -250,12 +254,12 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     ways = _one(compiled, arithmetic, True, same), _one(compiled, "float64", False, same)
     forward, asked = (sum(each) for each in zip(*ways, strict=True))
     whole = static.input_range[1] - static.input_range[0]
-    seen = 1.0 if same else _seen_by_creep(compiled)
+    seen = 1.0 if same else _seen(compiled)
     inverse, rounding = (
         min(SECOND_ORDER * _lags(compiled, seen * own + gain * asked, u, same), whole)
         for own in (plays.inverse, plays.rounding)
     )
-    if same or (compiled.tables.slew and len(compiled.tables.lag.exact)):
+    if same or (compiled.tables.slew and (len(compiled.tables.lag.exact) or compiled.tables.own.ahead)):
         inverse = whole
     rest = math.prod(float(row[creep.REST]) for row in compiled.tables.creep.block)
     rest *= math.prod(each.forward.largest for each in compiled.own[compiled.tables.own.ahead :])

@@ -35,6 +35,7 @@ from hystgen.compensator.chain.moving import (
     steepest_bend,
     yield_error,
 )
+from hystgen.compensator.chain.own_fixed import Formats, asked_of_input
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, upward
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.creep import compensator as creep
@@ -58,10 +59,12 @@ DOUBLE = 2.0**-40
 class Sizes:
     """Largest sizes of the signals behind the plays, in output codes: forwards the sum of the plays, the input of each
     creep, mode and saturation, the output if modes stand still, and the output; back what is left of a reference behind
-    each saturation, the target that the output side is given, and the sum that is asked of the plays."""
+    each saturation, the target that the output side is given, and the sum that is asked of the plays; of blocks of the
+    user's own the input, and the output asked for."""
 
     plays: float
     creeps: list[float]
+    owns: list[tuple[float, float]]
     modes: list[float]
     saturations: list[float]
     still: float
@@ -73,7 +76,8 @@ class Sizes:
     @property
     def largest(self) -> float:
         """Of all of them."""
-        forwards = (self.plays, *self.creeps, *self.modes, *self.saturations, self.output)
+        own = (size for pair in self.owns for size in pair)
+        forwards = (self.plays, *self.creeps, *own, *self.modes, *self.saturations, self.output)
         return max(*forwards, *self.undone, self.target, self.asked)
 
 
@@ -95,10 +99,11 @@ class Bend:
 class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
-    `bends`: there and back of each tanh; `ends`: of the output; `slowed`: share of its rates that a slew limit loses in
-    whole codes; `drifted`: error of drifts in signals; `reached`: whether all that is asked in front of the plays can
-    be led to; `largest_step`: as in `Compiled`; `finer`: bits of what arrives in front of the plays below their input;
-    `bumps`: of bent plays; `heats`: errors of temperatures of own heat, degrees.
+    `ahead`, `behind`: blocks of the user's own in front of the plays and behind; `bends`: there and back of each tanh;
+    `ends`: of the output; `slowed`: share of its rates that a slew limit loses in whole codes; `drifted`: error of
+    drifts in signals; `reached`: whether all that is asked in front of the plays can be led to; `largest_step`: as in
+    `Compiled`; `finer`: bits of what arrives in front of the plays below their input; `bumps`: of bent plays; `heats`:
+    errors of temperatures of own heat, degrees.
     """
 
     static: StaticModel
@@ -110,6 +115,8 @@ class Bounds:
     drop: int
     creeps: list[CreepNumbers]
     lags: list[tuple[bool, tuple[float, float, float, float]]]
+    ahead: list[Formats]
+    behind: list[Formats]
     modes: list[ModeNumbers]
     drifted: float
     taps: list[float]
@@ -192,11 +199,19 @@ class Bounds:
         asked = given + 1.0
         if not self.static.stages:
             asked = float(max(map(abs, self.inner.play)) + self.inner.margin) * 2.0**self.finer
+        for each in reversed(self.ahead):
+            asked = asked_of_input(each.linear, given, asked) + 1.0
         found = []
         for exact, numbers in reversed(self.lags):
             found.append((given, asked))
             asked = lag_fixed.Sizes(exact, numbers[lag.RATE], numbers[lag.LATE], given, asked).answer
         return found[::-1]
+
+    def _passed(self, each: Formats, error: float, own: float) -> float:
+        """Error of the input that a block of the user's own is solved for, by one of the output and an own one."""
+        if self.condition:
+            return error / abs(each.linear.forward.d) + own
+        return each.linear.passed(error, own)
 
     def _gains(self) -> tuple[int, float]:
         """How many gains there are, and the error of each as a share of the output."""
@@ -251,13 +266,13 @@ class Bounds:
         """Roundings of what arrives in front of the plays for the drive as sent, forwards, and what rounding the drive
         to a code makes of it, in signals."""
         places = zip(range(len(self.lags)), self._lag_sizes(), strict=True)
-        here = sum(self._lag(j, *sizes)[0] for j, sizes in places)
+        here = sum(self._lag(j, *sizes)[0] for j, sizes in places) + sum(each.output for each in self.ahead)
         here += 0.5 * 2.0**self.finer if self.finer else 0.0
         code = 0.5 * 2.0**self._fine
         if self.lags:
             exact, (rate, theta, _, _) = self.lags[0]
             return here, code * (1.0 if exact else rate * (1.0 + 2.0 * theta))
-        rounded = bool(self.static.stages) or self._fine > 0
+        rounded = bool(self.static.stages or self.ahead) or self._fine > 0
         return here, code * rounded
 
     @cached_property
@@ -327,10 +342,12 @@ class Bounds:
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         waited = 0.5 * 2.0**self._fine * bool(self.tables.delay.samples and self.tables.delay.share[0])
         error = self._plays(self._arrival()[0] + short + waited)
-        if self.lags and self.static.branches_differ:  # what arrives comes to rest on either branch
+        if (self.lags or self.ahead) and self.static.branches_differ:  # what arrives comes to rest on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)
         for j, numbers in enumerate(self.creeps):
             error = error * numbers.rest + self._creep(j)
+        for each in self.behind:
+            error = error * each.linear.forward.largest + each.output * self._signal
         gains, share = self._gains()
         error = LARGEST_GAIN**gains * (error + gains * (share * self.sizes.still + self._signal))
         error += LARGEST_GAIN**gains * self._warmed(self.heats)
@@ -358,6 +375,11 @@ class Bounds:
         error = (1.0 / LEAST_GAIN) ** gains * (error + gains * (share * self.sizes.still + self._signal) + late)
         whole = float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
         apart = self._plays(self.slowed * whole) if self.slowed else 0.0  # states behind drives that a rate holds
+        seen = apart * math.prod(numbers.rest for numbers in self.creeps)
+        seen *= math.prod(max(each.linear.forward.largest, 1.0) for each in self.behind)
+        for each in reversed(self.behind):
+            states = seen * each.linear.forward.before() + each.output * self._signal
+            error = self._passed(each, error + states, each.answer * self._signal)
         for j, numbers in reversed(list(enumerate(self.creeps))):
             states = apart * float(sum(numbers.terms[:, creep.WEIGHT]))
             error = self._creep_gain(numbers) * (error + self._creep(j) + self._creep_back(j) + states)
@@ -376,6 +398,8 @@ class Bounds:
         missed_by = self._plays(0.0) * float(self.inner.output_lsb) + self._steepest * solved * self._arriving
         for numbers in self.creeps:  # whose states have seen what the plays gave
             missed_by *= numbers.slope * self._creep_gain(numbers)
+        for each in self.behind:
+            missed_by = self._passed(each, 0.0, missed_by)
         residual = self._asked() * float(self.inner.output_lsb) + missed_by
         return self._gain() * residual / self._arriving
 
@@ -394,6 +418,9 @@ class Bounds:
 
     def _led(self, error: float) -> float:
         """The error of the drive in signals, for one of what is in front of the plays."""
+        for j in range(len(self.ahead) - 1, -1, -1):
+            code = 0.5 * 2.0**self._fine if j == 0 and not self.lags else 0.5
+            error = self._passed(self.ahead[j], error + self.ahead[j].output, self.ahead[j].answer + code)
         for j in range(len(self.lags) - 1, -1, -1):
             exact, (rate, second, late, _) = self.lags[j]
             _, kept, answer = self._lag(j, *self._lag_sizes()[j])
@@ -424,7 +451,8 @@ class Bounds:
         """What `rounding` holds for where drives in front of a lag can part without a bound but the range."""
         led = any(not exact for exact, _ in self.lags)
         dilated = self.tables.moving.moves == DILATED
-        if not (led or dilated or (self.lags and (not self.reached or self.parts.slew))):
+        followed = self.lags or self.ahead
+        if not (led or dilated or (followed and (not self.reached or self.parts.slew))):
             return ""
         return "both have seen the same drives" + (", nothing limited" if not self.reached else "")
 

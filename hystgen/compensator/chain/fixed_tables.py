@@ -22,7 +22,7 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.arithmetic.factors import LARGEST, factor
 from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
-from hystgen.compensator.chain import moving
+from hystgen.compensator.chain import moving, own, own_fixed
 from hystgen.compensator.chain.fixed_bounds import Bend, Bounds, Sizes
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
@@ -38,13 +38,14 @@ from hystgen.compensator.chain.layout import (
     ChainTables,
     Codes,
     Compiled,
+    OwnChainTables,
     Parts,
     fastest,
     output_range,
     taps_of,
 )
 from hystgen.compensator.chain.moving import Bumps
-from hystgen.compensator.chain.own import OwnTables
+from hystgen.compensator.chain.own_fixed import Formats
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, lsbs, nearest
 from hystgen.effects import bend
 from hystgen.effects.ageing import compensator as ageing
@@ -111,6 +112,9 @@ class _Builder:
         self.creeps = [creep.numbers(each, seconds) for each in self.parts.creeps]
         self.modes = [resonance.numbers(each, seconds) for each in self.parts.modes]
         self.lags = [lag.numbers(each, seconds) for each in self.parts.lags]
+        self.own_drives, self.own_outputs = (
+            [own.linear(each, seconds) for each in side] for side in (self.parts.own_drives, self.parts.own_outputs)
+        )
         self.given = (lsb[0] is not None, lsb[1] is not None)
 
     def build(self) -> Compiled:
@@ -119,24 +123,27 @@ class _Builder:
         inner = (self.drive_lsb, self.output_lsb)
         beyond, self.reached = self._beyond() if self.lags else (0, True)
         bent = moving.largest_bend(static, self.parts.plays)
-        self.inner = Builder(plain, self.arithmetic, "loop", inner, self.given, beyond, bool(self.lags), bent)
+        led = bool(self.lags or self.own_drives)
+        self.inner = Builder(plain, self.arithmetic, "loop", inner, self.given, beyond, led, bent)
         plays, _ = self.inner.build()
         room = LARGEST.bit_length() - 2 - math.ceil(math.log2(self.sizes.largest))
         if room < 1:
             self._refuse(f"signals behind the plays reach {self.sizes.largest:.3g} output codes, too many")
         self.finer = 0
+        self.ahead: list[Formats] = []
         self.bits = min(self.inner.bits, room)
         self.drop = self.inner.bits - self.bits
         limits = self._limits(plays.limits)
-        behind = self._saturations()
+        saturations = self._saturations()
         drive = [end << self.inner.fine for end in self.inner.drive]
         plays.limits[slots.DRIVE_MIN], plays.limits[slots.DRIVE_MAX] = drive
         span = self.static.input_range[1] - self.static.input_range[0]
+        self.behind = self._need(self._own_behind, "effects of your own")
         tables = ChainTables(
             plays,
             limits,
             self._need(lambda: self._moving(plays), "effects on plays"),
-            self._need(self._lags, "a lag"),
+            self._need(self._lags, "effects in front of the plays"),
             self._need(self._creep_tables, "creep"),
             self._need(self._delay, "a delay"),
             self._need(self._mode_tables, "resonance"),
@@ -144,18 +151,21 @@ class _Builder:
             self._need(self._gains, "a temperature"),
             self._need(self._heat_tables, "own heat"),
             self._need(self._clock_tables, "drift"),
-            OwnTables(np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(1, np.int64), 0),
-            behind,
+            own_fixed.build([*self.ahead, *self.behind], len(self.ahead)),
+            saturations,
             self._need(self._tap, "the preview"),
             np.array(self._numbers(), dtype=np.int64),
             int(bool(self.parts.slew)),
         )
+        if self.parts.own_drives or self.parts.own_outputs:
+            tables = OwnChainTables(*tables)
+            tables.own_effects = tuple(map(type, (*self.parts.own_drives, *self.parts.own_outputs)))
         slowed = max((1.0 - math.floor(rate) / float(rate) for rate in self.rates()), default=0.0)
         max_rate = self._max_rate()
         weights = self.taps.weights.tolist() if self.taps else []
         bounds = Bounds(
             static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags,
-            self.modes, sum(each.error for each in self.clocks), weights,
+            self.ahead, self.behind, self.modes, sum(each.error for each in self.clocks), weights,
             self.bends, (self.low, self.high), slowed, self.reached, self._largest_step(), self.finer,
             self.seconds, self.bumps, [one.error for one in self.heats],
         )  # fmt: skip
@@ -198,6 +208,10 @@ class _Builder:
         for each in self.creeps:
             creeps.append(size)
             size = size * each.rest * slack + 1.0
+        owns = []
+        for one in self.own_outputs:
+            owns.append(size)
+            size = size * one.forward.largest * slack + 1.0
         settled = size
         span = self._code(self.high - self.low)
         for _ in self.parts.ageing:
@@ -226,12 +240,17 @@ class _Builder:
         asked = target
         for _ in (*self.parts.heat, *self.parts.thermal):
             asked = (asked + span) / thermal.LEAST_GAIN
+        asked_of_own: list[float] = []
         for _ in self.parts.ageing:
             asked = asked / thermal.LEAST_GAIN
+        for one, inside in zip(reversed(self.own_outputs), reversed(owns), strict=True):
+            asked_of_own.append(asked)
+            asked = own_fixed.asked_of_input(one, inside, asked) * slack + 1.0
         for each, inside in zip(reversed(self.creeps), reversed(creeps), strict=True):
             moved = inside + (asked + inside * each.rest) / each.slope
             asked = max(moved, asked / each.rest) * slack + 1.0
-        return Sizes(plays, creeps, modes, saturations, still + away, size + away, undone, target, asked)
+        pairs = list(zip(owns, reversed(asked_of_own), strict=True))
+        return Sizes(plays, creeps, pairs, modes, saturations, still + away, size + away, undone, target, asked)
 
     def led_back(self, effect: TanhSaturation, settled: float, size: float) -> float:
         """Largest input to which a displacement is led back: any that the model has at rest at least."""
@@ -354,9 +373,10 @@ class _Builder:
 
         Plays alone have them, in an arithmetic that has none below a drive code.
         """
-        if not self.lags or self.static.stages or self.parts.plays or self.inner.fine:
+        if self.static.stages or self.parts.plays or self.inner.fine:
             return 0
         leads = [math.log2(4.0 / numbers[lag.RATE]) for exact, numbers in self.lags if not exact]
+        leads += [math.log2(2.0 * one.backward.largest) for one in self.own_drives]
         return min(MOST_FINER, math.ceil(sum(leads)) + 1) if leads else 0
 
     def _lag_tables(self) -> Any:
@@ -364,6 +384,10 @@ class _Builder:
         given = float(max(map(abs, c.drive)) << (c.fine + self.finer)) + 1.0
         asked = float(max(map(abs, c.play)) + c.margin) * 2.0**self.finer if not self.static.stages else given + 1.0
         rows = []
+        self.ahead = []
+        for one in reversed(self.own_drives):
+            self.ahead.insert(0, own_fixed.formats(one, given, asked, 0))
+            asked = own_fixed.asked_of_input(one, given, asked) + 1.0
         for exact, numbers in reversed(self.lags):
             sizes = lag_fixed.Sizes(exact, numbers[lag.RATE], numbers[lag.LATE], given, asked)
             rows.append((exact, numbers, sizes))
@@ -376,6 +400,12 @@ class _Builder:
         scale = 2.0**self.bits
         sizes = [size * scale for size in self.sizes.creeps]
         return creep_fixed.tables(list(zip(self.creeps, sizes, strict=True)), self.bits)
+
+    def _own_behind(self) -> list[Formats]:
+        """Blocks of the user's own behind the plays."""
+        scale = 2.0**self.bits
+        pairs = zip(self.own_outputs, self.sizes.owns, strict=True)
+        return [own_fixed.formats(one, given * scale, asked * scale, self.bits) for one, (given, asked) in pairs]
 
     @cached_property
     def clocks(self) -> list[ClockNumbers]:

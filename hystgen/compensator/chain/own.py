@@ -8,12 +8,13 @@ samples are bounded mode by mode: `sum |C A^k B| <= sum |c_j b_j|/(1 - |lambda_j
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.jit import jit
 from hystgen.effects import own
 from hystgen.effects.base import Array, Effect, Place
 from hystgen.effects.kinds import Constants
@@ -25,12 +26,14 @@ million samples: their quotient is what a difference of states loses."""
 
 
 class OwnTables(NamedTuple):
-    """Blocks in front of the plays, then those behind: `number` (m,), those of each from `first` (k + 1) on; the memory
-    of each from `place` (k + 1) on; `ahead`: how many stand in front."""
+    """Blocks in front of the plays, then those behind: `number` (m,), in fixed point (m, 4), those of each from `first`
+    (k + 1) on; the memory of each from `place` (k + 1) on; `bits` (k,): of its signals below those of the chain, in
+    fixed point; `ahead`: how many stand in front."""
 
     first: Counts
     number: Reals
     place: Counts
+    bits: Counts
     ahead: int
 
 
@@ -63,6 +66,11 @@ class System:
         """Sum (n,) of all that one disturbance of each state makes of the output."""
         lost, vectors, back = self._modes()
         return np.asarray((np.abs(self.c @ vectors) * lost) @ np.abs(back))
+
+    def once(self) -> Array:
+        """Largest output (n,) that a disturbance of each state makes at any later sample."""
+        _, vectors, back = self._modes()
+        return np.asarray(np.abs(self.c @ vectors) @ np.abs(back))
 
     def before(self) -> float:
         """Largest output that inputs within 1 up to the sample before make."""
@@ -111,18 +119,26 @@ class Linear:
         lost = np.array([each.error for each in state])
         begun = np.array(sizes, dtype=object)
         _apply(self.effect, "rest", shares, begun, Rounded(size, 0.0, u))
-        lost = lost + np.array([each.error for each in begun])
-        forward = y.error + float(self.forward.after() @ lost)
+        started = self.forward.once() @ np.array([each.error for each in begun])
+        forward = y.error + float(self.forward.after() @ lost + started)
         asked = Rounded(self.forward.largest * size, 0.0, u)
         x = _apply(self.effect, "solve", shares, np.array(sizes, dtype=object), asked)
         return forward, self.passed(forward, x.error)
 
     def passed(self, error: float, own: float = 0.0) -> float:
-        """Error of the input for one of the output, and for roundings `own` of solve."""
-        before, now = self.forward.before(), abs(self.forward.d)
-        if self.exact and before < now:  # whatever is limited or committed on the way
-            return (error / now + own) / (1.0 - before / now)
-        return self.backward.largest * error + own * (1.0 + self.backward.largest * self.forward.largest)
+        """Error of the input for one of the output, and for roundings `own` of solve.
+
+        Limits let an error of the input through in part, or not at all: a single state then comes to lie between what
+        either way makes of it, and what inputs before make of an output smaller than the present one does is a
+        contraction of errors of the input.
+        """
+        before, now, back = self.forward.before(), abs(self.forward.d), self.backward
+        bounds = []
+        if self.exact and len(self.settled) == 1:
+            bounds.append(back.largest * error + own * (1.0 + back.before() * now))
+        if self.exact and before < now:
+            bounds.append((error / now + own) / (1.0 - before / now))
+        return min(bounds, default=back.largest * error + own * (1.0 + back.largest * self.forward.largest))
 
     def _shares(self, u: float) -> NDArray[Any]:
         return np.array([Rounded(abs(each), u * abs(each), u) for each in self.numbers.tolist()], dtype=object)
@@ -182,8 +198,8 @@ def linear(effect: Effect, seconds: float) -> Linear:
     return Linear(effect, one.table, systems[0], systems[1], rest, one.state.copy())
 
 
-def problems(effect: Effect, seconds: float) -> Iterator[str]:
-    """Why the C cannot have the block of an effect."""
+def problems(effect: Effect, seconds: float, fixed: bool) -> Iterator[str]:
+    """Why the C cannot have the block of an effect, in fixed point or else in floating point."""
     assert effect.block is not None
     one = linear(effect, seconds)
     if not _adds_up(one, seconds):
@@ -212,6 +228,23 @@ def problems(effect: Effect, seconds: float) -> Iterator[str]:
             f"in front of the plays a drive at rest has to pass as it is, and none may overshoot; it passes "
             f"{one.rest:g} of it at rest and up to {one.forward.largest:g} on the way"
         )
+    elif fixed and not one.exact:
+        yield (
+            "its solve does not give the input for which absorb returns the output asked for, and fixed point bounds "
+            "its numbers by that; use float32"
+        )
+    elif fixed and not _stays_for_solve(effect, seconds):
+        yield "its solve changes the memory, which fixed point bounds by what absorb and rest do; leave that to absorb"
+
+
+def _stays_for_solve(effect: Effect, seconds: float) -> bool:
+    """Whether solve leaves the memory as it is."""
+    instance = own.Instance(effect)
+    instance.advance(seconds)
+    before = np.random.default_rng(0).normal(size=len(instance.state))
+    instance.state[:] = before
+    instance.solve(1.0)
+    return bool(np.all(instance.state == before))
 
 
 def _adds_up(one: Linear, seconds: float) -> bool:
@@ -240,6 +273,7 @@ def build(drives: Sequence[Linear], outputs: Sequence[Linear], reals: Any) -> Ow
         np.cumsum([0, *(len(each.numbers) for each in every)]).astype(np.int64),
         reals(np.concatenate([np.empty(0), *(each.numbers for each in every)]), "numbers of effects of your own"),
         np.cumsum([0, *(len(each.settled) for each in every)]).astype(np.int64),
+        np.zeros(len(every), dtype=np.int64),
         len(drives),
     )
 
@@ -250,5 +284,25 @@ def constants(t: OwnTables, kinds: Sequence[type[Effect]]) -> list[Constants]:
     for j, effect in enumerate(kinds):
         assert effect.block is not None
         row = t.number[t.first[j] : t.first[j + 1]]
-        found.append(Constants(own.kind(effect), row, effect.block.products))
+        kind, products = own.kind(effect), effect.block.products
+        if row.ndim > 1:  # fixed point, where a product takes two
+            absorb, solve = products
+            found.append(Constants(kind, row.ravel(), (2 * absorb, 2 * solve), bits=int(t.bits[j])))
+        else:
+            found.append(Constants(replace(kind, letters="", memory=""), row, products))
     return found
+
+
+# ---------------------------------------------------------------- product_float.c
+
+
+@jit(inline=True)
+def product(number: Any, x: Any) -> Any:
+    """A number of the table times x."""
+    return number * x
+
+
+@jit(inline=True)
+def passed(t: OwnTables, j: int, x: Any) -> Any:  # noqa: ARG001  as in fixed point
+    """A signal of the chain is one of block j, and the other way round."""
+    return x

@@ -34,6 +34,7 @@ class Blocks(NamedTuple):
     front: tuple[Function, Function]  # forward, inverse
     plays: tuple[Function, Function, Function]  # follow, started, inverse input
     finer: Function  # what has to arrive, with bits below an input of the plays
+    own: tuple[Function, Function, Function]  # of the user's own: product; a signal as one of a block; and back
 
 
 class Sides(NamedTuple):
@@ -82,20 +83,22 @@ def _tabled(verb: Function) -> Function:
     return call
 
 
-def _one(block: OwnBlock, verb: str, j: int) -> Function:
+def _one(arithmetic: tuple[Function, Function, Function], block: OwnBlock, verb: str, j: int) -> Function:
     """What block `j` of the user's own does."""
-    function = block.compiled[verb]
+    product, entered, left = arithmetic
+    function = block.compiled(verb, product)
     if verb == "resting":
 
         @jit
         def resting(t: OwnTables, s: Reals, y: Any) -> Any:  # noqa: ARG001  as of every block
-            return function(t.number[t.first[j] : t.first[j + 1]], y)
+            return left(t, j, function(t.number[t.first[j] : t.first[j + 1]], entered(t, j, y)))
 
         return resting
 
     @jit
     def call(t: OwnTables, s: Reals, x: Any) -> Any:
-        return function(t.number[t.first[j] : t.first[j + 1]], s[t.place[j] : t.place[j + 1]], x)
+        row, memory = t.number[t.first[j] : t.first[j + 1]], s[t.place[j] : t.place[j + 1]]
+        return left(t, j, function(row, memory, entered(t, j, x)))
 
     return call
 
@@ -137,7 +140,7 @@ def sides_of(blocks: Blocks, drives: Sequence[OwnBlock], outputs: Sequence[OwnBl
     mode_rest, mode_absorb = _each(_tabled(mode.mode_rest)), _each(mode.mode_absorb)
 
     def own(verb: str, given: Sequence[OwnBlock], begin: int) -> Function:
-        calls = [_one(block, verb, begin + j) for j, block in enumerate(given)]
+        calls = [_one(blocks.own, block, verb, begin + j) for j, block in enumerate(given)]
         return _through(calls[::-1] if verb in ("solve", "resting") else calls)
 
     own_drive_rest, own_drive_absorb, own_drive_solve = (own(verb, drives, 0) for verb in ("rest", "absorb", "solve"))

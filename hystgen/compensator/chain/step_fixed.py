@@ -10,7 +10,7 @@ from typing import Any
 from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_fixed
-from hystgen.compensator.chain import moving_fixed
+from hystgen.compensator.chain import moving_fixed, own_fixed
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
     DRIVE_BITS,
@@ -159,7 +159,7 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:
 
 BLOCKS = Blocks(
     lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, fixed_delayed,
-    (front_forward, front_inverse), moving_fixed.PLAYS, finer,
+    (front_forward, front_inverse), moving_fixed.PLAYS, finer, (own_fixed.product, own_fixed.entered, own_fixed.left),
 )  # fmt: skip
 CODES = Codes(
     step_fixed.finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared

@@ -6,7 +6,7 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_float
-from hystgen.compensator.chain import moving_float
+from hystgen.compensator.chain import moving_float, own
 from hystgen.compensator.chain.layout import ChainTables, Stages
 from hystgen.compensator.chain.preview import preview_target
 from hystgen.compensator.chain.sides import Blocks
@@ -61,6 +61,6 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:  # noqa: ARG001  as in fi
 
 BLOCKS = Blocks(
     lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, delayed,
-    (front_forward, front_inverse), moving_float.PLAYS, finer,
+    (front_forward, front_inverse), moving_float.PLAYS, finer, (own.product, own.passed, own.passed),
 )  # fmt: skip
 CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)

@@ -65,12 +65,10 @@ def refusals(
             )
         elif effect.name == "thermal" and not effect.columns and not isinstance(effect, SelfHeating):
             yield effect, "the heat of loops, open loop: its temperature drifts with the room's; measure it"
-        elif ARITHMETICS[arithmetic].fixed and effect.block:
-            yield effect, "an effect of your own, whose block is in floating point; use float32"
         elif isinstance(effect, SelfHeating):
             yield from ((effect, reason) for reason in thermal.heat_problems(effect, (low, high), seconds))
         elif effect.block:
-            yield from ((effect, reason) for reason in own.problems(effect, seconds))
+            yield from ((effect, reason) for reason in own.problems(effect, seconds, ARITHMETICS[arithmetic].fixed))
             if effect.place is Place.DRIVE and effect in chain.effects[: _behind_slew(chain)]:
                 yield effect, "in front of the slew limit; give it an order: ClassVar[int] above that of slew_limit, 1"
         elif effect.name.startswith(USER):

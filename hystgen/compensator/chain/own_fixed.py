@@ -1,0 +1,173 @@
+"""Blocks of effects of the user's own in fixed point: formats that follow from their functions, and roundings.
+
+The functions are those of floating point. A block computes with signals that have bits below those of the chain, as
+many as keep what its states lose in a sample, and keep of that, below a fraction of a signal. A number of its table is
+a factor, of a product that leaves out the last bits of what it multiplies where that has more than a product takes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from hystgen.arithmetic.factors import LARGEST, error, factor, lifted, times
+from hystgen.basics.jit import jit
+from hystgen.compensator.chain.own import Linear, OwnTables
+from hystgen.plays.fixed import nearest
+
+STATE_BITS = 60
+"""Bits of any number that a block computes, without its sign."""
+
+GUARD = 3
+"""Bits of a signal below what all roundings of a block's states make of its output, as of the catalogue's states."""
+
+MANTISSA, SHIFT, DROP, LIFT = range(4)
+
+
+@dataclass(frozen=True)
+class Formats:
+    """A block in fixed point: `table` (n, 4) of its numbers, a factor and the bits that a product leaves out of its
+    argument and of its result; `bits` of its signals below those of the chain; `output` and `answer`: roundings of what
+    absorb and solve give, in signals of the chain."""
+
+    linear: Linear
+    table: list[tuple[int, int, int, int]]
+    bits: int
+    output: float
+    answer: float
+
+
+@dataclass
+class _Number:
+    """A number of a table, and the largest size that it multiplies."""
+
+    value: float
+    row: tuple[int, int, int, int]
+    seen: float = 0.0
+
+    def __mul__(self, x: _Traced) -> _Traced:
+        self.seen = max(self.seen, x.size)
+        *_, drop, lift = self.row
+        scaled = self.value * 2.0 ** (drop - lift)
+        wrong = abs(self.value) * (x.error + (2.0**drop if drop else 0.0))
+        wrong += 2.0**lift * (0.5 + error(scaled) * x.size / 2.0**drop)
+        return x.made(abs(self.value) * x.size, wrong)
+
+
+@dataclass(frozen=True)
+class _Traced:
+    """A whole number within `size`, no farther than `error` from the exact one; `most`: the largest size of all."""
+
+    size: float
+    error: float
+    most: list[float] = field(compare=False)
+
+    def made(self, size: float, error: float) -> _Traced:
+        self.most[0] = max(self.most[0], size)
+        return _Traced(size, error, self.most)
+
+    def __add__(self, other: _Traced) -> _Traced:
+        return self.made(self.size + other.size, self.error + other.error)
+
+    __sub__ = __add__
+
+    def __neg__(self) -> _Traced:
+        return self
+
+
+def _row(value: float, seen: float) -> tuple[int, int, int, int]:
+    """A number of the table for arguments up to `seen`."""
+    drop = max(0, math.ceil(math.log2(max(seen, 1.0))) + 1 - (LARGEST.bit_length() - 1))
+    lift = lifted(value * 2.0**drop, 0)
+    return (*factor(value * 2.0 ** (drop - lift)), drop, lift)
+
+
+@dataclass(frozen=True)
+class _Trace:
+    """What the functions of a block make of an input and an output asked for up to these sizes."""
+
+    linear: Linear
+    given: float
+    asked: float
+
+    def run(self, rows: Sequence[tuple[int, int, int, int]], bits: int) -> tuple[list[float], float, float, float]:
+        """With signals of `bits` more: the sizes that each number multiplies, the largest size, and the roundings of
+        absorb and of solve."""
+        most = [0.0]
+        numbers = [_Number(*each) for each in zip(self.linear.numbers.tolist(), rows, strict=True)]
+
+        def signal(size: float) -> _Traced:
+            return _Traced(0.0, 0.0, most).made(size * 2.0**bits, 0.0)
+
+        def state() -> Any:
+            return np.array([signal(size) for size in (self.given * self.linear.sizes()).tolist()], dtype=object)
+
+        given, asked = signal(self.given), signal(self.asked)
+
+        block = self.linear.effect.block
+        assert block is not None
+        begun, moved = state(), state()
+        rest, now = block.rest(numbers, begun, given), block.absorb(numbers, moved, given)
+        started, lost = (np.array([each.error for each in states]) for states in (begun, moved))
+        back = [block.solve(numbers, state(), asked), block.resting(numbers, asked)]
+        forward = self.linear.forward
+        output = max(rest.error, now.error) + float(forward.after() @ lost + forward.once() @ started)
+        return [each.seen for each in numbers], most[0], output, max(each.error for each in back)
+
+
+def asked_of_input(linear: Linear, given: float, asked: float) -> float:
+    """Largest input that solve or resting give for an output up to `asked`, behind inputs up to `given`."""
+    now, before = abs(linear.forward.d), linear.forward.before()
+    return max((asked + before * given) / now, asked / linear.rest)
+
+
+def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
+    """A block for an input and an output asked for up to these sizes, in signals of the chain, of which `code` bits are
+    below a code. Raises OverflowError where its numbers do not fit, or its states would stall."""
+    trace = _Trace(linear, given, asked)
+    values = linear.numbers.tolist()
+    seen, most, noise, _ = trace.run([_row(value, 0.0) for value in values], 0)
+    wanted = max(math.ceil(math.log2(max(noise, 1.0))), 0) + GUARD
+    bits = min(wanted, STATE_BITS - math.ceil(math.log2(most)))
+    if bits < 0 or bits + code < wanted - GUARD + 1:
+        raise OverflowError("no room")
+    rows = [_row(value, size * 2.0**bits) for value, size in zip(values, seen, strict=True)]
+    _, _, output, answer = trace.run(rows, bits)
+    return Formats(linear, rows, bits, output / 2.0**bits + 0.5, answer / 2.0**bits + 0.5)
+
+
+def build(rows: Sequence[Formats], ahead: int) -> OwnTables:
+    """Blocks in front of the plays, `ahead` of them, and behind."""
+    table = [number for each in rows for number in each.table]
+    return OwnTables(
+        np.cumsum([0, *(len(each.table) for each in rows)]).astype(np.int64),
+        np.array(table, dtype=np.int64).reshape(-1, 4),
+        np.cumsum([0, *(len(each.linear.settled) for each in rows)]).astype(np.int64),
+        np.array([each.bits for each in rows], dtype=np.int64),
+        ahead,
+    )
+
+
+# ---------------------------------------------------------------- product_fixed.c, and the glue around a block
+
+
+@jit
+def product(number: Any, x: Any) -> Any:
+    """A number of the table times x, to the nearest whole number."""
+    return times(x >> number[DROP], number[MANTISSA], number[SHIFT]) << number[LIFT]
+
+
+@jit
+def entered(t: OwnTables, j: int, x: Any) -> Any:
+    """A signal of the chain as one of block j."""
+    return x << t.bits[j]
+
+
+@jit
+def left(t: OwnTables, j: int, x: Any) -> Any:
+    """A signal of block j as one of the chain."""
+    return nearest(x, t.bits[j])
