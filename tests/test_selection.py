@@ -10,6 +10,7 @@ import pytest
 from made_up import HELD, NOISE, TO_FIT, Hypothesis, Made, World, first_of
 from numpy.typing import NDArray
 
+from hystgen.diagnosis import run
 from hystgen.diagnosis.search import screening, selection
 
 Array = NDArray[np.float64]
@@ -318,3 +319,50 @@ def test_what_is_less_free_in_a_record_is_no_merit(own: float, accepted: bool) -
     best = screening.Tried(option, better, ("better",), 0.6, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
     assert (selection.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("left", "names", "given"),
+    [(0.59, [], False), (0.61, [], True), (0.59, ["lag"], False), (0.61, ["lag"], False), (0.65, ["lag"], True)],
+)
+def test_the_model_as_given_is_the_answer_where_it_does_better(left: float, names: list[str], given: bool) -> None:
+    """It leaves 0.6 of the held-out records: names have to do worse by a twentieth to fall."""
+    first, found = Made("given", 1, (1.0, 0.6)), Made("found", 1, (0.5, left))
+    records: Any = SimpleNamespace(held=HELD, residual=lambda each: each.left[1])
+    effects: Any = tuple(SimpleNamespace(name=name) for name in names)
+    answer = selection.no_worse_than(first, selection.Outcome(found, found, effects, ()), records)  # type: ignore[arg-type]
+    assert (answer.fitted is first) is given
+    assert [each.name for each in answer.found] == ([] if given else names)
+
+
+@pytest.mark.parametrize(
+    ("bare", "names", "left", "without"),
+    [
+        (0.97, ["lag"], 0.1, False),  # held-out records hardly prefer none
+        (0.9, ["lag"], 0.4, True),
+        (0.9, ["lag", "asymmetry"], 0.4, False),  # a front is found again, and does worse in the end
+        (0.9, ["lag", "asymmetry"], 0.2, True),
+        (0.9, [], 0.4, False),
+    ],
+)
+def test_a_front_that_misleads_held_out_records_is_left_out(
+    bare: float, names: list[str], left: float, without: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the front the refit leaves 1, and 0.3 in the end; `left`: in the end without it."""
+    ready: Any = SimpleNamespace(held=HELD)
+    refits = {"front": Made("front", 1, (0.3, 1.0)), "none": Made("none", 1, (1.0, bare))}
+    ends = {"front": Made("front", 1, (0.2, 0.3)), "none": Made("none", 1, (0.2, left))}
+
+    def thorough(_: Any, __: Any, refit: Any) -> Any:
+        made = refit(ready).name
+        found = tuple(SimpleNamespace(name=name) for name in (names if made == "none" else ["creep"]))
+        outcome: Any = selection.Outcome(refits[made], ends[made], found, ())  # type: ignore[arg-type]
+        return run._Done(None, None, None, outcome)  # type: ignore[arg-type]
+
+    begun = ready, lambda _: refits["front"], lambda _: refits["none"]
+    monkeypatch.setattr(run._Task, "_begun", lambda *_: begun)
+    monkeypatch.setattr(run._Task, "_thorough", thorough)
+    task: Any = object.__new__(run._Task)
+    done = task._searched(None)
+    assert done.found.fitted is ends["none" if without else "front"]
+    assert done.notes == ((run.NO_FRONT,) if without else ())
