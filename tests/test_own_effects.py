@@ -32,88 +32,9 @@ T = 1e-3
 DROOP = "name: user:droop, share: 0.05, time_constant: 0.7"
 Call = Callable[..., tuple[int, str, str]]
 
-# A drive stage that follows by a share of the way each sample, in front of the plays, with a file of its own
-STAGE = '''"""An amplifier."""
-from typing import ClassVar, Literal
-import numpy as np
-from hystgen.effects import Effect, OwnBlock, Place, product
-
-RATE, INVERSE_RATE = range(2)
-
-def rest(t, s, x):
-    s[0] = x
-    return x
-
-def resting(t, y):
-    return y
-
-def solve(t, s, y):
-    return s[0] + product(t[INVERSE_RATE], y - s[0])
-
-def absorb(t, s, x):
-    s[0] = s[0] + product(t[RATE], x - s[0])
-    return s[0]
-
-class Follower(Effect):
-    name: Literal["user:follower"]
-    bandwidth: float
-    place: ClassVar[Place] = Place.DRIVE
-    order: ClassVar[int] = 2
-    block: ClassVar[OwnBlock] = OwnBlock(
-        "follower.c", ("rate", "inverse_rate"), ("reached",), rest, resting, solve, absorb)
-
-    def numbers(self, seconds):
-        rate = 1.0 - np.exp(-self.bandwidth * seconds)
-        return [rate, 1.0 / rate]
-
-    def drive(self, a, run):
-        y = a.copy()
-        for k, seconds in enumerate(run.steps, 1):
-            y[k] = y[k - 1] + (1.0 - np.exp(-self.bandwidth * seconds)) * (a[k] - y[k - 1])
-        return y
-'''
-STAGE_C = """#include "hystgen_runtime.h"
-
-typedef struct {
-    hystgen_number_t rate;
-    hystgen_number_t inverse_rate;
-} hystgen_user_follower_table_t;
-
-typedef struct {
-    hystgen_signal_t reached;
-} hystgen_user_follower_t;
-
-static hystgen_signal_t hystgen_user_follower_rest(const hystgen_user_follower_table_t *t,
-                                                   hystgen_user_follower_t *self,
-                                                   hystgen_signal_t x)
-{
-    (void)t;
-    self->reached = x;
-    return x;
-}
-
-static hystgen_signal_t hystgen_user_follower_resting(const hystgen_user_follower_table_t *t,
-                                                      hystgen_signal_t y)
-{
-    (void)t;
-    return y;
-}
-
-static hystgen_signal_t hystgen_user_follower_solve(const hystgen_user_follower_table_t *t,
-                                                    hystgen_user_follower_t *self,
-                                                    hystgen_signal_t y)
-{
-    return self->reached + hystgen_product(&t->inverse_rate, y - self->reached);
-}
-
-static hystgen_signal_t hystgen_user_follower_absorb(const hystgen_user_follower_table_t *t,
-                                                     hystgen_user_follower_t *self,
-                                                     hystgen_signal_t x)
-{
-    self->reached = self->reached + hystgen_product(&t->rate, x - self->reached);
-    return self->reached;
-}
-"""
+# A drive stage in front of the plays, with a file of its own
+FOLDER = Path(__file__).with_name("follower")
+STAGE, STAGE_C = ((FOLDER / name).read_text() for name in ("model.py", "follower.c"))
 FOLLOWER = "name: user:follower, bandwidth: 700"
 
 
@@ -126,7 +47,9 @@ def written(folder: Path, *effects: str, name: str = "stage") -> Path:
 
 
 def outside(folder: Path, python: str = STAGE, c: str | None = STAGE_C) -> Path:
-    """A folder with an effect, which nothing in the package knows of."""
+    """A folder with an effect, which nothing in the package knows of; with other texts than those a copy."""
+    if (python, c) == (STAGE, STAGE_C):
+        return FOLDER
     own_folder = folder / "follower"
     own_folder.mkdir()
     (own_folder / "model.py").write_text(python)
@@ -367,11 +290,11 @@ def test_a_missing_c_file_is_named(tmp_path: Path, run: Call) -> None:
 SOLVED, NUMBERS = "    return s[0] + product", "return [rate, 1.0 / rate]"
 PRECISE = "is of another precision than the C's; put it in the table"
 BAD_PYTHON = {
-    "number": (SOLVED, "    return 1.0 + s[0] + product", f":16: the number 1.0 in solve {PRECISE}"),
-    "named number": (SOLVED, "    return RATE + product", f":16: the number RATE in solve {PRECISE}"),
-    "call": ("    return s[0] + product", "    return np.abs(s[0]) + product", ":16: solve has np.abs(s[0]); write it"),
-    "times": (SOLVED, "    return s[0] * s[0] + product", ":16: solve has s[0] * s[0]; write it with +, -, product"),
-    "product": ("y - s[0])", "y - s[0]) + product(y, s[0])", ":16: solve has product(y, s[0]); give a number of the"),
+    "number": (SOLVED, "    return 1.0 + s[0] + product", f":24: the number 1.0 in solve {PRECISE}"),
+    "named number": (SOLVED, "    return RATE + product", f":24: the number RATE in solve {PRECISE}"),
+    "call": ("    return s[0] + product", "    return np.abs(s[0]) + product", ":24: solve has np.abs(s[0]); write it"),
+    "times": (SOLVED, "    return s[0] * s[0] + product", ":24: solve has s[0] * s[0]; write it with +, -, product"),
+    "product": ("y - s[0])", "y - s[0]) + product(y, s[0])", ":24: solve has product(y, s[0]); give a number of the"),
     "place": ("Place.DRIVE", "Place.OUTPUT", "class Follower has place output, for which it has to define mapped"),
     "side": ("order: ClassVar[int] = 2", "order: ClassVar[int] = 0", "in front of the slew limit; give it an order"),
     "name": ("user:follower", "user:My-Follower", "user:My-Follower cannot name it in C"),
@@ -380,10 +303,10 @@ BAD_PYTHON = {
     "numbers": (NUMBERS, "return [rate]", "2 finite numbers were expected, rate, inverse_rate"),
     "infinite": (NUMBERS, "return [rate, np.inf]", "2 finite numbers were expected"),
     "fails": (NUMBERS, "return [rate, 1 / 0]", "failed in numbers: ZeroDivisionError"),
-    "not linear": ("    return s[0]\n\nclass", "    return s[0] + t[RATE]\n\nclass", "its block is not linear"),
+    "not linear": ("    return s[0]\n\n\nclass", "    return s[0] + t[RATE]\n\n\nclass", "its block is not linear"),
     "moves at rest": ("    s[0] = x\n", "    s[0] = x + x\n", "does not stay where rest leaves it"),
-    "other at rest": ("(t, y):\n    return y", "(t, y):\n    return product(t[RATE], y)", "one undoes the other"),
-    "gain": ("    return s[0]\n\nclass", "    return s[0] + s[0]\n\nclass", "does not stay where rest leaves it"),
+    "other at rest": ("\n    return y", "\n    return product(t[RATE], y)", "one undoes the other"),
+    "gain": ("    return s[0]\n\n\nclass", "    return s[0] + s[0]\n\n\nclass", "does not stay where rest leaves it"),
     "grows": ("- np.exp(", "- 3.0 * np.exp(", "its block keeps"),
 }  # fmt: skip
 
@@ -406,9 +329,10 @@ def test_a_wrong_block_is_refused_by_name(tmp_path: Path, run: Call, wrong: str)
 SOFT = ("    return s[0] + product(t[INVERSE_RATE], y - s[0])", "    return y")  # the drive itself
 ONLY_FLOAT = {
     "another input": ([SOFT], "its solve does not give the input for which absorb returns the output asked for"),
-    "memory": ([("def solve(t, s, y):", "def solve(t, s, y):\n    s[1] = y"), ('("reached",)', '("reached", "asked")'),
+    "memory": ([("    return s[0] + product", "    s[1] = y\n    return s[0] + product"),
+                ('("reached",)', '("reached", "asked")'),
                 ("    s[0] = x\n    return x", "    s[0] = x\n    s[1] = x\n    return x"),
-                ("    return s[0]\n\nclass", "    s[1] = s[0]\n    return s[0]\n\nclass")],
+                ("    return s[0]\n\n\nclass", "    s[1] = s[0]\n    return s[0]\n\n\nclass")],
                "its solve changes the memory, which fixed point bounds by what absorb and rest do"),
 }  # fmt: skip
 
