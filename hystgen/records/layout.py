@@ -431,10 +431,6 @@ class Segments:
     tags: dict[str, list[str]]
     absolute: bool
 
-    def __post_init__(self) -> None:
-        self.clock = Clock()
-        self._since(self.tags, 1)
-
     def begin(self, text: str) -> int:
         """Where the next header begins; -1 for none."""
         found = _SEGMENT.search(text)
@@ -465,16 +461,17 @@ class Segments:
         return self._since(tags, line), int(text) if len(rows) == 1 and (text := rows.pop()).isdecimal() else None
 
     def _since(self, tags: dict[str, list[str]], line: int) -> float:
-        if self.absolute:
+        """Seconds from the date and time of the first segment to those of another; 0 where either has none."""
+        parts = [[next(iter(each.get(tag, ())), "") for tag in ("Date", "Time")] for each in (self.tags, tags)]
+        stamps = [" ".join(each).replace(",", ".") if all(each) else "" for each in parts]
+        if self.absolute or not all(stamps):
             return 0.0
-        day, time = (next(iter(tags.get(tag, ())), "") for tag in ("Date", "Time"))
-        if not (day and time):
-            return 0.0
+        clock = Clock()
         try:
-            return self.clock.seconds(f"{day} {time}".replace(",", "."))
+            return [clock.seconds(stamp) for stamp in stamps][1]
         except ValueError:
-            said = printable(f"{day} {time}")
-            raise self.reading.refuse(f'"{said}" is no date and time; export the file again', line) from None
+            said = " or ".join(f'"{printable(stamp)}"' for stamp in stamps)
+            raise self.reading.refuse(f"{said} is no date and time; export the file again", line) from None
 
 
 def _tags(lines: Sequence[str], delimiter: str) -> dict[str, list[str]]:
