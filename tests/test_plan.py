@@ -226,6 +226,16 @@ class TestCommand:
             "error: the sample time nan is no number above 0; give seconds",
         ]
 
+    def test_files_of_another_session_are_named(self, tmp_path: Path, run: Call) -> None:
+        words = ["diagnose", "--plan", file_of(tmp_path), "-o", tmp_path / "out"]
+        assert "earlier plan" not in run(*words, "--rate", "50")[2]
+        _, _, err = run(*words)
+        left = [tmp_path / "out" / name for name in ("session.csv", "session.json")]
+        assert f"of an earlier plan, with other drives: {left[0]}, {left[1]}; remove" in err
+        for path in left:
+            path.unlink()
+        assert "earlier plan" not in run(*words)[2]
+
     @pytest.mark.parametrize(
         ("dac", "problems"),
         [
