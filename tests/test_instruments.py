@@ -122,6 +122,10 @@ def test_labview_in_segments(tmp_path: Path) -> None:
         assert f":{len(bad)}:" in problem(put(tmp_path / "b.lvm", bad))
     other = [*first, "", *(line.replace("Position", "Current") for line in later)]
     assert "a segment with other channels" in problem(put(tmp_path / "c.lvm", other))
+    unended = read_record(put(tmp_path / "e.lvm", [*first, "", *first[13:20]]))
+    assert unended.notes == ("the last segment has no rows; it was left out",)
+    several = [line.replace("1.000000E-3\t1.000000E-3", "1E-3\t2E-3") for line in lvm("Multi")[13:]]
+    assert "channels have times of their own" in problem(put(tmp_path / "f.lvm", [*lvm("Multi"), "", *several]))
     assert "a segment that begins at 0 s" in problem(put(tmp_path / "d.lvm", [*first, "", *first[13:]]))
 
 

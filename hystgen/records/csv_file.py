@@ -325,7 +325,11 @@ class _Body:
     def _join_segments(self) -> None:
         """Give the rows of all segments one time. Raises RecordError where one begins before another ends."""
         layout = self.layout.segments
-        if layout is None or not self.segments:
+        if layout is None:
+            return
+        if self.kept:
+            self.reading.notes.append("the last segment has no rows; it was left out")
+        if not self.segments:
             return
         self.reading.understood(f"{len(self.segments) + 1} segments")
         if self.time_column != layout.place:

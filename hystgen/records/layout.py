@@ -340,6 +340,8 @@ END = "***End_of_Header***"
 _SEGMENT = re.compile(r"^(?:Channels\b|\*\*\*Start_Special)", re.MULTILINE)
 """How the header of a further segment begins."""
 
+_OWN_TIMES = "its channels have times of their own (X0, Delta_X); export them with one time, X_Columns One"
+
 _SPECIAL = ("***Start_Special***", "***End_Special***")
 
 
@@ -400,9 +402,7 @@ def _of_segment(
     steps = [_number(reading, dialect, text, "Delta_X", header) for text in segment.get("Delta_X", ()) if text]
     starts = [_number(reading, dialect, text, "X0", header) for text in segment.get("X0", ()) if text]
     if len(set(steps)) > 1 or len(set(starts)) > 1:
-        raise reading.refuse(
-            "its channels have times of their own (X0, Delta_X); export them with one time, X_Columns One", header
-        )
+        raise reading.refuse(_OWN_TIMES, header)
     if kept == "Multi" and places:
         found.units[places[0]] = unit
         for k in places[1:]:
@@ -457,6 +457,9 @@ class Segments:
                 "file is one experiment, export each by itself",
                 line,
             )
+        several = any(len({text for text in tags.get(tag, ()) if text}) > 1 for tag in ("X0", "Delta_X"))
+        if several and names.count("X_Value") > 1:
+            raise self.reading.refuse(_OWN_TIMES, line)
         rows = {text for text in tags.get("Samples", ()) if text}
         return self._since(tags, line), int(text) if len(rows) == 1 and (text := rows.pop()).isdecimal() else None
 
