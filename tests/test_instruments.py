@@ -14,7 +14,7 @@ import scipy.io
 from nptdms import ChannelObject, TdmsWriter
 
 from hystgen.basics import extras
-from hystgen.records import Record, RecordError, parse_columns, read_record
+from hystgen.records import Record, RecordError, csv_file, parse_columns, read_record
 
 N = 50
 T = np.arange(N) * 0.001
@@ -93,13 +93,53 @@ def test_labview_with_comments_and_faults(tmp_path: Path) -> None:
     bad = [*lines]
     bad[first + 3] = bad[first + 3].replace(f"{V[3]:.6f}", "overload")
     assert f':{first + 4}:10: error: "overload" in column "Drive" is no number' in problem(put(tmp_path / "b.lvm", bad))
-    several = [*lines, *lines[16:]]
+    several = [*lvm("No"), *lvm("No")[16:]]
     assert "has a second table in it" in problem(put(tmp_path / "c.lvm", several))
     text = problem(put(tmp_path / "d.lvm", lvm("Multi", steps=("1E-3", "2E-3"))))
     assert "channels have times of their own" in text
     cut = read_record(put(tmp_path / "e.lvm", lines[:-10]))
     assert cut.notes == ("the file says that it has 50 samples, it has 40",)
     assert "without a segment" in problem(put(tmp_path / "f.lvm", lines[:14]))
+
+
+def test_labview_in_segments(tmp_path: Path) -> None:
+    """Each segment has a header of its own; its times count from its date and time where they are relative."""
+    for pref, shift in (("Relative", 120.5), ("Absolute", 120.5)):
+        first = [line.replace("Relative", pref) for line in lvm()]
+        first.insert(19, "\t".join(("Time", "14:21:05.0", "14:21:05.0", "")))
+        later = [line.replace("Time\t14:21:05.0", "Time\t14:23:05.5") for line in first[13:]]
+        if pref == "Absolute":
+            rows = [line.split("\t") for line in later[-N:]]
+            later[-N:] = ["\t".join([f"{float(cells[0]) + shift:.6f}", *cells[1:]]) for cells in rows]
+        path = put(tmp_path / "a.lvm", [*first, "", *later])
+        record = read_record(path)
+        np.testing.assert_allclose(record.t, np.concatenate([T, T + shift]), rtol=0, atol=1e-6)
+        np.testing.assert_allclose(record.v, np.tile(V, 2), rtol=0, atol=1e-6)
+        np.testing.assert_allclose(record.y, np.tile(Y, 2), rtol=0, atol=1e-6)
+        assert "2 segments" in record.read_as
+        bad = [*first, "", *later]
+        bad[-1] = bad[-1].replace(f"{V[-1]:.6f}", "overload")
+        assert f":{len(bad)}:" in problem(put(tmp_path / "b.lvm", bad))
+    other = [*first, "", *(line.replace("Position", "Current") for line in later)]
+    assert "a segment with other channels" in problem(put(tmp_path / "c.lvm", other))
+    unended = read_record(put(tmp_path / "e.lvm", [*first, "", *first[13:20]]))
+    assert unended.notes == ("the last segment has no rows; it was left out",)
+    several = [line.replace("1.000000E-3\t1.000000E-3", "1E-3\t2E-3") for line in lvm("Multi")[13:]]
+    assert "channels have times of their own" in problem(put(tmp_path / "f.lvm", [*lvm("Multi"), "", *several]))
+    assert "a segment that begins at 0 s" in problem(put(tmp_path / "d.lvm", [*first, "", *first[13:]]))
+
+
+@pytest.mark.parametrize("size", [300, 1000, 1 << 20])
+def test_a_header_of_a_segment_across_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int) -> None:
+    monkeypatch.setattr(csv_file, "BLOCK", size)
+    monkeypatch.setattr(csv_file, "SAMPLE", 64)
+    monkeypatch.setattr(csv_file, "SAMPLE_LINES", 30)
+    first = lvm()
+    shifted = first[13:]
+    rows = [line.split("\t") for line in shifted[-N:]]
+    shifted[-N:] = ["\t".join([f"{float(cells[0]) + 10.0:.6f}", *cells[1:]]) for cells in rows]
+    record = read_record(put(tmp_path / "a.lvm", [*first, *shifted]))
+    np.testing.assert_allclose(record.t, np.concatenate([T, T + 10.0]), rtol=0, atol=1e-6)
 
 
 # Tektronix, by what the manuals of MDO, MSO and DPO say of spreadsheet files ----------------------------------------

@@ -226,6 +226,16 @@ class TestCommand:
             "error: the sample time nan is no number above 0; give seconds",
         ]
 
+    def test_files_of_another_session_are_named(self, tmp_path: Path, run: Call) -> None:
+        left = [tmp_path / "out" / name for name in ("session.csv", "session.json")]
+        left[0].parent.mkdir()
+        assert hystgen.plan(file_of(tmp_path)).left_over(left[0].parent) == []
+        for path in left:
+            path.touch()
+        assert hystgen.plan(tmp_path / "stage.yaml", rate=50.0).left_over(left[0].parent) == []
+        _, _, err = run("diagnose", "--plan", tmp_path / "stage.yaml", "-o", left[0].parent)
+        assert f"of an earlier plan, with other drives: {left[0]}, {left[1]}; remove" in err
+
     @pytest.mark.parametrize(
         ("dac", "problems"),
         [

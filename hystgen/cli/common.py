@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import glob
 import itertools
 import math
@@ -19,6 +20,18 @@ from hystgen.basics import console
 if TYPE_CHECKING:
     from hystgen.model import Model
 
+
+ADVICE = {
+    errno.ENOENT: "give a path that exists",
+    errno.EACCES: "change its permissions, or give another path",
+    errno.EPERM: "change its permissions, or give another path",
+    errno.EROFS: "give a path that can be written to",
+    errno.ENOSPC: "free some space, or give another path",
+    errno.EISDIR: "give the path of a file",
+    errno.ENOTDIR: "give the path of a folder",
+    errno.EEXIST: "give another path",
+}
+"""What to do about errors of the system."""
 
 
 class Failed(click.ClickException):
@@ -68,10 +81,11 @@ def guarded(path: str, action: Callable[[], Any]) -> Any:
 
 
 def _reason(error: Exception) -> str:
-    """The text of an error; for errors of the system the file and the reason."""
+    """The text of an error; for errors of the system the file, the reason and what to do."""
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
-    return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    said = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return f"{said}; {ADVICE[error.errno]}" if error.errno in ADVICE else said
 
 
 def load_model(path: str, effects: Sequence[str] = ()) -> Model:

@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from decimal import Decimal
 from functools import partial
-from pathlib import PurePath
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -149,6 +149,11 @@ class Plan:
         codes = (CODES, header.file(self.parameters)) if self.dac else ()
         whole = () if self.whole is None else (WHOLE, *codes, session.FILE)
         return (*(drive.name for drive in self.drives), *whole, "plan.html")
+
+    def left_over(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Files in `folder` of an earlier plan with a session, which belong to other drives than these."""
+        session_files = (WHOLE, CODES, header.file(self.parameters), session.FILE)
+        return [path for name in session_files if name not in self.names and (path := Path(folder) / name).exists()]
 
     def sentence(self) -> str:
         """Number of records and samples, and the time they take."""

@@ -236,6 +236,10 @@ class _Body:
         # The time alone may be a time of day; elsewhere that is text
         self.clock_column = wanted["t"] if wanted.get("t") in layout.clocks else None
         self.clock = Clock()
+        self.time_column = wanted.get("t")
+        # A header of a segment whose end is in the next block; first row, line and seconds of each segment
+        self.kept = ""
+        self.segments: list[tuple[int, int, float]] = []
         # Columns of numbers, as far as is known; those with text, and those called alike, are not stored
         alike = Counter(self.names)
         self.stored: dict[int, Array] = {
@@ -250,7 +254,29 @@ class _Body:
         self.faults: dict[tuple[str, ...], _Fault] = {}
 
     def take(self, text: str) -> None:
-        """Rows of one block of whole lines."""
+        """Rows of one block of whole lines, and headers of further segments among them."""
+        segments = self.layout.segments
+        if segments is None:
+            self._take_rows(text)
+            return
+        text, self.kept = self.kept + text, ""
+        while (begin := segments.begin(text)) >= 0:
+            self._take_rows(text[:begin])
+            end = segments.end(text, begin)
+            if end < 0:
+                self.kept = text[begin:]
+                if len(self.kept) > BLOCK:
+                    raise self.reading.refuse("has a segment whose header does not end; export it again", self.line + 1)
+                return
+            seconds, rows = segments.read(text[begin:end], self.line + 1)
+            self.segments.append((self.rows, self.line + 1, seconds))
+            if rows is not None and self.layout.rows is not None:
+                self.layout.rows += rows
+            self.line += text.count("\n", begin, end)
+            text = text[end:]
+        self._take_rows(text)
+
+    def _take_rows(self, text: str) -> None:
         another = text.find(self.layout.another) if self.layout.another else -1
         if another >= 0:
             raise self.reading.refuse(
@@ -288,12 +314,36 @@ class _Body:
         reading.refuse_if_any()
         for x in self.stored.values():
             x.resize(self.rows, refcheck=False)
+        self._join_segments()
         reading.left_out("without numbers", [self.names[k] for k in sorted(self.text_columns)])
         numeric = [c for k, c in enumerate(columns) if k not in self.text_columns]
         taken = {**chosen, **reading.further(numeric, chosen)}
         place = {c: k for k, c in enumerate(columns)}
         numbers = {name: self.stored[place[c]] for name, c in taken.items()}
         return reading.finished(numbers, taken, self.lines)
+
+    def _join_segments(self) -> None:
+        """Give the rows of all segments one time. Raises RecordError where one begins before another ends."""
+        layout = self.layout.segments
+        if layout is None:
+            return
+        if self.kept:
+            self.reading.notes.append("the last segment has no rows; it was left out")
+        if not self.segments:
+            return
+        self.reading.understood(f"{len(self.segments) + 1} segments")
+        if self.time_column != layout.place:
+            return
+        t = self.stored[layout.place]
+        ends = [row for row, _, _ in self.segments[1:]] + [self.rows]
+        for (row, line, seconds), end in zip(self.segments, ends, strict=True):
+            t[row:end] += seconds
+            if 0 < row < end and not t[row] > t[row - 1]:
+                raise self.reading.refuse(
+                    f"has a segment that begins at {t[row]:g} s, when the one before it has come to {t[row - 1]:g} s; "
+                    "one file is one experiment, export each by itself",
+                    line,
+                )
 
     def _room(self, rows: int, size: int) -> None:
         """Make room for `more` rows, at once for all that may follow if these have `size` bytes."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 
 from hystgen.basics.problems import printable
 from hystgen.records import columns
-from hystgen.records.cells import BLANKS, Dialect, is_comment
+from hystgen.records.cells import BLANKS, Clock, Dialect, is_comment
 from hystgen.records.columns import STANDARD, Step, column, meaning, unit_alone
 from hystgen.records.reading import Reading
 
@@ -40,7 +40,7 @@ class Layout:
     `also`: second names of columns; `header`: line of the names, None where there is none; `first`: line from which on
     there are rows; `steps`: what the lines above say of the sample rate; `kind`: the instrument's format, empty for
     text in general; `clocks`: columns of times of day; `rows`: number of rows the file says it has; `another`: text
-    that would begin another table.
+    that would begin another table; `segments`: headers among the rows behind which the table goes on.
     """
 
     dialect: Dialect
@@ -54,6 +54,7 @@ class Layout:
     clocks: frozenset[int] = frozenset()
     rows: int | None = None
     another: str = ""
+    segments: Segments | None = None
 
 
 @dataclass(frozen=True)
@@ -336,14 +337,19 @@ def _may_be_names(view: _View, cells: Sequence[str]) -> bool:
 
 END = "***End_of_Header***"
 
+_SEGMENT = re.compile(r"^(?:Channels\b|\*\*\*Start_Special)", re.MULTILINE)
+"""How the header of a further segment begins."""
+
+_OWN_TIMES = "its channels have times of their own (X0, Delta_X); export them with one time, X_Columns One"
+
 _SPECIAL = ("***Start_Special***", "***End_Special***")
 
 
 def labview(reading: Reading, lines: Sequence[str]) -> Layout | None:
     """The layout that the tags give, by NI's "Specification for the LabVIEW Measurement File (.lvm)".
 
-    Tags of the file, then those of a segment, each up to `***End_of_Header***`, then names and rows. A file with
-    several segments is several experiments and refused.
+    Tags of the file, then those of a segment, each up to `***End_of_Header***`, then names and rows. Further segments
+    go on with the rows, see `Segments`; without a column of times they are refused.
     """
     if not lines[0].startswith("LabVIEW Measurement"):
         return None
@@ -370,6 +376,7 @@ def _of_segment(
     header: int,
 ) -> Layout:
     found = Layout(dialect, names, header + 1, header, kind="LabVIEW measurement file", another=END)
+    written = names.copy()
     # The comment at the end of a row is no channel, and may be missing
     if names[-1] in ("Comment", ""):
         names[-1] = ""
@@ -385,15 +392,17 @@ def _of_segment(
     if len(samples) == 1 and (only := samples.pop()).isdecimal():
         found.rows = int(only)
     kept = next(iter(file.get("X_Columns", ())), "One")
+    absolute = next(iter(file.get("Time_Pref", ())), "") == "Absolute"
+    if places and unit == "s" and kept in ("One", "Multi"):
+        found.segments = Segments(reading, dialect, places[0], written, segment, absolute)
+        found.another = ""
     if kept == "One" and places:
         found.units[places[0]] = unit
         return found
     steps = [_number(reading, dialect, text, "Delta_X", header) for text in segment.get("Delta_X", ()) if text]
     starts = [_number(reading, dialect, text, "X0", header) for text in segment.get("X0", ()) if text]
     if len(set(steps)) > 1 or len(set(starts)) > 1:
-        raise reading.refuse(
-            "its channels have times of their own (X0, Delta_X); export them with one time, X_Columns One", header
-        )
+        raise reading.refuse(_OWN_TIMES, header)
     if kept == "Multi" and places:
         found.units[places[0]] = unit
         for k in places[1:]:
@@ -404,6 +413,68 @@ def _of_segment(
     if steps and unit == "s" and steps[0] > 0.0:
         found.steps = [Step(steps[0], f"Delta_X {steps[0]:g} s")]
     return found
+
+
+@dataclass
+class Segments:
+    """Segments behind the first one of a LabVIEW file: rows of the same channels, each under a header of its own.
+
+    By NI's specification times are seconds since the date and time of the segment where `Time_Pref` is `Relative`, and
+    since one moment for the whole file where it is `Absolute`. `place`: column of the times; `names`, `tags`: of the
+    first segment.
+    """
+
+    reading: Reading
+    dialect: Dialect
+    place: int
+    names: list[str]
+    tags: dict[str, list[str]]
+    absolute: bool
+
+    def begin(self, text: str) -> int:
+        """Where the next header begins; -1 for none."""
+        found = _SEGMENT.search(text)
+        return found.start() if found else -1
+
+    def end(self, text: str, begin: int) -> int:
+        """Where the rows below a header begin; -1 where the text ends before them."""
+        mark = text.find(END, begin)
+        names = text.find("\n", mark) + 1 if mark >= 0 else 0
+        return text.find("\n", names) + 1 or -1 if names else -1
+
+    def read(self, header: str, line: int) -> tuple[float, int | None]:
+        """Seconds from the first segment to this one, and the number of rows that it says it has.
+
+        Raises RecordError where it has other channels.
+        """
+        *lines, last = header.rstrip("\n").split("\n")
+        tags = _tags(lines, self.dialect.delimiter)
+        names = [cell.strip() for _, cell in self.dialect.cells(last)]
+        units = [[text for text in each.get("Y_Unit_Label", ()) if text] for each in (tags, self.tags)]
+        if [name for name in names if name] != [name for name in self.names if name] or units[0] != units[1]:
+            raise self.reading.refuse(
+                f"has a segment with other channels ({printable(', '.join(filter(None, names)))}) than the first; one "
+                "file is one experiment, export each by itself",
+                line,
+            )
+        several = any(len({text for text in tags.get(tag, ()) if text}) > 1 for tag in ("X0", "Delta_X"))
+        if several and names.count("X_Value") > 1:
+            raise self.reading.refuse(_OWN_TIMES, line)
+        rows = {text for text in tags.get("Samples", ()) if text}
+        return self._since(tags, line), int(text) if len(rows) == 1 and (text := rows.pop()).isdecimal() else None
+
+    def _since(self, tags: dict[str, list[str]], line: int) -> float:
+        """Seconds from the date and time of the first segment to those of another; 0 where either has none."""
+        parts = [[next(iter(each.get(tag, ())), "") for tag in ("Date", "Time")] for each in (self.tags, tags)]
+        stamps = [" ".join(each).replace(",", ".") if all(each) else "" for each in parts]
+        if self.absolute or not all(stamps):
+            return 0.0
+        clock = Clock()
+        try:
+            return [clock.seconds(stamp) for stamp in stamps][1]
+        except ValueError:
+            said = " or ".join(f'"{printable(stamp)}"' for stamp in stamps)
+            raise self.reading.refuse(f"{said} is no date and time; export the file again", line) from None
 
 
 def _tags(lines: Sequence[str], delimiter: str) -> dict[str, list[str]]:
