@@ -14,8 +14,9 @@ from hystgen.basics.problems import counted
 from hystgen.basics.version import __version__
 from hystgen.planning import header
 from hystgen.planning import plan as planning
-from hystgen.planning.plan import CODES, EDGE, MEASURED, RECORDING, WHOLE, Drive, lasting
+from hystgen.planning.plan import CODES, MEASURED, RECORDING, WHOLE, Drive, lasting
 from hystgen.planning.session import FILE as SESSION
+from hystgen.planning.waveforms import EDGE
 from hystgen.report.html import Figure, Listing, Section, Table, Text, page
 
 WIDE, NARROW = (9.0, 5), (4.2, 3)
