@@ -84,7 +84,7 @@ class PIController:
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What a loop did: arrays (N,), one entry a sample.
+    """What a loop did: arrays (N,), one entry per sample.
 
     `t` in s; `reference`, `output` and `error` (reference less output) in units of the plant's output; `control`: what
     the controller asks for; `drive`: what the compensator makes of it; `displacement`: the plant's input, behind the
@@ -217,7 +217,7 @@ def _sampled(system: Any, sample_time: float, what: str) -> tuple[Array, Array, 
             system = signal.lti(*system)
         except (TypeError, ValueError):
             raise ValueError(
-                f"{what} is no system of scipy.signal; give one, or (num, den), (zeros, poles, gain), (A, B, C, D)"
+                f"{what} is not a system of scipy.signal; give one, or (num, den), (zeros, poles, gain), (A, B, C, D)"
             ) from None
     try:
         space = system.to_ss()

@@ -287,7 +287,7 @@ BAD_C = {
     "comment": (VOID, "    (void)t; /* open\n    self", ":15: a comment that does not end"),
     "slashes": (VOID, "    (void)t; // unused\n    self", ":15: a comment with //; write /* */"),
     "long": (VOID, f"    (void)t; /* {95 * 'x'} */\n    self", ":15: 114 columns, more than 100"),
-    "letters": (VOID, "    (void)t; /* \u00e9 */\n    self", ":15: '\u00e9' is no printable ASCII"),
+    "letters": (VOID, "    (void)t; /* \u00e9 */\n    self", ":15: '\u00e9' is not printable ASCII"),
     "end": ("    return self->reached;\n}\n", "    return self->reached;\n}\nint x", ":39: 'int x' belongs to no type"),
     "foreign": ("self->reached = x;", "self->reached = hystgen_tanh(x);", ":16: hystgen_tanh is not in the file"),
     "escape": ("    (void)t;\n    return y;", "    (void)t; }\nint y(void) {\n    return 0;", ":24: 'int y(void)"),

@@ -222,8 +222,8 @@ class TestCommand:
         code, _, err = run(*words, "-o", tmp_path / "out")
         assert code == 2
         assert err.splitlines() == [
-            "error: the max rate -1.0 is no number above 0; give input units per second",
-            "error: the sample time nan is no number above 0; give seconds",
+            "error: the max rate -1.0 is not a number above 0; give input units per second",
+            "error: the sample time nan is not a number above 0; give seconds",
         ]
 
     def test_a_range_too_narrow_for_its_numbers(self, tmp_path: Path) -> None:

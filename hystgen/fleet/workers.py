@@ -35,7 +35,7 @@ IDLE = 30.0
 """Seconds after which a process without work ends."""
 
 WATCH = 1.0
-"""Seconds between two looks of a process for the one that started it."""
+"""[s] A process checks at this interval whether the one that started it is still there."""
 
 
 class SchedulerError(OSError):

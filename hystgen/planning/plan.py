@@ -31,10 +31,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SAMPLE_TIME = 1e-4
-"""s, where neither the caller nor the parameter file gives one."""
+"""[s] Default where neither the caller nor the parameter file gives one."""
 
 MEASURED = "measured"
-"""Folder of the measured records beside the drives."""
+"""Folder for the measured records, next to the drives."""
 
 WHOLE, CODES, RECORDING = "session.csv", "session_codes.txt", "recording.csv"
 """Files of a session at one rate: its drives, its codes, and where its recording is looked for."""
@@ -135,7 +135,7 @@ class Plan:
         return shlex.join([*words, *out])
 
     def tables(self) -> dict[str, str]:
-        """Names and text of the files but the page: CSV of t, v and, with a converter, code; of a session all of it."""
+        """Names and text of all files except the page: tables of t, v and, with a converter, codes."""
         from hystgen.records import columns_text, headers
 
         names = ("t", "v") if self.dac is None else ("t", "v", "code")
@@ -157,7 +157,7 @@ class Plan:
         return {**made, session.FILE: self.session.to_json()}
 
     def _options(self) -> str:
-        """Of the command line that makes the same session."""
+        """Options of the command line that makes the same session."""
         said = [f"--max-rate {self.max_rate!r}"]
         if self.session is not None:
             said.append(f"--rate {self.session.rate!r}")
@@ -186,9 +186,9 @@ def plan(
     shortest time between samples, s (default: the file's, else `SAMPLE_TIME`). Every drive stays inside `input_range`
     and below `max_rate`.
 
-    `rate`: the one sample rate of a converter, Hz, in place of `sample_time`: every drive has a sample a tick, and all
-    are parts of one session, with the rests between them. `dac_bits`, `dac_range` and `dac_coding` say how its codes
-    are made (see `Dac`); drives are then what the codes give, and pass `max_rate` by no more than a code.
+    `rate`: the one sample rate of a converter, Hz, instead of `sample_time`: every drive has one sample per tick, and
+    all are parts of one session, with the rests between them. `dac_bits`, `dac_range` and `dac_coding` say how its
+    codes are made (see `Dac`); drives are then what the codes give, and pass `max_rate` by no more than a code.
 
     Raises ParameterError, PlanError with every problem.
     """
@@ -209,12 +209,12 @@ def plan(
         ("rate", rate, "samples per second"),
     )
     problems = [
-        f"the {name} {value!r} is no number above 0; give {unit}"
+        f"the {name} {value!r} is not a number above 0; give {unit}"
         for name, value, unit in given
         if value is not None and not 0.0 < value < math.inf
     ]
     if rate is not None and sample_time is not None:
-        problems.append("a rate is one over a sample time; give one of both")
+        problems.append("a rate is one over a sample time; give one or the other")
     dac = _dac(rate, dac_bits, dac_range, dac_coding, problems)
     if problems:
         raise PlanError(problems)
@@ -306,6 +306,7 @@ class _Player:
 
     @property
     def first(self) -> int:
+        """Tick at which the first record begins."""
         return (len(self.nodes) - 1) * self.every + self.tempo.rest
 
     def played(self, nodes: Sequence[int], every: int) -> tuple[Array, Codes | None]:

@@ -89,7 +89,7 @@ def to_seconds(t: Array, unit: str) -> tuple[Array, str]:
     """Times in seconds, and what the user should know about it, empty when they were seconds already."""
     scale = TIMES.get(_plain(unit).partition(" since ")[0].casefold())
     if scale is None:
-        return t, f'the unit "{printable(unit)}" of t is no known unit of time; its numbers were taken as seconds'
+        return t, f'the unit "{printable(unit)}" of t is not a known unit of time; its numbers were taken as seconds'
     factor, divisor = scale
     if factor == divisor:
         return t, ""
@@ -188,7 +188,7 @@ def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
             text = match["number"]
             if "," in text and (decimal != "," or text.count(",") > 1 or "." in text):
                 continue
-            # What has a value of its own is no unit but the next entry of the line
+            # What has a value of its own is not a unit but the next entry of the line
             after = "" if match["entry"] else match["after"]
             unit = match["unit"] or (match["suffix"] or "").lstrip("_") or after or ""
             step = _step(bool(match["rate"]), float(text.replace(",", ".")), unit, f"line {number}")
@@ -349,9 +349,9 @@ def parse_columns(text: str) -> dict[str, str]:
     for part in text.split(","):
         ours, equals, theirs = (piece.strip() for piece in part.partition("="))
         if not equals or not ours or not theirs:
-            raise ValueError(f'"{printable(part.strip())}" is no NAME=COLUMN; write t=Time,v=U,y=Pos')
+            raise ValueError(f'"{printable(part.strip())}" is not NAME=COLUMN; write t=Time,v=U,y=Pos')
         if not ours.isidentifier():
-            raise ValueError(f'"{printable(ours)}" is no column name; the names on the left are t, v, y, u, ...')
+            raise ValueError(f'"{printable(ours)}" is not a column name; the names on the left are t, v, y, u, ...')
         if ours in mapping:
             raise ValueError(f"{ours} is given twice; name one column for it")
         if theirs in mapping.values():
@@ -512,7 +512,7 @@ class Finder:
     def _missing(self, ours: str, theirs: str) -> None:
         if theirs in self.ignored:
             self.problems.append(
-                f'"{printable(theirs)}" is no column of numbers; export a vector of numbers, or name another column '
+                f'"{printable(theirs)}" is not a column of numbers; export a vector of numbers, or name another column '
                 f'with --columns "{ours}=COLUMN"'
             )
             return

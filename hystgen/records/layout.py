@@ -1,8 +1,8 @@
 """The layout of a text table: the separator of its cells, the lines of its header, its units and its numbers.
 
-The numbers show it: of all ways to separate cells and to write decimals the one that makes numbers of most cells of the
-first lines is that of the file. Header and units are then the lines above them with as many cells. The headers of some
-instruments say it themselves.
+The numbers reveal it: a file uses the separator and the decimal mark with which most cells of its first lines are
+numbers. Header and units are then the lines above with the same number of cells. The headers of some instruments state
+their layout.
 """
 
 from __future__ import annotations
@@ -370,7 +370,7 @@ def _of_segment(
     header: int,
 ) -> Layout:
     found = Layout(dialect, names, header + 1, header, kind="LabVIEW measurement file", another=END)
-    # The comment at the end of a row is no channel, and may be missing
+    # The comment at the end of a row is not a channel, and may be missing
     if names[-1] in ("Comment", ""):
         names[-1] = ""
     places = [k for k, name in enumerate(names) if name == "X_Value"]
@@ -425,7 +425,7 @@ def _number(reading: Reading, dialect: Dialect, text: str, tag: str, line: int) 
         # Versions differ in whether tags follow the decimal separator of the rows
         return float(text.replace(dialect.decimal, "."))
     except ValueError:
-        raise reading.refuse(f'{tag} has "{printable(text)}", which is no number; export it again', line) from None
+        raise reading.refuse(f'{tag} has "{printable(text)}", which is not a number; export it again', line) from None
 
 
 # GCS arrays of Physik Instrumente ----------------------------------------------------------------------------
@@ -469,7 +469,7 @@ def pi_gcs(reading: Reading, lines: Sequence[str]) -> Layout | None:
         except ValueError:
             seconds = 0.0
         if not 0.0 < seconds < float("inf"):
-            raise reading.refuse("SAMPLE_TIME is no number of seconds; correct it, or export the table again", place)
+            raise reading.refuse("SAMPLE_TIME is not a number of seconds; correct it, or export the table again", place)
         found.steps = [Step(seconds, f"SAMPLE_TIME {seconds:g} s (line {place})")]
     return found
 
@@ -477,7 +477,7 @@ def pi_gcs(reading: Reading, lines: Sequence[str]) -> Layout | None:
 def _whole(reading: Reading, entries: dict[str, tuple[int, str]], key: str) -> int:
     line, text = entries[key]
     if not text.isdecimal() or (key != "NDATA" and not 0 < int(text) < LARGEST_CODE):
-        raise reading.refuse(f"{key} is no whole number that can be; correct it, or export the table again", line)
+        raise reading.refuse(f"{key} is not a possible whole number; correct it, or export the table again", line)
     return int(text)
 
 
@@ -489,7 +489,7 @@ _SETTINGS = ("Sample Interval", "Record Length", "Vertical Units")
 
 
 def tektronix(reading: Reading, lines: Sequence[str]) -> Layout | None:
-    """The layout that the settings give: one a line and one cell a channel, then `TIME,CH1,CH2` and the rows.
+    """The layout that the settings give: one per line and one cell per channel, then `TIME,CH1,CH2` and the rows.
 
     They have what the header lacks: units of time and of each channel, and the label that a user gave it.
     """
@@ -562,7 +562,7 @@ def rigol(reading: Reading, lines: Sequence[str]) -> Layout | None:
 
 
 def yokogawa(reading: Reading, lines: Sequence[str]) -> Layout | None:
-    """The layout that the settings give, one a line and one cell a channel; rows begin with an empty cell.
+    """The layout that the settings give, one per line and one cell per channel; rows begin with an empty cell.
 
     They have no time. `"TraceName","CH1","CH2"` has the names, `VUnit` the units, `HResolution` the time between rows.
     """

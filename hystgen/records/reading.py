@@ -28,7 +28,7 @@ BESIDE = 2
 HDF5 (2026-11-26)."""
 
 NO_SECONDS = 1e11
-"""Times from here on are no seconds: those since 1970 get there in the year 5138, milliseconds did in 1973."""
+"""Times from here on are not seconds: those since 1970 get there in the year 5138, milliseconds did in 1973."""
 
 
 def _memory() -> float:
@@ -199,7 +199,7 @@ class Reading:
         """The table of a file whose columns are read one by one.
 
         Read are the columns asked for and, out of the groups that hold these, all others of the same length; not those
-        that are no numbers (`ignored`) or whose numbers the file does not hold itself (`outside`). `matrices`: name to
+        that are not numbers (`ignored`) or whose numbers the file does not hold itself (`outside`). `matrices`: name to
         shape and numbers; the only one of a file without vectors is the record.
         """
         if not columns and len(matrices) == 1:
@@ -278,7 +278,7 @@ def in_matrix(shape: tuple[int, ...]) -> int:
 
 
 def one_dimension(shape: tuple[int, ...]) -> int:
-    """Length of a vector, whether it is a row, a column or neither; 0 where it is no vector."""
+    """Length of a vector, whether it is a row, a column or neither; 0 where it is not a vector."""
     length = int(np.prod(shape, dtype=np.int64))
     return length if length > 1 and length == max(shape) else 0
 

@@ -114,7 +114,7 @@ def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
         size, corners = samples * plan.dac.bytes, header.nodes(plan.stretches)
         said.insert(
             1,
-            f"{CODES} has the same as one code a line: {samples} codes, {size / 1e6:.3g} MB of memory at "
+            f"{CODES} has the same as one code per line: {samples} codes, {size / 1e6:.3g} MB of memory at "
             f"{counted(plan.dac.bytes, 'byte')} each. The files of the single records have their codes in the column "
             f"code. For firmware {header.file(plan.parameters)} has the {len(corners)} codes between which the drive "
             f"is straight, {len(corners) * plan.dac.bytes / 1e3:.3g} kB.",
