@@ -72,7 +72,7 @@ class PIController:
     """Proportional-integral controller `u_k = kp e_k + ki T (e_0 + ... + e_k)`, T the loop's sample time.
 
     `kp` in controller output per error unit, `ki` in the same per second. Nothing is limited. Raises ValueError for
-    gains that are no finite numbers.
+    gains that are not finite.
     """
 
     kp: float
@@ -100,7 +100,7 @@ class Response:
     displacement: Array
 
     def max_error(self, start: float = 0.0) -> float:
-        """Largest `|error|` from `start` (s) on, at the samples. Raises ValueError where nothing is left."""
+        """Largest `|error|` from `start` (s) on, at the samples. Raises ValueError if no sample is left."""
         return float(np.max(np.abs(self._error_from(start))))
 
     def rms_error(self, start: float = 0.0) -> float:

@@ -81,7 +81,7 @@ def diagnose(
     plan: bool, max_rate: float | None, session: str | None, history: str | None, rest: float, skip: float,
     **reading: Any,
 ) -> None:
-    """Find what a model is missing: where it disagrees with records, the missing effect, the model with it added.
+    """Find what a model is missing: where it disagrees with records, which effect is missing, and the model with it.
 
     Example: hystgen diagnose stage_x.yaml slow.csv steps.csv --holdout other.csv -o diagnosis/
 

@@ -198,7 +198,7 @@ def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
 
 
 def is_named(name: str) -> bool:
-    """Whether a name, with a unit or without, is one of a sample rate or a sample time."""
+    """Whether a name, with or without a unit, means a sample rate or a sample time."""
     key, _ = split_unit(name)
     return re.fullmatch(f"{_RATE}|{_STEP}", key) is not None
 
@@ -214,7 +214,7 @@ def from_number(name: str, value: float, of: str = "", unit: str = "") -> Step |
 
 
 def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
-    """Seconds a sample, from a rate or an interval; None if the unit is of neither."""
+    """Seconds per sample, from a rate or an interval; None if the unit fits neither."""
     if not 0.0 < value < float("inf"):
         return None
     plain = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u")
@@ -446,7 +446,7 @@ class Finder:
         return meant[0] if len(meant) == 1 else None
 
     def _name_together(self, found: Mapping[str, Column]) -> None:
-        """One question for all columns that nothing identifies, or more than one may be."""
+        """One question for all columns that nothing identifies, or for which there are several candidates."""
         if not self._unnamed:
             for ours, meant in self._several.items():
                 self._ask(ours, ours, meant)
@@ -473,7 +473,7 @@ class Finder:
         return f', for example --columns "{",".join(f"{ours}={self._address(c)}" for ours, c in answers.items() if c)}"'
 
     def _address(self, c: Column) -> str:
-        """What names a column in `--columns`: its name, or its number where that is not its alone, or has a comma."""
+        """The word for a column in `--columns`: its name, or its number if the name is not unique or has a comma."""
         alone = sum(each.name == c.name for each in self.columns) == 1
         return printable(c.name) if alone and not set(",=") & set(c.name) else f"#{self.columns.index(c) + 1}"
 
@@ -548,7 +548,7 @@ class Finder:
 
 
 def further_names(others: Sequence[Column], taken: Sequence[str]) -> dict[str, Column]:
-    """Columns beyond the chosen ones under the shortest name that is theirs alone; those without one are left out."""
+    """The other columns, each under its shortest unique name; those without one are left out."""
     names: dict[str, Column] = {}
     times = [Counter(getattr(c, part) for c in others) for part in ("label", "own", "name")]
     for c in others:

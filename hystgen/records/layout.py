@@ -27,7 +27,7 @@ _RULE = re.compile(r"\s*([-=_*~])\1{2,}[\s\-=_*~+]*")
 _MARKS = re.compile(r"^[\s#%/]+")
 
 EXAMPLES = {1: "v=#1", 2: "1,2 --sample-time SECONDS"}
-"""How to name columns by their numbers in a table of this many columns."""
+"""How to name columns by their numbers in a table with this many columns."""
 
 EXAMPLE = "1,2,3"
 """The same for every wider table."""
@@ -75,7 +75,7 @@ class _View:
 
 
 def find(reading: Reading, lines: Sequence[str]) -> Layout:
-    """The layout of a table by its first lines, which say it if they are an instrument's, else the numbers show it.
+    """The layout of a table, from its first lines if an instrument wrote them, else from the numbers.
 
     Raises RecordError where nothing or more than one thing fits.
     """
@@ -111,7 +111,7 @@ def _shown(reading: Reading, lines: Sequence[str]) -> Layout:
 
 
 def _dialects(reading: Reading, lines: Sequence[str]) -> list[Dialect]:
-    """Everything that may separate cells, with either mark of decimals."""
+    """Every possible separator of cells, with either decimal mark."""
     quoted = any('"' in line for line in lines)
     delimiters = [reading.delimiter] if reading.delimiter else list(DELIMITERS)
     found = []
@@ -124,7 +124,7 @@ def _dialects(reading: Reading, lines: Sequence[str]) -> list[Dialect]:
 
 
 def _view(dialect: Dialect, lines: Sequence[_Line]) -> _View | None:
-    """The lines seen by a dialect; None where they are no table of numbers then."""
+    """The lines seen by a dialect; None if it makes no table of numbers of them."""
     rows = [[cell for _, cell in dialect.cells(line.text)] if not line.comment else [] for line in lines]
     weights = [[dialect.weight(cell) for cell in row] for row in rows]
     widths = Counter(len(row) for row in weights if 1 in row)
@@ -197,7 +197,7 @@ def _made(view: _View, names: list[str], header: int, first: int, units: Sequenc
 
 
 def _names(view: _View, text: str) -> list[str] | None:
-    """Cells of a line that has as many as the rows have; None for any other line.
+    """Cells of a line with the same number of cells as the rows; None for any other line.
 
     A last cell without a name may be missing in the header or in the rows.
     """

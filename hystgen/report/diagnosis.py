@@ -166,7 +166,7 @@ def _kind(effect: NamedEffect, there: Sequence[Effect]) -> type[Effect] | None:
 
 
 def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
-    """Rows of name, value, low and high, one a number; the first of equal lists stands for all."""
+    """Rows of name, value, low and high, one per number; the first of equal lists stands for all."""
     if isinstance(value, Mapping):
         known = sure or {}
         return [
