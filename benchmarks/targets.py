@@ -8,8 +8,8 @@ with the same care for NaN, range and status), same compiler, flags (-std=c99 -O
 the range. For the corners engine also the worst case, which is constructed: corner lists of every shape, the deepest
 one among them, then a sample after which the next one has to do more (`ways`), then jumps to everywhere; what lies
 near the dearest of these; and the same with a NaN, an infinity or a `commit` before the jump (`interrupted`). A sample
-that is no number right behind a commit, which sends the answer before the commit once more, is counted apart. So is a
-range that begins where the plays rest, as those of most piezo drives do: from 0 on references may need less than its
+that is not a number right behind a commit, which sends the answer before the commit once more, is counted apart. So is
+a range that begins where the plays rest, as those of most piezo drives do: from 0 on references may need less than its
 lower end; there some fixed sequences, in which rounding decides whether they do, are run as well. Every answer that is
 counted has been compared with the bit reference.
 
@@ -336,8 +336,9 @@ def interrupted(case: Case, found: Sequence[Reals]) -> tuple[Any, Any, list[int]
     """Operations, arguments in the operator's own numbers, and where those of each trial end: trials with something
     between what they jump from and the jump.
 
-    What is no number; a commit of the drive that is jumped from, behind a step elsewhere; and both, where the answer of
-    the step before the commit is asked for again, which leads where the trial jumps to, and a step from there.
+    A sample that is not a number; a commit of the drive that is jumped from, behind a step elsewhere; and both, where
+    the answer of the step before the commit is asked for again, which leads where the trial jumps to, and a step from
+    there.
     """
     odd = [np.nan, np.inf, -np.inf] if ARITHMETICS[case.arithmetic].number.kind == "f" else []
     paths: list[Reals] = []  # what the plays see, to know what the inverse has to be asked for
@@ -385,7 +386,7 @@ def ties() -> tuple[Any, Any]:
 
 
 def behind_commit(call: Any, x: Any) -> Any:
-    """Which operations are steps of what is no number right behind a commit."""
+    """Which operations are steps of what is not a number right behind a commit."""
     return (call == slots.OP_STEP) & ~np.isfinite(x) & (np.roll(call, 1) == slots.OP_COMMIT)
 
 
@@ -486,7 +487,7 @@ class Bench:
         return figures_of(case, engine, "multisine", self.run(case, image, engine, x), image)
 
     def worst(self, case: Case) -> list[Figures]:
-        """Engine corners over the worst trials; apart, where there is that, what is no number behind a commit, and
+        """Engine corners over the worst trials; apart, where there is that, what is not a number behind a commit, and
         the calls of `commit`."""
         image = self.image(case, "corners")
         stack = 0

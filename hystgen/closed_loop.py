@@ -72,7 +72,7 @@ class PIController:
     """Proportional-integral controller `u_k = kp e_k + ki T (e_0 + ... + e_k)`, T the loop's sample time.
 
     `kp` in controller output per error unit, `ki` in the same per second. Nothing is limited. Raises ValueError for
-    gains that are no finite numbers.
+    gains that are not finite.
     """
 
     kp: float
@@ -84,7 +84,7 @@ class PIController:
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What a loop did: arrays (N,), one entry a sample.
+    """What a loop did: arrays (N,), one entry per sample.
 
     `t` in s; `reference`, `output` and `error` (reference less output) in units of the plant's output; `control`: what
     the controller asks for; `drive`: what the compensator makes of it; `displacement`: the plant's input, behind the
@@ -100,7 +100,7 @@ class Response:
     displacement: Array
 
     def max_error(self, start: float = 0.0) -> float:
-        """Largest `|error|` from `start` (s) on, at the samples. Raises ValueError where nothing is left."""
+        """Largest `|error|` from `start` (s) on, at the samples. Raises ValueError if no sample is left."""
         return float(np.max(np.abs(self._error_from(start))))
 
     def rms_error(self, start: float = 0.0) -> float:
@@ -217,7 +217,7 @@ def _sampled(system: Any, sample_time: float, what: str) -> tuple[Array, Array, 
             system = signal.lti(*system)
         except (TypeError, ValueError):
             raise ValueError(
-                f"{what} is no system of scipy.signal; give one, or (num, den), (zeros, poles, gain), (A, B, C, D)"
+                f"{what} is not a system of scipy.signal; give one, or (num, den), (zeros, poles, gain), (A, B, C, D)"
             ) from None
     try:
         space = system.to_ss()

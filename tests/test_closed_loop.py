@@ -575,7 +575,7 @@ TWICE = Bang()
         ({"sample_time": math.nan}, ValueError, "not positive"),
         ({"sample_time": "a"}, ValueError, "the sample time 'a' is not positive"),
         ({"plant": ([1.0, 0.0, 0.0], [1.0, 1.0])}, ValueError, "the plant is not proper"),
-        ({"plant": 5.0}, ValueError, "the plant is no system of scipy.signal; give one, or"),
+        ({"plant": 5.0}, ValueError, "the plant is not a system of scipy.signal; give one, or"),
         ({"plant": (np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2)))}, ValueError, "2 inputs and 2 outputs"),
         ({"plant": ([math.inf], [1.0, 1.0])}, ValueError, "coefficients that are not finite"),
         ({"plant": ([], [-1.0, -1.0 + 1.0j], 1.0)}, ValueError, "the plant has complex coefficients"),

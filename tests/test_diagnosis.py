@@ -153,7 +153,7 @@ class TestBlindPlants:
         page = html.unescape(re.sub(r"\s+", " ", shown))
         reason = " ".join(emitted[2].split("error: ", 1)[-1].split())
         assert ("As C they are not there yet" in page) == (emitted[0] != 0) == (f"yet: {reason}." in page)
-        assert ("What the compensator would leave of the recorded motion:" in page) == (emitted[0] == 0)
+        assert ("Error that the compensator would leave in the motion:" in page) == (emitted[0] == 0)
         assert (reason in " ".join(err.split())) == (emitted[0] != 0)
         assert page.count("Your next step: ") == 1
         assert ("Your next step: write the compensator as C." in page) == (emitted[0] == 0)
@@ -894,7 +894,7 @@ class TestOwnEffects:
         assert [each.name for each in again.effects] == ["user:neighbour"]
 
     def test_numbers_that_make_nothing_end_its_search(self, tmp_path: Path) -> None:
-        """Right beside the start the output is no number."""
+        """Right beside the start the output is not a number."""
 
         class Cliff(Effect):
             name: Literal["user:cliff"] = "user:cliff"

@@ -361,7 +361,7 @@ class TestWholeRecords:
 
     @pytest.mark.parametrize("factor", [1000.0, 0.001])
     def test_a_drive_in_another_unit(self, factor: float) -> None:
-        """It is no measure of how wide the others are."""
+        """It is not a measure of how wide the others are."""
         given = records()
         given[1] = replace(given[1], v=factor * np.asarray(given[1].v))
         kept, (each,) = check(given)

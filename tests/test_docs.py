@@ -117,7 +117,7 @@ class Page:
 
     def text(self, block: Block) -> None:
         """A file."""
-        assert block.saved_as, "a block of text that is no file"
+        assert block.saved_as, "a block of text that is not a file"
 
     def yaml(self, block: Block) -> None:
         """A parameter file, or part of one."""

@@ -456,7 +456,7 @@ class TestLoadingCurve:
 
     def test_a_record_that_turns_is_none(self) -> None:
         v, y = plant(np.asarray, 3)
-        with pytest.raises(IdentificationError, match="is no initial loading curve"):
+        with pytest.raises(IdentificationError, match="is not an initial loading curve"):
             hystgen.identify(record(v, y), loading_curve=True)
         with pytest.raises(ValueError, match="exclude each other"):
             hystgen.identify(record(v, y), loading_curve=True, history=(5.0,))

@@ -230,7 +230,7 @@ class TestWeights:
         v = wander(5, turns=120)
         fit = hystgen.identify(record(v, noisy(brute_output(v, THRESHOLDS, WEIGHTS, 0.0), 0.01)))
         r, p = fitted(fit)
-        assert p.min() > 0.0  # a play without weight is no part of the model
+        assert p.min() > 0.0  # a play without weight is not a part of the model
         other = wander(6)
         y = brute_output(other, THRESHOLDS, WEIGHTS, 0.0)
         first = first_exact(other, float(r[-1]))

@@ -92,7 +92,8 @@ def test_labview_with_comments_and_faults(tmp_path: Path) -> None:
     check(read_record(put(tmp_path / "a.lvm", lines)))
     bad = [*lines]
     bad[first + 3] = bad[first + 3].replace(f"{V[3]:.6f}", "overload")
-    assert f':{first + 4}:10: error: "overload" in column "Drive" is no number' in problem(put(tmp_path / "b.lvm", bad))
+    said = problem(put(tmp_path / "b.lvm", bad))
+    assert f':{first + 4}:10: error: "overload" in column "Drive" is not a number' in said
     several = [*lvm("No"), *lvm("No")[16:]]
     assert "has a second table in it" in problem(put(tmp_path / "c.lvm", several))
     text = problem(put(tmp_path / "d.lvm", lvm("Multi", steps=("1E-3", "2E-3"))))
@@ -235,7 +236,7 @@ def test_pi_gcs_that_is_not_clear_or_damaged(tmp_path: Path) -> None:
     cut = read_record(put(tmp_path / "b.dat", gcs(count=N + 1), "\n"))
     assert cut.notes == ("the file says that it has 51 samples, it has 50",)
     lines = [line.replace("= 0.001000", "= fast") for line in gcs()]
-    assert ":7:1: error: SAMPLE_TIME is no number of seconds" in problem(put(tmp_path / "c.dat", lines, "\n"))
+    assert ":7:1: error: SAMPLE_TIME is not a number of seconds" in problem(put(tmp_path / "c.dat", lines, "\n"))
     lines = [line.replace("DIM = 2", "DIM = 3") for line in gcs()]
     assert "2 columns where the header has 3" in problem(put(tmp_path / "d.dat", lines, "\n"), columns={"v": "#1"})
 
@@ -295,7 +296,7 @@ def test_settings_of_instruments_that_say_no_one_time(tmp_path: Path) -> None:
     path = put(tmp_path / "a.csv", [*head, *rows(",{v:.6f},{y:.6f}")])
     assert problem(path) == ":5:1: error: its channels have sample rates of their own; export them with one rate"
     path = put(tmp_path / "b.csv", ["CH1V,CH2V,t0 = 0, tInc = fast", *rows("{v:.6f},{y:.6f},,")])
-    assert problem(path) == ':1:1: error: tInc has "fast", which is no number; export it again'
+    assert problem(path) == ':1:1: error: tInc has "fast", which is not a number; export it again'
 
 
 def test_an_overrange_of_picoscope_is_no_value(tmp_path: Path) -> None:

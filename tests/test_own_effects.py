@@ -260,7 +260,7 @@ BAD_C = {
     "comment": (VOID, "    (void)t; /* open\n    self", ":16: a comment that does not end"),
     "slashes": (VOID, "    (void)t; // unused\n    self", ":16: a comment with //; write /* */"),
     "long": (VOID, f"    (void)t; /* {95 * 'x'} */\n    self", ":16: 114 columns, more than 100"),
-    "letters": (VOID, "    (void)t; /* \u00e9 */\n    self", ":16: '\u00e9' is no printable ASCII"),
+    "letters": (VOID, "    (void)t; /* \u00e9 */\n    self", ":16: '\u00e9' is not printable ASCII"),
     "end": ("    return self->reached;\n}\n", "    return self->reached;\n}\nint x", ":42: 'int x' belongs to no type"),
     "bare": ("hystgen_product(&t->rate, x - self->reached)", "t->rate * (x - self->reached)", ":39: t->rate by itself"),
     "foreign": ("self->reached = x;", "self->reached = hystgen_tanh(x);", ":17: hystgen_tanh is not in the file"),

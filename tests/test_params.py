@@ -148,7 +148,7 @@ REFUSED = [
         '1:7: character U+D800 is not allowed; remove it',
     ]),
     case('second_document', H + M + "---\na: 1\n", [
-        '5:1: a second document starts here; keep one model a file',
+        '5:1: a second document starts here; keep one model per file',
     ]),
     case('yaml_1_1', "%YAML 1.1\n---\n" + H + M, [
         '1:1: directives are not accepted; remove the line that starts with %',
@@ -204,7 +204,7 @@ REFUSED = [
         '1:19: nested more than 16 deep; remove the extra nesting',
     ]),
     case('too_many_values', "a: [" + "1," * 100_000 + "]\n", [
-        '1:199999: more than 100000 keys and values; keep one model a file',
+        '1:199999: more than 100000 keys and values; keep one model per file',
     ]),
     case('everything_missing', "{}\n", [
         '1:1: hystgen: is missing; add `hystgen: 1`',
@@ -806,10 +806,10 @@ def test_size(tmp_path: Path) -> None:
     assert path.stat().st_size == 2**20
     assert load_parameters(path) == parse_parameters(CONTRACT)
     path.write_text(CONTRACT + "#" * (2**20 - len(CONTRACT)) + "\n")
-    size = "the file has 1048577 bytes, more than 1048576 (1 MiB); keep one model a file"
+    size = "the file has 1048577 bytes, more than 1048576 (1 MiB); keep one model per file"
     assert load_refusal(path) == f"FILE: error: {size}"
     assert refusal(path.read_text()) == [f"f.yaml: error: {size}"]
-    assert load_refusal("/dev/zero") == "FILE: error: the file has more than 1048576 bytes (1 MiB); keep one model a file"
+    assert load_refusal("/dev/zero") == "FILE: error: the file has more than 1048576 bytes (1 MiB); keep one model per file"
 
 
 @pytest.mark.parametrize(

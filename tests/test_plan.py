@@ -17,7 +17,7 @@ from modelfiles import head
 import hystgen
 from hystgen import effects
 from hystgen.basics.problems import PlanError
-from hystgen.planning import plan as plans
+from hystgen.planning import waveforms
 from hystgen.report.plan import Plan
 from tests.plants.__main__ import main as plants
 from tests.plants.effects import catalogue
@@ -145,7 +145,7 @@ class TestContent:
 
     def test_sine(self) -> None:
         x = np.linspace(-3.0, 3.0, 5001)
-        assert np.max(np.abs([plans.sine(float(each)) - np.sin(2.0 * np.pi * each) for each in x])) < 1e-13
+        assert np.max(np.abs([waveforms.sine(float(each)) - np.sin(2.0 * np.pi * each) for each in x])) < 1e-13
 
     def test_same_bytes_everywhere(self, tmp_path: Path) -> None:
         """The digest of the CSV files depends neither on the machine nor on its libraries."""
@@ -222,8 +222,8 @@ class TestCommand:
         code, _, err = run(*words, "-o", tmp_path / "out")
         assert code == 2
         assert err.splitlines() == [
-            "error: the max rate -1.0 is no number above 0; give input units per second",
-            "error: the sample time nan is no number above 0; give seconds",
+            "error: the max rate -1.0 is not a number above 0; give input units per second",
+            "error: the sample time nan is not a number above 0; give seconds",
         ]
 
     def test_files_of_another_session_are_named(self, tmp_path: Path, run: Call) -> None:

@@ -244,7 +244,7 @@ def test_datasets_by_path_and_by_their_last_name(tmp_path: Path) -> None:
     )
     assert len(reported) == 3
     (problem,) = problems(path, columns=parse_columns("t=session1/t,v=session1/title,y=session1/y"))
-    assert problem.startswith('"session1/title" is no column of numbers; ')
+    assert problem.startswith('"session1/title" is not a column of numbers; ')
     (problem,) = problems(path, columns=parse_columns("t=session1/t,v=session1/driev,y=session1/y"))
     assert 'did you mean --columns "v=session1/drive"?' in problem
     check(read_record(path, parse_columns("t=/session1/t,v=/session1/drive,y=/session1/y")))
@@ -413,7 +413,7 @@ def test_fields_of_structs_in_both_kinds_of_mat(tmp_path: Path) -> None:
 def test_text_of_matlab_is_no_column_though_it_is_stored_as_numbers(tmp_path: Path) -> None:
     write_mat_73(tmp_path / "a.mat", {"t": T, "v": V, "y": Y})
     (problem,) = problems(tmp_path / "a.mat", columns={"y": "comment"})
-    assert problem.startswith('"comment" is no column of numbers')
+    assert problem.startswith('"comment" is not a column of numbers')
 
 
 def test_hdf5_under_the_name_of_a_mat_file(tmp_path: Path) -> None:
@@ -435,7 +435,7 @@ def test_nulls_and_text_in_parquet(tmp_path: Path) -> None:
     assert record.notes[0] == "columns without numbers were left out: state"
     assert "1 sample without a value in v or y or t dropped, the first at index 7" in record.notes
     (problem,) = problems(tmp_path / "a.parquet", columns={"v": "state"})
-    assert problem.startswith('"state" is no column of numbers')
+    assert problem.startswith('"state" is not a column of numbers')
 
 
 def test_columns_called_alike_in_parquet(tmp_path: Path) -> None:
@@ -746,7 +746,7 @@ def test_seconds_by_other_names_and_unknown_units_of_time(tmp_path: Path) -> Non
     write_csv(tmp_path / "a.csv", {"t [samples]": T, "v": V, "y": Y})
     record = read_record(tmp_path / "a.csv")
     check(record)
-    assert record.notes == ('the unit "samples" of t is no known unit of time; its numbers were taken as seconds',)
+    assert record.notes == ('the unit "samples" of t is not a known unit of time; its numbers were taken as seconds',)
 
 
 def test_units_of_parquet_fields(tmp_path: Path) -> None:
@@ -933,8 +933,8 @@ def test_faults_far_into_a_file_of_many_blocks(tmp_path: Path, monkeypatch: pyte
         read_record(tmp_path / "bad.csv")
     column = len(",".join(some[900][:2])) + 2
     assert caught.value.problems == [
-        f'{tmp_path / "bad.csv"}:902:{column}: error: "fault" in column "y" is no number; write a number, or nothing '
-        "where there is no value",
+        f'{tmp_path / "bad.csv"}:902:{column}: error: "fault" in column "y" is not a number; write a number, or '
+        "nothing where there is no value",
         f"{tmp_path / 'bad.csv'}:1802:1: error: 1 column where the header has 4; complete or remove the line",
         f"{tmp_path / 'bad.csv'}:1902:1: error: 5 columns where the header has 4; complete or remove the line",
     ]
@@ -1074,7 +1074,7 @@ def test_a_bar_while_reading_on_a_terminal(tmp_path: Path) -> None:
         [sys.executable, "-c", PATIENT.format(0.0), "simulate", "m.yaml", file],
         cwd=tmp_path, capture_output=True, text=True, check=True,
     )  # fmt: skip
-    assert "reading" not in done.stderr, "nothing where stderr is no terminal"
+    assert "reading" not in done.stderr, "nothing where stderr is not a terminal"
 
 
 def terminal(ours: int) -> str:

@@ -284,7 +284,8 @@ class TestRefuse:
         column = len(cells[4][0]) + 2
         reported = problems(path)
         assert reported[0] == (
-            f':6:{column}: error: "abc" in column "v" is no number; write a number, or nothing where there is no value'
+            f':6:{column}: error: "abc" in column "v" is not a number; write a number, or nothing where there is no '
+            "value"
         )
         assert reported[1].startswith(f":11:{len(','.join(cells[9][:2])) + 2}: error: ")
         assert reported[2] == ":13:1: error: 1 column where the header has 3; complete or remove the line"
@@ -328,8 +329,8 @@ class TestRefuse:
         ]
         np.savez(tmp_path / "e.npz", t=np.arange(20.0), v=np.array([{}] * 20))
         assert problems(tmp_path / "e.npz")[0] == (
-            ': error: "v" is no column of numbers; export a vector of numbers, or name another column with --columns '
-            '"v=COLUMN"'
+            ': error: "v" is not a column of numbers; export a vector of numbers, or name another column with '
+            '--columns "v=COLUMN"'
         )
         np.save(tmp_path / "f.npy", np.arange(20.0))
         (tmp_path / "f.npy").rename(tmp_path / "f.npz")

@@ -237,8 +237,8 @@ class TestCommand:
     @pytest.mark.parametrize(
         ("words", "said"),
         [
-            (["--plan", "FILE", "--rate", "0"], "the rate 0.0 is no number above 0"),
-            (["--plan", "FILE", "--rate", "50", "--sample-time", "0.02"], "give one of both"),
+            (["--plan", "FILE", "--rate", "0"], "the rate 0.0 is not a number above 0"),
+            (["--plan", "FILE", "--rate", "50", "--sample-time", "0.02"], "give one or the other"),
             (["--plan", "FILE", "--rate", "1e6"], "give a rate of 30000 Hz or less"),
             (["--plan", "FILE", "--rate", "50", "--dac-bits", "16"], "need its bits and its range"),
             (["--plan", "FILE", "--dac-bits", "16", "--dac-range", "-20,120"], "give the rate at which it is played"),

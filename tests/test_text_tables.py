@@ -203,10 +203,10 @@ def test_decimal_commas_that_may_be_thousands_marks(tmp_path: Path) -> None:
     # One number that can only be a decimal decides for all
     record = read_record(put(tmp_path / "b.csv", "t;v;y", *rows, "60;0,5;1,000"))
     assert record.v[:2].tolist() == [1.1, 2.101]
-    # With a point behind it the comma is no decimal comma, and nothing is read
+    # With a point behind it the comma is not a decimal comma, and nothing is read
     rows = [f'{k},"{1 + k % 9},{100 + k}.5",{k % 7}' for k in range(N)]
     (problem,) = problems(put(tmp_path / "c.csv", "t,v,y", *rows))
-    assert ':2:3: error: "1,100.5" in column "v" is no number; thousands marks are not read' in problem
+    assert ':2:3: error: "1,100.5" in column "v" is not a number; thousands marks are not read' in problem
     assert problem.endswith("(and 59 more, the last in line 61)")
 
 

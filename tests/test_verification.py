@@ -146,7 +146,7 @@ def test_a_compiler_may_be_a_command_of_several_words(tmp_path: Path, monkeypatc
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ("gcc 'a", "the compiler \"gcc 'a\" is no command: No closing quotation; correct it"),
+        ("gcc 'a", "the compiler \"gcc 'a\" is not a command: No closing quotation; correct it"),
         (" ", "a compiler is named by a command; write gcc, clang, zig or another"),
     ],
 )

@@ -225,7 +225,7 @@ def write(found: dict[str, dict[float, str]]) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """The table and the count, one line a number."""
+    """The table and the count, one line per number."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0] if __doc__ else None)
     parser.add_argument("--only", action="append", default=[], metavar="NAME")
     parser.add_argument("--tests", action="append", default=[], metavar="FILE")

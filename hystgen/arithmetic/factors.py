@@ -35,7 +35,7 @@ def factor(x: float | Fraction) -> tuple[int, int]:
         shift -= 1
         mantissa = round(exact * 2**shift)
     if shift < LEAST_SHIFT:
-        raise OverflowError(f"{float(x):.6g} is no factor below {BEYOND:g}")
+        raise OverflowError(f"{float(x):.6g} is not a factor below {BEYOND:g}")
     return mantissa, shift
 
 
@@ -46,7 +46,7 @@ def error(x: float | Fraction) -> float:
 
 
 def lifted(x: float, bits: int) -> int:
-    """Of `bits` that a product with x is to add, those that it leaves out so that it is one with a factor."""
+    """Number of the `bits` of a product with x that have to be dropped so that x becomes a factor."""
     return max(0, math.frexp(x)[1] + bits - (math.frexp(BEYOND)[1] - 1))
 
 

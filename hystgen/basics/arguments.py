@@ -97,7 +97,7 @@ def choice(name: str, value: object, known: Sequence[str]) -> None:
 
 
 def words(name: str, value: object, example: str) -> tuple[str, ...]:
-    """A list of words. Raises TypeError; one word alone is no list."""
+    """A list of words. Raises TypeError; one word alone is not a list."""
     if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping):
         found = tuple(value)
         if all(isinstance(word, str) for word in found):
@@ -161,12 +161,12 @@ def signal(name: str, value: object) -> NDArray[Any]:
     try:
         found = np.atleast_1d(np.asarray(value))
     except ValueError:  # lists of different lengths
-        raise ValueError(f"{name} has one number a sample, and rows of different lengths are given") from None
+        raise ValueError(f"{name} has one number per sample, and rows of different lengths are given") from None
     if found.ndim != 1:
         hint = ""
         if found.ndim == 2:
             hint = "; give .ravel() of it" if 1 in found.shape else "; give one of its columns"
-        raise ValueError(f"{name} has one number a sample, shape (N,), not shape {found.shape}{hint}")
+        raise ValueError(f"{name} has one number per sample, shape (N,), not shape {found.shape}{hint}")
     if found.dtype.kind == "O":
         try:
             if any(x is None for x in found):
@@ -201,7 +201,7 @@ def finite_samples(v: ArrayLike) -> Array:
 
 
 def finite(**values: float) -> None:
-    """Raise ValueError for a parameter that is no finite number."""
+    """Raise ValueError for a parameter that is not a finite number."""
     for name, value in values.items():
         try:
             if math.isfinite(value):
@@ -212,7 +212,7 @@ def finite(**values: float) -> None:
 
 
 def positive(**values: float) -> None:
-    """Raise ValueError for a parameter that is no finite number above 0."""
+    """Raise ValueError for a parameter that is not a finite number above 0."""
     finite(**values)
     for name, value in values.items():
         if not value > 0.0:
@@ -220,7 +220,7 @@ def positive(**values: float) -> None:
 
 
 def whole_from(least: int, **values: int) -> None:
-    """Raise ValueError for a parameter that is no whole number from `least` on."""
+    """Raise ValueError for a parameter that is not a whole number from `least` on."""
     for name, value in values.items():
         if not isinstance(value, int | np.integer) or value < least:
             raise ValueError(f"{name} has to be a whole number from {least} on, not {value!r}")

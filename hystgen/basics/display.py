@@ -10,7 +10,7 @@ from hystgen.basics import drawing
 
 
 def block(line: str, table: str = "", draw: Callable[[], Any] | None = None) -> str:
-    """HTML of a line, a table of text below it, and of the figure that `draw` makes, left out without matplotlib."""
+    """HTML of a line, a table of text below it, and of the figure that `draw` makes, if matplotlib is installed."""
     parts = [f"<p>{html.escape(line.strip('<>'))}</p>"]
     if table:
         parts.append(f"<pre>{html.escape(table)}</pre>")

@@ -21,7 +21,7 @@ def _words(text: str) -> frozenset[str]:
 
 _NAME = re.compile(NAME_PATTERN.rstrip("$") + r"\Z")
 
-# C up to C23 and C++ up to C++23; keywords with a leading underscore are no names anyway.
+# C up to C23 and C++ up to C++23; keywords with a leading underscore are not names anyway.
 KEYWORDS = _words(
     """
     alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t char8_t class

@@ -1,4 +1,4 @@
-"""The same work on several things, in processes that are copies of this one, or in threads of it.
+"""The same work on several items, in forked copies of this process or in its threads.
 
 A copy (fork) sees all that this process had when it was made, so that little has to be sent, and results are those of a
 plain loop whatever the processes' order. Where processes cannot be copied safely it is a plain loop.

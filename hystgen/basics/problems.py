@@ -39,7 +39,7 @@ class Problem:
 class ParameterError(ValueError):
     """A parameter file that is refused, with every problem found in it.
 
-    `problems` is sorted by position, `file` is the name as the user gave it; `str()` gives a line a problem.
+    `problems` is sorted by position, `file` is the name as the user gave it; `str()` gives one line per problem.
     """
 
     def __init__(self, file: str, problems: Iterable[Problem]) -> None:
@@ -87,7 +87,7 @@ def path_text(path: Path) -> str:
 class RecordError(ValueError):
     """A data file that is refused, with every problem found in it.
 
-    `problems` has one line a problem, `FILE:LINE:COL: error: what; what to do` (`FILE: error: ...` where there is no
+    `problems` has one line per problem, `FILE:LINE:COL: error: what; what to do` (`FILE: error: ...` where there is no
     line); `str()` joins them.
     """
 
@@ -97,7 +97,7 @@ class RecordError(ValueError):
 
 
 class PlanError(ValueError):
-    """A plan that cannot be made, with every reason in `problems`; `str()` gives a line a problem."""
+    """A plan that cannot be made, with every reason in `problems`; `str()` gives one line per problem."""
 
     def __init__(self, problems: Iterable[str]) -> None:
         self.problems = list(problems)

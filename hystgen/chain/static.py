@@ -181,7 +181,7 @@ class StaticModel:
 
     @cached_property
     def slope_ratio(self) -> float:
-        """Largest slope of the model over its smallest: how much the inverse can amplify a relative error."""
+        """Largest slope over the smallest, the factor by which the inverse can amplify a relative error."""
         least = self.front_slopes[0] * min(self.pi.slopes)
         most = self.front_slopes[1] * max(self.pi.slopes)
         return most / least if least > 0.0 else math.inf
@@ -201,7 +201,7 @@ class StaticModel:
         return list(self._inverse_problems)
 
     def _branch_problems(self) -> list[str]:
-        """Where the descending branch runs below the ascending one: there the inverse would step the wrong way."""
+        """Where the descending branch runs below the ascending one: there the inverse would move the wrong way."""
         low, high = self.input_range
         if not (math.isfinite(low) and math.isfinite(high)):
             return ["with two branches the input range has to be finite"]

@@ -66,7 +66,7 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
 @click.option("--plan", is_flag=True, help="write the drive records to measure, and a page that explains them")
 @click.option("--max-rate", type=float, help="with --plan: fastest change of the drive, input units per second")
 @click.option("--rate", type=float, metavar="HZ", help="with --plan: all drives at this rate of a converter, in order")
-@click.option("--dac-bits", type=int, help="with --rate: codes for a DAC of so many bits")
+@click.option("--dac-bits", type=int, help="with --rate: codes for a DAC with this many bits")
 @click.option(
     "--dac-range", metavar="LOW,HIGH", help="drive at the lowest code and one above the highest, amplifier included"
 )
@@ -84,7 +84,7 @@ def diagnose(
     plan: bool, max_rate: float | None, session: str | None, history: str | None, rest: float, skip: float,
     **reading: Any,
 ) -> None:
-    """Find what a model is missing: where it disagrees with records, the missing effect, the model with it added.
+    """Find what a model is missing: where it disagrees with records, which effect is missing, and the model with it.
 
     Example: hystgen diagnose stage_x.yaml slow.csv steps.csv --holdout other.csv -o diagnosis/
 

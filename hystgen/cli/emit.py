@@ -71,7 +71,7 @@ def emit(
 def _check(
     models: Sequence[tuple[str, Model]], output: str, options: Mapping[str, Any], effects: Sequence[str]
 ) -> None:
-    """Exit code 1 with the differences of files on disk, and the commands that fit."""
+    """Exit with code 1; says how the files on disk differ and which commands bring them up to date."""
     from hystgen.emission import calls, stale
     from hystgen.emission.options import OPTIONS
 

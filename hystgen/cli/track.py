@@ -33,7 +33,7 @@ def track(
     params: str, data: tuple[str, ...], plot: str | None, effects: tuple[str, ...], history: str | None, rest: float,
     skip: float, **reading: Any,
 ) -> None:
-    """Print what tracking would leave on the recorded actuator: with a straight line, with plays alone, with the model.
+    """Print the tracking error on the recorded actuator: with a straight line, with plays only, with the model.
 
     Example: hystgen track diagnosed/params.yaml held_out.csv --plot tracking.svg
     """

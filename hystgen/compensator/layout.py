@@ -135,7 +135,7 @@ def first_moves(
 
     `not_above` gives the largest number of the type that is not above a drive, and whether it is that drive. The
     forward operator has to know which way the actuator moves from the drive that the start memory stands for, also
-    where that is no number of the type or lies beyond the limits: seen from the number below it, every move has its
+    where that is not a number of the type or lies beyond the limits: seen from the number below it, every move has its
     true direction if no move counts as descending. The inverse starts at the nearest number, where it may stay.
     """
     low, high = limits

@@ -141,7 +141,7 @@ def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
 
 def codes(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[Any]:
     """Samples as codes of fixed point. Raises ValueError for numbers that are not codes."""
-    with np.errstate(invalid="ignore"):  # what is no code is found below
+    with np.errstate(invalid="ignore"):  # what is not a code is found below
         found = np.ascontiguousarray(x, dtype=t.threshold.dtype)
     most = int(t.limits[CODE_MAX])
     if np.any(x != found) or np.any(found < -most - 1) or np.any(found > most):

@@ -123,7 +123,7 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
 
 @arguments.taking(emit_options, "emit")
 def differences(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) -> list[str]:
-    """The files in folder `output` that are missing or differ from what `emit` would write, one sentence a file.
+    """The files in folder `output` that are missing or differ from what `emit` would write, one sentence per file.
 
     The sentence names what differs: options, parameters, version of hystgen, edits by hand, line ends.
     """

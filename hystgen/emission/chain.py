@@ -1,6 +1,5 @@
-"""The C that names the blocks of a model with effects: their tables, their memory, and the order they are called in.
-
-What a block does stands in `c_runtime/`; here are only its places.
+"""The glue of a model with effects in C: tables and memory of its blocks, and the order of their calls. The blocks
+themselves are in `c_runtime/`.
 """
 
 from __future__ import annotations
@@ -155,7 +154,7 @@ def saturation(t: ChainTables, j: int, name: str, prefix: str) -> dict[str, Any]
 
 
 def _curve(t: Bends, which: int, own: str) -> tuple[list[str], str]:
-    """The tables of a curve in fixed point, and what stands between the braces of the curve itself."""
+    """The tables of a curve in fixed point, and the initializer of the curve itself."""
     here = int(t.first[which])
     rows = slice(here, here + int(t.pieces[which]))
     arrays = [

@@ -45,7 +45,7 @@ AVR = Layout(integer=2, pointer=2, packed=True)
 
 @dataclass(frozen=True)
 class Memory:
-    """Bytes of the constant tables and of an instance of each operator; `play`: of both, those of one play more."""
+    """Bytes of the constant tables and of an instance of each operator; `play`: bytes of both per additional play."""
 
     tables: int
     instances: list[tuple[str, int]]
@@ -319,7 +319,7 @@ def worst_case(n: int, op: str, corners: bool, numbers: Tables | FixedTables) ->
 
 
 def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[int, int, int, int]:
-    """Multiplications, comparisons, and of these more a play, more a bit of n; of plays, checks and limits.
+    """Multiplications; comparisons; further ones per play and per bit of n; of plays, checks and limits.
 
     Counted in the bit reference (`tests/test_cost.py`), and rounded up to what a search that bisects its whole list
     would take.
@@ -329,7 +329,7 @@ def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[in
             return 1, 11 if fixed else 7, 2, 0
         return 3, 14, 3, 0
     if fixed:  # the corner, then the play in its block: either is bisected; clamps, the code, what lies ahead
-        # the output of a corner is put together from its parts, of the top one and of the one behind it
+        # the output of a corner is the sum of its parts, for the top one and the one behind it
         return (1, 15, 0, 2) if op == "forward" else (5 + 2 * fast, 19 + 3 * fast, 0, 4)
     # the sign of a move takes a multiplication too; up to eight plays are tried one by one before either search
     if op == "forward" or fast:

@@ -1,5 +1,4 @@
-"""What to emit, and the comment at the top of every emitted file that says so: what made the file, and whether it still
-is as it was made."""
+"""What to emit, and the banner of every emitted file: what made the file, and whether it has been edited since."""
 
 from __future__ import annotations
 

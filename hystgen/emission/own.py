@@ -50,7 +50,10 @@ def pieces(t: ChainTables) -> tuple[list[Piece], list[Piece]]:
 
 
 def of_effect(effect: type[Effect]) -> tuple[list[Piece], list[Piece]]:
-    """Types and functions of the C file of an effect. Raises EffectsError, a line a problem: `FILE:LINE: what; do`."""
+    """Types and functions of the C file of an effect.
+
+    Raises EffectsError with one line per problem: `FILE:LINE: what is wrong; what to do`.
+    """
     file, kind = own.source(effect), own.kind(effect)
     try:
         data = file.read_bytes()
@@ -85,7 +88,7 @@ def _of_lines(text: str) -> Iterator[tuple[int, str]]:
         return
     for number, (whole, line) in enumerate(zip(text.split("\n"), code.split("\n"), strict=True), 1):
         if strange := re.search(r"[^ -~]", whole):
-            yield number, f"{printable(strange[0])!r} is no printable ASCII; write another character"
+            yield number, f"{printable(strange[0])!r} is not printable ASCII; write another character"
         if len(whole) > WIDTH:
             yield number, f"{len(whole)} columns, more than {WIDTH}; break the line"
         if "?" "?" in whole:

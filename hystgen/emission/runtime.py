@@ -66,7 +66,7 @@ FIXED_KERNELS = (
 
 @dataclass(frozen=True)
 class Family:
-    """How an arithmetic appears in C: which files of the run time and which types it has; `chain`: in a model with
+    """An arithmetic in C: its files of the run time and its types; `chain`: in a model with
     effects."""
 
     arithmetic: Arithmetic
@@ -362,7 +362,7 @@ def chain_types(own: Iterable[Piece], glue: str, family: Family) -> list[Piece]:
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
-    """Prototypes of an operator: those of every model, and of what models with effects have beside, the ones named."""
+    """Prototypes of an operator: those of every model, and those of models with effects that are named."""
     chain = {f"hystgen_{operator}_{each}" for each in more}
     beside = [piece for piece in _pieces([f"hystgen_chain_{operator}_api.h"]) if piece.name in chain]
     return [*_pieces([f"hystgen_{operator}_api.h"]), *beside]
@@ -424,7 +424,7 @@ def render_operators(pieces: Iterable[Piece], name: str, corners: int, prefix: s
 def api(
     operators: Iterable[str], name: str, prefix: str, family: Family, calls: Mapping[str, Iterable[str]]
 ) -> str:
-    """Prototypes of a model's functions; `calls`: by operator, what it has beside those of every model."""
+    """Prototypes of a model's functions; `calls`: by operator, the functions it has in addition."""
     text = "\n".join("".join(piece.text for piece in _calls(op, calls.get(op, ()))) for op in operators)
     return _named(text, prefix, family, name)
 

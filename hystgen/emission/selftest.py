@@ -32,7 +32,7 @@ WIDE = ("set_travel",)
 """Settings that take more bits than a code, too many for the samples of fixed point."""
 
 SHARE = 0.125
-"""[share of its span] The samples change a setting by this much: little enough for references to stay in reach."""
+"""[share of its span] The samples change a setting by this much: so little that references stay in reach."""
 
 
 def _fractions(length: int) -> list[float]:
@@ -53,7 +53,7 @@ def _fractions(length: int) -> list[float]:
 def operators(
     numbers: Tables | FixedTables | ChainTables, options: Options, calls: Mapping[str, Sequence[str]]
 ) -> list[dict[str, Any]]:
-    """One entry an operator: its name, its settings with their letters, and its samples as C text.
+    """One entry per operator: its name, its settings with their letters, and its samples as C text.
 
     `calls`: by operator, the functions that a model with effects has beside those of every model.
     """
@@ -95,7 +95,7 @@ def _samples(
         return min(max(round(x), -most - 1), most)
 
     def at(low: Any, high: Any, part: float) -> Any:
-        """The argument that far along a range: in the arithmetic's own operations, or the nearest code there is."""
+        """The argument at this fraction of a range: in the arithmetic's own operations, or the nearest code."""
         if numbers.fixed:
             return code(int(low) + (int(high) - int(low)) * part)
         real = numbers.threshold.dtype.type

@@ -77,7 +77,7 @@ def advice(
     again: Callable[[Mapping[str, str]], list[Difference]],
     effects: Sequence[str] = (),
 ) -> list[str]:
-    """Commands that fit these differences of one model's files, each with what it does.
+    """Commands that settle these differences of one model's files, each with what it does.
 
     `given`: options of the command line, `wanted`: all that it led to; `again` compares the files with other options;
     `effects`: files of effects of the user's own.

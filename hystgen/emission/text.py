@@ -37,7 +37,7 @@ def literal(x: Any) -> str:
     """The C literal that gives exactly this float32, float64 or whole number back, the shortest one.
 
     Whole numbers keep their value in every dialect: without the suffix C90 and C++98 take one beyond `long` as
-    unsigned, and the smallest number of a type is no literal in any.
+    unsigned, and the smallest number of a type is not a literal in any.
     """
     if isinstance(x, np.integer | int):
         return _whole(int(x))

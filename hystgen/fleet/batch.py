@@ -150,7 +150,7 @@ def identify_batch(
     identifier. `output`: the folder that gets, for each unit, `UNIT.yaml`, the bytes that `identify` writes for it
     alone, and in folder `UNIT` the C files, those of `emit`; and at the end `summary.csv`, sorted by unit. `holdout`:
     paths of held-out records in which `{unit}` stands for the name of the unit's file without its ending; files that
-    they lead to are no units. `emit`: False leaves the C out; `emission`: options of `emit`. `jobs`: processes, all
+    they lead to are not units. `emit`: False leaves the C out; `emission`: options of `emit`. `jobs`: processes, all
     cores by default. `scheduler`: address of a Dask scheduler, whose workers then do the work and need the package,
     but no access to any file. `progress`: a bar on a terminal's stderr. Any other option is one of `identify`.
 

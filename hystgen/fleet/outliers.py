@@ -23,8 +23,8 @@ SAME = 1e-6
 """Relative spread below which units are alike for every purpose: written digits and solvers differ by less."""
 
 MATTERS, MATTERS_ERROR = 0.05, 0.2
-"""An outlier differs from the median by at least this share of it, an error by at least that much more: units of a
-tight fleet score high for differences that nobody would act on."""
+"""An outlier differs from the median by at least this share of it, and an error lies above it by at least this share:
+units of a tight fleet score high for differences that nobody would act on."""
 
 LEAST_ERROR = 1e-6
 """Held-out errors below this, in %, are rounding of the written digits."""

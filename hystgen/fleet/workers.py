@@ -35,7 +35,7 @@ IDLE = 30.0
 """Seconds after which a process without work ends."""
 
 WATCH = 1.0
-"""Seconds between two looks of a process for the one that started it."""
+"""[s] A process checks at this interval whether the one that started it is still there."""
 
 
 class SchedulerError(OSError):
@@ -147,7 +147,7 @@ def _figures(fit: Any, model: Any) -> dict[str, Any]:
 
 
 def _begin(folder: str, parent: int) -> None:
-    """Set a process up for work: the process that started it, `parent`, ends it and cleans up.
+    """Set up a worker process; the process that started it, `parent`, ends it and cleans up.
 
     Ctrl-C reaches all processes of a terminal; the one that was started there ends the others. Temporary files go below
     a folder of that one, which removes it. If that one is killed, results would be waited on for ever.
@@ -167,8 +167,8 @@ def _end_with(parent: int) -> None:
 def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> Generator[Result, None, None]:
     """Results in the order in which they come, from `jobs` processes (1: from this one); tasks are taken when needed.
 
-    A process that dies takes the whole pool along. What was under way is then repeated one by one: only the unit that
-    dies alone too has failed, and the rest goes on.
+    A process that dies takes the whole pool along. The units under way are then repeated one by one: only a unit that
+    dies again by itself has failed, and the rest goes on.
     """
     with writing.temporary() as folder:
         yield from _pooled(tasks, jobs, work, str(folder))

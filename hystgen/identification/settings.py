@@ -42,7 +42,7 @@ class Settings:
         """Sentences about settings kept and left out; `fit` as it was before."""
         said = []
         if self.problem:
-            said.append(f"{self.file}: nothing of what was there is kept, it is no parameter file: {self.problem}")
+            said.append(f"{self.file}: nothing of what was there is kept, it is not a parameter file: {self.problem}")
         names = [key for key in KEPT_KEYS if key in self.values]
         if self._gives_units(fit):
             names.insert(0, "units")

@@ -27,22 +27,10 @@ if TYPE_CHECKING:
 Shapes = tuple["type[Effect]", ...]
 """Classes of one name."""
 
-EFFECT_NAMES = (
-    "creep",
-    "rate_dependence",
-    "resonance",
-    "lag",
-    "delay",
-    "slew_limit",
-    "asymmetry",
-    "saturation",
-    "thermal",
-    "drift",
-    "ageing",
-    "sensor_nonlinearity",
-    "noncongruent",
-)
-"""The closed catalogue of effects."""
+_FRONT = effects.CATALOGUE.index("saturation")
+
+EFFECT_NAMES = (*effects.CATALOGUE[:_FRONT], "asymmetry", *effects.CATALOGUE[_FRONT:])
+"""Names of effects: the folders of the catalogue and asymmetry, which is a memoryless stage of the model."""
 
 _PARTS: dict[str, type[BaseModel]] = {
     "units": schema.Units,

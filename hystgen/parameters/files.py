@@ -156,7 +156,7 @@ def _by_name(user_effects: Sequence[type[Effect]]) -> dict[str, tuple[type[Effec
 
 def _too_large(size: int | None, file: str) -> ParameterError:
     has = f"more than {MAX_BYTES} bytes" if size is None else f"{size} bytes, more than {MAX_BYTES}"
-    return ParameterError(file, [Problem("", f"the file has {has} (1 MiB); keep one model a file")])
+    return ParameterError(file, [Problem("", f"the file has {has} (1 MiB); keep one model per file")])
 
 
 def _plain(value: Any) -> Any:

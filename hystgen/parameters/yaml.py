@@ -141,7 +141,7 @@ def read(text: str) -> Document:
 
 
 def _next(events: Iterator[Any], text: str, builder: _Builder) -> Any:
-    """The parser's next event, None at the end; a text that is no YAML is refused."""
+    """The parser's next event, None at the end; a text that is not YAML is refused."""
     try:
         return next(events, None)
     except ReaderError as error:
@@ -218,7 +218,7 @@ class _Builder:
         if isinstance(event, DocumentStartEvent):
             self.documents += 1
             if self.documents > 1:
-                self.document.refuse((), position, "a second document starts here; keep one model a file")
+                self.document.refuse((), position, "a second document starts here; keep one model per file")
                 raise _LimitError
         elif isinstance(event, MappingEndEvent | SequenceEndEvent):
             level = self.levels.pop()
@@ -231,7 +231,7 @@ class _Builder:
         document = self.document
         self.count += 1
         if self.count > MAX_VALUES:
-            document.refuse((), position, f"more than {MAX_VALUES} keys and values; keep one model a file")
+            document.refuse((), position, f"more than {MAX_VALUES} keys and values; keep one model per file")
             raise _LimitError
         level = self.levels[-1] if self.levels else None
         live = level is None or (level.live and level.key is not _UNUSABLE)

@@ -35,7 +35,7 @@ class JilesAtherton:
     numbers. Starts demagnetised at the field 0. Right after a reversal the equation has a negative slope, which is not
     physical; dM_irr/dH is zero until M_an is ahead of M again, as in J. H. B. Deane, Modeling the dynamics of nonlinear
     inductor circuits, IEEE Trans. Magn. 30, 1994. Raises ValueError for wrong parameters, also for alpha M_s >= 3 a:
-    then the anhysteretic curve is no function; and where the integration fails. Integrated to the tolerance in
+    then the anhysteretic curve is not a function; and where the integration fails. Integrated to the tolerance in
     `integration`. Sources: D. C. Jiles, D. L. Atherton, Theory of ferromagnetic hysteresis, J. Magn. Magn. Mater. 61,
     1986; D. C. Jiles, J. B. Thoelke, M. K. Devine, Numerical determination of hysteresis parameters, IEEE Trans. Magn.
     28, 1992 (this form).

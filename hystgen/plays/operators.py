@@ -1,8 +1,7 @@
 """The operators of the Prandtl-Ishlinskii literature, sample by sample, as they are defined.
 
-These are the definitions that identification builds its regressors from and that everything faster is tested
-against. Signals are one-dimensional arrays `v_0, v_1, ...`; equation numbers are those of the tutorial note that
-`docs/note.md` names.
+Identification builds its regressors from these definitions, and everything faster is tested against them. Signals are
+one-dimensional arrays `v_0, v_1, ...`; equation numbers are those of the tutorial note that `docs/note.md` names.
 """
 
 from __future__ import annotations
@@ -154,7 +153,7 @@ def stop(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
 
 
 def dead_zone(v: ArrayLike, threshold: float) -> NDArray[Any]:
-    """Dead-zone operator (42): what of `v` lies beyond the threshold, on the threshold's own side of zero."""
+    """Dead-zone operator (42): the part of `v` beyond the threshold, on the threshold's own side of zero."""
     x = np.asarray(v, dtype=np.float64)
     if threshold > 0:
         return np.maximum(x - threshold, 0.0)

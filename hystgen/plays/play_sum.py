@@ -40,7 +40,7 @@ def project(requested: float | Sequence[float], thresholds: Sequence[float]) -> 
     for i in range(2, n + 1):
         reach = thresholds[i] - thresholds[i - 1]
         states.append(min(max(float(requested[i]), states[-1] - reach), states[-1] + reach))
-    # decimal numbers miss their sums by rounding: that is no projection
+    # sums of decimal numbers are off by rounding, which does not count as a projection
     grain = 8 * np.finfo(np.float64).eps
     moved = any(
         abs(a - float(b)) > grain * max(abs(a), abs(float(b)), r)
@@ -108,7 +108,7 @@ class PlaySum:
         cls, x: ArrayLike, phi: ArrayLike, initial_state: float | Sequence[float] = 0.0
     ) -> Self:
         """The play sum whose initial loading curve is the polygon through the points: `p_0 = phi'(0)`, and the weight
-        at each corner is by how much the slope changes there (22)(23), of which `p(r) = phi''(r)` is the limit.
+        at each corner is the change of slope there (22)(23); the limit is the density `p(r) = phi''(r)`.
 
         `x`: N + 1 points from 0, strictly rising, in input units; `phi`: the curve there, from 0, in output units; the
         last slope goes on beyond the last point. The thresholds are the first N points. Raises ValueError otherwise.

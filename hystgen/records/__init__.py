@@ -1,8 +1,8 @@
 """Measured data in, computed columns out: one file is one experiment.
 
 Text tables (`t` time, `v` drive, `y` measured, any further columns) as instruments and programs export them, and
-`.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. What is wrong with a file is refused, all of it at once and each
-with its place; small faults of a recording are repaired and counted in `Record.notes`.
+`.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. Every problem of a file is reported, all at
+once and each with its place; small faults of a recording are repaired and counted in `Record.notes`.
 
 Of a text file, `csv_file` makes lines and reads the rows, once `layout` has found what is where in them; `cells` reads
 single cells. For every format, `columns` finds the columns asked for and sample rates, and `reading` makes the record

@@ -89,7 +89,7 @@ def to_seconds(t: Array, unit: str) -> tuple[Array, str]:
     """Times in seconds, and what the user should know about it, empty when they were seconds already."""
     scale = TIMES.get(_plain(unit).partition(" since ")[0].casefold())
     if scale is None:
-        return t, f'the unit "{printable(unit)}" of t is no known unit of time; its numbers were taken as seconds'
+        return t, f'the unit "{printable(unit)}" of t is not a known unit of time; its numbers were taken as seconds'
     factor, divisor = scale
     if factor == divisor:
         return t, ""
@@ -188,7 +188,7 @@ def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
             text = match["number"]
             if "," in text and (decimal != "," or text.count(",") > 1 or "." in text):
                 continue
-            # What has a value of its own is no unit but the next entry of the line
+            # What has a value of its own is not a unit but the next entry of the line
             after = "" if match["entry"] else match["after"]
             unit = match["unit"] or (match["suffix"] or "").lstrip("_") or after or ""
             step = _step(bool(match["rate"]), float(text.replace(",", ".")), unit, f"line {number}")
@@ -198,7 +198,7 @@ def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
 
 
 def is_named(name: str) -> bool:
-    """Whether a name, with a unit or without, is one of a sample rate or a sample time."""
+    """Whether a name, with or without a unit, means a sample rate or a sample time."""
     key, _ = split_unit(name)
     return re.fullmatch(f"{_RATE}|{_STEP}", key) is not None
 
@@ -214,7 +214,7 @@ def from_number(name: str, value: float, of: str = "", unit: str = "") -> Step |
 
 
 def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
-    """Seconds a sample, from a rate or an interval; None if the unit is of neither."""
+    """Seconds per sample, from a rate or an interval; None if the unit fits neither."""
     if not 0.0 < value < float("inf"):
         return None
     plain = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u")
@@ -349,9 +349,9 @@ def parse_columns(text: str) -> dict[str, str]:
     for part in text.split(","):
         ours, equals, theirs = (piece.strip() for piece in part.partition("="))
         if not equals or not ours or not theirs:
-            raise ValueError(f'"{printable(part.strip())}" is no NAME=COLUMN; write t=Time,v=U,y=Pos')
+            raise ValueError(f'"{printable(part.strip())}" is not NAME=COLUMN; write t=Time,v=U,y=Pos')
         if not ours.isidentifier():
-            raise ValueError(f'"{printable(ours)}" is no column name; the names on the left are t, v, y, u, ...')
+            raise ValueError(f'"{printable(ours)}" is not a column name; the names on the left are t, v, y, u, ...')
         if ours in mapping:
             raise ValueError(f"{ours} is given twice; name one column for it")
         if theirs in mapping.values():
@@ -446,7 +446,7 @@ class Finder:
         return meant[0] if len(meant) == 1 else None
 
     def _name_together(self, found: Mapping[str, Column]) -> None:
-        """One question for all columns that nothing identifies, or more than one may be."""
+        """One question for all columns that nothing identifies, or for which there are several candidates."""
         if not self._unnamed:
             for ours, meant in self._several.items():
                 self._ask(ours, ours, meant)
@@ -473,7 +473,7 @@ class Finder:
         return f', for example --columns "{",".join(f"{ours}={self._address(c)}" for ours, c in answers.items() if c)}"'
 
     def _address(self, c: Column) -> str:
-        """What names a column in `--columns`: its name, or its number where that is not its alone, or has a comma."""
+        """The word for a column in `--columns`: its name, or its number if the name is not unique or has a comma."""
         alone = sum(each.name == c.name for each in self.columns) == 1
         return printable(c.name) if alone and not set(",=") & set(c.name) else f"#{self.columns.index(c) + 1}"
 
@@ -512,7 +512,7 @@ class Finder:
     def _missing(self, ours: str, theirs: str) -> None:
         if theirs in self.ignored:
             self.problems.append(
-                f'"{printable(theirs)}" is no column of numbers; export a vector of numbers, or name another column '
+                f'"{printable(theirs)}" is not a column of numbers; export a vector of numbers, or name another column '
                 f'with --columns "{ours}=COLUMN"'
             )
             return
@@ -548,7 +548,7 @@ class Finder:
 
 
 def further_names(others: Sequence[Column], taken: Sequence[str]) -> dict[str, Column]:
-    """Columns beyond the chosen ones under the shortest name that is theirs alone; those without one are left out."""
+    """The other columns, each under its shortest unique name; those without one are left out."""
     names: dict[str, Column] = {}
     times = [Counter(getattr(c, part) for c in others) for part in ("label", "own", "name")]
     for c in others:

@@ -104,7 +104,7 @@ def _blocks(reading: Reading, chunks: Iterator[bytes]) -> Iterator[bytes]:
             yield data[:end]
         rest = data[end:]
         if len(rest) > BLOCK:
-            raise reading.refuse(f"has a line of more than {BLOCK >> 20} MB; export one row a line")
+            raise reading.refuse(f"has a line of more than {BLOCK >> 20} MB; export one row per line")
     if rest:
         yield rest
 
@@ -126,7 +126,7 @@ SPARE = 1.05
 
 
 def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
-    """Read a text file with one row a line."""
+    """Read a text file with one row per line."""
     blocks = texts(reading, stream)
     sample = ""
     while (len(sample) < SAMPLE or sample.count("\n") < SAMPLE_LINES) and (text := next(blocks, "")):
@@ -178,7 +178,7 @@ def _layout(reading: Reading, sample: str) -> Layout:
 
 
 def _refuse_wrong_delimiter(reading: Reading, found: Layout, lines: Sequence[str]) -> None:
-    """Raise RecordError where the delimiter given makes one column of what another one makes a table."""
+    """Raise RecordError if the given delimiter yields one column where another one would yield a table."""
     if reading.delimiter is None or len(found.names) != 1 or not found.header:
         return
     shown = [line for line in lines[found.header - 1 :] if line.strip() and not is_comment(line)][:2]
@@ -458,15 +458,15 @@ class _Body:
         return self.dialect.number(cell)
 
     def _bad_cell(self, column: int, cell: str, line: int, place: int) -> None:
-        """A cell of a column that is needed is no number. The same fault in many cells is one problem."""
+        """A cell of a column that is needed is not a number. The same fault in many cells is one problem."""
         name = printable(self.names[column])
         if column == self.clock_column:
-            kind, no, advice = "", "no time of day", "write every time as the first one"
+            kind, what, advice = "", "a time of day", "write every time as the first one"
         else:
-            no = "no number"
+            what = "a number"
             kind, advice = self.dialect.fault(cell)
         self._wrong(
-            f'"{printable(cell.strip())}" in column "{name}" is {no}; {advice}',
+            f'"{printable(cell.strip())}" in column "{name}" is not {what}; {advice}',
             (kind,) if kind else (kind, name, shape(cell)),
             line,
             place,

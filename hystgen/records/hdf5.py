@@ -94,7 +94,7 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
 
 
 def _list_of_structs(reading: Reading, file: Any, group: Any, folder: str) -> list[Column]:
-    """The vectors of a list of structs, of which MATLAB keeps a dataset a field, with a reference a struct."""
+    """The vectors of a list of structs, of which MATLAB keeps one dataset per field, with one reference per struct."""
     import h5py
 
     fields = {

@@ -1,8 +1,8 @@
 """The layout of a text table: the separator of its cells, the lines of its header, its units and its numbers.
 
-The numbers show it: of all ways to separate cells and to write decimals the one that makes numbers of most cells of the
-first lines is that of the file. Header and units are then the lines above them with as many cells. The headers of some
-instruments say it themselves.
+The numbers reveal it: a file uses the separator and the decimal mark with which most cells of its first lines are
+numbers. Header and units are then the lines above with the same number of cells. The headers of some instruments state
+their layout.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _RULE = re.compile(r"\s*([-=_*~])\1{2,}[\s\-=_*~+]*")
 _MARKS = re.compile(r"^[\s#%/]+")
 
 EXAMPLES = {1: "v=#1", 2: "1,2 --sample-time SECONDS"}
-"""How to name columns by their numbers in a table of this many columns."""
+"""How to name columns by their numbers in a table with this many columns."""
 
 EXAMPLE = "1,2,3"
 """The same for every wider table."""
@@ -76,7 +76,7 @@ class _View:
 
 
 def find(reading: Reading, lines: Sequence[str]) -> Layout:
-    """The layout of a table by its first lines, which say it if they are an instrument's, else the numbers show it.
+    """The layout of a table, from its first lines if an instrument wrote them, else from the numbers.
 
     Raises RecordError where nothing or more than one thing fits.
     """
@@ -112,7 +112,7 @@ def _shown(reading: Reading, lines: Sequence[str]) -> Layout:
 
 
 def _dialects(reading: Reading, lines: Sequence[str]) -> list[Dialect]:
-    """Everything that may separate cells, with either mark of decimals."""
+    """Every possible separator of cells, with either decimal mark."""
     quoted = any('"' in line for line in lines)
     delimiters = [reading.delimiter] if reading.delimiter else list(DELIMITERS)
     found = []
@@ -125,7 +125,7 @@ def _dialects(reading: Reading, lines: Sequence[str]) -> list[Dialect]:
 
 
 def _view(dialect: Dialect, lines: Sequence[_Line]) -> _View | None:
-    """The lines seen by a dialect; None where they are no table of numbers then."""
+    """The lines seen by a dialect; None if it makes no table of numbers of them."""
     rows = [[cell for _, cell in dialect.cells(line.text)] if not line.comment else [] for line in lines]
     weights = [[dialect.weight(cell) for cell in row] for row in rows]
     widths = Counter(len(row) for row in weights if 1 in row)
@@ -198,7 +198,7 @@ def _made(view: _View, names: list[str], header: int, first: int, units: Sequenc
 
 
 def _names(view: _View, text: str) -> list[str] | None:
-    """Cells of a line that has as many as the rows have; None for any other line.
+    """Cells of a line with the same number of cells as the rows; None for any other line.
 
     A last cell without a name may be missing in the header or in the rows.
     """
@@ -377,7 +377,7 @@ def _of_segment(
 ) -> Layout:
     found = Layout(dialect, names, header + 1, header, kind="LabVIEW measurement file", another=END)
     written = names.copy()
-    # The comment at the end of a row is no channel, and may be missing
+    # The comment at the end of a row is not a channel, and may be missing
     if names[-1] in ("Comment", ""):
         names[-1] = ""
     places = [k for k, name in enumerate(names) if name == "X_Value"]
@@ -496,7 +496,7 @@ def _number(reading: Reading, dialect: Dialect, text: str, tag: str, line: int) 
         # Versions differ in whether tags follow the decimal separator of the rows
         return float(text.replace(dialect.decimal, "."))
     except ValueError:
-        raise reading.refuse(f'{tag} has "{printable(text)}", which is no number; export it again', line) from None
+        raise reading.refuse(f'{tag} has "{printable(text)}", which is not a number; export it again', line) from None
 
 
 # GCS arrays of Physik Instrumente ----------------------------------------------------------------------------
@@ -540,7 +540,7 @@ def pi_gcs(reading: Reading, lines: Sequence[str]) -> Layout | None:
         except ValueError:
             seconds = 0.0
         if not 0.0 < seconds < float("inf"):
-            raise reading.refuse("SAMPLE_TIME is no number of seconds; correct it, or export the table again", place)
+            raise reading.refuse("SAMPLE_TIME is not a number of seconds; correct it, or export the table again", place)
         found.steps = [Step(seconds, f"SAMPLE_TIME {seconds:g} s (line {place})")]
     return found
 
@@ -548,7 +548,7 @@ def pi_gcs(reading: Reading, lines: Sequence[str]) -> Layout | None:
 def _whole(reading: Reading, entries: dict[str, tuple[int, str]], key: str) -> int:
     line, text = entries[key]
     if not text.isdecimal() or (key != "NDATA" and not 0 < int(text) < LARGEST_CODE):
-        raise reading.refuse(f"{key} is no whole number that can be; correct it, or export the table again", line)
+        raise reading.refuse(f"{key} is not a possible whole number; correct it, or export the table again", line)
     return int(text)
 
 
@@ -560,7 +560,7 @@ _SETTINGS = ("Sample Interval", "Record Length", "Vertical Units")
 
 
 def tektronix(reading: Reading, lines: Sequence[str]) -> Layout | None:
-    """The layout that the settings give: one a line and one cell a channel, then `TIME,CH1,CH2` and the rows.
+    """The layout that the settings give: one per line and one cell per channel, then `TIME,CH1,CH2` and the rows.
 
     They have what the header lacks: units of time and of each channel, and the label that a user gave it.
     """
@@ -633,7 +633,7 @@ def rigol(reading: Reading, lines: Sequence[str]) -> Layout | None:
 
 
 def yokogawa(reading: Reading, lines: Sequence[str]) -> Layout | None:
-    """The layout that the settings give, one a line and one cell a channel; rows begin with an empty cell.
+    """The layout that the settings give, one per line and one cell per channel; rows begin with an empty cell.
 
     They have no time. `"TraceName","CH1","CH2"` has the names, `VUnit` the units, `HResolution` the time between rows.
     """

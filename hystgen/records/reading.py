@@ -21,14 +21,14 @@ from hystgen.records.columns import LISTED, STANDARD, Column, Finder, Step, colu
 from hystgen.records.record import Array, Record
 
 SAME_STEP = 1e-6
-"""Largest relative difference of two sample times that say the same: files write at least seven digits, or round."""
+"""Largest relative difference between sample times that count as equal: files write at least seven digits, or round."""
 
 BESIDE = 2
 """[times] Memory for a record over that of its numbers, because of sorted copies and marks: 1.7 with 2e7 samples of
 HDF5 (2026-11-26)."""
 
 NO_SECONDS = 1e11
-"""Times from here on are no seconds: those since 1970 get there in the year 5138, milliseconds did in 1973."""
+"""Times from here on are not seconds: those since 1970 get there in the year 5138, milliseconds did in 1973."""
 
 
 def _memory() -> float:
@@ -106,11 +106,11 @@ class Reading:
         self.read_as: list[str] = []
 
     def understood(self, text: str) -> None:
-        """Something that was found out about the file, for the line that says how it was read."""
+        """Add a finding about the file to the line that says how it was read."""
         self.read_as.append(text)
 
     def problem(self, text: str, line: int | None = None, column: int | None = None) -> None:
-        """Something for which the file is refused, with its place where it has lines."""
+        """Add a problem for which the file is refused, with its place if the file has lines."""
         place = self.file if line is None else f"{self.file}:{line}:{column or 1}"
         self.problems.append(f"{place}: error: {text}")
 
@@ -126,7 +126,7 @@ class Reading:
 
     @contextmanager
     def parsing(self, kind: str) -> Iterator[None]:
-        """Whatever a library says about a file that it cannot read is a problem of the file."""
+        """Report any error of a library that cannot read a file as a problem of the file."""
         try:
             yield
         except RecordError:
@@ -199,7 +199,7 @@ class Reading:
         """The table of a file whose columns are read one by one.
 
         Read are the columns asked for and, out of the groups that hold these, all others of the same length; not those
-        that are no numbers (`ignored`) or whose numbers the file does not hold itself (`outside`). `matrices`: name to
+        that are not numbers (`ignored`) or whose numbers the file does not hold itself (`outside`). `matrices`: name to
         shape and numbers; the only one of a file without vectors is the record.
         """
         if not columns and len(matrices) == 1:
@@ -278,7 +278,7 @@ def in_matrix(shape: tuple[int, ...]) -> int:
 
 
 def one_dimension(shape: tuple[int, ...]) -> int:
-    """Length of a vector, whether it is a row, a column or neither; 0 where it is no vector."""
+    """Length of a vector, whether it is a row, a column or neither; 0 where it is not a vector."""
     length = int(np.prod(shape, dtype=np.int64))
     return length if length > 1 and length == max(shape) else 0
 
@@ -447,7 +447,7 @@ def _step(reading: Reading, t: Array) -> float:
     return step
 
 
-# Numbers that stand for no value: what instruments write in place of a reading, what no reading can be -------
+# Numbers that stand for no value: what instruments write instead of a reading, what no reading can be -------
 
 
 LARGEST = 1e20
@@ -468,11 +468,11 @@ ENDS_OF_INTEGERS = frozenset(
 
 
 def no_value(x: Array) -> NDArray[np.bool_]:
-    """Whether each number (N,) of a column stands for no value; what is not finite does.
+    """Whether each number (N,) of a column stands for no value, as everything does that is not finite.
 
-    A number below `LARGEST` does where it is a usual fill value (all nines, the end of an integer type) that lies
-    farther from all others of the column than these spread: a column may pass through -999 as well. The end of an
-    integer type does in a column with fractions only; in one of codes it is a code.
+    A number below `LARGEST` stands for no value if it is a usual fill value (all nines, the end of an integer type) and
+    lies farther from all others of the column than these spread: a column may also pass through -999. The end of an
+    integer type counts only in a column with fractions; in a column of codes it is a code.
     """
     wrong = ~np.isfinite(x) | (x >= LARGEST) | (x <= -LARGEST)
     rest, fills = x[~wrong] if wrong.any() else x, []

@@ -149,7 +149,7 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
         Text("What they mean for a compensator:"),
         Table(means, (0, 1, 2)),
         Text(f"As C they are not there yet: {not_emitted}.") if not_emitted
-        else Text("What the compensator would leave of the recorded motion:", "hystgen track params.yaml RECORDS"),
+        else Text("Error that the compensator would leave in the motion:", "hystgen track params.yaml RECORDS"),
         Text(
             "Their numbers, with intervals that count the correlation of the residuals and the freedom of the weights, "
             "but not that another shape may fit as well:"
@@ -166,7 +166,7 @@ def _kind(effect: NamedEffect, there: Sequence[Effect]) -> type[Effect] | None:
 
 
 def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
-    """Rows of name, value, low and high, one a number; the first of equal lists stands for all."""
+    """Rows of name, value, low and high, one per number; the first of equal lists stands for all."""
     if isinstance(value, Mapping):
         known = sure or {}
         return [

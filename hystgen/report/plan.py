@@ -14,8 +14,9 @@ from hystgen.basics.problems import counted
 from hystgen.basics.version import __version__
 from hystgen.planning import header
 from hystgen.planning import plan as planning
-from hystgen.planning.plan import CODES, EDGE, MEASURED, RECORDING, WHOLE, Drive, lasting
+from hystgen.planning.plan import CODES, MEASURED, RECORDING, WHOLE, Drive, lasting
 from hystgen.planning.session import FILE as SESSION
+from hystgen.planning.waveforms import EDGE
 from hystgen.report.html import Figure, Listing, Section, Table, Text, page
 
 WIDE, NARROW = (9.0, 5), (4.2, 3)
@@ -113,7 +114,7 @@ def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
         size, corners = samples * plan.dac.bytes, header.nodes(plan.stretches)
         said.insert(
             1,
-            f"{CODES} has the same as one code a line: {samples} codes, {size / 1e6:.3g} MB of memory at "
+            f"{CODES} has the same as one code per line: {samples} codes, {size / 1e6:.3g} MB of memory at "
             f"{counted(plan.dac.bytes, 'byte')} each. The files of the single records have their codes in the column "
             f"code. For firmware {header.file(plan.parameters)} has the {len(corners)} codes between which the drive "
             f"is straight, {len(corners) * plan.dac.bytes / 1e3:.3g} kB.",

@@ -85,7 +85,7 @@ def find(name: str) -> Compiler | None:
     try:
         words = shlex.split(name)
     except ValueError as failure:
-        raise ValueError(f"the compiler {name!r} is no command: {failure}; correct it") from None
+        raise ValueError(f"the compiler {name!r} is not a command: {failure}; correct it") from None
     if not words:
         raise ValueError("a compiler is named by a command; write gcc, clang, zig or another")
     path = shutil.which(words[0])

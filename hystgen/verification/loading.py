@@ -26,7 +26,7 @@ def load(library: Path, loader: Callable[[str], Loaded]) -> Loaded:
     try:
         return loader(str(library))
     except OSError as failure:
-        reason = str(failure).partition(".  Additionally")[0]  # cffi tells of a second search, by name
+        reason = str(failure).partition(".  Additionally")[0]  # cffi adds that it also searched by name
     for around in _elsewhere():
         with contextlib.suppress(OSError), writing.staging(around) as folder:
             return loader(str(shutil.copy(library, folder)))

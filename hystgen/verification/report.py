@@ -28,7 +28,7 @@ class Row:
     operator: str
     samples: int = 0
     different: int = 0
-    max_ulp: float | None = 0.0  # None: an answer is no finite number
+    max_ulp: float | None = 0.0  # None: an answer is not a finite number
     first: str = ""
     mean_instructions: float | None = None
     max_instructions: int | None = None

@@ -277,7 +277,7 @@ def bumps(static: StaticModel, effects: Sequence[Effect], step: float, end: int,
 
 
 def _bump(effect: Effect, i: int, scale: float) -> tuple[Any, Callable[[float], float]]:
-    """What a bent play contributes beyond itself, and what tells it from that of other plays."""
+    """What a bent play contributes beyond itself, and what distinguishes it from other plays."""
     if isinstance(effect, PlayFunctions):
         row = effect.coefficients[i - 1]
 

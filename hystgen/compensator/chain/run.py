@@ -18,7 +18,7 @@ from hystgen.plays import slots
 def answers(compiled: Compiled, record: Run, inverse: bool) -> NDArray[Any]:
     """Answers (N,) for the drives or references in `record.v`; a preview sees what follows, the last sample stays.
 
-    Fixed point takes and gives codes, temperatures apart, which are in degC. Raises ValueError for what is no code.
+    Fixed point takes and gives codes, temperatures apart, which are in degC. Raises ValueError for what is not a code.
     """
     t = compiled.tables
     x = reference.codes(t, record.v) if t.fixed else record.v

@@ -80,7 +80,7 @@ def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
 
 @jit
 def inverse_hold(t: Tables, m: Memory) -> Any:
-    """A sample that is no number: the last answer once more."""
+    """A sample that is not a number: the last answer once more."""
     inverse_keep(m)
     inverse_replace(t, m, m.real[RETURNED] if m.counts[STEPPED] and m.counts[COMMITTED] else m.real[DRIVE])
     m.counts[STEPPED] = 1

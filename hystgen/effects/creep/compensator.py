@@ -20,7 +20,7 @@ EFFECTS = (ExponentialCreep, LogarithmicCreep)
 class CreepBlock:
     """`y_k = d h_k + sum X_i`, `X_i <- E_i X_i + c_i (b0_i h_(k-1) + b1_i h_k)`, the weights folded into the states.
 
-    `direct`: d, what of a step arrives at once; `weights`: c_i >= 0. Solved, `h_k = (y_k - sum (E_i X_i +
+    `direct`: d, the share of a step that arrives at once; `weights`: c_i >= 0. Solved, `h_k = (y_k - sum (E_i X_i +
     c_i b0_i h_(k-1)))/(d + sum c_i b1_i)`: for d > 0 the inverse is stable whatever the time constants are, since the
     response is strictly positive real.
     """

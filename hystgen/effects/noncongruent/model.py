@@ -45,7 +45,7 @@ class _Noncongruent(Effect):
     timed: ClassVar[bool] = False
     pointwise: ClassVar[bool] = True
     compensated: ClassVar[Compensated] = "exact"
-    compensation: ClassVar[str] = "exact: one equation a sample is solved"
+    compensation: ClassVar[str] = "exact: one equation per sample is solved"
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """There are plays to bend."""

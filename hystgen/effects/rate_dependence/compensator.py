@@ -57,7 +57,7 @@ class Movement:
 # ---------------------------------------------------------------- a nonlinear dashpot, by a table
 
 BEGIN, C0, C1, C2, C3 = range(5)
-"""Columns of a piece: where it begins, and the coefficients of a cubic in what lies beyond."""
+"""Columns of a piece: where it begins, and the coefficients of a cubic in the distance from there."""
 
 LEAST_STRETCH = 1e-6
 """[largest thresholds] Stretches below count as proportional to what they yield; a range has some 1e5 of them."""
@@ -70,7 +70,7 @@ LONGEST = 4.0
 
 YIELD_ERROR = 1e-3
 """Largest relative error of what a stretch yields: of the lag of plays behind their input it is a share of
-`YIELD_ERROR/exponent`, where records tell time constants to a per cent at best."""
+`YIELD_ERROR/exponent`, while records determine time constants to 1 % at best."""
 
 
 def nonlinear(effect: Effect) -> TypeGuard[RelaxingPlays]:

@@ -83,7 +83,7 @@ def mean_decay(x: float) -> float:
 
 @jit
 def bent_decay(x: float) -> float:
-    """`(1 - 2 x exp(-x) - exp(-2 x))/(2 x^3)`, what a growing disturbance leaves of its square's sum; 1/6 at 0."""
+    """`(1 - 2 x exp(-x) - exp(-2 x))/(2 x^3)`, the sum of squares that remains of a growing disturbance; 1/6 at 0."""
     if x < 0.1:
         return 1 / 6 - x * (1 / 6 - x * (11 / 120 - x * (13 / 360 - x * 57 / 5040)))
     decay = math.exp(-x)
@@ -331,7 +331,7 @@ class ThresholdRate(_RateDependence):
 
 
 class RelaxingPlays(_RateDependence):
-    """Plays that follow viscously: `z' = dz_r(w - z)/tau`, `dz_r` what of its argument lies beyond +/- r.
+    """Plays that follow viscously: `z' = dz_r(w - z)/tau`, `dz_r` the part of its argument beyond +/- r.
 
     A dashpot beside the dry friction of every play; for tau = 0 the play itself. With `exponent` m the dashpot is
     nonlinear: `z' = (r_n/tau) sign(d) (|d|/r_n)^m`, `d = dz_r(w - z)`, r_n the largest threshold. Over straight `w` the
@@ -345,7 +345,7 @@ class RelaxingPlays(_RateDependence):
     )
 
     compensated: ClassVar[Compensated] = "exact"
-    compensation: ClassVar[str] = "exact: one equation a sample is solved"
+    compensation: ClassVar[str] = "exact: one equation per sample is solved"
 
     def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
         """Viscous plays."""

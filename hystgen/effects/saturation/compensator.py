@@ -9,7 +9,7 @@ from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturati
 
 
 def unsaturated(effect: TanhSaturation | HardSaturation | Stops, y: Array) -> Array:
-    """The input (N,) that gives the output `y` (N,); beyond what there is, that of the nearest output there is."""
+    """The input (N,) that gives the output `y` (N,); for an output out of reach, that of the nearest one in reach."""
     if isinstance(effect, TanhSaturation):
         most = np.nextafter(1.0, 0.0)
         return np.asarray(effect.level * np.arctanh(np.clip(y / effect.level, -most, most)))

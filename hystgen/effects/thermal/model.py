@@ -244,7 +244,7 @@ def _numbers(row: tuple[int | None, int | None], about: About) -> tuple[Array, A
     """Least, largest, first and other first numbers: time constant, then a gain, an offset or both.
 
     Warmth changes from loop to loop, not within one: what follows the drive within a quarter of a loop over its range
-    is no temperature.
+    is not a temperature.
     """
     n = sum(place is not None for place in row)
     low, high = span(20.0 * about.sample_time, 3.0 * about.session)

@@ -1,0 +1,114 @@
+"""Drive and time of a plan in whole steps of decimal grids."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+
+from hystgen.basics.problems import PlanError
+
+MARGIN = 0.01
+"""Share of the input range, at each end, that no record enters."""
+
+OF_RATE = 0.98
+"""Share of the rate limit that is used, so that rounding stays below the limit."""
+
+FULL_SCALE = 8
+"""Sample times of a move over the whole range, where no rate limit is given."""
+
+LONGEST_EDGE = 32
+"""Most samples of a full-scale move at the rate limit; a longer one is sampled less often."""
+
+MOVE = 12
+"""Fewest samples of a full-scale move of a triangle."""
+
+SLOW = 24.0
+"""s of a slow record, at least."""
+
+SLOWER = 1.5
+"""Least ratio of the lengths of a slow and a fast record."""
+
+FAST_SAMPLES = 1000
+"""Samples of a fast record, about."""
+
+REST = 0.125
+"""Pause between records, in slow records."""
+
+LONGEST_MOVE = 60.0
+"""s of a move over the range: a plan of slower ones, which would take a day, is refused."""
+
+SLOW_SAMPLES = 480
+"""Samples of a slow record."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Drive values as whole numbers of 10^-digits, from the lowest to the highest that a record visits."""
+
+    digits: int
+    low: int
+    high: int
+
+    @classmethod
+    def over(cls, low: float, high: float) -> Grid:
+        """A grid of a millionth of the range or finer. Raises PlanError where numbers are too coarse for it."""
+        a, b = Decimal(low), Decimal(high)
+        digits = 6 - (b - a).adjusted()
+        if max(abs(low), abs(high)) > 1e8 * (high - low):
+            raise PlanError([f"input_range [{low!r}, {high!r}] is too narrow for numbers of its size"])
+        margin = Decimal(str(MARGIN)) * (b - a)
+        first, last = (x.scaleb(digits) for x in (a + margin, b - margin))
+        return cls(digits, math.ceil(first), math.floor(last))
+
+    def values(self, codes: Sequence[int]) -> list[float]:
+        """The drive of codes: the doubles nearest to their decimals."""
+        unit = 10 ** abs(self.digits)
+        return [code / unit if self.digits >= 0 else float(code * unit) for code in codes]
+
+    def rate(self, per_second: float, seconds: float) -> int:
+        """The largest number of codes that the drive moves in `seconds`."""
+        return math.floor(Decimal(OF_RATE * per_second) * Decimal(seconds) * Decimal(1).scaleb(self.digits))
+
+
+@dataclass(frozen=True)
+class Tempo:
+    """Times in whole numbers of the sample time: between samples of `fast`, a duration of `slow` records, the `rest`.
+
+    `move`: samples of a full-scale move of the fast triangles.
+    """
+
+    sample_time: float
+    max_rate: float
+    fast: int
+    slow: int
+    rest: int
+    move: int
+
+    @classmethod
+    def of(cls, grid: Grid, max_rate: float, sample_time: float) -> Tempo:
+        """Fast records as fast as sampling and rate allow, slow ones slower. Raises PlanError for days of drive."""
+        span = grid.high - grid.low
+        across = float(span) * 10.0**-grid.digits / (OF_RATE * max_rate * sample_time)
+        seconds = max(across, FULL_SCALE) * sample_time
+        if not seconds <= LONGEST_MOVE:
+            what = f"one move over the input range takes {seconds:.3g} s, and a plan hundreds of them"
+            raise PlanError([f"{what}; give a larger max rate or a shorter sample time"])
+        fast = max(1, math.ceil(across / LONGEST_EDGE))
+        slow = max(math.ceil(SLOW / sample_time), math.ceil(SLOWER * FAST_SAMPLES * fast))
+        move = max(MOVE, math.ceil(across / fast))
+        return cls(sample_time, max_rate, fast, slow, math.ceil(REST * slow), move)
+
+    def seconds(self, ticks: int) -> float:
+        """The double nearest to the decimal of `ticks` sample times."""
+        return float(ticks * Decimal(repr(self.sample_time)))
+
+    def every_of(self, share: float, samples: int) -> int:
+        """Sample times between the `samples` of a record that lasts this share of a slow one."""
+        return max(self.fast, round(share * self.slow / samples))
+
+    @property
+    def middle(self) -> int:
+        """Between fast and slow, halfway in the logarithm."""
+        return max(self.fast, math.isqrt(self.fast * self.every_of(1.0, SLOW_SAMPLES)))

@@ -1,0 +1,314 @@
+"""The records of a plan: what each is for, and the waveform that it drives.
+
+Drives are computed in whole steps of a decimal grid and with the four basic operations alone, so that the files have
+the same bytes on every machine.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from hystgen.planning.grid import MOVE, SLOW_SAMPLES, Grid, Tempo
+
+EDGE = 4
+"""Fewest samples of any move: three lie between its ends."""
+
+ROUND = 3
+"""Samples over which every drive is averaged: a sharper corner would lie between samples, where no record sees it."""
+
+
+class Course:
+    """A drive as it is written: codes sample by sample, from the lowest on; places are shares of the range.
+
+    `pace`: samples of a quick full-scale move.
+    """
+
+    def __init__(self, grid: Grid, step: int, pace: int) -> None:
+        self._grid, self._step, self.pace = grid, step, pace
+        self.codes = [grid.low]
+
+    @property
+    def place(self) -> float:
+        """Where the drive is."""
+        return (self.codes[-1] - self._grid.low) / (self._grid.high - self._grid.low)
+
+    def go(self, place: float, pace: float = 0.0) -> None:
+        """A straight move at `pace` samples a full-scale one, in `EDGE` samples or more, within the rate limit.
+
+        Then the drive stands still, so that with round corners two samples remain at the turning point: it is sampled
+        behind a delay of any fraction of a sample, too.
+        """
+        begin, end = self.codes[-1], self._code(place)
+        size = abs(end - begin)
+        samples = max(EDGE, math.ceil(pace * abs(place - self.place)), -(-size // max(self._step - 1, 1)))
+        for k in range(1, samples + 1):
+            self.codes.append(begin + (2 * (end - begin) * k + samples) // (2 * samples))
+        self.hold(ROUND)
+
+    def hold(self, samples: int) -> None:
+        """The drive stands still."""
+        self.codes += [self.codes[-1]] * samples
+
+    def wave(self, values: Sequence[float]) -> None:
+        """A wave about the middle of the range, as large as range and rate limit allow; a move to it comes first."""
+        steepest = max(abs(b - a) for a, b in itertools.pairwise(values))
+        size = 0.5 * (self._grid.high - self._grid.low - 2) / max(map(abs, values))
+        size = min(size, (self._step - 1) / steepest)
+        middle = (self._grid.low + self._grid.high) // 2
+        codes = [middle + round(size * value) for value in values]
+        self.go((codes[0] - self._grid.low) / (self._grid.high - self._grid.low), self.pace)
+        self.codes += codes[1:]
+
+    def rounded(self) -> list[int]:
+        """The drive with round corners."""
+        half = ROUND // 2
+        padded = [self.codes[0]] * half + self.codes + [self.codes[-1]] * half
+        return [(2 * sum(padded[k : k + ROUND]) + ROUND) // (2 * ROUND) for k in range(len(self.codes))]
+
+    def _code(self, place: float) -> int:
+        return self._grid.low + round(place * (self._grid.high - self._grid.low))
+
+
+def sine(turns: float) -> float:
+    """sin(2 pi turns), to 1e-13: the C library's differs from machine to machine in the last bit."""
+    x = turns - math.floor(turns + 0.5)
+    if abs(x) > 0.25:
+        x = math.copysign(0.5, x) - x
+    x *= 2.0 * math.pi
+    total = term = x
+    for k in range(1, 10):
+        term *= -x * x / ((2 * k) * (2 * k + 1))
+        total += term
+    return total
+
+
+def _ends(course: Course, pace: float) -> None:
+    """Moves to the top and the bottom: the history of the record that comes next."""
+    course.go(1.0, pace)
+    course.go(0.0, pace)
+    course.hold(EDGE)
+
+
+def _triangles(course: Course) -> None:
+    for slower, cycles in ((1, 4), (2, 2), (4, 1)):
+        for _ in range(cycles):
+            course.go(1.0, slower * course.pace)
+            course.go(0.0, slower * course.pace)
+    _nested(course, 2 * course.pace)
+
+
+def _nested(course: Course, pace: float) -> None:
+    for k in range(6):
+        course.go(1.0 - 0.08 * k, pace)
+        course.go(0.08 * (k + 1), pace)
+
+
+def _slow(course: Course) -> None:
+    for k in range(5):
+        course.go(1.0 - 0.1 * k, 75)
+        course.go(0.1 * k, 75)
+
+
+def _minor(course: Course, pace: float, size: float = 0.25) -> None:
+    course.go(1.0, pace)
+    course.go(0.0, pace)
+    for bias in (0.02, 0.5 - 0.5 * size, 0.98 - size):
+        course.go(bias + size, pace)
+        for _ in range(2):
+            course.go(bias, pace)
+            course.go(bias + size, pace)
+    course.go(1.0, pace)
+    for bias in (0.98 - size, 0.5 - 0.5 * size, 0.02):
+        course.go(bias, pace)
+        course.go(bias + size, pace)
+        course.go(bias, pace)
+
+
+def _slow_minor(course: Course) -> None:
+    _minor(course, 60)
+
+
+def _fast_minor(course: Course) -> None:
+    _minor(course, 3 * course.pace)
+    _minor(course, course.pace)
+    for bias in (0.15, 0.5, 0.85):
+        course.go(bias, course.pace)
+        for _ in range(4):
+            course.go(bias + 0.1, course.pace)
+            course.go(bias - 0.1, course.pace)
+
+
+def _steps(course: Course, hold: int, levels: Sequence[float]) -> None:
+    course.hold(hold // 3)
+    for level in levels:
+        course.go(level)
+        course.hold(hold)
+
+
+def _sweep(course: Course, samples: int = 1100) -> None:
+    """Frequency rises with time squared to an eighth of the sampling rate, amplitude falls as the limit demands."""
+    first, last = 1.0 / (16.0 * course.pace), 1.0 / 8.0
+    turns, values = 0.0, []
+    for k in range(samples):
+        x = k / samples
+        frequency = first + (last - first) * x * x
+        values.append(min(1.0, 1.0 / (6.0 * course.pace * frequency)) * -sine(turns + 0.25))
+        turns += frequency
+    course.wave(values)
+
+
+def _multisine(course: Course, period: int = 240, periods: int = 4) -> None:
+    """Odd lines with random phases, whole periods."""
+    phases = random.Random(1)
+    lines = [(line, phases.random()) for line in range(1, 24, 2)]
+    one = [sum(sine(line * k / period + phase) / line for line, phase in lines) for k in range(period)]
+    course.wave([*(one * periods), one[0]])
+
+
+def _cycles(course: Course) -> None:
+    for _ in range(28):
+        course.go(1.0, MOVE)
+        course.go(0.0, MOVE)
+
+
+def _settling(course: Course) -> None:
+    _nested(course, course.pace)
+    _steps(course, 50, (1.0, 0.3, 0.7, 0.0))
+
+
+def _staircase(course: Course) -> None:
+    course.hold(2 * course.pace)
+    for level, slower in (
+        (0.35, 0), (0.8, 2), (0.55, 0), (1.0, 0), (0.0, 0), (0.9, 0), (0.45, 4), (0.65, 0), (0.2, 0)
+    ):  # fmt: skip
+        course.go(level, slower * course.pace)
+        course.hold(70)
+
+
+def _reversals(course: Course, seed: int, turns: int, slowest: float) -> None:
+    """Random turning points at random speeds, now and then a hold; both ends come first."""
+    chance = random.Random(seed)
+    course.go(1.0, slowest * course.pace)
+    course.go(0.0, slowest * course.pace)
+    for _ in range(turns):
+        course.go(0.02 + 0.96 * chance.random(), (1.0 + (slowest - 1.0) * chance.random()) * course.pace)
+        if chance.random() < 0.2:
+            course.hold(2 * course.pace)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A record: file name, purpose, effects that it shows, waveform and time between samples."""
+
+    name: str
+    purpose: str
+    shows: tuple[str, ...]
+    draw: Callable[[Course], None]
+    every: Callable[[Tempo], int]
+    held_out: bool = False
+
+
+def _fast(tempo: Tempo) -> int:
+    return tempo.fast
+
+
+def _middle(tempo: Tempo) -> int:
+    return tempo.middle
+
+
+def _lasting(share: float, samples: int = SLOW_SAMPLES) -> Callable[[Tempo], int]:
+    return lambda tempo: tempo.every_of(share, samples)
+
+
+FULL_STEPS = (1.0, 0.0, 0.5, 1.0, 0.25, 0.75, 0.0)
+LONG_HOLDS = (1.0, 0.0, 0.5, 1.0, 0.5, 0.0)
+
+RECORDS = (
+    Kind(
+        "slow", "One slow full loop, then nested ones: the hysteresis itself, and what bends it at every amplitude.",
+        ("asymmetry", "saturation", "sensor_nonlinearity"), _slow, _lasting(1.0),
+    ),
+    Kind(
+        "fast_triangles", "The same loops at the rate limit and two and four times slower: what widens them with rate.",
+        ("rate_dependence", "lag", "delay", "slew_limit"), _triangles, _fast,
+    ),
+    Kind(
+        "fast_steps", "Full-scale and smaller steps with resolved edges: a tail is a lag, a shift a delay, a straight "
+        "slope a slew limit, ringing a resonance.",
+        ("lag", "delay", "slew_limit", "resonance"), partial(_steps, hold=130, levels=FULL_STEPS), _fast,
+    ),
+    Kind(
+        "holds", "Long holds after moves both ways: creep follows the last move, drift does not.",
+        ("creep", "drift", "thermal"), partial(_steps, hold=100, levels=LONG_HOLDS), _lasting(4.0, 700),
+    ),
+    Kind(
+        "staircase", "Steps of other sizes and speeds, to judge what the fast records say.",
+        ("lag", "delay", "slew_limit", "resonance"), _staircase, _fast, True,
+    ),
+    Kind(
+        "slow_minor", "Equal small loops at three biases, reached from both sides: congruent or not.",
+        ("noncongruent", "asymmetry", "sensor_nonlinearity"), _slow_minor, _lasting(1.0),
+    ),
+    Kind(
+        "fast_minor", "Small loops at high rate with many reversals: a lag opens the smallest ones, plays do not.",
+        ("rate_dependence", "lag", "noncongruent"), _fast_minor, _fast,
+    ),
+    Kind(
+        "slow_reversals", "Random turning points with pauses, to judge what the slow records say.",
+        ("creep", "asymmetry", "saturation", "sensor_nonlinearity", "noncongruent"),
+        partial(_reversals, seed=2, turns=14, slowest=3.0), _lasting(1.25, 600), True,
+    ),
+    Kind(
+        "sweep", "A sine from slow to an eighth of the sampling rate: the peak of a resonance, the phase of a lag.",
+        ("resonance", "lag", "delay"), _sweep, _fast,
+    ),
+    Kind(
+        "cycles", "Many equal full loops: they travel and heat; later ones differ from earlier ones.",
+        ("ageing", "thermal"), _cycles, _lasting(1.0, 720),
+    ),
+    Kind(
+        "settling", "Nested loops and short holds at a middle pace, while it cools: creep and rate in between.",
+        ("creep", "rate_dependence", "thermal"), _settling, _middle,
+    ),
+    Kind(
+        "fast_reversals", "Random turning points at random speeds near the limit, to judge.",
+        ("rate_dependence", "lag", "delay", "slew_limit"), partial(_reversals, seed=3, turns=40, slowest=4.0), _fast,
+        True,
+    ),
+    Kind(
+        "multisine", "Equal periods of an odd multisine with random phases: the noise without a model, what is even.",
+        ("asymmetry", "sensor_nonlinearity", "resonance"), _multisine, _fast,
+    ),
+    Kind(
+        "reversals", "Random turning points at a middle pace, to judge what lies between slow and fast.",
+        ("creep", "rate_dependence", "noncongruent"), partial(_reversals, seed=5, turns=25, slowest=3.0), _middle, True,
+    ),
+    Kind(
+        "slow_again", "The first record once more: what has changed in the session, and is neither rate nor amplitude.",
+        ("drift", "ageing", "thermal"), _slow, _lasting(1.0),
+    ),
+)  # fmt: skip
+"""The records of a session, in their order."""
+
+
+def written(record: Kind, grid: Grid, tempo: Tempo, every: int) -> list[int]:
+    """The codes of a record, which ends with moves to the top and the bottom: the history of the next."""
+    pace = tempo.move if every == tempo.fast else 2 * MOVE
+    course = Course(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), pace)
+    course.hold(EDGE)
+    record.draw(course)
+    _ends(course, pace)
+    return course.rounded()
+
+
+def lead_in(grid: Grid, tempo: Tempo, every: int) -> list[int]:
+    """Moves to the top and the bottom, the history of the first record, slow enough for any stage."""
+    course = Course(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), 2 * MOVE)
+    course.hold(EDGE)
+    _ends(course, 2 * MOVE)
+    return course.rounded()
