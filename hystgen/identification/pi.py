@@ -197,6 +197,11 @@ samples before each reversal and can take any value, while a slightly larger dri
 the play below, and the error at the ends of the loop is already within 10 % of what plays up to 0.9 reach.
 """
 
+LEAST_RETURN = 0.05
+"""The same, there and back, of a play whose start memory is not known: less is hardly more than a straight line. A drive
+whose amplitude grows to the end moves its widest plays once; with 0.15 the errors of 10 simulated plants were 3 times
+those with a known start in the median, and weights of plays that are there were missing."""
+
 COUNTS = (6, 8, 12, 16, 24)
 """Numbers of plays tried by default."""
 
@@ -237,13 +242,13 @@ def largest(courses: Sequence[Course]) -> float:
     found = 0.0
     for course in courses:
         low_end, high_end = course.drive_range
-        wanted = LEAST_TRAVEL * (high_end - low_end)
-        if wanted == 0.0:
+        if high_end == low_end:
             continue
+        wanted = np.array([LEAST_TRAVEL, LEAST_RETURN]) * (high_end - low_end)
         low, high = 0.0, float(np.ptp(course.v))
         for _ in range(40):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if travel(course, middle) >= wanted else (low, middle)
+            low, high = (middle, high) if np.all(travel(course, middle) >= wanted) else (low, middle)
         found = max(found, low)
     return found
 

@@ -145,17 +145,17 @@ def _reached(v: Array) -> int:
     return first + int(np.argmax(visit))
 
 
-def travel(course: Course, threshold: float) -> float:
-    """Peak-to-peak movement of one play over the samples compared.
+def travel(course: Course, threshold: float) -> tuple[float, float]:
+    """Peak-to-peak movement of one play over the samples compared, and how far it goes there and back.
 
-    Where these begin before the memory of that play is known, the lesser of the way up and the way down: while a drive
-    goes one way, a play behind an unknown start shows no more than a straight line.
+    Where these begin before the memory of that play is known, the second is the lesser of the way up and the way down:
+    while a drive goes one way, a play behind an unknown start shows no more than a straight line.
     """
     start = start_states(course.v, course.history, np.array([threshold]))[0]
     moved = operators.play(course.v[: course.last], threshold, float(start))[course.first :]
-    if course.first >= replace(course, start=None).resettled(threshold).first:
-        return float(np.ptp(moved))
-    return min(ways(moved))
+    whole = float(np.ptp(moved))
+    known = course.first >= replace(course, start=None).resettled(threshold).first
+    return whole, whole if known else min(ways(moved))
 
 
 def ways(x: Array) -> tuple[float, float]:

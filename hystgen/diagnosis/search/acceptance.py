@@ -128,7 +128,13 @@ LEAST_EXPLAINED = 0.5
 """[share of the variance above the noise] Names stand only where together they leave at most this of held-out and of
 fitted records: most is explained. What a disturbance shares with an effect is less: room temperature on the gain and
 a slow crosstalk line kept 0.74 to 0.79 of the fitted variance under false names, right names at most 0.28. Set by:
-second_plants foreign 0:10, single 0:13. Changed by: acceptance::test_names_explain_most."""
+second_plants foreign 0:10, single 0:13. Changed by: acceptance::test_names_near_the_noise_explain_half."""
+
+MOSTLY_EXPLAINED = 1.0 / 3.0
+"""[share of the variance above the noise] The same of names that leave more than `MUCH_LEFT`, as wrong names do: they
+have to explain two thirds. Room temperature on the gain kept 0.39 to 0.41 under the names of ageing and self-heating,
+right names at most 0.30, beside a second effect that was not found. Set by: second_plants foreign 300:308, single and
+pair 300:312. Changed by: second_plants foreign 400:410, acceptance::test_names_explain_most."""
 
 MUCH_LEFT = 3.0
 """[times the noise floor] A verdict that names effects says first what they leave if it is more. Changed by: blind

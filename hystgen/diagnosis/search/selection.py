@@ -291,7 +291,9 @@ def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
         if records.one_loop and group is records.held and after > acceptance.FAR_ABOVE_NOISE * records.noise:
             return Refusal("most", after, acceptance.FAR_ABOVE_NOISE * records.noise)
         left, gap = apart(after, records.noise), apart(before, records.noise)
-        if not is_noise(after, records.noise) and left**2 > acceptance.LEAST_EXPLAINED * gap**2:
+        far = after > acceptance.MUCH_LEFT * records.noise
+        most = acceptance.MOSTLY_EXPLAINED if far else acceptance.LEAST_EXPLAINED
+        if not is_noise(after, records.noise) and left**2 > most * gap**2:
             return Refusal("most", after, before)
     return None
 
