@@ -353,7 +353,7 @@ def test_a_broken_time_of_day_has_a_place(tmp_path: Path) -> None:
     lines = list(STYLES["ISO"])
     lines[30] = "soon," + lines[30].split(",", 1)[1]
     (problem,) = problems(put(tmp_path / "a.csv", *lines))
-    assert problem == ':31:1: error: "soon" in column "time" is no time of day; write every time as the first one'
+    assert problem == ':31:1: error: "soon" in column "time" is not a time of day; write every time as the first one'
     lines[30] = "," + lines[30].split(",", 1)[1]
     assert len(read_record(put(tmp_path / "a.csv", *lines))) == N - 1
 

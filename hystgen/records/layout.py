@@ -474,7 +474,7 @@ class Segments:
             return [clock.seconds(stamp) for stamp in stamps][1]
         except ValueError:
             said = " or ".join(f'"{printable(stamp)}"' for stamp in stamps)
-            raise self.reading.refuse(f"{said} is no date and time; export the file again", line) from None
+            raise self.reading.refuse(f"{said} is not a date and time; export the file again", line) from None
 
 
 def _tags(lines: Sequence[str], delimiter: str) -> dict[str, list[str]]:
