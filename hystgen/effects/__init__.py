@@ -1,4 +1,4 @@
-"""The catalogue of effects beyond the static model: one folder an effect, each with a forward model and its parameters.
+"""The catalogue of effects beyond the static model: one folder per effect, with its forward model and parameters.
 
 An effect's `model` is imported when a parameter file names it, so that plain models stay quick to load.
 """

@@ -60,7 +60,7 @@ class Run:
     """the longer run from which these samples are taken; its first and its last sample are among them"""
 
     def picked(self, places: NDArray[np.intp]) -> Run:
-        """Fewer samples of it; what adds up from sample to sample adds up over all of them."""
+        """The run at fewer samples; sums from sample to sample still run over all of them."""
         extra = {name: column[places] for name, column in self.extra.items()}
         return Run(self.t[places], self.v[places], extra, self.rest, (self, places))
 
@@ -104,7 +104,7 @@ class Run:
         return self.remembered(time_constants, make)
 
     def of_steps(self, make: Callable[[Array], Array]) -> Array:
-        """What is made of each step by itself, (k, N - 1); for steps that are equal it is made once."""
+        """Values for each step, (k, N - 1); steps of equal length share them."""
         steps, place = self.different
         return make(steps).take(place, axis=1) if len(steps) < len(place) // 2 else make(self.steps)
 
@@ -114,7 +114,7 @@ class Run:
         return np.unique(self.steps, return_inverse=True)
 
     def remembered(self, by: Hashable, make: Callable[[], Array]) -> Array:
-        """What is made of the steps and of some numbers; a search comes back to most of them."""
+        """Values made from the steps and some numbers, remembered, since a search comes back to most of them."""
         found = self._made.pop(by, None)
         if found is None:
             found = make()
@@ -176,7 +176,7 @@ class Candidate:
     amounts: tuple[int, ...] = ()
 
     def at(self, numbers: Array) -> Candidate:
-        """The same with all numbers but the amounts as they are here."""
+        """The same shape with all numbers fixed at their values here, except the amounts."""
         free = np.isin(np.arange(len(numbers)), self.amounts)
         return replace(self, low=np.where(free, self.low, numbers), high=np.where(free, self.high, numbers))
 
@@ -186,7 +186,7 @@ Problem = tuple[tuple[str | int, ...], str]
 
 
 def without_plays(thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-    """The problem of an effect on plays with a threshold in a model that has none."""
+    """The problem of an effect that needs plays with a threshold, in a model without any."""
     if thresholds is not None and len(thresholds) < 2:
         yield ("name",), "acts on plays with a threshold, and the model has none; remove the entry"
 
@@ -229,7 +229,7 @@ class Effect(BaseModel):
     timed: ClassVar[bool] = True
     """whether the times of the samples matter"""
     pointwise: ClassVar[bool] = False
-    """whether `bent` or `mapped` makes of a sample what depends on that sample alone, and needs nothing of the run"""
+    """whether the answer of `bent` or `mapped` depends only on the sample itself, not on the run"""
     columns: ClassVar[tuple[str, ...]] = ()
     """further columns that a record needs"""
     fades: ClassVar[bool] = False
@@ -253,16 +253,16 @@ class Effect(BaseModel):
             guarded.guard(cls, Effect, str(words[0]))
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """What does not fit together, as (keys, message); `thresholds` of the model, None where they are not known."""
+        """Contradictions between parameters, as (keys, message); `thresholds` of the model, None where not known."""
         yield from ()
 
     def remarks(self, thresholds: tuple[float, ...]) -> list[str]:
-        """What else `hystgen show` says of the effect in a model of these thresholds, one line each."""
+        """Further lines of `hystgen show` about the effect in a model with these thresholds."""
         return []
 
     @property
     def dead_time(self) -> float:
-        """DRIVE: s that pass before anything is seen of a change of the drive."""
+        """DRIVE: seconds before a change of the drive shows at all."""
         return 0.0
 
     def drive(self, a: Array, run: Run) -> Array:
@@ -288,7 +288,7 @@ class Effect(BaseModel):
         return cls.bent is not Effect.bent
 
     def bent(self, rows: Array, thresholds: Array) -> Array:
-        """PLAYS: what becomes of the plays' rows (n+1, N) before the weights sum them."""
+        """PLAYS: the plays' rows (n+1, N) as the weights sum them."""
         return rows
 
     def bent_sum(self, p: Array, rows: Array, thresholds: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Checks of the results of a user's own effects, before anything depends on them."""
+"""Checks of the results of a user's own effects before anything depends on them."""
 
 from __future__ import annotations
 

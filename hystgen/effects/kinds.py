@@ -19,7 +19,7 @@ VERBS = ("rest", "resting", "solve", "absorb")
 
 @dataclass(frozen=True)
 class Rows:
-    """What a block has several of: what one is called, its real numbers, and those of its memory; in fixed point their
+    """Several entries of a block: name of one, its real numbers, and those of its memory; in fixed point their
     `letters` and those of its `memory`, as in `Kind`."""
 
     name: str

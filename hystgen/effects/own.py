@@ -1,4 +1,4 @@
-"""The compensator of an effect of the user's own: a linear block in Python, and the C file with the same functions.
+"""The compensator of a user's own effect: a linear block in Python, and the C file with the same functions.
 
     def rest(t, s, x): ...      settle at the input x; returns the output
     def resting(t, y): ...      the input of the settled output y

@@ -1,4 +1,4 @@
-"""Effects of the user's own, from Python files of the same form as those of the catalogue."""
+"""A user's own effects, from Python files of the same form as those of the catalogue."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ METHODS = {
     Place.OUTPUT: ("mapped",),
     Place.ADDED: ("added",),
 }
-"""What a class of each place has to define, one of them at least."""
+"""Methods of a class by place; it has to define at least one of them."""
 
 
 def load_user_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:

@@ -1,4 +1,4 @@
-"""Verification: emitted files, compiled and run, give the bits of the Python reference or they do not."""
+"""Verification: do emitted files, compiled and run, give the bits of the Python reference?"""
 
 from typing import TYPE_CHECKING, Any
 

@@ -57,9 +57,8 @@ def rows(
     folder: Path,
     progress: Callable[[str], None],
 ) -> list[Row]:
-    """One row: what the self-test says on the emulated board, and what the module takes of its memory.
-
-    `size`: what a model that is too large for the board is measured by; None where it cannot be built for one.
+    """One row: result of the self-test on the emulated board, and memory of the module. `size`: by
+    which a model that is too large for the board is judged; None where it cannot be built for one.
     """
     if compiler and "gcc" not in compiler:
         words = f"does not build for {board.name}; use gcc"

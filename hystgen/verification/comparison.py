@@ -29,7 +29,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Difference:
-    """How many samples were compared, how many differ, by how much at most (None: infinitely), and the first one."""
+    """Number of samples compared and of those that differ, largest difference (None: infinite), first that differs."""
 
     samples: int
     different: int

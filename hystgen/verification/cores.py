@@ -24,10 +24,9 @@ def rows(
     folder: Path,
     progress: Callable[[str], None],
 ) -> Iterator[Row]:
-    """One row an operator, compiler and build.
-
-    Where the core has an FPU also as a user builds it who passes nothing, which lets compilers contract a product and a
-    sum, with a row for the self-test; where qemu is installed also the self-test as a whole firmware.
+    """One row per operator, compiler and build. Where the core has an FPU, also built without flags, which lets
+    compilers contract a product and a sum, with a row for the self-test; where qemu is installed, also the self-test as
+    a whole firmware.
     """
     problem = cross.wheel_problem()
     if problem:

@@ -29,12 +29,12 @@ PAGE = 0x1000
 
 
 class EmulatorError(RuntimeError):
-    """The emulated core did not do what it should; the message says why."""
+    """The emulated core failed; the message says why."""
 
 
 @dataclass(frozen=True)
 class Image:
-    """An ELF file: what is loaded where, symbols with their sizes, and bytes of each section."""
+    """An ELF file: its loaded parts with their addresses, symbols with their sizes, and bytes of each section."""
 
     segments: tuple[tuple[int, bytes], ...]
     symbols: dict[str, tuple[int, int]]

@@ -71,7 +71,7 @@ def rows(
     folder: Path,
     progress: Callable[[str], None],
 ) -> Iterator[Row]:
-    """One row an operator, compiler and build; compilers: those named, else all that are installed."""
+    """One row per operator, compiler and build; compilers: those named, else all that are installed."""
     chosen = [(name, compilers.find(name)) for name in compiler] or [(c.name, c) for c in compilers.available()]
     if not chosen:
         message = f"no C compiler found; install gcc or clang, or: {extras.install('zig')}"

@@ -15,7 +15,7 @@ from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 
 POINTS = 2000
-"""Points of a path; to follow the plays one by one in Python takes about 0.1 s for as many."""
+"""Points of a path; following the plays one by one in Python takes about 0.1 s for this number."""
 
 # What a point of the path is: the drive at which a play starts to follow, at which one would after a turn here, a limit
 # of the drive, or any

@@ -46,7 +46,7 @@ class _Ageing(Effect):
 class LogarithmicAgeing(_Ageing):
     """Gain `1 - loss log10(1 + D/travel)`, D the distance travelled since the start of the session.
 
-    The logarithmic law of depolarisation, which data sheets quote a decade, over travel in place of time.
+    The logarithmic law of depolarisation, which data sheets quote per decade, over travel instead of time.
     """
 
     shape: Literal["logarithmic"] = Field(default="logarithmic", description="loss a decade of travel")
@@ -58,7 +58,7 @@ class LogarithmicAgeing(_Ageing):
         return np.asarray(1.0 - self.loss * run.remembered(("decades", self.travel), lambda: self._decades(run)))
 
     def _decades(self, run: Run) -> Array:
-        """Decades of travel; a search changes the loss more often than the travel."""
+        """Decades of travel, remembered: a search changes the loss more often than the travel."""
         with np.errstate(over="ignore"):
             return np.asarray(np.log10(1.0 + np.minimum(run.travelled / self.travel, 1e300)))
 
@@ -112,7 +112,7 @@ class SeveralAgeing(_Ageing):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Two losses and travels, where one exponential takes something away."""
+        """Two losses and travels, where one exponential explains a part of the error."""
         total = max(about.travel, 1e-12)
 
         def build(x: Array) -> SeveralAgeing:

@@ -16,15 +16,15 @@ from hystgen.basics.quantities import NotNegative, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, not_as_many, span
 
 FASTEST = 0.01
-"""s; what follows a move faster than this is a lag or friction of the domain walls, and has other names."""
+"""[s] Motion that follows a move faster than this is a lag or friction of the domain walls, not creep."""
 
 MOST_A_DECADE, MOST_OF_A_STATE = 0.06, 0.1
-"""Largest shares that are tried: stages creep by 1 to 2 % a decade, and up to three times as much."""
+"""Largest shares that are tried: stages creep by 1 to 2 % per decade, some up to three times that."""
 
 LOGARITHMIC = "creep, logarithmic"
 
 PER_DECADE = 2
-"""States a decade of a logarithmic spectrum; their ripple on the straight line over log t is 0.1 % of its slope."""
+"""States per decade of a logarithmic spectrum; their ripple on the straight line over log t is 0.1 % of its slope."""
 
 
 @jit
@@ -186,7 +186,7 @@ class LogarithmicCreep(_Creep):
         return self.at_once * h + _states(h, run, tau, np.full(len(tau), weight))
 
     def transients(self, run: Run) -> Array:
-        """`exp(-t/tau_i)` for one time constant a decade, enough for any start of the spectrum."""
+        """`exp(-t/tau_i)` for one time constant per decade, enough for any start of the spectrum."""
         return _fading(run, self.spectrum()[0][::PER_DECADE])
 
     def largest(self, run: Run) -> Array:
@@ -196,7 +196,7 @@ class LogarithmicCreep(_Creep):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The share a decade over the whole recorded time; where it helps, with free ends of the spectrum."""
+        """The share per decade over the whole recorded time; where it helps, with free ends of the spectrum."""
         low, high = span(max(0.5 * about.sample_time, FASTEST), 10.0 * about.session)
         t0 = min(max(0.1, about.sample_time), about.duration)
         # A longer spectrum only changes the gain, which the weights of the plays take up

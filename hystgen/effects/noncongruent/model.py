@@ -150,9 +150,8 @@ class LoopCentre(_Noncongruent):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Amplitude, centre within the drive, width; where a cubic takes something away.
-
-        How a bump begins is read off the density that the cubic has: from far away no search finds its place.
+        """Amplitude, centre within the drive, width; where a cubic explains a part of the error. A search starts at
+        the bump of the cubic's density: from far away it would not find the place.
         """
         if len(about.thresholds) < 2:
             return []

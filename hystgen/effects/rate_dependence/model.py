@@ -333,7 +333,7 @@ class ThresholdRate(_RateDependence):
 class RelaxingPlays(_RateDependence):
     """Plays that follow viscously: `z' = dz_r(w - z)/tau`, `dz_r` the part of its argument beyond +/- r.
 
-    A dashpot beside the dry friction of every play; for tau = 0 the play itself. With `exponent` m the dashpot is
+    A dashpot parallel to the dry friction of every play; for tau = 0 the play itself. With `exponent` m the dashpot is
     nonlinear: `z' = (r_n/tau) sign(d) (|d|/r_n)^m`, `d = dz_r(w - z)`, r_n the largest threshold. Over straight `w` the
     linear case is exact, contacts within a step included; the nonlinear one is integrated to about 1e-6 of r_n a step.
     """

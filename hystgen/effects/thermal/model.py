@@ -139,7 +139,7 @@ class _OwnHeat(_Thermal):
         """Final rise at the heat of each step (N - 1,), K."""
 
     def above(self, run: Run) -> Array:
-        """Temperature rise, K; a search comes back to it with other gains and offsets."""
+        """Temperature rise, K; remembered, since a search comes back to it with other gains and offsets."""
         numbers = self.model_dump(exclude={"gain_per_degree", "offset_per_degree"})
         return run.remembered((type(self), *numbers.values()), lambda: self._rise(run))
 
@@ -211,7 +211,7 @@ class HysteresisHeating(_OwnHeat):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Time constant with gain, with gain and offset, and the reach; where the drive's own heat takes something."""
+        """Time constant with gain, with gain and offset, and the reach; where the drive's own heat helps."""
         low_drive, high_drive = about.drive
         wide = high_drive - low_drive
         rate = about.travel / max(about.session, about.sample_time)
@@ -241,7 +241,7 @@ class HysteresisHeating(_OwnHeat):
 
 
 def _numbers(row: tuple[int | None, int | None], about: About) -> tuple[Array, Array, Array, tuple[Array, ...]]:
-    """Least, largest, first and other first numbers: time constant, then a gain, an offset or both.
+    """Bounds, start and further starts of the numbers: time constant, then a gain, an offset or both.
 
     Warmth changes from loop to loop, not within one: what follows the drive within a quarter of a loop over its range
     is not a temperature.
