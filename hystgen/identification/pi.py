@@ -129,9 +129,11 @@ the play below, and the error at the ends of the loop is already within 10 % of 
 """
 
 LEAST_RETURN = 0.05
-"""The same, there and back, of a play whose start memory is not known: less is hardly more than a straight line. A drive
-whose amplitude grows to the end moves its widest plays once; with 0.15 the errors of 10 simulated plants were 3 times
-those with a known start in the median, and weights of plays that are there were missing."""
+"""The same, there and back, of a play whose start memory is not known: less is hardly more than a straight line.
+
+A drive whose amplitude grows to the end moves its widest plays once. With 0.15 here too, weights of plays that are there
+were missing: in 10 simulated plants errors were 3.0 times those with a known start in the median, now 1.9.
+"""
 
 COUNTS = (6, 8, 12, 16, 24)
 """Numbers of plays tried by default."""
