@@ -131,7 +131,7 @@ the play below, and the error at the ends of the loop is already within 10 % of 
 LEAST_RETURN = 0.05
 """The same, there and back, of a play whose start memory is not known: less is hardly more than a straight line.
 
-A drive whose amplitude grows to the end moves its widest plays once. With 0.15 here too, weights of plays that are there
+A drive whose amplitude grows to the end moves its widest plays once. With 0.15 here too, weights of plays that exist
 were missing: in 10 simulated plants errors were 3.0 times those with a known start in the median, now 1.9.
 """
 
