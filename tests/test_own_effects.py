@@ -394,6 +394,27 @@ def test_two_names_that_are_one_in_c_are_refused(tmp_path: Path) -> None:
         emitted_files(hystgen.load(path, [EXAMPLE, other]))
 
 
+@pytest.mark.parametrize("keeps", [0.5, 0.99, 0.999])
+@pytest.mark.parametrize("apart", [0.0, 1e-13, 1e-9, 1e-4])
+def test_sums_over_samples_are_no_smaller_than_they_are(keeps: float, apart: float) -> None:
+    """Two low-passes in series, alike or nearly so, against the sums themselves."""
+    a = np.array([[keeps, 0.0], [1.0 - keeps, keeps * (1.0 - apart)]])
+    b, c = np.array([1.0 - keeps, 0.0]), np.array([0.3, 1.0])
+    system = own.System(a, b, c, 0.0)
+    power, states, after, once = np.eye(2), np.zeros(2), np.zeros(2), np.zeros(2)
+    for _ in range(int(40.0 / (1.0 - keeps))):
+        states += np.abs(power @ b)
+        after += np.abs(c @ power)
+        once = np.maximum(once, np.abs(c @ power))
+        power = a @ power
+    before = float(after @ np.abs(b))  # all are positive
+    pairs = (system.states(), states), (system.after(), after), (system.once(), once), (system.before(), before)
+    for bound, exact in pairs:
+        assert np.all(bound >= exact * (1.0 - 1e-9))
+    if apart < 1e-6:
+        assert all(np.all(bound <= 2.0 * exact) for bound, exact in (*pairs[:2], pairs[3]))
+
+
 def test_two_folders_give_one_file_of_both(tmp_path: Path) -> None:
     text = emitted_files(both(tmp_path), operator="both")
     assert "stage_user_droop_absorb" in text["stage.c"]
