@@ -624,9 +624,9 @@ def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
         emit_options(model("straight"), arithmetic="q15")
     with pytest.raises(FormatError, match=r"slew_limit: 0\.819 drive codes a sample are less than one"):
         compiled(model("slow", chain("slow", "name: slew_limit, rate: 0.1")), "q15")
-    with pytest.raises(FormatError, match="creep: its states and constants do not fit q31"):
+    with pytest.raises(FormatError, match="creep: states and constants do not fit q31"):
         compiled(model("slow", chain("slow", "name: creep, time_constants: [1.0e+7], weights: [9.0]")), "q31")
-    with pytest.raises(FormatError, match="a lag: its states and constants do not fit q31"):
+    with pytest.raises(FormatError, match="a lag: states and constants do not fit q31"):
         compiled(model("slow", chain("slow", "name: lag, time_constant: 1.0e9")), "q31")
     long = model("remote", chain("remote", "name: delay, time: 33"))
     with pytest.raises(UnsupportedEffectsError, match="33000 samples, and the forward operator keeps 32768 at most"):

@@ -143,7 +143,7 @@ class _Builder:
             plays,
             limits,
             self._need(lambda: self._moving(plays), "effects on plays"),
-            self._need(self._lags, "effects in front of the plays"),
+            self._need(self._lags, "effects in front of the plays" if self.own_drives else "a lag"),
             self._need(self._creep_tables, "creep"),
             self._need(self._delay, "a delay"),
             self._need(self._mode_tables, "resonance"),
@@ -187,7 +187,7 @@ class _Builder:
         except OverflowError as error:
             raise FormatError((
                 ("model", "effects"),
-                f"{what}: its states and constants do not fit {self.arithmetic}, whose signals have "
+                f"{what}: states and constants do not fit {self.arithmetic}, whose signals have "
                 f"{self.bits} bits below an output code; use {self.about.finer}",
             )) from error  # fmt: skip
 
