@@ -85,7 +85,8 @@ def _reason(error: Exception) -> str:
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
     said = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    return f"{said}; {ADVICE[error.errno]}" if error.errno in ADVICE else said
+    ours = error.errno not in ADVICE or error.strerror != os.strerror(error.errno)  # with advice of its own
+    return said if ours else f"{said}; {ADVICE[error.errno]}"
 
 
 def load_model(path: str, effects: Sequence[str] = ()) -> Model:
