@@ -85,8 +85,10 @@ def _reason(error: Exception) -> str:
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
     said = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
-    ours = error.errno not in ADVICE or error.strerror != os.strerror(error.errno)  # with advice of its own
-    return said if ours else f"{said}; {ADVICE[error.errno]}"
+    number = error.errno or 0
+    if number in ADVICE and error.strerror == os.strerror(number):  # texts of this package bring advice of their own
+        return f"{said}; {ADVICE[number]}"
+    return said
 
 
 def load_model(path: str, effects: Sequence[str] = ()) -> Model:
