@@ -235,7 +235,7 @@ def test_bits_equal_in_other_layouts(name: str, arithmetic: str, layout: str) ->
     check_codegen(name, arithmetic=arithmetic, layout=layout)
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", FILES)

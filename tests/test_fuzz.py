@@ -39,6 +39,7 @@ def fuzz(folder: Path, seconds: float, *module: str, change: Callable[[str], str
 
 
 @needs_clang
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize(
     ("name", "arithmetic", "engine"),
     [

@@ -94,12 +94,13 @@ def test_the_inverse_composes_with_the_forward_model(tmp_path: Path, even: bool)
     v = one.inverse().simulate(u, t=t)
     assert np.max(np.abs(one.simulate(v, t=t) - u)) < 1e-12
     if even:
-        assert np.max(np.abs(one.inverse().simulate(u, "float64") - v)) < 1e-11
+        with jit.plain():
+            assert np.max(np.abs(one.inverse().simulate(u, "float64") - v)) < 1e-11
 
 
-@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
-def test_c_gives_the_bits_of_the_reference(tmp_path: Path, arithmetic: str) -> None:
-    report = hystgen.verify(both(tmp_path, CREEP), arithmetic, "both", compiler=["gcc"], length=1000)
+def test_c_gives_the_bits_of_the_reference(tmp_path: Path) -> None:
+    """Compiled, which the others are not."""
+    report = hystgen.verify(both(tmp_path, CREEP), "float32", "both", compiler=["gcc"], length=1000)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} >= {"inverse", "forward"}
 
@@ -165,10 +166,10 @@ def test_fixed_point_stays_within_its_bounds(tmp_path: Path, arithmetic: str, ef
         assert np.max(np.abs(y - exact)) <= codes.forward_error < 64.0
 
 
-@pytest.mark.parametrize("arithmetic", ["q31", "q15"])
-def test_c_gives_the_bits_of_the_reference_in_fixed_point(tmp_path: Path, arithmetic: str) -> None:
+@pytest.mark.parametrize("arithmetic", ["float64", "q31", "q15"])
+def test_c_gives_the_bits_of_the_reference_in_every_arithmetic(tmp_path: Path, arithmetic: str) -> None:
     with jit.plain():
-        report = hystgen.verify(both(tmp_path, CREEP), arithmetic, "both", compiler=["gcc"], length=20)
+        report = hystgen.verify(both(tmp_path, CREEP), arithmetic, "both", compiler=["gcc"], length=100)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} == {"inverse", "forward"}
 
