@@ -52,8 +52,9 @@ SEARCHED = 200_000  # samples of a round of the search for the worst case
 # A trial with at least this many samples is searched separately. `trials` makes 600 of random turns this long; with 4
 # and 16 plays no other has more than 18 samples, with 128 plays corner lists are on both sides of it
 LONG = 100
-# [trials] The next round tries the neighbours of this many, the most expensive. 10 and 90 lead to the same instructions
-# as 30: 293 for the inverse of 8 plays in float32 on a Cortex-M4F, in 53, 173 and 64 s (`Bench._worst_trials`)
+# [trials] The next round tries the neighbours of this many, the most expensive. For the inverse of 8 plays in float32
+# on a Cortex-M4F 10, 30 and 90 all find 293 instructions, in 53, 64 and 173 s (`Bench._worst_trials`): 30 is three
+# times what was needed, for little more time
 KEPT = 30
 RANGE = 10.0  # half of it
 MEANS = {"fine": lambda: multisine(20000), "coarse": lambda: multisine(2000), "walk": lambda: walk(5000)}

@@ -14,6 +14,9 @@ LOW_BITS = 20
 LARGEST = 2**51
 """Numbers that are multiplied are smaller: their upper part then has 31 bits, as a mantissa has."""
 
+STATE_BITS = 60
+"""Bits of a state without its sign, of which a product takes 50: ten are left out, and no rate outgrows a factor."""
+
 MANTISSA_BITS, LEAST_SHIFT, MOST_SHIFT = 31, LOW_BITS + 1, LOW_BITS + 62
 """Bits of a mantissa without its sign, and shifts: a product drops at least a bit, to be rounded, and at most 62."""
 

@@ -87,13 +87,13 @@ class Dac:
 
 
 def wrong_bits(bits: int) -> Iterator[str]:
-    """What is wrong with the number of bits of a converter."""
+    """Problems with the number of bits of a converter."""
     if not FEWEST_BITS <= bits <= MOST_BITS:
         yield f"a DAC of {bits} bits; give {FEWEST_BITS} to {MOST_BITS}"
 
 
 def wrong_range(low: float, high: float) -> Iterator[str]:
-    """What is wrong with the range of a converter."""
+    """Problems with the range of a converter."""
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         yield f"the DAC range {low:g} to {high:g} does not rise; give its lower end first"
 

@@ -1,6 +1,6 @@
 """The records of a plan: what each is for, and the waveform that it drives.
 
-Drives are computed in whole steps of a decimal grid and with the four basic operations alone, so that the files have
+Drives are computed in whole steps of a decimal grid and with only the four basic operations, so that the files have
 the same bytes on every machine.
 """
 

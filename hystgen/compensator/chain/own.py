@@ -3,7 +3,7 @@
 Such a block is linear, so that its functions, called with one number after the other, say what it does: forwards
 `s <- A s + B x`, `y = C s + D x` by absorb, and backwards from y to x by solve and then absorb. Sums over all later
 samples are bounded mode by mode: `sum |C A^k B| <= sum |c_j b_j|/(1 - |lambda_j|)` in the eigenvectors of A, or by sums
-of powers of A, whichever is smaller; where two modes are one, by powers alone.
+of powers of A, whichever is smaller; where two modes are one, only by powers.
 """
 
 from __future__ import annotations
@@ -25,11 +25,6 @@ from hystgen.plays.slots import Counts, Reals
 SAME = 1e-9
 """Relative difference up to which two answers of a block are the same but for rounding, with a time constant of up to a
 million samples: their quotient is what a difference of states loses."""
-
-
-MOST_ALIKE = 1e6
-"""Condition of the eigenvectors beyond which two modes count as one: rounding takes 1e-10 of a sum there, and all of it
-from 1e16 on."""
 
 
 class OwnTables(NamedTuple):
@@ -54,10 +49,12 @@ class System:
     d: float
 
     def _modes(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]] | None:
-        """Reciprocals of what each mode loses in a sample, eigenvectors, and their inverse; None where two modes are
-        one, or nearly so, and the eigenvectors span too little."""
+        """Reciprocals of what each mode loses in a sample, eigenvectors, and their inverse.
+
+        None where two modes are one, so that the eigenvectors do not span the states.
+        """
         values, vectors = np.linalg.eig(self.a)
-        if len(values) and np.linalg.cond(vectors) > MOST_ALIKE:
+        if np.linalg.matrix_rank(vectors) < len(values):
             return None
         with np.errstate(divide="ignore"):
             return 1.0 / np.maximum(1.0 - np.abs(values), 0.0), vectors, np.linalg.inv(vectors)

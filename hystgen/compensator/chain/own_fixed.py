@@ -14,16 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic.factors import LARGEST, error, factor, lifted, times
+from hystgen.arithmetic.factors import LARGEST, STATE_BITS, error, factor, lifted, times
 from hystgen.basics.jit import jit
 from hystgen.compensator.chain.own import Linear, OwnTables
 from hystgen.plays.fixed import nearest
 
-STATE_BITS = 60
-"""Bits of any number that a block computes, without its sign."""
-
 GUARD = 3
-"""Bits of a signal below what all roundings of a block's states make of its output, as of the catalogue's states."""
+"""Bits of a signal below what the roundings of a block's states make of its output: where there is room an eighth of
+the chain's last bit, beside the half that rounding takes. Held by `test_fixed_point_stays_within_its_bounds`."""
 
 MANTISSA, SHIFT, DROP, LIFT = range(4)
 
@@ -126,8 +124,10 @@ def asked_of_input(linear: Linear, given: float, asked: float) -> float:
 
 
 def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
-    """A block for an input and an output asked for up to these sizes, in signals of the chain, of which `code` bits are
-    below a code. Raises OverflowError where its numbers do not fit, or its states would stall."""
+    """A block for an input and an output asked for up to these sizes, in signals of the chain.
+
+    These have `code` bits below a code. Raises OverflowError where its numbers do not fit, or its states would stall.
+    """
     trace = _Trace(linear, given, asked)
     values = linear.numbers.tolist()
     seen, most, noise, _ = trace.run([_row(value, 0.0) for value in values], 0)

@@ -13,16 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic.factors import LARGEST, factor, times
+from hystgen.arithmetic.factors import LARGEST, STATE_BITS, factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag import compensator as floating
 from hystgen.effects.lag.compensator import LagTables
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
-
-STATE_BITS = 60
-"""Bits of a state without its sign, of which a product takes 50: ten are left out, and no rate outgrows a factor."""
 
 GUARD = 3
 """Bits of a state below the last one in which it stalls."""
