@@ -401,7 +401,7 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array 
 def no_worse_than(given: Fitted, outcome: Outcome, records: Records) -> Outcome:
     """The outcome, or the model as given where that predicts held-out records better.
 
-    A refit that does worse there is not a better model; where effects were named, it has to be worse by enough to count.
+    A refit that does worse there is not a better model; where effects were named, by enough to count.
     """
     least, found = records.residual(given), outcome.fitted
     if not (better(given, found, records.held) if outcome.found else least < records.residual(found)):
