@@ -1,8 +1,8 @@
 #include "hystgen_runtime.h"
 
-/* Gain that follows the distance travelled, as cubic pieces over it. */
+/* A gain that depends on the distance travelled, as a piecewise cubic. */
 
-/* The gain after a travel, from the piece that it lies in; behind the last one it stays. */
+/* The gain at a travel; past the last piece it stays constant. */
 static hystgen_real_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, hystgen_real_t travel) {
     unsigned int low = 0;
     unsigned int high = t->n;
@@ -20,7 +20,7 @@ static hystgen_real_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, hystg
     return ((piece->c3 * share + piece->c2) * share + piece->c1) * share + piece->c0;
 }
 
-/* The travel from the next step on. Returns whether it had to be limited. */
+/* Sets the travel. Returns whether it had to be limited. */
 static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                       hystgen_real_t travel) {
     const hystgen_real_t inside = travel < 0 ? 0 : travel > t->last ? t->last : travel;
@@ -32,8 +32,7 @@ static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_a
     return inside < travel || inside > travel;
 }
 
-/* A gain in place of that of the travel, from the next step on. Returns whether it had to be
-   limited. */
+/* Sets a gain in place of the one that follows the travel. Returns whether it had to be limited. */
 static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                hystgen_real_t gain) {
     const hystgen_real_t inside = gain < t->least     ? t->least
@@ -45,7 +44,7 @@ static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t
     return inside < gain || inside > gain;
 }
 
-/* The drive has moved by `way`. The reciprocal of the gain follows by Newton's steps. */
+/* The drive has moved by `way`. Newton steps update the reciprocal of the gain. */
 static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                 hystgen_real_t way) {
     const hystgen_real_t high = self->high;
@@ -56,7 +55,7 @@ static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_
         change = next - high;
     }
     self->high = next;
-    self->low = change - (next - high); /* what the sum has lost */
+    self->low = change - (next - high); /* what rounding took from the sum */
     if (self->own) {
         unsigned int i;
         self->gain = hystgen_ageing_gain(t, next);

@@ -1,12 +1,12 @@
 #include "hystgen_runtime.h"
 
-/* Gain that follows the distance travelled in drive codes, as cubic pieces over it. */
+/* A gain that depends on the distance travelled in drive codes, as a piecewise cubic. */
 
-/* Fraction bits of the share of a piece, and half of one. */
+/* Fraction bits of a position within a piece, and one half. */
 #define HYSTGEN_PART_BITS 20u
 #define HYSTGEN_PART_HALF ((int64_t)1 << (HYSTGEN_PART_BITS - 1u))
 
-/* The gain after a travel, from the piece that it lies in; behind the last one it stays. */
+/* The gain at a travel; past the last piece it stays constant. */
 static int32_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, int64_t travel) {
     unsigned int low = 0;
     unsigned int high = t->n;
@@ -30,7 +30,7 @@ static int32_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, int64_t trav
     return (int32_t)gain;
 }
 
-/* The travel from the next step on. Returns whether it had to be limited. */
+/* Sets the travel. Returns whether it had to be limited. */
 static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                       int64_t travel) {
     const int64_t inside = travel < 0 ? 0 : travel > t->last ? t->last : travel;
@@ -41,8 +41,7 @@ static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_a
     return inside != travel;
 }
 
-/* A gain in place of that of the travel, from the next step on. Returns whether it had to be
-   limited. */
+/* Sets a gain in place of the one that follows the travel. Returns whether it had to be limited. */
 static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                hystgen_real_t gain) {
     const int64_t given = (int64_t)gain * ((int64_t)1 << t->bits);
@@ -52,7 +51,7 @@ static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t
     return self->gain != given;
 }
 
-/* The drive has moved by `way`. The reciprocal of the gain follows by Newton's steps. */
+/* The drive has moved by `way`. Newton steps update the reciprocal of the gain. */
 static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                 int64_t way) {
     const int64_t next = self->high + (way >= 0 ? way : -way);

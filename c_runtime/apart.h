@@ -1,5 +1,5 @@
 #if defined(__GNUC__)
-#define HYSTGEN_APART __attribute__((noinline)) static /* called from several places, or rarely */
+#define HYSTGEN_APART __attribute__((noinline)) static /* has several callers, or rarely runs */
 #else
 #define HYSTGEN_APART static
 #endif

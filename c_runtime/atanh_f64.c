@@ -1,15 +1,15 @@
 #include "hystgen_runtime.h"
 
 /*
- * atanh x for |x| < 1, without division; anything beyond, NaN too, is taken as the last double
+ * atanh x for |x| < 1, without division. Any other x, NaN included, counts as the largest double
  * below 1.
  *
  * Up to 1/2: x + x z P(z) with z = x^2. Above: (k log 2 + log(1 + |x|) - log m)/2, where 1 - |x| =
  * m / 2^k and m and 1 + |x| lie in [1, 2). Both logarithms come from the same eight polynomials, in
  * the distances d and e from the center of a piece of [1, 2); each center is a point whose
- * logarithm is almost a double. k and the pieces are read off 2^53 (1 - |x|), a whole number.
- * fit_coefficients.py derives the numbers and the bound on the error: 1.48 ulp. Odd; the sign of
- * zero and subnormal numbers are kept.
+ * logarithm is almost a double. k and the pieces are read off the integer 2^53 (1 - |x|).
+ * fit_coefficients.py derives the numbers and the bound on the error: 1.48 ulp. The function is
+ * odd; it keeps subnormal numbers and the sign of zero.
  */
 static const hystgen_real_t hystgen_atanh_odd[13] = {
     0.33333333333334075, 0.1999999999978094,   0.14285714308911257, 0.11111109860963812,
@@ -48,7 +48,7 @@ static const hystgen_real_t hystgen_atanh_row[8][11] = {
      -0.008872914618661135, 0.0036639147803697886, -0.0015759958357201482, 0.0006972571680012851,
      -0.00031316844998055933, 0.0001451208468374469, -0.00022989476911220504}};
 
-/* The piece of [1, 2) that m lies in, a whole number of 2^53 to [1, 2). */
+/* The piece of [1, 2) that holds m / 2^53. */
 static inline unsigned int hystgen_atanh_piece(uint_least64_t m) {
     return (unsigned int)(m >> 50) & 7u;
 }

@@ -1,8 +1,8 @@
 #include "hystgen_runtime.h"
 
-/* A smooth limit behind the plays, in fixed point: curves of polynomials there and back. */
+/* A smooth limit behind the plays, in fixed point: piecewise polynomials for it and its inverse. */
 
-/* The value of a curve at x; `limited` is set where x lies beyond its ends. */
+/* The value of a curve at x; sets `limited` if x lies beyond its ends. */
 static int64_t hystgen_bend(const hystgen_bend_curve_t *c, int64_t x, bool *limited) {
     const int64_t argument = hystgen_nearest(x, c->drop);
     const int64_t inside = argument < -c->end ? -c->end : argument > c->end ? c->end : argument;
@@ -14,7 +14,7 @@ static int64_t hystgen_bend(const hystgen_bend_curve_t *c, int64_t x, bool *limi
 }
 
 static int64_t hystgen_bend_forward(const hystgen_bend_t *t, int64_t x) {
-    bool limited = false; /* at the ends of what there is */
+    bool limited = false; /* not reported */
     return hystgen_bend(&t->forward, x, &limited);
 }
 

@@ -1,9 +1,9 @@
 #include "hystgen_runtime.h"
 
-/* What play i contributes at z, in fixed point: z and the value of a curve, which several plays may
-   have in common. Beyond where plays can be a curve stays at its end. */
+/* What play i contributes at z, in fixed point: z plus the value of a curve, which plays may share.
+   Beyond the range of the plays a curve keeps its end value. */
 HYSTGEN_APART int64_t hystgen_bent(unsigned int i, int64_t z) {
-    bool limited = false; /* of inputs that a search tries */
+    bool limited = false; /* not reported: only inputs tried by a search go that far */
     return z + hystgen_nearest(hystgen_bend(&hystgen_bump[hystgen_bump_of[i]], z, &limited),
                                HYSTGEN_BUMP_BITS);
 }

@@ -6,7 +6,7 @@ static inline hystgen_sum_t hystgen_bent(unsigned int i, hystgen_sum_t z) {
     return z;
 }
 
-/* The same, beside what is known of plays that rest. */
+/* The same, whether the play rests or not. */
 static inline hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
                                                 const hystgen_sum_t *bent, hystgen_sum_t z) {
     (void)i;

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* What play i contributes at z: a polynomial of its own; play 0 is the input itself. */
+/* What play i contributes at z: a polynomial for each play. Play 0 is the input itself. */
 static hystgen_real_t hystgen_bent(unsigned int i, hystgen_real_t z) {
     const hystgen_real_t x = z * HYSTGEN_INVERSE_SCALE;
     hystgen_real_t sum = 0;

@@ -1,4 +1,4 @@
-/* What code in floating point asks of a build. */
+/* What floating-point code requires of a build. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
 #error "hystgen: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
 #endif

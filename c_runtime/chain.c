@@ -1,33 +1,34 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects. Everything between drive and displacement is a block. What was
-   applied goes through all of them forwards, a reference backwards, so that the memory is the
-   actuator's and nothing else. Which blocks there are, the model's own functions say:
+/* Operators of a model with effects: a chain of blocks from drive to displacement. An applied drive
+   passes forwards through all of them, a reference backwards, so that the memory holds only what
+   the actuator has seen. The model's own functions call its blocks:
 
-   waited, slewed   delay and slew limit: of the forward operator, and the inverse has none of a
-                    delay, whose reference comes ahead of its time
+   waited, slewed   delay and slew limit; only the forward operator has the delay, since references
+                    of the inverse come ahead of time
    drive_side       lag: in front of the memoryless part and the plays
-   output_side      creep, ageing, heat, gain: behind the plays; forwards the modes of the stage too
-   displaced        saturation, offsets and drift, behind everything
+   output_side      creep, ageing, heat, gain: behind the plays; the forward operator also has the
+                    modes of the stage here
+   displaced        saturation, offsets and drift, at the very end
 
    rest: everything has settled at an input; absorb: one sample; solve: the input that gives an
    output.
 
    moving   false  no drive has been applied yet: the first one finds everything at rest there
-            true   every block has seen the sample before
-   A step leaves its answer pending. The next step or settle takes it, or what was committed.
+            true   every block has seen the previous sample
+   A step leaves its answer pending. The next step or settle absorbs it, or the drive committed in
+   its place.
 
-   Between the blocks a signal has a type of its own; what codes are as signals says chain_float.c
-   or chain_fixed.c. */
+   Signals between the blocks have a type of their own; chain_float.c and chain_fixed.c convert. */
 
-/* An offset that is set, kept to what the displacement spans. */
+/* An offset, limited to the span of the displacement. */
 static hystgen_signal_t hystgen_inside_offset(hystgen_signal_t d) {
     return d > HYSTGEN_FARTHEST_OFFSET    ? HYSTGEN_FARTHEST_OFFSET
            : d < -HYSTGEN_FARTHEST_OFFSET ? -HYSTGEN_FARTHEST_OFFSET
                                           : d;
 }
 
-/* The plays have seen what arrives of drive v. Returns their sum. */
+/* Drive v has passed through the drive side and moved the plays. Returns their sum. */
 HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_forward_played(hystgen_forward_t *self,
                                                                hystgen_real_t v) {
     const hystgen_reach_t late = hystgen_forward_waited(self, v);
@@ -54,7 +55,7 @@ HYSTGEN_APART_IN_FIXED void hystgen_forward_absorb(hystgen_forward_t *self, hyst
     self->moving = true;
 }
 
-/* The plays have seen what arrives of drive v. Returns their sum. */
+/* Drive v has passed through the drive side and moved the plays. Returns their sum. */
 HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_played(hystgen_inverse_t *self,
                                                                hystgen_real_t v) {
     const hystgen_signal_t x = hystgen_entered_drive(v);
@@ -76,7 +77,7 @@ HYSTGEN_APART_IN_FIXED void hystgen_inverse_absorb(hystgen_inverse_t *self, hyst
     self->moving = true;
 }
 
-/* What is pending is what the actuator has seen. */
+/* The actuator has seen the pending drive. */
 static void hystgen_inverse_take(hystgen_inverse_t *self) {
     if (self->has_pending) {
         hystgen_inverse_absorb(self, self->pending);
@@ -93,7 +94,7 @@ static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_re
     return v;
 }
 
-/* What init and reset have in common once the plays are set; they stand for this drive. */
+/* The part common to init and reset, once the plays are set: they rest at this drive. */
 static void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive, bool ascending) {
     self->applied = drive;
     self->drive = hystgen_arriving(hystgen_entered_drive(drive));
@@ -108,7 +109,7 @@ static void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive,
     self->status = 0;
 }
 
-/* What init and reset have in common once the plays are set; they stand for this drive. */
+/* The part common to init and reset, once the plays are set: they rest at this drive. */
 static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive, bool ascending) {
     self->pending = drive;
     self->answer = drive;
@@ -183,7 +184,7 @@ void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v) {
     hystgen_inverse_absorb(self, inside);
 }
 
-/* The offset from the next step on, within its limits. */
+/* Sets the offset, within its limits. */
 static void hystgen_forward_put_offset(hystgen_forward_t *self, hystgen_signal_t d) {
     if (!hystgen_finite(d)) {
         self->status |= HYSTGEN_STATUS_HELD;
@@ -204,7 +205,7 @@ void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d) {
     }
 }
 
-/* The offset from the next step on, within its limits. */
+/* Sets the offset, within its limits. */
 static void hystgen_inverse_put_offset(hystgen_inverse_t *self, hystgen_signal_t d) {
     if (!hystgen_finite(d)) {
         self->status |= HYSTGEN_STATUS_HELD;
@@ -256,7 +257,7 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
     return self->answer;
 }
 
-/* The next reference. Returns what the output side has to give at this sample. */
+/* Takes the next reference. Returns the output that the output side has to reach at this sample. */
 HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self,
                                                             hystgen_real_t u) {
     bool limited = false;
@@ -281,7 +282,7 @@ void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u) {
     }
 }
 
-/* The drive after which the output side gives y, within its limits; the memory is up to date. */
+/* The drive, within its limits, that makes the output side give y. The memory is up to date. */
 HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_sought(hystgen_inverse_t *self,
                                                              hystgen_signal_t y) {
     const bool moving = self->moving;
@@ -329,7 +330,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
 }
 
 hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self) {
-    unsigned int status = 0; /* of what is asked beside the steps */
+    unsigned int status = 0; /* not reported: this is no step */
     return hystgen_output_code(hystgen_inverse_displaced(self, self->output), &status);
 }
 

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects: the travel that its gain follows. */
+/* Operators of a model with effects: the travel, and the gain that follows it. */
 
 hystgen_travel_t hystgen_forward_travel(const hystgen_forward_t *self) {
     return self->ageing_1.high;

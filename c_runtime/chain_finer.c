@@ -1,10 +1,10 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects: the input of the plays has no bits below a drive code, and the
-   lead of a lag would make noise of that. */
+/* Operators of a model with effects: the input of the plays has no bits below a drive code. The
+   inverse of a lag would amplify that rounding into noise, so the input is refined for it. */
 
-/* Input of the plays that gives their sum h, with HYSTGEN_ARRIVING_BITS bits below w, which is the
-   nearest: what is left of h there, over the slope. */
+/* The input of the plays that gives their sum h, with HYSTGEN_ARRIVING_BITS more bits than w, the
+   nearest one without them: the remainder of h at w, divided by the slope. */
 static hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *self, hystgen_signal_t h,
                                               hystgen_reach_t w, hystgen_reach_t a) {
     const hystgen_tables_t *t = &hystgen_model_tables;
@@ -25,7 +25,7 @@ static hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *self, hys
         left -= t->weight[i] * z;
     }
     const hystgen_sum_t size = left < 0 ? -left : left;
-    if (size > t->slope[k]) { /* beyond what is asked of the plays */
+    if (size > t->slope[k]) { /* w was limited and is not the nearest */
         return whole;
     }
     const hystgen_signal_t more = hystgen_over_slope(

@@ -1,9 +1,8 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects: signals in fixed point, which have bits below those of codes.
- */
+/* Operators of a model with effects: signals in fixed point, with bits below those of codes. */
 
-/* Every code is a number. */
+/* Every code is a finite number. */
 static inline bool hystgen_finite(hystgen_signal_t x) {
     (void)x;
     return true;
@@ -13,7 +12,7 @@ static inline hystgen_signal_t hystgen_entered_drive(hystgen_real_t v) {
     return (hystgen_signal_t)v * ((hystgen_signal_t)1 << HYSTGEN_DRIVE_BITS);
 }
 
-/* What arrives in front of the plays, in units of their input. */
+/* A signal in front of the plays, in units of their input. */
 static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a) {
     return (hystgen_fine_t)hystgen_nearest(a, HYSTGEN_ARRIVING_BITS);
 }
@@ -22,7 +21,7 @@ static inline hystgen_signal_t hystgen_entered_level(hystgen_real_t u) {
     return (hystgen_signal_t)u * ((hystgen_signal_t)1 << HYSTGEN_LEVEL_BITS);
 }
 
-/* Drive code of a signal, kept near the range. */
+/* Drive code of a signal, limited to two spans beyond the range. */
 static hystgen_reach_t hystgen_drive_code(hystgen_signal_t v) {
     const hystgen_signal_t code = hystgen_nearest(v, HYSTGEN_DRIVE_BITS);
     return (hystgen_reach_t)(code > HYSTGEN_MOST_CODE    ? HYSTGEN_MOST_CODE
@@ -30,7 +29,7 @@ static hystgen_reach_t hystgen_drive_code(hystgen_signal_t v) {
                                                          : code);
 }
 
-/* A drive that was applied, within its range. */
+/* An applied drive, limited to its range. */
 static inline hystgen_real_t hystgen_applied_drive(hystgen_real_t v) {
     return hystgen_clamp_drive(v);
 }
@@ -46,18 +45,18 @@ static hystgen_real_t hystgen_output_code(hystgen_signal_t y, unsigned int *stat
                                                        : code);
 }
 
-/* A share of x; 1 would be one more than the largest code. */
+/* A share of x. The largest code is the share just below 1. */
 static hystgen_signal_t hystgen_shared(hystgen_real_t share, hystgen_signal_t x) {
     const hystgen_factor_t f = {(int32_t)share * ((int32_t)1 << HYSTGEN_SHARE_BITS), 31u};
     return hystgen_times(x, &f);
 }
 
-/* A sum of the plays, which has bits below those of a signal, as one. */
+/* A sum of the plays, which has bits below those of a signal, as a signal. */
 static inline hystgen_signal_t hystgen_level(hystgen_sum_t sum) {
     return hystgen_nearest(sum, HYSTGEN_LEVEL_DROP);
 }
 
-/* The sum that a signal asks of the plays, kept to what they can give. */
+/* The sum of the plays that a signal asks for, limited to what they can give. */
 static inline hystgen_sum_t hystgen_asked(hystgen_signal_t h) {
     const hystgen_signal_t inside = h > HYSTGEN_LARGEST_LEVEL    ? HYSTGEN_LARGEST_LEVEL
                                     : h < -HYSTGEN_LARGEST_LEVEL ? -HYSTGEN_LARGEST_LEVEL

@@ -1,7 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects: signals in floating point, which are numbers of the same type.
- */
+/* Operators of a model with effects: signals in floating point, of the type of drives. */
 
 static bool hystgen_finite(hystgen_signal_t x) {
     return x >= -HYSTGEN_REAL_MAX && x <= HYSTGEN_REAL_MAX; /* false for NaN */
@@ -23,7 +22,7 @@ static inline hystgen_reach_t hystgen_drive_code(hystgen_signal_t v) {
     return v;
 }
 
-/* A drive that was applied, within its range; none is -0. */
+/* An applied drive, limited to its range; never -0. */
 static inline hystgen_real_t hystgen_applied_drive(hystgen_real_t v) {
     return hystgen_clamp_drive(v) + 0;
 }
@@ -38,7 +37,7 @@ static inline hystgen_signal_t hystgen_shared(hystgen_real_t share, hystgen_sign
     return share * x;
 }
 
-/* A sum of the plays as a signal, and the sum that a signal asks of them. */
+/* A sum of the plays as a signal, and the sum of the plays that a signal asks for. */
 static inline hystgen_signal_t hystgen_level(hystgen_sum_t sum) {
     return sum;
 }

@@ -1,9 +1,10 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects: plays that an effect moves or bends in its own way. Play i is
-   kept as where it would come to rest (`play`) and what it contributes there (`bent`). */
+/* Operators of a model with effects: plays that an effect moves or bends in its own way. The state
+   of play i is the value at which it would come to rest (`play`) and what it contributes there
+   (`bent`). */
 
-/* What the plays give once their input has gone to w. It rises with w. */
+/* The sum of the plays after their input has gone to w. It rises with w. */
 HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_moved_sum(const hystgen_play_t *play,
                                                        const hystgen_sum_t *bent,
                                                        hystgen_reach_t w) {
@@ -42,7 +43,7 @@ static hystgen_sum_t hystgen_resting(unsigned int i, const hystgen_play_t *play,
     return upper < low ? low : upper;
 }
 
-/* What rest at an input w gives, for plays as they are. */
+/* The sum of the plays if they came to rest with their input at w. */
 HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_resting_sum(const hystgen_play_t *play,
                                                          hystgen_reach_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
@@ -53,7 +54,7 @@ HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_resting_sum(const hystgen_play_t *p
     return sum;
 }
 
-/* The plays as they are set, at rest with their input at w. Returns their sum. */
+/* The plays come to rest with their input at w. Returns their sum. */
 static hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum_t *bent,
                                         hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
@@ -79,17 +80,17 @@ static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_
                                       : hystgen_moved_rest(self->play, self->bent, w));
 }
 
-/* Sum of the plays as they are set. */
+/* Sum of the plays in the start memory. */
 static hystgen_signal_t hystgen_forward_started(hystgen_forward_t *self) {
     return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
 }
 
-/* Sum of the plays as they are set. */
+/* Sum of the plays in the start memory. */
 static hystgen_signal_t hystgen_inverse_started(hystgen_inverse_t *self) {
     return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
 }
 
-/* What the plays give with their input at w. */
+/* Sum of the plays with their input at w. */
 static hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_reach_t w) {
     return self->moving ? hystgen_moved_sum(self->play, self->bent, w)
                         : hystgen_resting_sum(self->play, w);

@@ -1,13 +1,13 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects: plays that move as in any other model. */
+/* Operators of a model with effects: plays that no effect changes. */
 
-/* Sum of the plays as they are set. */
+/* Sum of the plays. */
 static hystgen_signal_t hystgen_forward_started(const hystgen_forward_t *self) {
     return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
 }
 
-/* Sum of the plays as they are set. */
+/* Sum of the plays. */
 static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
     return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
 }

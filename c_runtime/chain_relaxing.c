@@ -1,14 +1,14 @@
 #include "hystgen_runtime.h"
 
 /* Operators of a model with effects: viscous plays with one time constant. The first move finds
-   them at rest, like plain ones. */
+   them at rest, as it finds plain ones. */
 
-/* Sum of the plays as they are set. */
+/* Sum of the plays. */
 static hystgen_signal_t hystgen_forward_started(const hystgen_forward_t *self) {
     return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
 }
 
-/* Sum of the plays as they are set. */
+/* Sum of the plays. */
 static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
     return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
 }

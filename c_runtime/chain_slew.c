@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* The drive nearest to v that the amplifier reaches in one step; any, before the first one. */
+/* The drive nearest to v that the amplifier reaches in one step; v itself in the first one. */
 static hystgen_reach_t hystgen_forward_slewed(hystgen_forward_t *self, hystgen_reach_t v) {
     hystgen_reach_t reached = v;
     if (self->moving) {
@@ -12,7 +12,7 @@ static hystgen_reach_t hystgen_forward_slewed(hystgen_forward_t *self, hystgen_r
     return reached;
 }
 
-/* The drive nearest to v that the amplifier reaches in one step; any, before the first one. */
+/* The drive nearest to v that the amplifier reaches in one step; v itself in the first one. */
 static hystgen_reach_t hystgen_inverse_slewed(const hystgen_inverse_t *self, hystgen_reach_t v) {
     const hystgen_reach_t highest = (hystgen_reach_t)self->applied + HYSTGEN_SLEW_RISING;
     const hystgen_reach_t lowest = (hystgen_reach_t)self->applied - HYSTGEN_SLEW_FALLING;

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* What arrives in front of the plays of a model with effects, within what the drive's range gives.
+/* A signal in front of the plays of a model with effects, limited to what the drive's range gives.
  */
 static hystgen_fine_t hystgen_clamp_fine(hystgen_reach_t a) {
     return (hystgen_fine_t)(a < HYSTGEN_FINE_MIN   ? HYSTGEN_FINE_MIN

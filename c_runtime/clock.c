@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* Drift over the time since the clock was set, counted in samples. A number of 24 bits counts them
-   exactly up to `carry`, 2^24; the other one, in these. */
+/* Drift over the time since the clock was started, counted in samples: `low` counts exactly up to
+   `carry`, 2^24; `high` counts how often it got there. */
 
 static void hystgen_clock_start(hystgen_clock_t *self) {
     self->high = 0;
@@ -16,7 +16,7 @@ static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *
     self->high = full ? self->high + 1 : self->high;
 }
 
-/* The drift so many samples ahead of the clock, at most as large as `farthest`. */
+/* The drift `ahead` samples after the present one, limited to +-`farthest`. */
 static hystgen_real_t hystgen_clock_drift(const hystgen_clock_table_t *t,
                                           const hystgen_clock_t *self, hystgen_real_t ahead) {
     const hystgen_real_t time = self->high * t->block + (self->low + ahead) * t->sample;

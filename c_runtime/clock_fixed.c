@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* Drift over the time since the clock was set, in fixed point: what it changes by in a sample is
-   summed, as whole signals and as the part of one. */
+/* Drift over the time since the clock was started, in fixed point: a sum of the change in each
+   sample, as a whole part in units of signals and a fraction below. */
 
 static void hystgen_clock_start(hystgen_clock_t *self) {
     self->whole = 0;
@@ -22,7 +22,7 @@ static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *
     }
 }
 
-/* The drift so many samples ahead of the clock, at most as large as `farthest`. */
+/* The drift `ahead` samples after the present one, limited to +-`farthest`. */
 static int64_t hystgen_clock_drift(const hystgen_clock_table_t *t, const hystgen_clock_t *self,
                                    int64_t ahead) {
     const int64_t more = (t->slope + self->gained) * ahead + t->change * (ahead * (ahead - 1) / 2);

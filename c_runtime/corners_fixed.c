@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-#define HYSTGEN_HIGH_STEP ((int64_t)1 << HYSTGEN_LOW_BITS) /* of a corner's output, in sums */
+#define HYSTGEN_HIGH_STEP ((int64_t)1 << HYSTGEN_LOW_BITS) /* of a corner's `high`, in sums */
 
 /* Field by field: for a whole structure a compiler may call memcpy. */
 HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from) {
@@ -11,7 +11,7 @@ HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *
     to->rising = from->rising;
 }
 
-/* x as the present move sees it: a falling move is a rising one with all signs changed. */
+/* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline int64_t hystgen_along(const hystgen_place_t *here, int64_t x) {
     return here->rising ? x : -x;
 }
@@ -26,7 +26,7 @@ HYSTGEN_APART void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t 
     here->depth = (uint_least16_t)(here->depth + 1u);
 }
 
-/* Where the play of a segment of a corner's block begins to follow, as the move sees it. */
+/* Where the play of a segment of a corner's block begins to follow, along the move. */
 static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_corner_t *c,
                                      const hystgen_segment_t *s, bool by_output) {
     const int64_t output = (int64_t)c->high * HYSTGEN_HIGH_STEP + (int64_t)c->low;
@@ -44,11 +44,12 @@ HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *co
     here->rising = !here->rising;
 }
 
-/* The last place where another play begins to follow before the output, or input, `to`; or here. */
+/* The last kink before `to`, an output or input along the move: where another play begins to
+   follow, or here. */
 HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here,
                                 const hystgen_corner_t *corner, int64_t to, bool by_output,
                                 hystgen_kink_t *kink) {
-    const hystgen_corner_t *c = NULL; /* held play k until it began to follow */
+    const hystgen_corner_t *c = NULL; /* the corner that held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
@@ -87,7 +88,7 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     }
 }
 
-/* The same for any move to an input; turns, moves nothing. */
+/* The same for any move to an input. May turn back, but moves nothing. */
 static inline void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here,
                                       hystgen_corner_t *corner, int32_t to, hystgen_kink_t *kink) {
     if (here->rising ? to < here->input : to > here->input) {
@@ -96,7 +97,7 @@ static inline void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t 
     hystgen_find(t, here, corner, hystgen_along(here, to), false, kink);
 }
 
-/* Moves the plays on from a kink to where the same ones follow; `moved` is the output between. */
+/* Moves the plays to an input short of the next kink; `moved` is the output since the last one. */
 static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to,
                           int64_t moved) {
     here->output = hystgen_along(here, kink->output + moved);
@@ -105,7 +106,7 @@ static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int
     here->depth = kink->depth;
 }
 
-/* Output that is gained from a kink on until the input comes to `to`, which may lie before it. */
+/* Output gained between a kink and the input `to`; -1 if `to` lies before the kink. */
 HYSTGEN_APART int64_t hystgen_gained(const hystgen_curve_t *t, const hystgen_place_t *here,
                                      const hystgen_kink_t *kink, int32_t to) {
     const int64_t way = hystgen_along(here, to) - kink->input;
@@ -120,7 +121,7 @@ HYSTGEN_KERNEL void hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plac
     hystgen_go_on(here, kink, to, hystgen_gained(t, here, kink, to));
 }
 
-/* Input at which another play begins to follow the present move, or the last one there is. */
+/* Input at which another play begins to follow the present move, or the largest input. */
 static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_t *here,
                                   const hystgen_corner_t *corner) {
     int64_t x = HYSTGEN_LARGEST;
@@ -132,7 +133,7 @@ static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_
     return (int32_t)hystgen_along(here, x);
 }
 
-/* The sum of the plays for the next input; `next` is where another one begins to follow. */
+/* The sum of the plays at the next input; `next` is where another play begins to follow. */
 HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here,
                                        hystgen_corner_t *corner, hystgen_kink_t *kink,
                                        int32_t *next, int32_t to) {
@@ -150,7 +151,8 @@ HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t
     return here->output;
 }
 
-/* The input, near the range, that gives an output behind a kink, `to` as the move sees it. */
+/* The input that gives `to`, an output beyond a kink along the move; at most a little outside the
+   range. */
 HYSTGEN_APART int64_t hystgen_solved(const hystgen_curve_t *t, const hystgen_place_t *here,
                                      const hystgen_kink_t *kink, int64_t to) {
     const hystgen_segment_t *s = &t->segment[kink->k];
@@ -159,8 +161,9 @@ HYSTGEN_APART int64_t hystgen_solved(const hystgen_curve_t *t, const hystgen_pla
     return hystgen_along(here, x > most ? most : x);
 }
 
-/* The input, near the range, that gives `output`, and the kink that it is counted from. Turns,
-   moves nothing. Short of `next`, as the move sees it, the same plays are known to follow. */
+/* The input that gives `output`, at most a little outside the range, and the kink it is counted
+   from. May turn back, but moves nothing. The same plays are known to follow up to the output
+   `next`, along the move. */
 HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here,
                                   hystgen_corner_t *corner, int64_t output, int64_t next,
                                   hystgen_kink_t *kink) {
@@ -180,7 +183,7 @@ HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *her
     return hystgen_solved(t, here, kink, to);
 }
 
-/* Output, as the present move sees it, at which another play begins to follow behind a kink. */
+/* Output, along the present move, at which another play begins to follow after a kink. */
 static int64_t hystgen_next_output(const hystgen_curve_t *t, const hystgen_place_t *here,
                                    const hystgen_corner_t *corner, const hystgen_kink_t *kink) {
     return kink->depth > 0
@@ -188,8 +191,8 @@ static int64_t hystgen_next_output(const hystgen_curve_t *t, const hystgen_place
                : HYSTGEN_FAR;
 }
 
-/* Moves the plays to an input near the one that was solved for from a kink. Returns the output, as
-   the move sees it, at which another one begins to follow. */
+/* Moves the plays to an input near the one that was solved for from a kink. Returns the output,
+   along the move, at which another play begins to follow. */
 HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here,
                                              hystgen_corner_t *corner, hystgen_kink_t *kink,
                                              int32_t to) {
@@ -204,12 +207,12 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
     return next;
 }
 
-/* Start memory: what each play holds (step 1), or all of them (step 0). Each is a block of its own,
-   left by a move to where it begins to follow. */
+/* Start memory: a value for each play (step 1), or one for all (step 0). Each play is a block of
+   its own, left by a move to where it begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here,
                                   hystgen_corner_t *corner, const int32_t *play,
                                   unsigned int step) {
-    int64_t aside = t->offset; /* what the plays above play k give */
+    int64_t aside = t->offset; /* output of the plays above play k, with the offset */
     unsigned int k;
     here->depth = 0;
     for (k = t->n; k > 0; --k) {

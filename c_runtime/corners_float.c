@@ -8,7 +8,7 @@ HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *
     to->rising = from->rising;
 }
 
-/* x as the present move sees it: a falling move is a rising one with all signs changed. */
+/* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_real_t x) {
 #ifdef HYSTGEN_SOFT_FLOAT
     return m->here.rising ? x : -x;
@@ -17,7 +17,7 @@ static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_rea
 #endif
 }
 
-/* There is no line to go on along: the next sample searches. */
+/* Forgets the line of the last outputs: the next sample searches. */
 HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m) {
     m->sign = (hystgen_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
@@ -25,7 +25,7 @@ HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m) {
     m->behind = m->here.input;
 }
 
-/* Leaves a corner here. A block whose last play follows beyond the limit only is never passed. */
+/* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
 HYSTGEN_APART void hystgen_leave_corner(const hystgen_curve_t *t, hystgen_plays_t *m,
                                         hystgen_corner_t *corner) {
     const hystgen_segment_t *s = &t->segment[m->here.k];
@@ -51,7 +51,8 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m,
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x, a way or a reach; `step`: of segment 1. */
+/* The last of segments k .. last that begins before x, which is a `way` or a `reach`; `step` points
+   to that field of segment 1. */
 static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k,
                                          unsigned int last, hystgen_real_t x) {
     while (k < last) {
@@ -64,7 +65,8 @@ static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned in
     return k;
 }
 
-/* Stops the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
+/* Ends the move in the top corner's block: where the sum is `output`, or at `input` if that comes
+   first. */
 HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           const hystgen_corner_t *corner, hystgen_real_t output,
                                           hystgen_real_t input) {
@@ -84,7 +86,7 @@ HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_play
     hystgen_forget_line(m);
 }
 
-/* Moves the plays to where their sum is `output`, as nearly as floating point can tell. */
+/* Moves the plays to where their sum is `output`, up to rounding. */
 HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_plays_t *m,
                                            hystgen_corner_t *corner, hystgen_real_t output) {
     if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) {
@@ -104,7 +106,7 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
     hystgen_stop_in_block(t, m, corner, output, hystgen_along(m, HYSTGEN_REAL_MAX));
 }
 
-/* Moves the plays to any input; false where the limit comes first, for the caller to stop there. */
+/* Moves the plays to any input. False if the limit comes first; the caller then stops there. */
 HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           hystgen_corner_t *corner, hystgen_real_t input) {
     if (hystgen_along(m, input) < hystgen_along(m, m->here.input)) {
@@ -140,7 +142,7 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
         begin = s->way - from;
         start = start + s->reach;
         next = s[1].way - from;
-        if (t->segment[c->top].reach > room) { /* gains fall: the limit lies here or beyond */
+        if (t->segment[c->top].reach > room) { /* gains fall, so the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
         }
         m->from = -hystgen_along(m, from);
@@ -164,7 +166,7 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     return true;
 }
 
-/* Moves on short of `cap`: more plays of the block follow. False where a search is faster. */
+/* Moves on, short of `cap`: more plays of the block follow. False if a search would be faster. */
 HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           hystgen_real_t input) {
     const hystgen_real_t way = hystgen_along(m, input - m->from);

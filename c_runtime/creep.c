@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* Creep as a block of the chain. A state answers a move at once by a known share, so that the block
-   is exactly invertible; what the states will give anyway is summed up where they move. */
+/* Creep as a block of the chain. Part of each state follows a move at once, so that the block is
+   exactly invertible. `ahead` is the output at the next sample for an input of 0. */
 
 /* Everything has settled at the input x. Returns the output. */
 static hystgen_real_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen_creep_t *self,
@@ -45,7 +45,7 @@ static hystgen_real_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystg
             (term->early * before + term->late * x) - term->rate * high + state[i].low;
         const hystgen_real_t next = high + change;
         state[i].high = next;
-        state[i].low = change - (next - high); /* what the sum has lost */
+        state[i].low = change - (next - high); /* what rounding took from the sum */
         ahead = ahead + (next + (term->early * x - term->rate * next));
     }
     self->before = x;

@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* Creep as a block of the chain, in fixed point. A state is what it will give at the next sample if
-   the input stays; a change of that counts at once by a known share, so that the block is exactly
+/* Creep as a block of the chain, in fixed point. A state holds its contribution at the next sample
+   if the input stays; part of a change of the input counts at once, so that the block is exactly
    invertible. States have bits below those of a signal, so that the slowest one does not stall. */
 
 /* Everything has settled at the input x. Returns the output. */

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* x / 2^bits to the nearest whole number, ties away from zero. */
+/* x / 2^bits to the nearest integer, ties away from zero. */
 HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits) {
     if (bits == 0) {
         return x;
@@ -8,9 +8,9 @@ HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits) {
     return (x + ((int64_t)1 << (bits - 1u)) - (x < 0 ? 1 : 0)) >> bits;
 }
 
-/* Value at x of a function that is given as polynomials c_0 + c_1 h + c_2 h^2 + ... on pieces, h =
-   0 .. 1 along each: where the pieces begin, the left shifts that stretch them to 2^31, and their
-   coefficients from degree 0. */
+/* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece:
+   where the pieces begin, the left shifts that stretch them to 2^31, and their coefficients from
+   degree 0. */
 HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
                                   const int32_t *coefficient, unsigned int pieces,
                                   unsigned int degree, int32_t x) {
@@ -37,8 +37,9 @@ HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
     return y;
 }
 
-/* Drive code for an input w of the plays that the drive range does not give: its end, and one code
-   more where that is not just rounding; tells whether w is more than an envelope can give. */
+/* Drive code for an input w of the plays outside the image of the drive range: the end of the
+   range, and one code more if w is off by more than rounding. Sets `limited` if no envelope gives
+   w. */
 HYSTGEN_API hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w,
                                            int32_t drive_min, int32_t drive_max, bool *limited) {
     if (w > e->last) {

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Finds the straight piece that x lies on and follows it. */
+/* Output at x of a dead-zone sum, by bisection for the straight piece. */
 HYSTGEN_API hystgen_real_t hystgen_dead_zone_forward(const hystgen_dead_zone_t *z,
                                                      hystgen_real_t x) {
     unsigned int low = 0;

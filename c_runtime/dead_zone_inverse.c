@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Finds the straight piece that y lies on and follows it. */
+/* Input at y of a dead-zone sum, by bisection for the straight piece. */
 HYSTGEN_API hystgen_real_t hystgen_dead_zone_inverse(const hystgen_dead_zone_t *z,
                                                      hystgen_real_t y) {
     unsigned int low = 0;

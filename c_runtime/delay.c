@@ -1,8 +1,8 @@
 #include "hystgen_runtime.h"
 
-/* A delay of the forward operator: drives wait in a ring. */
+/* A delay of the forward operator: drives wait in a ring buffer. */
 
-/* The drive has been v for long. */
+/* The drive has always been v. */
 static void hystgen_delay_rest(hystgen_real_t *sample, unsigned int *oldest, hystgen_real_t v) {
     unsigned int i;
     for (i = 0; i < HYSTGEN_WAITING; ++i) {
@@ -11,7 +11,7 @@ static void hystgen_delay_rest(hystgen_real_t *sample, unsigned int *oldest, hys
     *oldest = 0;
 }
 
-/* The place behind that of the oldest sample. */
+/* The place after that of the oldest sample. */
 static unsigned int hystgen_delay_next(unsigned int oldest) {
     return oldest + 1u < HYSTGEN_WAITING ? oldest + 1u : 0;
 }

@@ -8,7 +8,7 @@ HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascend
                                          HYSTGEN_DEGREE, v);
 }
 
-/* v = G^-1[w]; `limited` tells whether no drive at all gives w. */
+/* v = G^-1[w]; sets `limited` if no drive gives w. */
 HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool ascending,
                                                     bool *limited) {
     const hystgen_ends_t *ends = &hystgen_back_ends;

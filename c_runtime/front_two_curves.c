@@ -12,7 +12,7 @@ HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascend
         hystgen_front_descending_coefficient, HYSTGEN_FRONT_DESCENDING_PIECES, HYSTGEN_DEGREE, v);
 }
 
-/* v = G^-1[w] on one branch; `limited` tells whether no drive at all gives w on it. */
+/* v = G^-1[w] on one branch; sets `limited` if no drive gives w on it. */
 HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool ascending,
                                                     bool *limited) {
     const hystgen_ends_t *ends =

@@ -8,7 +8,7 @@ static void hystgen_gain_init(hystgen_gain_t *self) {
     self->offset = 0;
 }
 
-/* The gain from the next step on. Returns whether it had to be limited. */
+/* Sets the gain. Returns whether it had to be limited. */
 static bool hystgen_gain_set(const hystgen_gain_table_t *t, hystgen_gain_t *self,
                              hystgen_real_t gain) {
     const hystgen_real_t inside = gain < t->least     ? t->least
@@ -19,7 +19,7 @@ static bool hystgen_gain_set(const hystgen_gain_table_t *t, hystgen_gain_t *self
     return inside < gain || inside > gain;
 }
 
-/* Gain and offset of a temperature from the next step on. Returns whether it had to be limited. */
+/* Sets gain and offset by a temperature. Returns whether one of them had to be limited. */
 static bool hystgen_gain_heat(const hystgen_gain_table_t *t, hystgen_gain_t *self,
                               hystgen_real_t temperature) {
     const hystgen_real_t inside = temperature < t->coldest   ? t->coldest

@@ -2,7 +2,7 @@
 
 /* Gain and offset behind the plays, set from outside, in fixed point. */
 
-/* Fraction bits of a gain, 1, and the limits of one that is set. */
+/* Fraction bits of a gain, the gain 1, and the limits of a gain. */
 #define HYSTGEN_GAIN_BITS 29u
 #define HYSTGEN_GAIN_ONE ((int64_t)1 << HYSTGEN_GAIN_BITS)
 #define HYSTGEN_GAIN_LEAST (HYSTGEN_GAIN_ONE / 2)
@@ -15,12 +15,12 @@ static int32_t hystgen_gain_inside(int64_t gain) {
                                                    : gain);
 }
 
-/* 1 over a gain within its limits. */
+/* The reciprocal of a gain within its limits. */
 static int32_t hystgen_gain_reciprocal(int32_t gain) {
     return (int32_t)((((int64_t)1 << 2u * HYSTGEN_GAIN_BITS) + gain / 2) / gain);
 }
 
-/* The same for a gain that has moved, from what it was before, by Newton's steps. */
+/* The same for a gain that has changed, by Newton steps from the reciprocal before. */
 static int32_t hystgen_gain_followed(int32_t gain, int32_t before, unsigned int turns) {
     const int64_t half = (int64_t)1 << (HYSTGEN_GAIN_BITS - 1u);
     int64_t inverse = before;
@@ -45,7 +45,7 @@ static void hystgen_gain_init(hystgen_gain_t *self) {
     self->offset = 0;
 }
 
-/* Gain and offset of a temperature from the next step on. Returns whether it had to be limited. */
+/* Sets gain and offset by a temperature. Returns whether one of them had to be limited. */
 static bool hystgen_gain_heat(const hystgen_gain_table_t *t, hystgen_gain_t *self,
                               hystgen_real_t temperature) {
     const int64_t given = (int64_t)temperature * ((int64_t)1 << t->bits);

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Gain and offset of the actuator's own heat, from the drives that were applied. */
+/* Gain and offset by the actuator's own heat, which follows from the applied drives. */
 
 static void hystgen_heat_init(hystgen_heat_t *self) {
     self->high = 0;
@@ -10,7 +10,7 @@ static void hystgen_heat_init(hystgen_heat_t *self) {
     self->offset = 0;
 }
 
-/* The drive has moved to v, from `before`. The reciprocal of the gain follows by Newton's steps. */
+/* The drive has moved from `before` to v. Newton steps update the reciprocal of the gain. */
 static void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *self,
                               hystgen_real_t before, hystgen_real_t v) {
     const hystgen_real_t way =
@@ -22,7 +22,7 @@ static void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *sel
     const hystgen_real_t rise = next > t->hottest ? t->hottest : next;
     unsigned int i;
     self->high = next;
-    self->low = change - (next - high); /* what the sum has lost */
+    self->low = change - (next - high); /* what rounding took from the sum */
     self->gain = 1 + t->per_degree * rise;
     self->offset = t->offset_per_degree * rise;
     for (i = 0; i < t->turns; ++i) {

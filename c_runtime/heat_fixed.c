@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* Gain and offset of the actuator's own heat in fixed point, from the drives that were applied. The
-   temperature has as many bits as fit 64, so that the slowest one does not stall. */
+/* Gain and offset by the actuator's own heat, which follows from the applied drives, in fixed
+   point. The temperature has as many bits as fit in 64, so that a slow one does not stall. */
 
 static void hystgen_heat_init(hystgen_heat_t *self) {
     self->rise = 0;
@@ -16,7 +16,7 @@ static int64_t hystgen_heat_square(hystgen_real_t v) {
     return v >= 0 ? square : -square;
 }
 
-/* The drive has moved to v, from `before`. */
+/* The drive has moved from `before` to v. */
 HYSTGEN_APART void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *self,
                                      hystgen_real_t before, hystgen_real_t v) {
     const int64_t way = hystgen_heat_square(v) - hystgen_heat_square(before);

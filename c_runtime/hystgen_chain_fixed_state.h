@@ -12,21 +12,21 @@ typedef struct {
 } hystgen_creep_t;
 
 typedef struct {
-    int64_t high;
-    int64_t wanted; /* output that the last solution led to */
+    int64_t high;   /* x, a lag on a drive that holds */
+    int64_t wanted; /* output that the last input leads to */
     int64_t asked;  /* output asked for, */
     int64_t lead;   /* and the move that is to lead there */
 } hystgen_lag_t;
 
 typedef struct {
-    int64_t next;   /* what arrives at the next sample for an unchanged input */
+    int64_t next;   /* output at the next sample for an unchanged input */
     int64_t before; /* input of the last sample */
 } hystgen_lag_exact_t;
 
 typedef struct {
     int64_t before; /* input of the last sample */
     int64_t off;    /* output less input */
-    int64_t rate;   /* of that, per radian of the mode */
+    int64_t rate;   /* of `off`, per radian of the mode */
 } hystgen_mode_t;
 
 typedef struct {
@@ -43,18 +43,18 @@ typedef struct {
 } hystgen_ageing_t;
 
 typedef struct {
-    int64_t rise; /* of the temperature */
+    int64_t rise; /* of the temperature over the surroundings */
     int32_t gain;
     int32_t inverse;
     int64_t offset;
 } hystgen_heat_t;
 
 typedef struct {
-    int64_t whole;  /* drift in signals, */
-    int64_t part;   /* and the part of one, in units of the table */
-    int64_t lead;   /* samples that the next reference is ahead */
-    int64_t gained; /* by the change in a sample since the start */
-    int64_t count;
+    int64_t whole;  /* drift, in units of signals, */
+    int64_t part;   /* and the fraction below, in units of the table */
+    int64_t lead;   /* samples by which the next reference is ahead */
+    int64_t gained; /* growth of the change in a sample since the start */
+    int64_t count;  /* samples since the start */
 } hystgen_clock_t;
 
 #endif

@@ -1,8 +1,8 @@
-/* What the inverse operator of a model with effects has beside. */
+/* Further functions of the inverse operator of a model with effects. */
 #ifndef HYSTGEN_CHAIN_INVERSE_API_H
 #define HYSTGEN_CHAIN_INVERSE_API_H
 
-/* The next reference of the preview, without a drive: before the first step, HYSTGEN_PREVIEW times.
+/* The next reference of the preview, without an answer; HYSTGEN_PREVIEW times before the first one.
  */
 void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u);
 /* Everything comes to rest at drive v; the next step finds it moving from there. */
@@ -11,12 +11,13 @@ void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v);
 void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d);
 /* The temperature, degC, from the next step on. */
 void hystgen_inverse_set_temperature(hystgen_inverse_t *self, hystgen_real_t temperature);
-/* A gain in place of that of the travel, from the next step on, until a travel is set. */
+/* A gain in place of the one by travel, from the next step on, until a travel is set. */
 void hystgen_inverse_set_gain(hystgen_inverse_t *self, hystgen_real_t gain);
-/* Distance that the drive has travelled: keep it where it survives, and set it behind init. */
+/* Distance that the drive has travelled: store it where it survives a power cycle, and set it again
+   after init. */
 hystgen_travel_t hystgen_inverse_travel(const hystgen_inverse_t *self);
 void hystgen_inverse_set_travel(hystgen_inverse_t *self, hystgen_travel_t travel);
-/* The displacement that the model expects of the drive that was applied last. */
+/* The displacement that the model expects from the last applied drive. */
 hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self);
 /* Trim the offset by this share, 0 to 1, of what a sensor measures beyond the expected
  * displacement. */

@@ -2,7 +2,7 @@
 #ifndef HYSTGEN_CHAIN_STATE_H
 #define HYSTGEN_CHAIN_STATE_H
 
-/* A number that grows in steps far below its own last bit, in two parts. */
+/* A number in two parts, since it grows in steps far below its last bit. */
 typedef struct {
     hystgen_real_t high;
     hystgen_real_t low;
@@ -10,13 +10,13 @@ typedef struct {
 
 typedef struct {
     hystgen_real_t before; /* input of the last sample */
-    hystgen_real_t ahead;  /* output of the next one for an input 0 */
+    hystgen_real_t ahead;  /* output of the next one for an input of 0 */
 } hystgen_creep_t;
 
 typedef struct {
-    hystgen_real_t high;
+    hystgen_real_t high; /* x, a lag on a drive that holds, in two parts */
     hystgen_real_t low;
-    hystgen_real_t wanted; /* output that the last solution led to */
+    hystgen_real_t wanted; /* output that the last input leads to */
     hystgen_real_t asked;  /* output asked for, */
     hystgen_real_t answer; /* and the input that was to lead there */
 } hystgen_lag_t;
@@ -29,7 +29,7 @@ typedef struct {
 typedef struct {
     hystgen_real_t before; /* input of the last sample */
     hystgen_real_t off;    /* output less input */
-    hystgen_real_t rate;   /* of that, per radian of the mode */
+    hystgen_real_t rate;   /* of `off`, per radian of the mode */
 } hystgen_mode_t;
 
 typedef struct {
@@ -57,7 +57,7 @@ typedef struct {
 typedef struct {
     hystgen_real_t high; /* samples, in units of the table's carry and of one */
     hystgen_real_t low;
-    hystgen_real_t lead; /* samples that the next reference is ahead */
+    hystgen_real_t lead; /* samples by which the next reference is ahead */
 } hystgen_clock_t;
 
 #endif

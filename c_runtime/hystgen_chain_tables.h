@@ -2,7 +2,7 @@
 #ifndef HYSTGEN_CHAIN_TABLES_H
 #define HYSTGEN_CHAIN_TABLES_H
 
-/* A state of creep: X += early h_before + late h - rate X, its share of the output folded in. */
+/* A state of creep, scaled by its share of the output: X += early h_before + late h - rate X. */
 typedef struct {
     hystgen_real_t rate;
     hystgen_real_t early;
@@ -20,8 +20,7 @@ typedef struct {
     uint_least16_t n;
 } hystgen_creep_table_t;
 
-/* Lag in front of the plays: x += rate (v - x), and what arrives lies theta of that step behind x.
- */
+/* Lag in front of the plays: x += rate (v - x); the output lies theta of that step behind x. */
 typedef struct {
     hystgen_real_t rate;
     hystgen_real_t theta;
@@ -37,8 +36,9 @@ typedef struct {
     hystgen_real_t inverse_late;
 } hystgen_lag_exact_table_t;
 
-/* Mode of the stage: what output less input, and the rate of that, add of themselves in a step
-   (keep, swing), of each other (turn), and of a change of the input (lead, push). */
+/* Mode of the stage: in a step its two states, output less input and the rate of that, change by
+   shares of themselves (keep, swing), of each other (turn), and of a change of the input (lead,
+   push). */
 typedef struct {
     hystgen_real_t keep;
     hystgen_real_t turn;
@@ -47,7 +47,7 @@ typedef struct {
     hystgen_real_t push;
 } hystgen_mode_table_t;
 
-/* Gain and offset per degree above the reference, and between which temperatures. */
+/* Gain and offset per degree above the reference, between two temperatures. */
 typedef struct {
     hystgen_real_t per_degree;
     hystgen_real_t offset_per_degree;
@@ -58,7 +58,7 @@ typedef struct {
     hystgen_real_t largest;
 } hystgen_gain_table_t;
 
-/* A piece of the gain over travel, cubic in the share of its length. */
+/* A piece of the gain over travel: a cubic in the share of its length. */
 typedef struct {
     hystgen_real_t begin;
     hystgen_real_t inverse_length;
@@ -75,22 +75,22 @@ typedef struct {
     hystgen_real_t largest;
     hystgen_real_t last;
     uint_least16_t n;
-    uint_least8_t turns; /* steps of Newton's to the reciprocal of a gain that has moved */
+    uint_least8_t turns; /* Newton steps for the reciprocal of a gain that has changed */
 } hystgen_ageing_table_t;
 
-/* Own heat: degrees of a change of the drive's signed square in one step, and what a step keeps. */
+/* Own heat: degrees per change of the drive's signed square, and the share lost in a step. */
 typedef struct {
     hystgen_real_t rate;
     hystgen_real_t per_square;
     hystgen_real_t per_degree;
     hystgen_real_t offset_per_degree;
     hystgen_real_t hottest; /* rise up to which gain and offset follow */
-    uint_least16_t turns;   /* steps of Newton's to the reciprocal of a gain that has moved */
+    uint_least16_t turns;   /* Newton steps for the reciprocal of a gain that has changed */
 } hystgen_heat_table_t;
 
-/* Drift over time: rate, and half of what it changes by. */
+/* Drift over time: its rate, and half the change of the rate per second. */
 typedef struct {
-    hystgen_real_t sample; /* s, of one sample and of `carry` of them */
+    hystgen_real_t sample; /* duration in s of one sample, and of `carry` of them */
     hystgen_real_t block;
     hystgen_real_t carry;
     hystgen_real_t rate;

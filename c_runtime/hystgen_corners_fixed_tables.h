@@ -1,11 +1,12 @@
 #ifndef HYSTGEN_CORNERS_FIXED_TABLES_H
 #define HYSTGEN_CORNERS_FIXED_TABLES_H
 
-#define HYSTGEN_FAR ((int64_t)1 << 62) /* an output that none reaches */
+#define HYSTGEN_FAR ((int64_t)1 << 62) /* beyond every output */
 #define HYSTGEN_LARGEST 2147483647     /* the largest input of the plays */
 #define HYSTGEN_MOST_PLAYS 0x7fffu     /* the largest number of plays that a corner can name */
 
-/* Play k begins to follow this far from a turning point; from there to the next is a line. */
+/* Play k begins to follow this far from a turning point; the curve is straight from there to where
+   the next play does. */
 typedef struct {
     int64_t reach;       /* of the output: 2 z_k */
     uint32_t way;        /* of the input: 2 r_k */
@@ -18,7 +19,7 @@ typedef struct {
 typedef struct {
     const hystgen_segment_t *segment; /* plays 0 .. n, and one that never follows */
     int64_t offset;                   /* part of every output */
-    int64_t range[2]; /* ends of falling [0] moves, with signs changed, and of rising [1] ones */
+    int64_t range[2]; /* inputs at the end of falling [0] moves, sign changed, and of rising [1] */
     uint_least16_t n; /* plays without play 0 */
 } hystgen_curve_t;
 

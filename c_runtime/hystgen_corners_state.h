@@ -11,8 +11,8 @@ typedef struct {
 } hystgen_place_t;
 
 /* A turning point. It holds the plays of its block: those above the plays of the next corner, up to
-   play `top`. `pass`: input at which a falling [0] and a rising [1] move has taken the whole block
-   along, its sign changed for falling; one of them is the input at the turning point itself. */
+   play `top`. `pass`: input at which a falling [0] or rising [1] move has taken the whole block
+   along, sign changed for falling; one of the two is the input at the turning point itself. */
 typedef struct {
     hystgen_real_t output; /* at the turning point */
     hystgen_real_t pass[2];
@@ -25,7 +25,7 @@ typedef struct {
     hystgen_place_t here;
     hystgen_real_t next;   /* input up to which the same plays follow and nothing is limited */
     hystgen_real_t cap;    /* input up to which the same corner counts and nothing is limited */
-    hystgen_real_t behind; /* while no play follows: input on the other side, likewise */
+    hystgen_real_t behind; /* while no play follows: the same as `next`, on the other side */
     hystgen_real_t from;   /* input and output that the top corner's block counts from */
     hystgen_real_t base;
     hystgen_real_t begin; /* output = start + (input - begin) gain */

@@ -4,8 +4,8 @@
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     hystgen_place_t here;
-    int32_t before; /* input of the plays before the last step, where that was a usual one */
-    int32_t next;   /* reference short of which steps are usual, as the present move sees it */
+    int32_t before; /* input of the plays before the last step, if that was a usual one */
+    int32_t next;   /* reference, along the present move, short of which steps are usual */
     hystgen_real_t reference; /* of the last step */
     bool usual;               /* in the last step the same plays followed */
     bool repeat;              /* the last answer still stands for `reference` */

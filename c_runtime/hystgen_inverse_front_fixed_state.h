@@ -4,15 +4,15 @@
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     hystgen_place_t here;
-    int64_t next; /* output at which another play begins to follow, as the present move sees it */
-    hystgen_real_t drive; /* that the plays are at */
+    int64_t next; /* output, along the present move, at which another play begins to follow */
+    hystgen_real_t drive; /* where the plays are */
     hystgen_real_t undo_drive;
     hystgen_real_t reference; /* of the last step */
     hystgen_real_t level;     /* the same, limited: the next reference moves up or down from here */
     bool ascending;           /* direction of the drive's last move */
     bool undo_ascending;
     bool repeat;        /* the last answer still stands for `reference` */
-    bool limited;       /* no drive at all gives it; here rather than on the stack */
+    bool limited;       /* no drive gives it; here rather than on the stack */
     uint_least8_t bits; /* status of that answer */
     unsigned int status;
     hystgen_place_t undo; /* where the plays were before the last step */

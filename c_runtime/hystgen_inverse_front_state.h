@@ -5,7 +5,7 @@
 typedef struct {
     hystgen_plays_t plays;
     hystgen_place_t undo; /* where the plays were before the last step */
-    hystgen_real_t drive; /* that the plays are at */
+    hystgen_real_t drive; /* where the plays are */
     hystgen_real_t undo_drive;
     hystgen_real_t returned;  /* by the last step, if another drive was committed since */
     hystgen_real_t reference; /* of the last step */
@@ -15,7 +15,7 @@ typedef struct {
     bool stepped;      /* a step has answered */
     bool committed;    /* a drive was committed since */
     bool repeat;       /* the last answer still stands for `reference` */
-    bool limited;      /* no drive at all gives it; here rather than on the stack */
+    bool limited;      /* no drive gives it; here rather than on the stack */
     unsigned int bits; /* status of that answer */
     unsigned int status;
     hystgen_corner_t corner[HYSTGEN_CORNERS];

@@ -1,4 +1,4 @@
-/* The whole run time as one translation unit: this is what the shared-runtime layout compiles. */
+/* The whole run time as one translation unit, as the shared-runtime layout compiles it. */
 #include "hystgen_runtime.h"
 #ifdef HYSTGEN_FIXED
 #include "over_slope.c"

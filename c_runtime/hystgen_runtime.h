@@ -2,9 +2,9 @@
  * hystgen run time: the kernels behind every emitted model.
  *
  * Emitted code carries these functions with its own prefix in place of "hystgen_" (self-contained
- * and single-header layouts) or calls them here (shared-runtime layout). Nothing in them fails,
- * allocates, divides, recurses or runs unbounded, and nothing but <float.h>, <stdbool.h>,
- * <stddef.h> and <stdint.h> is needed.
+ * and single-header layouts) or calls them here (shared-runtime layout). They cannot fail, take
+ * bounded time, never allocate, divide or recurse, and need only <float.h>, <stdbool.h>, <stddef.h>
+ * and <stdint.h>.
  */
 #ifndef HYSTGEN_RUNTIME_H
 #define HYSTGEN_RUNTIME_H
@@ -14,9 +14,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* What the numbers of a model are: in floating point all of one type, in fixed point whole numbers
-   as wide as they have to be. play: inputs of the plays; reach: where plays start to follow; sum:
-   outputs before they are rounded; low: the lower part of one that a corner keeps. */
+/* Types of a model's numbers: in floating point all the same, in fixed point integers as wide as
+   they have to be. play: inputs of the plays; reach: where plays start to follow; sum: outputs
+   before they are rounded; low: the lower part of a sum that a corner keeps. */
 #if defined(HYSTGEN_FIXED)
 #ifdef HYSTGEN_REAL_IS_SHORT
 typedef int32_t hystgen_reach_t;
@@ -48,9 +48,9 @@ typedef hystgen_real_t hystgen_reach_t;
 typedef hystgen_real_t hystgen_sum_t;
 #endif
 
-/* In a model with effects, signals between its blocks, in fixed point wider than codes; a drive in
-   front of its plays, in fixed point with bits below a code; and the distance it has travelled.
-   Without effects, and in floating point, all of them are what the caller has. */
+/* In a model with effects, signal: between its blocks, in fixed point wider than codes; fine: a
+   drive in front of its plays, in fixed point with bits below a code; travel: the distance that the
+   drive has covered. Without effects, and in floating point, all of them have the caller's type. */
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
 typedef hystgen_sum_t hystgen_signal_t;
 typedef hystgen_play_t hystgen_fine_t;
@@ -65,8 +65,8 @@ typedef hystgen_real_t hystgen_number_t;
 #define hystgen_clamp_fine hystgen_clamp_drive
 #endif
 
-/* How functions appear in emitted files: kernels are static where a model carries them as its own;
-   some are kept apart there, so that less is on the stack. */
+/* Storage classes of functions in emitted files: kernels are static where a model has its own copy;
+   some are kept from being inlined there, to need less stack. */
 #include "apart.h"
 #define HYSTGEN_API
 #define HYSTGEN_KERNEL

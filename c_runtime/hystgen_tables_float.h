@@ -22,7 +22,7 @@ typedef struct {
     hystgen_real_t limit; /* largest |argument| that atanh is given */
 } hystgen_envelope_t;
 
-/* Dead-zone sum as the straight pieces it consists of, piece j between break points j-1 and j. */
+/* Dead-zone sum as straight pieces, piece j between break points j-1 and j. */
 typedef struct {
     const hystgen_real_t *break_x; /* n break points, rising */
     const hystgen_real_t *break_y;

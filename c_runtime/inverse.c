@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Any other sample than a usual one. */
+/* Any sample but a usual one. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
     const hystgen_curve_t *t = &hystgen_inverse_curve;
     hystgen_plays_t *m = &self->plays;
@@ -12,7 +12,7 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
                                                                : HYSTGEN_STATUS_HELD;
         x = (u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : HYSTGEN_OUTPUT_MAX) - HYSTGEN_OFFSET;
     }
-    if (bits == HYSTGEN_STATUS_HELD) { /* no number: the last answer once more */
+    if (bits == HYSTGEN_STATUS_HELD) { /* not finite: repeat the last answer */
         if (self->stepped && self->committed) {
             hystgen_move_to_output(t, m, self->corner, self->returned);
         }
@@ -32,9 +32,9 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     return m->here.output;
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit takes the step back and
-   puts the applied drive in its place. While `limited` is set, references beyond `input` have the
-   same answer, a limit of the drive.
+/* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
+   applied drive in its place. While `limited` is set, references beyond `input` have the same
+   answer, a limit of the drive.
 
    stepped  committed  the memory is at     a commit replaces    a NaN answers, and leaves there
    no       no         the start drive      nothing              the start drive
@@ -76,7 +76,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
         self->returned = m->here.output;
     }
     self->committed = true;
-    if (self->before < m->here.input || self->before > m->here.input) { /* it went along a line */
+    if (self->before < m->here.input || self->before > m->here.input) { /* a usual step */
         hystgen_copy_place(&self->undo, &m->here);
         self->undo.input = self->before;
         self->undo.output = m->start + (self->before - m->begin) * m->gain;

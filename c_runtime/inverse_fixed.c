@@ -1,17 +1,18 @@
 #include "hystgen_runtime.h"
 
-/* A reference as the present move sees it; ~u is -u - 1, which overflows for no code. */
+/* A reference along the present move; ~u is -u - 1, which overflows for no code. */
 static inline int32_t hystgen_inverse_sees(const hystgen_inverse_t *self, int32_t u) {
     return self->here.rising ? u : ~u;
 }
 
-/* No step is usual until another search; the next one begins here. */
+/* No step is usual before another search, which begins here. */
 static void hystgen_inverse_stay(hystgen_inverse_t *self) {
     self->next = -HYSTGEN_LARGEST - 1;
     self->usual = false;
 }
 
-/* Steps are usual to the next kink or limit, less rounding, but not before the least reference. */
+/* Steps are usual up to the next kink or limit, less rounding, but not below the least reference.
+ */
 HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next) {
     const hystgen_place_t *here = &self->here;
     const int32_t most =
@@ -29,7 +30,7 @@ HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t n
     }
 }
 
-/* Any other sample than a usual one. */
+/* Any sample but a usual one. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_copy_place(&self->undo, &self->here);
     self->usual = false;
@@ -58,10 +59,10 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     return (hystgen_real_t)hystgen_front_inverse(self->here.input);
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit takes the step back and
-   puts the applied drive in its place.
+/* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
+   applied drive in its place.
 
-   last call   the memory is at      a commit replaces     the same reference once more
+   last call   the memory is at      a commit replaces     the same reference again
    init        the start memory      nothing               is solved for
    step        the last answer       the last answer       has the same answer
    commit      the committed drive   the committed drive   is solved for */

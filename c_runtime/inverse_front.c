@@ -1,19 +1,19 @@
 #include "hystgen_runtime.h"
 
-/* The next step begins here. */
+/* Keeps the place for a commit to go back to. */
 static void hystgen_inverse_keep(hystgen_inverse_t *self) {
     hystgen_copy_place(&self->undo, &self->plays.here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
 
-/* The actuator is at drive v; the direction is that of its move. */
+/* The actuator is at drive v; its move sets the direction. */
 static void hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v) {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
 }
 
-/* The actuator has gone to v in place of where the last step led. */
+/* Undoes the last step: the actuator has gone to v instead. */
 HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t v) {
     hystgen_copy_place(&self->plays.here, &self->undo);
     hystgen_forget_line(&self->plays);
@@ -26,7 +26,7 @@ HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real
     }
 }
 
-/* A sample that is no number: the last answer once more. */
+/* A sample that is not finite: repeat the last answer. */
 static hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self) {
     hystgen_inverse_keep(self);
     hystgen_inverse_replace(self, self->stepped && self->committed ? self->returned : self->drive);
@@ -36,8 +36,8 @@ static hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self) {
     return self->drive;
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit, a limit or a drive that
-   holds takes the step back and puts the applied drive in its place.
+/* One sample. The memory takes the answer as applied at once; a commit, a limit or a drive that
+   holds undoes the step and puts the applied drive in its place.
 
    stepped  committed  the memory is at     a commit replaces    a NaN answers, and leaves there
    no       no         the start drive      nothing              the start drive
@@ -62,7 +62,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
         const bool clamped = inside < v || inside > v;
         self->bits |= self->limited ? HYSTGEN_STATUS_DOMAIN : 0u;
         if (clamped || (inside <= self->drive && inside >= self->drive)) {
-            /* the plays are not where w is */
+            /* this drive does not give w: the plays are elsewhere */
             self->bits |= clamped ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u;
             hystgen_inverse_replace(self, inside);
         } else {

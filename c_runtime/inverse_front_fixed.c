@@ -1,23 +1,23 @@
 #include "hystgen_runtime.h"
 
-/* The next step begins here. */
+/* Keeps the place for a commit to go back to. */
 HYSTGEN_APART void hystgen_inverse_keep(hystgen_inverse_t *self) {
     hystgen_copy_place(&self->undo, &self->here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
 
-/* The actuator is at drive v; the direction is that of its move. Returns the input of the plays. */
+/* The actuator is at drive v; its move sets the direction. Returns the input of the plays. */
 HYSTGEN_APART int32_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v) {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
     return hystgen_front_forward(v, self->ascending);
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit takes the step back and
-   puts the applied drive in its place.
+/* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
+   applied drive in its place.
 
-   last call   the memory is at      a commit replaces     the same reference once more
+   last call   the memory is at      a commit replaces     the same reference again
    init        the start memory      nothing               is solved for
    step        the last answer       the last answer       has the same answer
    commit      the committed drive   the committed drive   is solved for */
@@ -65,7 +65,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
 
 static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step,
                                   const hystgen_drive_t *first) {
-    unsigned int status = 0; /* of what no step has answered */
+    unsigned int status = 0; /* not reported: this is no step */
     hystgen_start(&hystgen_model_curve, &self->here, self->corner, play, step);
     self->drive = (hystgen_real_t)first->drive;
     self->ascending = first->ascending;

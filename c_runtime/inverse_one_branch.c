@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* The drive that gives w; `limited` tells whether no drive at all does. */
+/* The drive that gives w; sets `limited` if there is none. */
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
                                                                       hystgen_signal_t level,
                                                                       hystgen_reach_t w,

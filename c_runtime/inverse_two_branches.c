@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Whether going to v is a move of the branch that v was computed on. */
+/* Whether the move to v belongs to the branch that v was computed on. */
 static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t v, bool ascending) {
     const hystgen_fine_t inside = hystgen_clamp_fine(v);
     return inside > self->drive   ? ascending
@@ -8,9 +8,8 @@ static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t 
                                   : self->ascending == ascending;
 }
 
-/* The drive that gives w on the branch of its own move: that of the reference's move is tried
-   first, then the other one, and where neither fits the drive holds; `limited` tells whether no
-   drive at all gives w. */
+/* The drive that gives w on the branch of its own move. Tries the branch of the reference's move,
+   then the other one; if neither fits, the drive holds. Sets `limited` if no drive gives w. */
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
                                                                       hystgen_signal_t level,
                                                                       hystgen_reach_t w,
@@ -20,7 +19,7 @@ HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hyst
     if (!hystgen_inverse_fits(self, v, up)) {
         const hystgen_reach_t back = (hystgen_reach_t)hystgen_clamp_fine(v) - self->drive;
         if (up == self->ascending && back >= -HYSTGEN_HOLD && back <= HYSTGEN_HOLD) {
-            /* back by rounding alone */
+            /* it moves back only by rounding */
             v = self->drive;
         } else {
             v = hystgen_front_inverse(w, !up, limited);

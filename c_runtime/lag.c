@@ -1,8 +1,8 @@
 #include "hystgen_runtime.h"
 
 /* A lag as a block of the chain. The inverse of a lag on a drive that is straight between samples
-   rings; that of x, a lag on a drive that holds, does not. What arrives is x less theta of its last
-   step, so that x is led to the output asked for and theta of its step beyond: exact on ramps. */
+   rings; that of x, a lag on a drive that holds, does not. The output is x less theta of its last
+   step, so x is led beyond the output asked for by theta of the output's step: exact on ramps. */
 
 /* Everything has settled at the input v. Returns the output. */
 static hystgen_real_t hystgen_lag_rest(hystgen_lag_t *self, hystgen_real_t v) {
@@ -30,7 +30,7 @@ static hystgen_real_t hystgen_lag_absorb(const hystgen_lag_table_t *t, hystgen_l
     const hystgen_real_t change = t->rate * (v - high) + self->low;
     const hystgen_real_t next = high + change;
     self->high = next;
-    self->low = change - (next - high); /* what the sum has lost */
+    self->low = change - (next - high); /* what rounding took from the sum */
     self->wanted = self->asked + t->late * (v - self->answer);
     return next - t->theta * (next - high);
 }

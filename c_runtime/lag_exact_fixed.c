@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* A lag of at most half a step as a block of the chain, in fixed point. The state is what arrives
-   at the next sample if the input stays. */
+/* A lag of at most half a step as a block of the chain, in fixed point. The state is the output at
+   the next sample if the input stays. */
 
 /* Everything has settled at the input v. Returns the output. */
 static int64_t hystgen_lag_exact_rest(const hystgen_lag_exact_table_t *t, hystgen_lag_exact_t *self,

@@ -1,8 +1,8 @@
 #include "hystgen_runtime.h"
 
-/* A lag as a block of the chain, in fixed point: x, a lag on a drive that holds, is led to the
-   output asked for and theta of its step beyond, as in floating point. The move that x was to make
-   is kept, so that what another input than the answer makes of it is known. */
+/* A lag as a block of the chain, in fixed point: x, a lag on a drive that holds, is led beyond the
+   output asked for by theta of the output's step, as in floating point. `lead` is the move that x
+   was to make, so that the effect of an input other than the answer is known. */
 
 /* A number in units of the states times a factor. */
 static int64_t hystgen_lag_scaled(const hystgen_lag_table_t *t, int64_t x,

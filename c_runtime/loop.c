@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Operators of engine loop: what all arithmetics and memoryless parts have in common. */
+/* Operators of engine loop: the part common to all arithmetics and memoryless parts. */
 
 /* The actuator has seen drive v. */
 static void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v) {
@@ -12,8 +12,8 @@ static void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v) {
     hystgen_loop_absorb(&hystgen_model_tables, self->play, hystgen_inverse_arrive(self, v));
 }
 
-/* Returns drive v and leaves it pending: the next step takes it, or what was committed, into the
- * memory. */
+/* Returns drive v and leaves it pending: the next step absorbs it, or the drive committed in its
+   place. */
 static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_real_t v) {
     self->answer = v;
     self->pending = v;
@@ -22,7 +22,7 @@ static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_re
     return v;
 }
 
-/* What is pending is what the actuator has seen. */
+/* The actuator has seen the pending drive. */
 static void hystgen_inverse_take(hystgen_inverse_t *self) {
     if (self->has_pending) {
         hystgen_inverse_absorb(self, self->pending);
@@ -30,7 +30,7 @@ static void hystgen_inverse_take(hystgen_inverse_t *self) {
     }
 }
 
-/* Answers reference u, which is `level` once it is limited; `bits` is its status so far. */
+/* Answers reference u, which is `level` after limiting; `bits` is its status so far. */
 HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self,
                                                              hystgen_real_t u, hystgen_real_t level,
                                                              unsigned int bits) {
@@ -51,7 +51,7 @@ HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *
     return hystgen_inverse_answer(self, inside);
 }
 
-/* Drive v, which is `applied` once it is limited, is pending in place of the last answer. */
+/* Drive v, which is `applied` after limiting, is pending in place of the last answer. */
 static void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t applied,
                                     hystgen_real_t v) {
     if (v < applied || v > applied) {
@@ -62,7 +62,7 @@ static void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t appl
     self->has_pending = true;
 }
 
-/* What init and reset have in common once the plays are set; they stand for this drive. */
+/* The part common to init and reset, once the plays are set: they rest at this drive. */
 static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive) {
     self->pending = drive;
     self->drive = drive;

@@ -1,15 +1,15 @@
 #include "hystgen_runtime.h"
 
-/* Operators of engine loop: plays behind a memoryless part of two branches. */
+/* Operators of engine loop: plays behind a memoryless part with two branches. */
 
-/* The actuator is at drive v, whose own move picks the branch. Returns the input of the plays. */
+/* The actuator is at drive v; its move picks the branch. Returns the input of the plays. */
 static hystgen_play_t hystgen_forward_arrive(hystgen_forward_t *self, hystgen_fine_t v) {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
     return hystgen_front_forward(v, self->ascending);
 }
 
-/* The actuator is at drive v, whose own move picks the branch. Returns the input of the plays. */
+/* The actuator is at drive v; its move picks the branch. Returns the input of the plays. */
 static hystgen_play_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_fine_t v) {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;

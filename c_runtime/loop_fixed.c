@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Operators of engine loop: what is a sample in fixed point, where every code is a number. */
+/* Operators of engine loop: samples in fixed point, where every code is finite. */
 
 /* One sample. */
 hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Operators of engine loop: what is a sample in floating point, which has numbers that are none. */
+/* Operators of engine loop: samples in floating point, which may be NaN or infinite. */
 
 static bool hystgen_finite(hystgen_real_t x) {
     return x >= -HYSTGEN_REAL_MAX && x <= HYSTGEN_REAL_MAX; /* false for NaN */

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Operators of engine loop: where they start. */
+/* Operators of engine loop: start memory. */
 
 void hystgen_forward_init(hystgen_forward_t *self) {
     hystgen_loop_init(self->play);

@@ -8,14 +8,14 @@ static hystgen_real_t hystgen_forward_output(hystgen_forward_t *self) {
                         &self->status);
 }
 
-/* What init and reset have in common once the plays are set. */
+/* The part common to init and reset, once the plays are set. */
 static void hystgen_forward_begin(hystgen_forward_t *self) {
     self->answer = 0; /* no step has answered yet */
     self->status = 0;
 }
 
 static hystgen_real_t hystgen_inverse_output(const hystgen_inverse_t *self) {
-    unsigned int status = 0; /* of what no step has answered */
+    unsigned int status = 0; /* not reported: this is no step */
     return hystgen_code(hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET,
                         &status);
 }

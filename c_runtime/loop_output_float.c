@@ -6,7 +6,7 @@ static hystgen_real_t hystgen_forward_output(const hystgen_forward_t *self) {
     return hystgen_loop_output(&hystgen_model_tables, self->play) + HYSTGEN_OFFSET;
 }
 
-/* What init and reset have in common once the plays are set. */
+/* The part common to init and reset, once the plays are set. */
 static void hystgen_forward_begin(hystgen_forward_t *self) {
     self->answer = hystgen_forward_output(self);
     self->status = 0;

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Operators of engine loop: plays alone. */
+/* Operators of engine loop: only plays. */
 
 /* The actuator is at drive v. Returns the input of the plays. */
 static hystgen_play_t hystgen_forward_arrive(hystgen_forward_t *self, hystgen_fine_t v) {

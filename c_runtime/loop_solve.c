@@ -1,10 +1,10 @@
 #include "hystgen_runtime.h"
 
-/* The input of the plays that gives `output`: starts with every play following and lets go of the
-   largest thresholds until the solution has really reached the play that follows last. A play that
-   was let go did not follow, so the answer is kept from passing the input at which it would: a
-   rounding error of `output` is divided by the slope before that input, which may be small, and
-   must not run on along the steeper slope behind it. */
+/* The input of the plays that gives `output`: assumes first that every play follows, then drops the
+   largest thresholds one by one until the solution reaches the last play that is left. The answer
+   must not pass the input at which the play dropped last would follow: a rounding error of `output`
+   is divided by the slope before that input, which may be small, and must not run on along the
+   steeper slope behind it. */
 HYSTGEN_API hystgen_real_t hystgen_loop_solve(const hystgen_tables_t *t, const hystgen_real_t *play,
                                               hystgen_real_t output) {
     const bool rising = output >= hystgen_loop_output(t, play);
@@ -23,5 +23,5 @@ HYSTGEN_API hystgen_real_t hystgen_loop_solve(const hystgen_tables_t *t, const h
         tail = tail + t->weight[last] * play[last];
         next = first;
     }
-    return play[0]; /* `output` differs from the present one by rounding alone */
+    return play[0]; /* `output` differs from the present one only by rounding */
 }

@@ -1,7 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* The input of the plays that lies d further on in output than w, kept near the range of the plays'
- * input. */
+/* The input of the plays whose output is d further than that of w, between `least` and `most`. */
 static hystgen_reach_t hystgen_going(const hystgen_tables_t *t, hystgen_reach_t w, hystgen_sum_t d,
                                      unsigned int k, bool rising) {
     const hystgen_sum_t step = hystgen_over_slope(d, t->reciprocal[k], t->shift[k]);
@@ -11,9 +10,9 @@ static hystgen_reach_t hystgen_going(const hystgen_tables_t *t, hystgen_reach_t 
     return step > (hystgen_sum_t)w - t->least ? t->least : (hystgen_reach_t)(w - step);
 }
 
-/* The input of the plays that gives `output`: takes along the plays one by one until the next would
-   be too much. What is `left` of the way in output only shrinks, so that no sum grows beyond the
-   first one, whatever the plays hold. */
+/* The input of the plays that gives `output`: lets the plays follow one by one until the next would
+   be too much. The output still to go, `left`, only shrinks, so that no sum exceeds the first one,
+   whatever the plays hold. */
 HYSTGEN_API hystgen_reach_t hystgen_loop_solve(const hystgen_tables_t *t,
                                                const hystgen_play_t *play, hystgen_sum_t output) {
     const hystgen_sum_t here = hystgen_loop_output(t, play);
@@ -27,8 +26,8 @@ HYSTGEN_API hystgen_reach_t hystgen_loop_solve(const hystgen_tables_t *t,
     for (k = 1; k <= t->n; ++k) {
         const hystgen_reach_t start = rising ? (hystgen_reach_t)play[k] + t->threshold[k]
                                              : (hystgen_reach_t)play[k] - t->threshold[k];
-        /* play k starts to follow no earlier than play k-1, and at most twice their thresholds'
-         * distance later */
+        /* play k starts to follow no earlier than play k-1, and later by at most twice the
+           difference of their thresholds */
         const uint32_t further = (uint32_t)(rising ? start - w : w - start);
         const hystgen_sum_t step = (hystgen_sum_t)hystgen_wide(further, (uint32_t)t->slope[k]);
         if (left < step) {

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Operators of engine loop: where they start, and on which branch. */
+/* Operators of engine loop: start memory and branch. */
 
 void hystgen_forward_init(hystgen_forward_t *self) {
     hystgen_loop_init(self->play);

@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* A mode as a block of the forward operator: how far its output lies off the input, and the rate of
-   that, which turn into each other and fade. */
+/* A mode as a block of the forward operator. Its states, the output less the input and the rate of
+   that, turn into each other and decay. */
 
 /* Everything has settled at the input x. Returns the output. */
 static hystgen_real_t hystgen_mode_rest(hystgen_mode_t *self, hystgen_real_t x) {

@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* A mode as a block of the forward operator, in fixed point: how far its output lies off the input,
-   and the rate of that, with bits below those of a signal. */
+/* A mode as a block of the forward operator, in fixed point. Its states, the output less the input
+   and the rate of that, have bits below those of a signal. */
 
 /* A number in units of the states times a factor. */
 HYSTGEN_APART int64_t hystgen_mode_scaled(const hystgen_mode_table_t *t, int64_t x,

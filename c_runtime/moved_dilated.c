@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Play i once the input of the plays has gone to w; thresholds grow with the way of the step. */
+/* Play i after the input of the plays has gone to w; thresholds grow with the size of the step. */
 static hystgen_sum_t hystgen_moved(unsigned int i, const hystgen_play_t *play, hystgen_sum_t w) {
     const hystgen_sum_t way = w > play[0] ? w - play[0] : play[0] - w;
     const hystgen_sum_t threshold =

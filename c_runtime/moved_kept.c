@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Play i has moved, and comes to rest at z, while the input of the plays goes to w. */
+/* Play i moves while the input of the plays goes to w, and comes to rest at z. */
 static void hystgen_keep(unsigned int i, hystgen_play_t *play, hystgen_play_t w, hystgen_sum_t z) {
     (void)w;
     play[i] = (hystgen_play_t)z;

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Play i once the input of the plays has gone to w. */
+/* Play i after the input of the plays has gone to w. */
 static hystgen_sum_t hystgen_moved(unsigned int i, const hystgen_play_t *play, hystgen_sum_t w) {
     const hystgen_sum_t low = w - hystgen_model_tables.threshold[i];
     const hystgen_sum_t high = w + hystgen_model_tables.threshold[i];

@@ -5,7 +5,7 @@
 #define HYSTGEN_HALF_WORD 16u
 #define HYSTGEN_LOW_HALF 0xffffu
 
-/* a times b; with half words, and no call, on cores without a long multiplication. */
+/* a times b; by half words, without a library call, on cores without a long multiplication. */
 HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b) {
 #if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)
     const uint32_t low = (a & HYSTGEN_LOW_HALF) * (b & HYSTGEN_LOW_HALF);
@@ -22,7 +22,7 @@ HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b) {
 #endif
 }
 
-/* d / slope to the nearest whole number, d not negative: the upper bits of d times the reciprocal
+/* d / slope to the nearest integer, d >= 0: the upper bits of d times the reciprocal
    2^(32 + shift) / slope. A slope is at least 16, so that `shift` is 2 .. 29. */
 HYSTGEN_API int64_t hystgen_over_slope(int64_t d, uint32_t reciprocal, unsigned int shift) {
     const uint64_t low = hystgen_wide((uint32_t)d, reciprocal) >> HYSTGEN_WORD;

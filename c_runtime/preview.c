@@ -1,10 +1,9 @@
 #include "hystgen_runtime.h"
 
-/* The line of references, of which the newest is the argument of step and lies ahead of the motion.
- */
+/* A line of references. The newest one is the argument of step and lies ahead of the motion. */
 
-/* The next sample; the first one stands for all before it too. Stores go through volatile where a
-   compiler would otherwise call memmove, which a freestanding target need not have. */
+/* Appends a sample; the first one fills the line. Stores go through volatile where a compiler would
+   otherwise call memmove, which a freestanding target need not have. */
 static void hystgen_preview_put(hystgen_signal_t *line, bool *filled, hystgen_signal_t x) {
     volatile hystgen_signal_t *entry = line;
     unsigned int i;
@@ -15,7 +14,7 @@ static void hystgen_preview_put(hystgen_signal_t *line, bool *filled, hystgen_si
     *filled = true;
 }
 
-/* The newest sample once more, where there is one. */
+/* Appends the newest sample again, if there is one. */
 static void hystgen_preview_repeat(hystgen_signal_t *line, bool *filled) {
     if (*filled) {
         hystgen_preview_put(line, filled, line[HYSTGEN_TAPS - 1u]);

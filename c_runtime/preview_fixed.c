@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* What has to be given for the motion at this sample: the weighted sum of the line. */
+/* The output to reach at this sample: the weighted sum of the line. */
 static int64_t hystgen_preview_target(const hystgen_factor_t *tap, const int64_t *line) {
     int64_t sum = 0;
     unsigned int i;

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* What has to be given for the motion at this sample: the weighted sum of the line. */
+/* The output to reach at this sample: the weighted sum of the line. */
 static hystgen_real_t hystgen_preview_target(const hystgen_real_t *tap,
                                              const hystgen_real_t *line) {
     hystgen_real_t sum = tap[0] * line[0];

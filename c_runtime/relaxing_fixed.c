@@ -1,10 +1,10 @@
 #include "hystgen_runtime.h"
 
-/* Viscous plays with one time constant, in fixed point; see relaxing_float.c. A stretch gains less
-   than half a step of the plays' input where a play is within the time constant's samples of rest:
-   it stays. */
+/* Viscous plays with one time constant, in fixed point; see relaxing_float.c. A play stops where
+   its stretch would gain less than half a step of the plays' input in a sample. */
 
-/* Where play i rests, as near to the one before as their thresholds are: rounding must not pass. */
+/* Where play i rests: at most as far from the play before as their thresholds are from each other,
+   in spite of rounding. */
 static hystgen_play_t hystgen_beside(const hystgen_play_t *play, unsigned int i, int64_t rest) {
     const hystgen_tables_t *t = &hystgen_model_tables;
     if (i > 1u) {
@@ -33,8 +33,8 @@ static hystgen_sum_t hystgen_relaxing_follow(hystgen_play_t *play, hystgen_play_
     return sum;
 }
 
-/* Input of the plays at which their sum is `sum`. Of viscous plays none is stretched with their
-   input where play 1 rests; from there on they are solved for like others, with smaller slopes. */
+/* Input of the plays at which their sum is `sum`. No viscous play is stretched with the input where
+   play 1 rests; from there on they are solved for like plain ones, with smaller slopes. */
 static hystgen_reach_t hystgen_relaxing_input(hystgen_play_t *play, hystgen_sum_t sum) {
     play[0] = play[1];
     return hystgen_loop_solve(&hystgen_relaxing_tables, play, sum);

@@ -1,9 +1,9 @@
 #include "hystgen_runtime.h"
 
-/* Viscous plays with one time constant. A play is kept as where it would come to rest (`play`): at
-   the end of a step its input at w has stretched it by what lies beyond the threshold, of which it
-   gains a share. Exact while it slides or rests; where contact begins or ends inside a step, it
-   does so at the first touch. */
+/* Viscous plays with one time constant. The state of a play is where it would come to rest
+   (`play`). At the end of a step its input w has stretched it by what lies beyond the threshold;
+   the play gains a share of that. Exact while it slides or rests; contact that begins or ends
+   within a step counts from the first touch. */
 
 /* The plays follow their input w. Returns their sum. */
 static hystgen_real_t hystgen_relaxing_follow(hystgen_real_t *play, hystgen_real_t w) {
@@ -19,8 +19,8 @@ static hystgen_real_t hystgen_relaxing_follow(hystgen_real_t *play, hystgen_real
     return sum;
 }
 
-/* Input of the plays at which their sum is h: of none at first, then of those that are stretched on
-   the way there, one after the other. They come in the order of their thresholds. */
+/* Input of the plays at which their sum is h: first without any stretched play, then with those
+   that are stretched on the way there, in the order of their thresholds. */
 static hystgen_real_t hystgen_relaxing_input(const hystgen_real_t *play, hystgen_real_t h) {
     hystgen_real_t rest = 0;
     unsigned int i;
@@ -39,7 +39,7 @@ static hystgen_real_t hystgen_relaxing_input(const hystgen_real_t *play, hystgen
         rest = rest + hystgen_relaxing.share[i] * first;
         w = rest * hystgen_relaxing.inverse[i];
         if (rising ? w < first : w > first) {
-            w = first; /* a rounding error must not pass where the play begins */
+            w = first; /* rounding must not take w back past the play's first touch */
         }
     }
     return w;

@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* Input of the plays at which their sum is h, by halves between where it is and the farthest: the
-   nearer of two neighbours. */
+/* Input of the plays at which their sum is h, by bisection between the present input and the
+   farthest one: the nearer of two neighbours. */
 HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *self,
                                                     hystgen_signal_t h) {
     const hystgen_sum_t sum = hystgen_asked(h);

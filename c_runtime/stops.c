@@ -1,8 +1,8 @@
 #include "hystgen_runtime.h"
 
-/* Stops behind the plays, in fixed point: beyond them the output goes on with another slope. */
+/* Stops behind the plays, in fixed point: beyond them the output continues with another slope. */
 
-/* x, with the slope f beyond the stops. */
+/* x between the stops, and a slope of f beyond them. */
 static int64_t hystgen_stops_beyond(const hystgen_stops_t *t, int64_t x,
                                     const hystgen_factor_t *f) {
     const int64_t inside = x < t->lower ? t->lower : x > t->upper ? t->upper : x;

@@ -3,12 +3,12 @@
 /*
  * tanh x for every finite float, without division.
  *
- * Below hystgen_tanh_knot[0], just above which tanh is 1/2: x + x z P(z) with z = x^2. From there
- * on one of eight polynomials in the distance from the center of its piece; each center is a point
- * at which tanh is almost a float, so that the constant term adds no error. From 9.01 on tanh
- * rounds to 1. fit_coefficients.py derives the numbers. Worst error over all floats: 0.78 ulp. Odd
- * and nowhere falling; the sign of zero and subnormal numbers are kept; infinities give +-1, and so
- * does NaN.
+ * Below hystgen_tanh_knot[0], just above tanh x = 1/2: x + x z P(z) with z = x^2. Above: one of
+ * eight polynomials in the distance from the center of its piece; each center is a point where tanh
+ * is almost a float, so that the constant term adds no error. From 9.01 on tanh rounds to 1.
+ * fit_coefficients.py derives the numbers. Worst error over all floats: 0.78 ulp. The function is
+ * odd and never decreases; it keeps subnormal numbers and the sign of zero. Infinities and NaN
+ * give +-1.
  */
 static const hystgen_real_t hystgen_tanh_odd[5] = {-0.33333313f, 0.13332483f, -0.053843424f,
                                                    0.021039838f, -0.0062336805f};

@@ -3,11 +3,11 @@
 /*
  * tanh x for every finite double, without division.
  *
- * Below hystgen_tanh_knot[0], just above which tanh is 1/2: x + x z P(z) with z = x^2. From there
- * on one of eight polynomials in the distance from the center of its piece; each center is a point
- * at which tanh is almost a double, so that the constant term adds no error. From 19.06 on tanh
- * rounds to 1. fit_coefficients.py derives the numbers and the bound on the error: 0.86 ulp. Odd;
- * the sign of zero and subnormal numbers are kept; infinities give +-1, and so does NaN.
+ * Below hystgen_tanh_knot[0], just above tanh x = 1/2: x + x z P(z) with z = x^2. Above: one of
+ * eight polynomials in the distance from the center of its piece; each center is a point where tanh
+ * is almost a double, so that the constant term adds no error. From 19.06 on tanh rounds to 1.
+ * fit_coefficients.py derives the numbers and the bound on the error: 0.86 ulp. The function is
+ * odd; it keeps subnormal numbers and the sign of zero. Infinities and NaN give +-1.
  */
 static const hystgen_real_t hystgen_tanh_odd[12] = {
     -0.3333333333333333,     0.1333333333333298,    -0.05396825396799937,   0.021869488526593105,

@@ -1,9 +1,9 @@
 #include "hystgen_runtime.h"
 
-/* Bits of the part of a number that is multiplied apart. */
+/* Bits of the lower part of a number, which is multiplied separately. */
 #define HYSTGEN_LOW_PART 20u
 
-/* x times a factor, to the nearest whole number; |x| < 2^51, a shift is 21 to 82. */
+/* x times a factor, to the nearest integer; |x| < 2^51, a shift is 21 to 82. */
 static int64_t hystgen_times(int64_t x, const hystgen_factor_t *f) {
     const int32_t high = (int32_t)(x >> HYSTGEN_LOW_PART);
     const int32_t low = (int32_t)(x & (((int64_t)1 << HYSTGEN_LOW_PART) - 1));

@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* What a yield moves a play by, and the other way round. */
+/* The move of a play for a yield, and the reverse. */
 static inline int64_t hystgen_moved_by(int64_t yield) {
     return hystgen_nearest(yield, HYSTGEN_YIELD_BITS);
 }
@@ -9,9 +9,9 @@ static inline int64_t hystgen_yield_of(int64_t moved) {
     return moved * ((int64_t)1 << HYSTGEN_YIELD_BITS);
 }
 
-/* What a play with a nonlinear dashpot that is stretched by x, not negative, gains of it in a step,
-   with HYSTGEN_YIELD_BITS bits below a step of the plays' input: pieces of cubics in fixed point,
-   as hystgen_curve has them, each with the bits that its values leave out; never more than x. */
+/* The part of a stretch x >= 0 that a play with a nonlinear dashpot gains in a step, with
+   HYSTGEN_YIELD_BITS bits below a step of the plays' input: a piecewise cubic as in hystgen_curve,
+   each piece with the bits that its values leave out; never more than x. */
 HYSTGEN_APART int64_t hystgen_yield(int64_t x) {
     const uint32_t inside = x > HYSTGEN_STRETCH ? (uint32_t)HYSTGEN_STRETCH : (uint32_t)x;
     unsigned int low = 0;
@@ -33,7 +33,7 @@ HYSTGEN_APART int64_t hystgen_yield(int64_t x) {
     return y > hystgen_yield_of(x) ? hystgen_yield_of(x) : y;
 }
 
-/* The part of a step's way at whose end its input counts as standing still. */
+/* How far into the step `way` the input counts as standing still. */
 static inline int64_t hystgen_seen(int64_t way) {
     return hystgen_times(way, &hystgen_seen_share);
 }

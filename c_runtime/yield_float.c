@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* What a play with a nonlinear dashpot that is stretched by x, not negative, gains of it in a step:
-   a table, cubic between its knots. */
+/* The part of a stretch x >= 0 that a play with a nonlinear dashpot gains in a step: a table, cubic
+   between its knots. */
 static hystgen_real_t hystgen_yield(hystgen_real_t x) {
     unsigned int low = 0;
     unsigned int high = HYSTGEN_YIELDS;
@@ -16,12 +16,12 @@ static hystgen_real_t hystgen_yield(hystgen_real_t x) {
     return ((c[4] * on + c[3]) * on + c[2]) * on + c[1];
 }
 
-/* The part of a step's way at whose end its input counts as standing still. */
+/* How far into the step `way` the input counts as standing still. */
 static inline hystgen_real_t hystgen_seen(hystgen_real_t way) {
     return way * HYSTGEN_SEEN;
 }
 
-/* What a yield moves a play by, and the other way round. */
+/* The move of a play for a yield, and the reverse. */
 static inline hystgen_real_t hystgen_moved_by(hystgen_real_t yield) {
     return yield;
 }

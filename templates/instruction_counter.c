@@ -1,7 +1,7 @@
 /*
- * Compiled for this machine by `hystgen verify --targets` and called by the emulator before every instruction: counts
- * the instructions of each call of `step` that the harness makes, from its first to its return. What the harness
- * itself executes, and a step that is part of a reset, is not counted.
+ * `hystgen verify --targets` compiles this for the host, and the emulator calls it before every instruction. It counts
+ * the instructions of each call of `step` that the harness makes, from entry to return, but not those of the harness
+ * itself, nor a step that is part of a reset.
  */
 #include <stdint.h>
 
@@ -13,8 +13,8 @@ typedef struct {
     uint64_t stack_pointer;        /* at the last call */
     int (*read_register)(void *emulator, int number, void *value);
     int64_t stack_register;
-    uint64_t last, behind;         /* the instruction executed before this one, and the address behind it */
-    uint64_t back;                 /* where the call that is being counted returns to; 0: none is */
+    uint64_t last, behind;         /* address of the previous instruction, and the address after it */
+    uint64_t back;                 /* return address of the call that is being counted, 0 for none */
     uint32_t count;
 } hystgen_counter_t;
 

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 2b8ad5cc4e3a5e2557138b41f92f84b214f913ada409bbdf234054d75ddae435, without this line
+ * Text: sha256 6eb42b61e2b68e3ac26d8a52bfc0a18f361f64219bb006c89c1fd8608d089442, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -17,11 +17,11 @@
 #pragma STDC FP_CONTRACT OFF
 #endif
 
-/* With -fsingle-precision-constant the numbers below would not be those of the model. */
+/* With -fsingle-precision-constant the literals below would lose bits. */
 typedef char bent_constants_are_double[sizeof(1.0) == sizeof(double) ? 1 : -1];
 
 #if defined(__GNUC__)
-#define BENT_APART __attribute__((noinline)) static /* called from several places, or rarely */
+#define BENT_APART __attribute__((noinline)) static /* has several callers, or rarely runs */
 #else
 #define BENT_APART static
 #endif
@@ -35,7 +35,7 @@ typedef struct {
     uint_least16_t n;                 /* plays without r_0 */
 } bent_tables_t;
 
-/* Dead-zone sum as the straight pieces it consists of, piece j between break points j-1 and j. */
+/* Dead-zone sum as straight pieces, piece j between break points j-1 and j. */
 typedef struct {
     const bent_real_t *break_x; /* n break points, rising */
     const bent_real_t *break_y;
@@ -46,7 +46,7 @@ typedef struct {
     uint_least16_t n;
 } bent_dead_zone_t;
 
-/* Finds the straight piece that x lies on and follows it. */
+/* Output at x of a dead-zone sum, by bisection for the straight piece. */
 static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t x) {
     unsigned int low = 0;
     unsigned int high = z->n;
@@ -61,7 +61,7 @@ static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t
     return z->anchor_y[low] + (x - z->anchor_x[low]) * z->slope[low];
 }
 
-/* Finds the straight piece that y lies on and follows it. */
+/* Input at y of a dead-zone sum, by bisection for the straight piece. */
 static bent_real_t bent_dead_zone_inverse(const bent_dead_zone_t *z, bent_real_t y) {
     unsigned int low = 0;
     unsigned int high = z->n;
@@ -76,8 +76,8 @@ static bent_real_t bent_dead_zone_inverse(const bent_dead_zone_t *z, bent_real_t
     return z->anchor_x[low] + (y - z->anchor_y[low]) * z->inverse_slope[low];
 }
 
-/* The textbook engine: every play is visited in every sample. Stores go through volatile where a
-   compiler would otherwise call memset or memcpy, which a freestanding target need not have. */
+/* The textbook engine: every sample visits every play. Stores go through volatile where a compiler
+   would otherwise call memset or memcpy, which a freestanding target need not have. */
 static void bent_loop_rest(const bent_tables_t *t, bent_real_t *play, bent_real_t w) {
     volatile bent_real_t *entry = play;
     unsigned int i;
@@ -107,11 +107,11 @@ static bent_real_t bent_loop_output(const bent_tables_t *t, const bent_real_t *p
     return sum;
 }
 
-/* The input of the plays that gives `output`: starts with every play following and lets go of the
-   largest thresholds until the solution has really reached the play that follows last. A play that
-   was let go did not follow, so the answer is kept from passing the input at which it would: a
-   rounding error of `output` is divided by the slope before that input, which may be small, and
-   must not run on along the steeper slope behind it. */
+/* The input of the plays that gives `output`: assumes first that every play follows, then drops the
+   largest thresholds one by one until the solution reaches the last play that is left. The answer
+   must not pass the input at which the play dropped last would follow: a rounding error of `output`
+   is divided by the slope before that input, which may be small, and must not run on along the
+   steeper slope behind it. */
 static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *play,
                                    bent_real_t output) {
     const bool rising = output >= bent_loop_output(t, play);
@@ -130,7 +130,7 @@ static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *pl
         tail = tail + t->weight[last] * play[last];
         next = first;
     }
-    return play[0]; /* `output` differs from the present one by rounding alone */
+    return play[0]; /* `output` differs from the present one only by rounding */
 }
 
 static const struct {
@@ -186,7 +186,7 @@ static bent_real_t bent_front_forward(bent_real_t v, bool ascending) {
     return w;
 }
 
-/* v = G^-1[w]; `limited` tells whether no drive at all gives w. */
+/* v = G^-1[w]; sets `limited` if no drive gives w. */
 static bent_real_t bent_front_inverse(bent_real_t w, bool ascending, bool *limited) {
     bent_real_t v = w;
     (void)ascending;
@@ -205,7 +205,7 @@ static bent_real_t bent_inverse_clamp(bent_real_t u) {
     return (bent_real_t)(least > BENT_OUTPUT_MAX ? BENT_OUTPUT_MAX : least);
 }
 
-/* The drive that gives w; `limited` tells whether no drive at all does. */
+/* The drive that gives w; sets `limited` if there is none. */
 static bent_real_t bent_inverse_choose(const bent_inverse_t *self, bent_real_t level, bent_real_t w,
                                        bool *limited) {
     (void)self;
@@ -213,7 +213,7 @@ static bent_real_t bent_inverse_choose(const bent_inverse_t *self, bent_real_t l
     return bent_front_inverse(w, true, limited);
 }
 
-/* Start memory: all plays hold the same. */
+/* Start memory: all plays hold the same value. */
 static void bent_loop_init(bent_real_t *play) {
     bent_loop_rest(&bent_model_tables, play, BENT_START);
 }
@@ -244,7 +244,7 @@ static bent_real_t bent_forward_output(const bent_forward_t *self) {
     return bent_loop_output(&bent_model_tables, self->play) + BENT_OFFSET;
 }
 
-/* What init and reset have in common once the plays are set. */
+/* The part common to init and reset, once the plays are set. */
 static void bent_forward_begin(bent_forward_t *self) {
     self->answer = bent_forward_output(self);
     self->status = 0;
@@ -265,8 +265,8 @@ static void bent_inverse_absorb(bent_inverse_t *self, bent_real_t v) {
     bent_loop_absorb(&bent_model_tables, self->play, bent_inverse_arrive(self, v));
 }
 
-/* Returns drive v and leaves it pending: the next step takes it, or what was committed, into the
- * memory. */
+/* Returns drive v and leaves it pending: the next step absorbs it, or the drive committed in its
+   place. */
 static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t v) {
     self->answer = v;
     self->pending = v;
@@ -275,7 +275,7 @@ static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t v) {
     return v;
 }
 
-/* What is pending is what the actuator has seen. */
+/* The actuator has seen the pending drive. */
 static void bent_inverse_take(bent_inverse_t *self) {
     if (self->has_pending) {
         bent_inverse_absorb(self, self->pending);
@@ -283,7 +283,7 @@ static void bent_inverse_take(bent_inverse_t *self) {
     }
 }
 
-/* Answers reference u, which is `level` once it is limited; `bits` is its status so far. */
+/* Answers reference u, which is `level` after limiting; `bits` is its status so far. */
 static bent_real_t bent_inverse_search(bent_inverse_t *self, bent_real_t u, bent_real_t level,
                                        unsigned int bits) {
     if (self->repeat && u >= self->reference && u <= self->reference) {
@@ -302,7 +302,7 @@ static bent_real_t bent_inverse_search(bent_inverse_t *self, bent_real_t u, bent
     return bent_inverse_answer(self, inside);
 }
 
-/* Drive v, which is `applied` once it is limited, is pending in place of the last answer. */
+/* Drive v, which is `applied` after limiting, is pending in place of the last answer. */
 static void bent_inverse_replace(bent_inverse_t *self, bent_real_t applied, bent_real_t v) {
     if (v < applied || v > applied) {
         self->status |= BENT_STATUS_INPUT_CLAMPED;
@@ -312,7 +312,7 @@ static void bent_inverse_replace(bent_inverse_t *self, bent_real_t applied, bent
     self->has_pending = true;
 }
 
-/* What init and reset have in common once the plays are set; they stand for this drive. */
+/* The part common to init and reset, once the plays are set: they rest at this drive. */
 static void bent_inverse_begin(bent_inverse_t *self, bent_real_t drive) {
     self->pending = drive;
     self->drive = drive;

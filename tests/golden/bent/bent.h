@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 670089e62d224f5ae7d0b1aa8a12ce89403b95501c766aff1404ba659b353b94, without this line
+ * Text: sha256 a03f15793b90c534e5055b28a208ebfb4f187fe629a9d2c3e47ec8b50e7cc0fa, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -34,7 +34,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* What code in floating point asks of a build. */
+/* What floating-point code requires of a build. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
 #error "bent: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
 #endif
@@ -66,7 +66,7 @@ extern "C" {
 /* Drive in V; output and reference in um */
 typedef double bent_real_t;
 
-/* What generated this header, and the hash of the parameters that it was generated from */
+/* The version that generated this header, and the hash of its parameters */
 #define BENT_HYSTGEN_VERSION "0.1.0"
 #define BENT_PARAMS_SHA256 "9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3"
 

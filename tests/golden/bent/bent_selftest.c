@@ -5,14 +5,14 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 a7104610938c0688bd12302aced94c4300f2daad5bf7438bb265101cb4abccd2, without this line
+ * Text: sha256 8a355da54382ae13b0f6f212e188bcf8788d091dae7974a260c3ea06f9058e11, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent_selftest.h"
 
 #include "bent.h"
 
-/* One call: 's'tep, 'c'ommit or 'r'eset with an argument; a step also has an expected answer and
+/* One call: 's'tep, 'c'ommit or 'r'eset with an argument; for a step also the expected answer and
    status. */
 typedef struct {
     char kind;
@@ -21,7 +21,7 @@ typedef struct {
     unsigned int status;
 } bent_selftest_sample_t;
 
-/* Too large for some stacks; the operators run one after the other. */
+/* Static, since some stacks are too small for it; the operators run one after the other. */
 static union {
     bent_forward_t forward;
     bent_inverse_t inverse;

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 ad235ff5a9f43c39212fd894f9686f3da669cb3481db5120bd0628b6d06b4eef, without this line
+ * Text: sha256 db593f08d1b578de4b910e3f0d6699da4823b9293b7b2ead5985f3a857824e31, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Cost (32-bit target): 11616 bytes of constants, 104 bytes of RAM for its own instance
@@ -17,9 +17,9 @@
 extern "C" {
 #endif
 
-/* Runs the recorded samples. 0 when every answer has the expected bits, else 1 + the index of the
-   first that has not.
-   Its instance is static: one call at a time. */
+/* Runs the recorded samples. Returns 0 if every answer has the expected bits, else 1 + the index of
+   the first that
+   does not. The instance is static: only one call may run at a time. */
 int bent_selftest(void);
 
 #ifdef __cplusplus

@@ -5,22 +5,23 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 3942c0745dcbe9c41d5028f065f82a062bde6da4c11a5edd369c86cb1a58435d, without this line
+ * Text: sha256 0d0034c58a64629a910f26e59a0addeaf9556a0860e31734f210e42db22e9bb7, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
 
 #if defined(__GNUC__)
-#define CURVED_APART __attribute__((noinline)) static /* called from several places, or rarely */
+#define CURVED_APART __attribute__((noinline)) static /* has several callers, or rarely runs */
 #else
 #define CURVED_APART static
 #endif
 
-#define CURVED_FAR ((int64_t)1 << 62) /* an output that none reaches */
+#define CURVED_FAR ((int64_t)1 << 62) /* beyond every output */
 #define CURVED_LARGEST 2147483647     /* the largest input of the plays */
 #define CURVED_MOST_PLAYS 0x7fffu     /* the largest number of plays that a corner can name */
 
-/* Play k begins to follow this far from a turning point; from there to the next is a line. */
+/* Play k begins to follow this far from a turning point; the curve is straight from there to where
+   the next play does. */
 typedef struct {
     int64_t reach;       /* of the output: 2 z_k */
     uint32_t way;        /* of the input: 2 r_k */
@@ -33,7 +34,7 @@ typedef struct {
 typedef struct {
     const curved_segment_t *segment; /* plays 0 .. n, and one that never follows */
     int64_t offset;                   /* part of every output */
-    int64_t range[2]; /* ends of falling [0] moves, with signs changed, and of rising [1] ones */
+    int64_t range[2]; /* inputs at the end of falling [0] moves, sign changed, and of rising [1] */
     uint_least16_t n; /* plays without play 0 */
 } curved_curve_t;
 
@@ -43,11 +44,11 @@ typedef struct {
     bool ascending;
 } curved_drive_t;
 
-/* Ends of the way back from the input of the plays to the drive, one branch. */
+/* Ends of one branch of the inverse from the input of the plays to the drive. */
 typedef struct {
     int64_t envelope_least; /* inputs of the plays that an envelope can give */
     int64_t envelope_most;
-    curved_reach_t least; /* up to here an input beyond the range's is no more than rounding */
+    curved_reach_t least; /* up to here an input outside first .. last is off by rounding only */
     curved_reach_t most;
     int32_t first; /* inputs of the plays that the drive range gives */
     int32_t last;
@@ -58,7 +59,7 @@ typedef struct {
 #define CURVED_HALF_WORD 16u
 #define CURVED_LOW_HALF 0xffffu
 
-/* a times b; with half words, and no call, on cores without a long multiplication. */
+/* a times b; by half words, without a library call, on cores without a long multiplication. */
 static uint64_t curved_wide(uint32_t a, uint32_t b) {
 #if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)
     const uint32_t low = (a & CURVED_LOW_HALF) * (b & CURVED_LOW_HALF);
@@ -74,7 +75,7 @@ static uint64_t curved_wide(uint32_t a, uint32_t b) {
 #endif
 }
 
-/* d / slope to the nearest whole number, d not negative: the upper bits of d times the reciprocal
+/* d / slope to the nearest integer, d >= 0: the upper bits of d times the reciprocal
    2^(32 + shift) / slope. A slope is at least 16, so that `shift` is 2 .. 29. */
 static int64_t curved_over_slope(int64_t d, uint32_t reciprocal, unsigned int shift) {
     const uint64_t low = curved_wide((uint32_t)d, reciprocal) >> CURVED_WORD;
@@ -86,7 +87,7 @@ static int64_t curved_over_slope(int64_t d, uint32_t reciprocal, unsigned int sh
                      ((uint32_t)quotient >> (shift - 1u) & 1u));
 }
 
-#define CURVED_HIGH_STEP ((int64_t)1 << 16) /* of a corner's output, in sums */
+#define CURVED_HIGH_STEP ((int64_t)1 << 16) /* of a corner's `high`, in sums */
 
 /* Field by field: for a whole structure a compiler may call memcpy. */
 static void curved_copy_place(curved_place_t *to, const curved_place_t *from) {
@@ -97,7 +98,7 @@ static void curved_copy_place(curved_place_t *to, const curved_place_t *from) {
     to->rising = from->rising;
 }
 
-/* x as the present move sees it: a falling move is a rising one with all signs changed. */
+/* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline int64_t curved_along(const curved_place_t *here, int64_t x) {
     return here->rising ? x : -x;
 }
@@ -112,7 +113,7 @@ CURVED_APART void curved_leave_corner(curved_place_t *here, curved_corner_t *cor
     here->depth = (uint_least16_t)(here->depth + 1u);
 }
 
-/* Where the play of a segment of a corner's block begins to follow, as the move sees it. */
+/* Where the play of a segment of a corner's block begins to follow, along the move. */
 static inline int64_t curved_begins(const curved_place_t *here, const curved_corner_t *c,
                                     const curved_segment_t *s, bool by_output) {
     const int64_t output = (int64_t)c->high * CURVED_HIGH_STEP + (int64_t)c->low;
@@ -130,11 +131,12 @@ CURVED_APART void curved_turn_back(curved_place_t *here, curved_corner_t *corner
     here->rising = !here->rising;
 }
 
-/* The last place where another play begins to follow before the output, or input, `to`; or here. */
+/* The last kink before `to`, an output or input along the move: where another play begins to
+   follow, or here. */
 CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *here,
                               const curved_corner_t *corner, int64_t to, bool by_output,
                               curved_kink_t *kink) {
-    const curved_corner_t *c = NULL; /* held play k until it began to follow */
+    const curved_corner_t *c = NULL; /* the corner that held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
@@ -173,7 +175,7 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
     }
 }
 
-/* The same for any move to an input; turns, moves nothing. */
+/* The same for any move to an input. May turn back, but moves nothing. */
 static inline void curved_find_input(const curved_curve_t *t, curved_place_t *here,
                                      curved_corner_t *corner, int32_t to, curved_kink_t *kink) {
     if (here->rising ? to < here->input : to > here->input) {
@@ -182,7 +184,7 @@ static inline void curved_find_input(const curved_curve_t *t, curved_place_t *he
     curved_find(t, here, corner, curved_along(here, to), false, kink);
 }
 
-/* Moves the plays on from a kink to where the same ones follow; `moved` is the output between. */
+/* Moves the plays to an input short of the next kink; `moved` is the output since the last one. */
 static void curved_go_on(curved_place_t *here, const curved_kink_t *kink, int32_t to,
                          int64_t moved) {
     here->output = curved_along(here, kink->output + moved);
@@ -191,7 +193,7 @@ static void curved_go_on(curved_place_t *here, const curved_kink_t *kink, int32_
     here->depth = kink->depth;
 }
 
-/* Output that is gained from a kink on until the input comes to `to`, which may lie before it. */
+/* Output gained between a kink and the input `to`; -1 if `to` lies before the kink. */
 CURVED_APART int64_t curved_gained(const curved_curve_t *t, const curved_place_t *here,
                                    const curved_kink_t *kink, int32_t to) {
     const int64_t way = curved_along(here, to) - kink->input;
@@ -205,7 +207,8 @@ CURVED_APART void curved_move_to_input(const curved_curve_t *t, curved_place_t *
     curved_go_on(here, kink, to, curved_gained(t, here, kink, to));
 }
 
-/* The input, near the range, that gives an output behind a kink, `to` as the move sees it. */
+/* The input that gives `to`, an output beyond a kink along the move; at most a little outside the
+   range. */
 CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t *here,
                                    const curved_kink_t *kink, int64_t to) {
     const curved_segment_t *s = &t->segment[kink->k];
@@ -214,8 +217,9 @@ CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t
     return curved_along(here, x > most ? most : x);
 }
 
-/* The input, near the range, that gives `output`, and the kink that it is counted from. Turns,
-   moves nothing. Short of `next`, as the move sees it, the same plays are known to follow. */
+/* The input that gives `output`, at most a little outside the range, and the kink it is counted
+   from. May turn back, but moves nothing. The same plays are known to follow up to the output
+   `next`, along the move. */
 static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curved_corner_t *corner,
                             int64_t output, int64_t next, curved_kink_t *kink) {
     if (here->rising ? output < here->output : output > here->output) {
@@ -234,7 +238,7 @@ static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curve
     return curved_solved(t, here, kink, to);
 }
 
-/* Output, as the present move sees it, at which another play begins to follow behind a kink. */
+/* Output, along the present move, at which another play begins to follow after a kink. */
 static int64_t curved_next_output(const curved_curve_t *t, const curved_place_t *here,
                                   const curved_corner_t *corner, const curved_kink_t *kink) {
     return kink->depth > 0
@@ -242,8 +246,8 @@ static int64_t curved_next_output(const curved_curve_t *t, const curved_place_t 
                : CURVED_FAR;
 }
 
-/* Moves the plays to an input near the one that was solved for from a kink. Returns the output, as
-   the move sees it, at which another one begins to follow. */
+/* Moves the plays to an input near the one that was solved for from a kink. Returns the output,
+   along the move, at which another play begins to follow. */
 static int64_t curved_move_to_solution(const curved_curve_t *t, curved_place_t *here,
                                        curved_corner_t *corner, curved_kink_t *kink, int32_t to) {
     int64_t next = curved_next_output(t, here, corner, kink);
@@ -257,11 +261,11 @@ static int64_t curved_move_to_solution(const curved_curve_t *t, curved_place_t *
     return next;
 }
 
-/* Start memory: what each play holds (step 1), or all of them (step 0). Each is a block of its own,
-   left by a move to where it begins to follow. */
+/* Start memory: a value for each play (step 1), or one for all (step 0). Each play is a block of
+   its own, left by a move to where it begins to follow. */
 CURVED_APART void curved_start(const curved_curve_t *t, curved_place_t *here,
                                curved_corner_t *corner, const int32_t *play, unsigned int step) {
-    int64_t aside = t->offset; /* what the plays above play k give */
+    int64_t aside = t->offset; /* output of the plays above play k, with the offset */
     unsigned int k;
     here->depth = 0;
     for (k = t->n; k > 0; --k) {
@@ -280,7 +284,7 @@ CURVED_APART void curved_start(const curved_curve_t *t, curved_place_t *here,
     here->k = 0;
 }
 
-/* x / 2^bits to the nearest whole number, ties away from zero. */
+/* x / 2^bits to the nearest integer, ties away from zero. */
 static int64_t curved_nearest(int64_t x, unsigned int bits) {
     if (bits == 0) {
         return x;
@@ -288,9 +292,9 @@ static int64_t curved_nearest(int64_t x, unsigned int bits) {
     return (x + ((int64_t)1 << (bits - 1u)) - (x < 0 ? 1 : 0)) >> bits;
 }
 
-/* Value at x of a function that is given as polynomials c_0 + c_1 h + c_2 h^2 + ... on pieces, h =
-   0 .. 1 along each: where the pieces begin, the left shifts that stretch them to 2^31, and their
-   coefficients from degree 0. */
+/* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece:
+   where the pieces begin, the left shifts that stretch them to 2^31, and their coefficients from
+   degree 0. */
 static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,
                             unsigned int pieces, unsigned int degree, int32_t x) {
     unsigned int low = 0;
@@ -316,8 +320,9 @@ static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int
     return y;
 }
 
-/* Drive code for an input w of the plays that the drive range does not give: its end, and one code
-   more where that is not just rounding; tells whether w is more than an envelope can give. */
+/* Drive code for an input w of the plays outside the image of the drive range: the end of the
+   range, and one code more if w is off by more than rounding. Sets `limited` if no envelope gives
+   w. */
 static curved_reach_t curved_beyond(const curved_ends_t *e, curved_reach_t w,
                                     int32_t drive_min, int32_t drive_max, bool *limited) {
     if (w > e->last) {
@@ -441,7 +446,7 @@ CURVED_APART curved_play_t curved_front_forward(curved_real_t v, bool ascending)
                                        CURVED_DEGREE, v);
 }
 
-/* v = G^-1[w]; `limited` tells whether no drive at all gives w. */
+/* v = G^-1[w]; sets `limited` if no drive gives w. */
 CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool ascending, bool *limited) {
     const curved_ends_t *ends = &curved_back_ends;
     int64_t v;
@@ -455,7 +460,7 @@ CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool ascendin
     return (curved_reach_t)curved_nearest(v, CURVED_BELOW);
 }
 
-/* The drive that gives w; `limited` tells whether no drive at all does. */
+/* The drive that gives w; sets `limited` if there is none. */
 static curved_reach_t curved_inverse_choose(const curved_inverse_t *self, curved_real_t level,
                                             curved_reach_t w, bool *limited) {
     (void)self;
@@ -463,24 +468,24 @@ static curved_reach_t curved_inverse_choose(const curved_inverse_t *self, curved
     return curved_front_inverse(w, true, limited);
 }
 
-/* The next step begins here. */
+/* Keeps the place for a commit to go back to. */
 CURVED_APART void curved_inverse_keep(curved_inverse_t *self) {
     curved_copy_place(&self->undo, &self->here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
 
-/* The actuator is at drive v; the direction is that of its move. Returns the input of the plays. */
+/* The actuator is at drive v; its move sets the direction. Returns the input of the plays. */
 CURVED_APART int32_t curved_inverse_arrive(curved_inverse_t *self, curved_real_t v) {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
     return curved_front_forward(v, self->ascending);
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit takes the step back and
-   puts the applied drive in its place.
+/* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
+   applied drive in its place.
 
-   last call   the memory is at      a commit replaces     the same reference once more
+   last call   the memory is at      a commit replaces     the same reference again
    init        the start memory      nothing               is solved for
    step        the last answer       the last answer       has the same answer
    commit      the committed drive   the committed drive   is solved for */
@@ -528,7 +533,7 @@ void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied) {
 
 static void curved_inverse_begin(curved_inverse_t *self, const int32_t *play, unsigned int step,
                                  const curved_drive_t *first) {
-    unsigned int status = 0; /* of what no step has answered */
+    unsigned int status = 0; /* not reported: this is no step */
     curved_start(&curved_model_curve, &self->here, self->corner, play, step);
     self->drive = (curved_real_t)first->drive;
     self->ascending = first->ascending;

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 d688e838656cf535169a5d6993c497e439ae10dcbb219ba2b3caa16cad6d957f, without this line
+ * Text: sha256 9dad30d3232c411d438d4a960496cedd0dc15521aac0dc1c5b9602c723fca806, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -52,7 +52,7 @@ typedef int32_t curved_play_t;
 typedef int32_t curved_reach_t;
 typedef int64_t curved_sum_t;
 
-/* What generated this header, and the hash of the parameters that it was generated from */
+/* The version that generated this header, and the hash of its parameters */
 #define CURVED_HYSTGEN_VERSION "0.1.0"
 #define CURVED_PARAMS_SHA256 "0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e"
 
@@ -73,15 +73,15 @@ typedef int64_t curved_sum_t;
 
 /* Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others. */
 typedef struct {
-    int64_t output; /* the sum of the plays, with the offset, before it is rounded to a code */
+    int64_t output; /* sum of the plays and the offset, not rounded to a code */
     int32_t input;  /* of the plays */
     uint_least16_t k;
     uint_least16_t depth;
     bool rising; /* direction of the present move */
 } curved_place_t;
 
-/* A place, as the present move sees it, where another play begins to follow, or where the move is
-   now: from there on plays 0 .. k do and `depth` corners hold the others. */
+/* A place along the present move where another play begins to follow, or the present one: from
+   there on plays 0 .. k follow and `depth` corners hold the others. */
 typedef struct {
     int64_t output;
     int64_t input;
@@ -102,15 +102,15 @@ typedef struct {
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     curved_place_t here;
-    int64_t next; /* output at which another play begins to follow, as the present move sees it */
-    curved_real_t drive; /* that the plays are at */
+    int64_t next; /* output, along the present move, at which another play begins to follow */
+    curved_real_t drive; /* where the plays are */
     curved_real_t undo_drive;
     curved_real_t reference; /* of the last step */
     curved_real_t level;     /* the same, limited: the next reference moves up or down from here */
     bool ascending;          /* direction of the drive's last move */
     bool undo_ascending;
     bool repeat;        /* the last answer still stands for `reference` */
-    bool limited;       /* no drive at all gives it; here rather than on the stack */
+    bool limited;       /* no drive gives it; here rather than on the stack */
     uint_least8_t bits; /* status of that answer */
     unsigned int status;
     curved_place_t undo; /* where the plays were before the last step */

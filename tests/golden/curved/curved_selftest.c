@@ -5,14 +5,14 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 dbb3a946dd6f68bc98d119c4d61c6e7057b8b0ac05d7b6f07ddcd845205b02f7, without this line
+ * Text: sha256 095c6490b69874df2c1cb21b5e77a3e29c92fae2b749972166e846c51ed37246, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved_selftest.h"
 
 #include "curved.h"
 
-/* One call: 's'tep, 'c'ommit or 'r'eset with an argument; a step also has an expected answer and
+/* One call: 's'tep, 'c'ommit or 'r'eset with an argument; for a step also the expected answer and
    status. */
 typedef struct {
     char kind;
@@ -21,7 +21,7 @@ typedef struct {
     unsigned int status;
 } curved_selftest_sample_t;
 
-/* Too large for some stacks. */
+/* Static, since some stacks are too small for it. */
 static curved_inverse_t curved_selftest_instance;
 
 static bool curved_selftest_same(curved_real_t a, curved_real_t b) {

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 70297276631f7dc98fbb36552a1e191d17e376ed8f13edd2bbe49600f1c023e8, without this line
+ * Text: sha256 c39874053fd7bbd46a466eff1d33d3e2b5acc51a556c36a11a28b006aa8fc8fe, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Cost (32-bit target): 2220 bytes of constants, 176 bytes of RAM for its own instance
@@ -18,9 +18,9 @@
 extern "C" {
 #endif
 
-/* Runs the recorded samples. 0 when every answer has the expected bits, else 1 + the index of the
-   first that has not.
-   Its instance is static: one call at a time. */
+/* Runs the recorded samples. Returns 0 if every answer has the expected bits, else 1 + the index of
+   the first that
+   does not. The instance is static: only one call may run at a time. */
 int curved_selftest(void);
 
 #ifdef __cplusplus

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 bc071703631b22b01aae267fa5f299e2e3e27d01684141a12df1548d11c6e474, without this line
+ * Text: sha256 8a64078e5c2c19c23fe7e0d205b05fa553c663e6995e8089f54d1d517867f224, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -18,19 +18,20 @@
 #endif
 
 #if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
-#define PLAIN_SOFT_FLOAT /* each operation of a number is a call of a library */
+#define PLAIN_SOFT_FLOAT /* each operation is a library call */
 #endif
 
 #if defined(__GNUC__)
-#define PLAIN_APART __attribute__((noinline)) static /* called from several places, or rarely */
+#define PLAIN_APART __attribute__((noinline)) static /* has several callers, or rarely runs */
 #else
 #define PLAIN_APART static
 #endif
 
-/* Play k begins to follow this far from a turning point; from there to the next is a line. */
+/* Play k begins to follow this far from a turning point; the curve is straight from there to where
+   the next play does. */
 typedef struct {
-    plain_real_t way;   /* of the input: 2 r_k of the drive, or 2 z_k of the output */
-    plain_real_t reach; /* of the output, the other one of them */
+    plain_real_t way;   /* of the input: 2 r_k if that is the drive, 2 z_k if it is the output */
+    plain_real_t reach; /* of the output: the other of the two */
     plain_real_t gain;  /* of the output over the input from there on */
     plain_real_t slope; /* 1 / gain */
 } plain_segment_t;
@@ -39,14 +40,14 @@ typedef struct {
 typedef struct {
     const plain_segment_t *segment; /* plays 0 .. n, and one that never follows */
     plain_real_t limit[2];          /* of the output */
-    plain_real_t inside[2]; /* outputs up to here stay within the limit whatever rounding does */
+    plain_real_t inside[2]; /* outputs up to here stay within the limit in spite of rounding */
     plain_real_t range[2];  /* of the input */
 } plain_curve_t;
 
-/* A start memory. `center`: input and output of the sum while plays 0 .. k do what play k does. */
+/* A start memory. `center`: input and output of the sum if plays 0 .. k hold what play k holds. */
 typedef struct {
     const plain_real_t (*center)[2];
-    uint_least16_t step;  /* 1: a center for each play, 0: one for all, which hold the same */
+    uint_least16_t step;  /* 1: a center for each play, 0: one for all, if all hold the same */
     uint_least16_t risen; /* plays up to this one are left by rising moves, the others by falling */
     plain_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } plain_start_t;
@@ -59,7 +60,7 @@ static void plain_copy_place(plain_place_t *to, const plain_place_t *from) {
     to->rising = from->rising;
 }
 
-/* x as the present move sees it: a falling move is a rising one with all signs changed. */
+/* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline plain_real_t plain_along(const plain_plays_t *m, plain_real_t x) {
 #ifdef PLAIN_SOFT_FLOAT
     return m->here.rising ? x : -x;
@@ -68,7 +69,7 @@ static inline plain_real_t plain_along(const plain_plays_t *m, plain_real_t x) {
 #endif
 }
 
-/* There is no line to go on along: the next sample searches. */
+/* Forgets the line of the last outputs: the next sample searches. */
 static void plain_forget_line(plain_plays_t *m) {
     m->sign = (plain_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
@@ -76,7 +77,7 @@ static void plain_forget_line(plain_plays_t *m) {
     m->behind = m->here.input;
 }
 
-/* Leaves a corner here. A block whose last play follows beyond the limit only is never passed. */
+/* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
 PLAIN_APART void plain_leave_corner(const plain_curve_t *t, plain_plays_t *m,
                                     plain_corner_t *corner) {
     const plain_segment_t *s = &t->segment[m->here.k];
@@ -100,7 +101,8 @@ static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corn
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x, a way or a reach; `step`: of segment 1. */
+/* The last of segments k .. last that begins before x, which is a `way` or a `reach`; `step` points
+   to that field of segment 1. */
 static unsigned int plain_find_segment(const plain_real_t *step, unsigned int k,
                                        unsigned int last, plain_real_t x) {
     while (k < last) {
@@ -113,7 +115,8 @@ static unsigned int plain_find_segment(const plain_real_t *step, unsigned int k,
     return k;
 }
 
-/* Stops the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
+/* Ends the move in the top corner's block: where the sum is `output`, or at `input` if that comes
+   first. */
 PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
                                      const plain_corner_t *corner, plain_real_t output,
                                      plain_real_t input) {
@@ -133,7 +136,7 @@ PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
     plain_forget_line(m);
 }
 
-/* Moves the plays to where their sum is `output`, as nearly as floating point can tell. */
+/* Moves the plays to where their sum is `output`, up to rounding. */
 PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
                                       plain_corner_t *corner, plain_real_t output) {
     if (plain_along(m, output) < plain_along(m, m->here.output)) {
@@ -153,7 +156,7 @@ PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
     plain_stop_in_block(t, m, corner, output, plain_along(m, FLT_MAX));
 }
 
-/* Moves the plays to any input; false where the limit comes first, for the caller to stop there. */
+/* Moves the plays to any input. False if the limit comes first; the caller then stops there. */
 PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
                                      plain_corner_t *corner, plain_real_t input) {
     if (plain_along(m, input) < plain_along(m, m->here.input)) {
@@ -189,7 +192,7 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
         begin = s->way - from;
         start = start + s->reach;
         next = s[1].way - from;
-        if (t->segment[c->top].reach > room) { /* gains fall: the limit lies here or beyond */
+        if (t->segment[c->top].reach > room) { /* gains fall, so the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
         }
         m->from = -plain_along(m, from);
@@ -213,7 +216,7 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
     return true;
 }
 
-/* Moves on short of `cap`: more plays of the block follow. False where a search is faster. */
+/* Moves on, short of `cap`: more plays of the block follow. False if a search would be faster. */
 PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, plain_real_t input) {
     const plain_real_t way = plain_along(m, input - m->from);
     unsigned int k = m->here.k;
@@ -285,7 +288,7 @@ static plain_real_t plain_clamp_drive(plain_real_t v) {
     return (plain_real_t)(least > PLAIN_DRIVE_MAX ? PLAIN_DRIVE_MAX : least);
 }
 
-/* Any other sample than a usual one. */
+/* Any sample but a usual one. */
 PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_t u) {
     const plain_curve_t *t = &plain_inverse_curve;
     plain_plays_t *m = &self->plays;
@@ -296,7 +299,7 @@ PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_
         bits = u >= -FLT_MAX && u <= FLT_MAX ? PLAIN_STATUS_INPUT_CLAMPED : PLAIN_STATUS_HELD;
         x = (u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX) - PLAIN_OFFSET;
     }
-    if (bits == PLAIN_STATUS_HELD) { /* no number: the last answer once more */
+    if (bits == PLAIN_STATUS_HELD) { /* not finite: repeat the last answer */
         if (self->stepped && self->committed) {
             plain_move_to_output(t, m, self->corner, self->returned);
         }
@@ -316,9 +319,9 @@ PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_
     return m->here.output;
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit takes the step back and
-   puts the applied drive in its place. While `limited` is set, references beyond `input` have the
-   same answer, a limit of the drive.
+/* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
+   applied drive in its place. While `limited` is set, references beyond `input` have the same
+   answer, a limit of the drive.
 
    stepped  committed  the memory is at     a commit replaces    a NaN answers, and leaves there
    no       no         the start drive      nothing              the start drive
@@ -360,7 +363,7 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied) {
         self->returned = m->here.output;
     }
     self->committed = true;
-    if (self->before < m->here.input || self->before > m->here.input) { /* it went along a line */
+    if (self->before < m->here.input || self->before > m->here.input) { /* a usual step */
         plain_copy_place(&self->undo, &m->here);
         self->undo.input = self->before;
         self->undo.output = m->start + (self->before - m->begin) * m->gain;

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 678e4a93638e3a32a5b2a25b13192c7f0a27484303970ea9eebdd62764b52543, without this line
+ * Text: sha256 88bd058b270c302c9dd5276bdc8b7bf6e969f01b548280415a6dc6ab47e4963d, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -33,7 +33,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* What code in floating point asks of a build. */
+/* What floating-point code requires of a build. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
 #error "plain: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
 #endif
@@ -65,7 +65,7 @@ extern "C" {
 /* Drive in V; output and reference in um */
 typedef float plain_real_t;
 
-/* What generated this header, and the hash of the parameters that it was generated from */
+/* The version that generated this header, and the hash of its parameters */
 #define PLAIN_HYSTGEN_VERSION "0.1.0"
 #define PLAIN_PARAMS_SHA256 "37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e"
 
@@ -92,8 +92,8 @@ typedef struct {
 } plain_place_t;
 
 /* A turning point. It holds the plays of its block: those above the plays of the next corner, up to
-   play `top`. `pass`: input at which a falling [0] and a rising [1] move has taken the whole block
-   along, its sign changed for falling; one of them is the input at the turning point itself. */
+   play `top`. `pass`: input at which a falling [0] or rising [1] move has taken the whole block
+   along, sign changed for falling; one of the two is the input at the turning point itself. */
 typedef struct {
     plain_real_t output; /* at the turning point */
     plain_real_t pass[2];
@@ -106,7 +106,7 @@ typedef struct {
     plain_place_t here;
     plain_real_t next;   /* input up to which the same plays follow and nothing is limited */
     plain_real_t cap;    /* input up to which the same corner counts and nothing is limited */
-    plain_real_t behind; /* while no play follows: input on the other side, likewise */
+    plain_real_t behind; /* while no play follows: the same as `next`, on the other side */
     plain_real_t from;   /* input and output that the top corner's block counts from */
     plain_real_t base;
     plain_real_t begin; /* output = start + (input - begin) gain */

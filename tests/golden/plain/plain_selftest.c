@@ -5,14 +5,14 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 4731693e08061d825819957279ce12c79f6ff626ac5f3fd0690a530540c93a50, without this line
+ * Text: sha256 ea963c70468212c360e2ef79ffc90f932d273ba577bf4469d052c931498c2e1d, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain_selftest.h"
 
 #include "plain.h"
 
-/* One call: 's'tep, 'c'ommit or 'r'eset with an argument; a step also has an expected answer and
+/* One call: 's'tep, 'c'ommit or 'r'eset with an argument; for a step also the expected answer and
    status. */
 typedef struct {
     char kind;
@@ -21,7 +21,7 @@ typedef struct {
     unsigned int status;
 } plain_selftest_sample_t;
 
-/* Too large for some stacks. */
+/* Static, since some stacks are too small for it. */
 static plain_inverse_t plain_selftest_instance;
 
 static bool plain_selftest_same(plain_real_t a, plain_real_t b) {

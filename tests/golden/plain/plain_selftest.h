@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 f0ee04dace2bfb52f49ff80f218dbf1054e06b046319a7ac0249a480891e3fbc, without this line
+ * Text: sha256 0907d30aa6389ae02625cbc08564a0a8ea03e69f47ea98644f7381dae51b1b3e, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Cost (32-bit target): 2960 bytes of constants, 200 bytes of RAM for its own instance
@@ -18,9 +18,9 @@
 extern "C" {
 #endif
 
-/* Runs the recorded samples. 0 when every answer has the expected bits, else 1 + the index of the
-   first that has not.
-   Its instance is static: one call at a time. */
+/* Runs the recorded samples. Returns 0 if every answer has the expected bits, else 1 + the index of
+   the first that
+   does not. The instance is static: only one call may run at a time. */
 int plain_selftest(void);
 
 #ifdef __cplusplus

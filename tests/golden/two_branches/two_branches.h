@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 01c234b0bc70928b0a5a0d0c23ae2434a0a742ee836279d5c6abd54aa6dcfbd0, without this line
+ * Text: sha256 b0f73f710466228e94ad28d1d5bf6ac35036d3fe5a971a97796dec7d8be36b6b, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -36,7 +36,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* What code in floating point asks of a build. */
+/* What floating-point code requires of a build. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
 #error "two_branches: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
 #endif
@@ -69,7 +69,7 @@ extern "C" {
 /* Drive in V; output and reference in um */
 typedef float two_branches_real_t;
 
-/* What generated this header, and the hash of the parameters that it was generated from */
+/* The version that generated this header, and the hash of its parameters */
 #define TWO_BRANCHES_HYSTGEN_VERSION "0.1.0"
 #define TWO_BRANCHES_PARAMS_SHA256 \
     "41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2"
@@ -100,8 +100,8 @@ typedef struct {
 } two_branches_place_t;
 
 /* A turning point. It holds the plays of its block: those above the plays of the next corner, up to
-   play `top`. `pass`: input at which a falling [0] and a rising [1] move has taken the whole block
-   along, its sign changed for falling; one of them is the input at the turning point itself. */
+   play `top`. `pass`: input at which a falling [0] or rising [1] move has taken the whole block
+   along, sign changed for falling; one of the two is the input at the turning point itself. */
 typedef struct {
     two_branches_real_t output; /* at the turning point */
     two_branches_real_t pass[2];
@@ -115,7 +115,7 @@ typedef struct {
     two_branches_real_t next; /* input up to which the same plays follow and nothing is limited */
     /* input up to which the same corner counts and nothing is limited */
     two_branches_real_t cap;
-    two_branches_real_t behind; /* while no play follows: input on the other side, likewise */
+    two_branches_real_t behind; /* while no play follows: the same as `next`, on the other side */
     two_branches_real_t from;   /* input and output that the top corner's block counts from */
     two_branches_real_t base;
     two_branches_real_t begin; /* output = start + (input - begin) gain */
@@ -129,7 +129,7 @@ typedef struct {
 typedef struct {
     two_branches_plays_t plays;
     two_branches_place_t undo; /* where the plays were before the last step */
-    two_branches_real_t drive; /* that the plays are at */
+    two_branches_real_t drive; /* where the plays are */
     two_branches_real_t undo_drive;
     two_branches_real_t returned;  /* by the last step, if another drive was committed since */
     two_branches_real_t reference; /* of the last step */
@@ -140,7 +140,7 @@ typedef struct {
     bool stepped;      /* a step has answered */
     bool committed;    /* a drive was committed since */
     bool repeat;       /* the last answer still stands for `reference` */
-    bool limited;      /* no drive at all gives it; here rather than on the stack */
+    bool limited;      /* no drive gives it; here rather than on the stack */
     unsigned int bits; /* status of that answer */
     unsigned int status;
     two_branches_corner_t corner[7];
@@ -178,20 +178,22 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #endif
 
 #if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
-#define TWO_BRANCHES_SOFT_FLOAT /* each operation of a number is a call of a library */
+#define TWO_BRANCHES_SOFT_FLOAT /* each operation is a library call */
 #endif
 
 #if defined(__GNUC__)
-/* called from several places, or rarely */
+/* has several callers, or rarely runs */
 #define TWO_BRANCHES_APART __attribute__((noinline)) static
 #else
 #define TWO_BRANCHES_APART static
 #endif
 
-/* Play k begins to follow this far from a turning point; from there to the next is a line. */
+/* Play k begins to follow this far from a turning point; the curve is straight from there to where
+   the next play does. */
 typedef struct {
-    two_branches_real_t way;   /* of the input: 2 r_k of the drive, or 2 z_k of the output */
-    two_branches_real_t reach; /* of the output, the other one of them */
+    /* of the input: 2 r_k if that is the drive, 2 z_k if it is the output */
+    two_branches_real_t way;
+    two_branches_real_t reach; /* of the output: the other of the two */
     two_branches_real_t gain;  /* of the output over the input from there on */
     two_branches_real_t slope; /* 1 / gain */
 } two_branches_segment_t;
@@ -200,15 +202,15 @@ typedef struct {
 typedef struct {
     const two_branches_segment_t *segment; /* plays 0 .. n, and one that never follows */
     two_branches_real_t limit[2];          /* of the output */
-    /* outputs up to here stay within the limit whatever rounding does */
+    /* outputs up to here stay within the limit in spite of rounding */
     two_branches_real_t inside[2];
     two_branches_real_t range[2]; /* of the input */
 } two_branches_curve_t;
 
-/* A start memory. `center`: input and output of the sum while plays 0 .. k do what play k does. */
+/* A start memory. `center`: input and output of the sum if plays 0 .. k hold what play k holds. */
 typedef struct {
     const two_branches_real_t (*center)[2];
-    uint_least16_t step;  /* 1: a center for each play, 0: one for all, which hold the same */
+    uint_least16_t step;  /* 1: a center for each play, 0: one for all, if all hold the same */
     uint_least16_t risen; /* plays up to this one are left by rising moves, the others by falling */
     two_branches_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } two_branches_start_t;
@@ -234,13 +236,13 @@ typedef struct {
 /*
  * tanh x for every finite float, without division.
  *
- * Below two_branches_tanh_knot[0], just above which tanh is 1/2: x + x z P(z) with z = x^2. From
- * there
- * on one of eight polynomials in the distance from the center of its piece; each center is a point
- * at which tanh is almost a float, so that the constant term adds no error. From 9.01 on tanh
- * rounds to 1. fit_coefficients.py derives the numbers. Worst error over all floats: 0.78 ulp. Odd
- * and nowhere falling; the sign of zero and subnormal numbers are kept; infinities give +-1, and so
- * does NaN.
+ * Below two_branches_tanh_knot[0], just above tanh x = 1/2: x + x z P(z) with z = x^2. Above: one
+ * of
+ * eight polynomials in the distance from the center of its piece; each center is a point where tanh
+ * is almost a float, so that the constant term adds no error. From 9.01 on tanh rounds to 1.
+ * fit_coefficients.py derives the numbers. Worst error over all floats: 0.78 ulp. The function is
+ * odd and never decreases; it keeps subnormal numbers and the sign of zero. Infinities and NaN
+ * give +-1.
  */
 static const two_branches_real_t two_branches_tanh_odd[5] = {-0.33333313f, 0.13332483f,
                                                              -0.053843424f, 0.021039838f,
@@ -292,15 +294,16 @@ static two_branches_real_t two_branches_tanh(two_branches_real_t x) {
 }
 
 /*
- * atanh x for |x| < 1, without division; anything beyond, NaN too, is taken as the last float
+ * atanh x for |x| < 1, without division. Any other x, NaN included, counts as the largest float
  * below 1.
  *
  * Up to 1/2: x + x z P(z) with z = x^2. Above: (k log 2 + log(1 + |x|) - log m)/2, where 1 - |x| =
  * m / 2^k and m and 1 + |x| lie in [1, 2). Both logarithms come from the same eight polynomials, in
  * the distances d and e from the center of a piece of [1, 2); each center is a point whose
- * logarithm is almost a float. k and the pieces are read off 2^24 (1 - |x|), a whole number.
+ * logarithm is almost a float. k and the pieces are read off the integer 2^24 (1 - |x|).
  * fit_coefficients.py derives the numbers. Worst error over all floats: 1.07 ulp, and 0.84 where
- * |x| < 0.999. Odd and nowhere falling; the sign of zero and subnormal numbers are kept.
+ * |x| < 0.999. The function is odd and never decreases; it keeps subnormal numbers and the sign of
+ * zero.
  */
 static const two_branches_real_t two_branches_atanh_odd[6] = {0.33333296f, 0.20002694f, 0.14220285f,
                                                               0.11839814f, 0.050866313f,
@@ -323,7 +326,7 @@ static const two_branches_real_t two_branches_atanh_row[8][5] = {
     {0.29977226f, 0.27453083f, -0.07536596f, 0.02760172f, -0.011743604f},
     {0.33032107f, 0.25825974f, -0.06669745f, 0.02298897f, -0.009052513f}};
 
-/* The piece of [1, 2) that m lies in, a whole number of 2^24 to [1, 2). */
+/* The piece of [1, 2) that holds m / 2^24. */
 static inline unsigned int two_branches_atanh_piece(uint_least32_t m) {
     return (unsigned int)(m >> 21) & 7u;
 }
@@ -342,7 +345,7 @@ static two_branches_real_t two_branches_atanh(two_branches_real_t x) {
     const two_branches_real_t u = 1.0f - a;
     const uint_least32_t two = 33554432u; /* 2^25 */
     const uint_least32_t whole = (uint_least32_t)(u * 16777216.0f);
-    uint_least32_t m = whole << 1; /* to be brought to 2^24 .. 2^25 - 1 */
+    uint_least32_t m = whole << 1; /* shifted to 2^24 .. 2^25 - 1 below */
     unsigned int k = 1u;
     for (step = 16u; step > 0u; step >>= 1) {
         if (m < two >> step) {
@@ -371,8 +374,7 @@ static two_branches_real_t two_branches_envelope_forward(const two_branches_enve
     return e->a0 * two_branches_tanh(e->a1 * x + e->a2) + e->a3;
 }
 
-/* (atanh((y - a3) / a0) - a2) / a1; an argument that no x can reach is limited, and `limited` set.
- */
+/* (atanh((y - a3) / a0) - a2) / a1. If no x gives y, limits the argument and sets `limited`. */
 static two_branches_real_t two_branches_envelope_inverse(const two_branches_envelope_t *e,
                                                          two_branches_real_t y, bool *limited) {
     two_branches_real_t argument = (y - e->a3) * e->inverse_a0;
@@ -394,7 +396,7 @@ static void two_branches_copy_place(two_branches_place_t *to, const two_branches
     to->rising = from->rising;
 }
 
-/* x as the present move sees it: a falling move is a rising one with all signs changed. */
+/* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline two_branches_real_t two_branches_along(const two_branches_plays_t *m,
                                                      two_branches_real_t x) {
 #ifdef TWO_BRANCHES_SOFT_FLOAT
@@ -404,7 +406,7 @@ static inline two_branches_real_t two_branches_along(const two_branches_plays_t 
 #endif
 }
 
-/* There is no line to go on along: the next sample searches. */
+/* Forgets the line of the last outputs: the next sample searches. */
 static void two_branches_forget_line(two_branches_plays_t *m) {
     m->sign = (two_branches_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
@@ -412,7 +414,7 @@ static void two_branches_forget_line(two_branches_plays_t *m) {
     m->behind = m->here.input;
 }
 
-/* Leaves a corner here. A block whose last play follows beyond the limit only is never passed. */
+/* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
 TWO_BRANCHES_APART void two_branches_leave_corner(const two_branches_curve_t *t,
                                                   two_branches_plays_t *m,
                                                   two_branches_corner_t *corner) {
@@ -439,7 +441,8 @@ static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_p
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x, a way or a reach; `step`: of segment 1. */
+/* The last of segments k .. last that begins before x, which is a `way` or a `reach`; `step` points
+   to that field of segment 1. */
 static unsigned int two_branches_find_segment(const two_branches_real_t *step, unsigned int k,
                                               unsigned int last, two_branches_real_t x) {
     while (k < last) {
@@ -452,7 +455,8 @@ static unsigned int two_branches_find_segment(const two_branches_real_t *step, u
     return k;
 }
 
-/* Stops the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
+/* Ends the move in the top corner's block: where the sum is `output`, or at `input` if that comes
+   first. */
 TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t,
                                                    two_branches_plays_t *m,
                                                    const two_branches_corner_t *corner,
@@ -474,7 +478,7 @@ TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t
     two_branches_forget_line(m);
 }
 
-/* Moves the plays to where their sum is `output`, as nearly as floating point can tell. */
+/* Moves the plays to where their sum is `output`, up to rounding. */
 TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *t,
                                                     two_branches_plays_t *m,
                                                     two_branches_corner_t *corner,
@@ -496,7 +500,7 @@ TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *
     two_branches_stop_in_block(t, m, corner, output, two_branches_along(m, FLT_MAX));
 }
 
-/* Moves the plays to any input; false where the limit comes first, for the caller to stop there. */
+/* Moves the plays to any input. False if the limit comes first; the caller then stops there. */
 TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t,
                                                    two_branches_plays_t *m,
                                                    two_branches_corner_t *corner,
@@ -534,7 +538,7 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
         begin = s->way - from;
         start = start + s->reach;
         next = s[1].way - from;
-        if (t->segment[c->top].reach > room) { /* gains fall: the limit lies here or beyond */
+        if (t->segment[c->top].reach > room) { /* gains fall, so the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
         }
         m->from = -two_branches_along(m, from);
@@ -559,7 +563,7 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
     return true;
 }
 
-/* Moves on short of `cap`: more plays of the block follow. False where a search is faster. */
+/* Moves on, short of `cap`: more plays of the block follow. False if a search would be faster. */
 TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t,
                                                    two_branches_plays_t *m,
                                                    two_branches_real_t input) {
@@ -671,8 +675,7 @@ static two_branches_real_t two_branches_front_forward(two_branches_real_t v, boo
     return w;
 }
 
-/* v = G^-1[w]; `limited` tells whether no drive at all gives w, on the branch of the drive's
-   direction. */
+/* v = G^-1[w]; sets `limited` if no drive gives w, on the branch of the drive's direction. */
 static two_branches_real_t two_branches_front_inverse(two_branches_real_t w, bool ascending,
                                                       bool *limited) {
     two_branches_real_t v = w;
@@ -687,7 +690,7 @@ static two_branches_real_t two_branches_clamp_drive(two_branches_real_t v) {
     return (two_branches_real_t)(least > TWO_BRANCHES_DRIVE_MAX ? TWO_BRANCHES_DRIVE_MAX : least);
 }
 
-/* Whether going to v is a move of the branch that v was computed on. */
+/* Whether the move to v belongs to the branch that v was computed on. */
 static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_branches_real_t v,
                                       bool ascending) {
     const two_branches_real_t inside = two_branches_clamp_drive(v);
@@ -695,9 +698,8 @@ static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_br
         : self->ascending == ascending;
 }
 
-/* The drive that gives w on the branch of its own move: that of the reference's move is tried
-   first, then the other one, and where neither fits the drive holds; `limited` tells whether no
-   drive at all gives w. */
+/* The drive that gives w on the branch of its own move. Tries the branch of the reference's move,
+   then the other one; if neither fits, the drive holds. Sets `limited` if no drive gives w. */
 TWO_BRANCHES_APART two_branches_real_t
     two_branches_inverse_choose(const two_branches_inverse_t *self, two_branches_real_t level,
                                 two_branches_real_t w, bool *limited) {
@@ -706,7 +708,7 @@ TWO_BRANCHES_APART two_branches_real_t
     if (!two_branches_inverse_fits(self, v, up)) {
         const two_branches_real_t back = two_branches_clamp_drive(v) - self->drive;
         if (up == self->ascending && back >= -TWO_BRANCHES_HOLD && back <= TWO_BRANCHES_HOLD) {
-            /* back by rounding alone */
+            /* it moves back only by rounding */
             v = self->drive;
         } else {
             v = two_branches_front_inverse(w, !up, limited);
@@ -716,20 +718,20 @@ TWO_BRANCHES_APART two_branches_real_t
     return v;
 }
 
-/* The next step begins here. */
+/* Keeps the place for a commit to go back to. */
 static void two_branches_inverse_keep(two_branches_inverse_t *self) {
     two_branches_copy_place(&self->undo, &self->plays.here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
 
-/* The actuator is at drive v; the direction is that of its move. */
+/* The actuator is at drive v; its move sets the direction. */
 static void two_branches_inverse_arrive(two_branches_inverse_t *self, two_branches_real_t v) {
     self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
 }
 
-/* The actuator has gone to v in place of where the last step led. */
+/* Undoes the last step: the actuator has gone to v instead. */
 TWO_BRANCHES_APART void two_branches_inverse_replace(two_branches_inverse_t *self,
                                                      two_branches_real_t v) {
     two_branches_copy_place(&self->plays.here, &self->undo);
@@ -743,7 +745,7 @@ TWO_BRANCHES_APART void two_branches_inverse_replace(two_branches_inverse_t *sel
     }
 }
 
-/* A sample that is no number: the last answer once more. */
+/* A sample that is not finite: repeat the last answer. */
 static two_branches_real_t two_branches_inverse_hold(two_branches_inverse_t *self) {
     two_branches_inverse_keep(self);
     two_branches_inverse_replace(self,
@@ -754,8 +756,8 @@ static two_branches_real_t two_branches_inverse_hold(two_branches_inverse_t *sel
     return self->drive;
 }
 
-/* One sample. The memory takes the answer for applied at once; a commit, a limit or a drive that
-   holds takes the step back and puts the applied drive in its place.
+/* One sample. The memory takes the answer as applied at once; a commit, a limit or a drive that
+   holds undoes the step and puts the applied drive in its place.
 
    stepped  committed  the memory is at     a commit replaces    a NaN answers, and leaves there
    no       no         the start drive      nothing              the start drive
@@ -780,7 +782,7 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
         const bool clamped = inside < v || inside > v;
         self->bits |= self->limited ? TWO_BRANCHES_STATUS_DOMAIN : 0u;
         if (clamped || (inside <= self->drive && inside >= self->drive)) {
-            /* the plays are not where w is */
+            /* this drive does not give w: the plays are elsewhere */
             self->bits |= clamped ? TWO_BRANCHES_STATUS_OUTPUT_CLAMPED : 0u;
             two_branches_inverse_replace(self, inside);
         } else {

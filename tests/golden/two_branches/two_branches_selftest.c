@@ -5,14 +5,14 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 9e38af228bfcbe98078b53190fcb88f0aff126a004f28c1f41f89b64fdda242c, without this line
+ * Text: sha256 759517d8fc08b94c58beab017a7658ec898dde3d3dcd857fc79212aa6cbb0922, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "two_branches_selftest.h"
 
 #include "two_branches.h"
 
-/* One call: 's'tep, 'c'ommit or 'r'eset with an argument; a step also has an expected answer and
+/* One call: 's'tep, 'c'ommit or 'r'eset with an argument; for a step also the expected answer and
    status. */
 typedef struct {
     char kind;
@@ -21,7 +21,7 @@ typedef struct {
     unsigned int status;
 } two_branches_selftest_sample_t;
 
-/* Too large for some stacks. */
+/* Static, since some stacks are too small for it. */
 static two_branches_inverse_t two_branches_selftest_instance;
 
 static bool two_branches_selftest_same(two_branches_real_t a, two_branches_real_t b) {

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 273a15ef9d7d39b79ebee6847d984804d9a3e031c05ba9e3e84318a0d8cc0265, without this line
+ * Text: sha256 d076e7762945a522ee2b8fd99248831917b68ad556d1b2e96c2788ca34d27af0, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Cost (32-bit target): 2960 bytes of constants, 220 bytes of RAM for its own instance
@@ -18,9 +18,9 @@
 extern "C" {
 #endif
 
-/* Runs the recorded samples. 0 when every answer has the expected bits, else 1 + the index of the
-   first that has not.
-   Its instance is static: one call at a time. */
+/* Runs the recorded samples. Returns 0 if every answer has the expected bits, else 1 + the index of
+   the first that
+   does not. The instance is static: only one call may run at a time. */
 int two_branches_selftest(void);
 
 #ifdef __cplusplus
