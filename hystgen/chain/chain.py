@@ -22,7 +22,7 @@ VISIT = 10.0
 VISIT_SAMPLES = 200
 
 SESSION_GAP = 10.0
-"""Median steps between two records of a session from which the drive holds in between; else it is straight."""
+"""Gap between two records of a session, in median steps, above which the drive holds in it; below, it is straight."""
 
 _BEHIND_OFFSET = 6
 
@@ -40,7 +40,7 @@ def _rank(effect: Effect) -> int:
 
 
 def in_order(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """The effects as the chain meets them; those of one place and order as they were given."""
+    """The effects in the order of the chain; effects with the same place and order stay as given."""
     return tuple(sorted(effects, key=lambda effect: (_rank(effect), effect.order)))
 
 
@@ -55,11 +55,11 @@ class Session:
 def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> Session:
     """The runs of a session on one time axis.
 
-    A record whose times lie behind those before it keeps them (session time), unless a rest would not fit between; any
-    other starts one median step after the record before and its rest. In rests and in gaps of more than `SESSION_GAP`
-    steps the drive holds, until one step before the next record. The values of `history` are visited before the first
-    record, each on a straight move of `VISIT` seconds from the one before, and the last is held for its rest. Raises
-    ValueError for records of no samples.
+    A record whose times come after those of the record before keeps them (session time), unless a rest would not fit in
+    between; any other starts one median step after the record before and its rest. In rests, and in gaps of more than
+    `SESSION_GAP` steps, the drive holds until one step before the next record. The values of `history` are visited
+    before the first record, each by a straight move of `VISIT` seconds, and the last is held for its rest. Raises
+    ValueError for records without samples.
     """
     if not runs or any(len(run.t) == 0 for run in runs):
         raise ValueError("a session has records, and each of them samples")
@@ -108,7 +108,7 @@ class Chain:
     """Static model and effects as one forward model.
 
     Order: delay, slew limit, lag, memoryless front, plays, creep, ageing and thermal, resonances, saturation behind,
-    output offset, sensor nonlinearity, drift. Raises EffectsError for two effects that say how the plays move.
+    output offset, sensor nonlinearity, drift. Raises EffectsError if two effects determine how the plays move.
     """
 
     def __init__(self, cascade: StaticModel, effects: Sequence[Effect]) -> None:
@@ -119,9 +119,9 @@ class Chain:
         self.effects = in_order(effects)
 
     def simulate(self, runs: Sequence[Run], history: Sequence[float] | None = None) -> list[Array]:
-        """Outputs (N,) of each run of a session, from the start memory and at rest; see `join`.
+        """Outputs (N,) of each run of a session, which begins at rest in the start memory; see `join`.
 
-        Raises EffectsError where a column is missing or an effect's answer has the wrong form.
+        Raises EffectsError if a column is missing or the result of an effect has the wrong form.
         """
         for name in sorted({column for effect in self.effects for column in effect.columns}):
             if any(name not in run.extra for run in runs):
@@ -135,7 +135,7 @@ class Chain:
         return [y[part] for part in session.parts]
 
     def output(self, run: Run) -> Array:
-        """Output (N,) of one run, from the start memory and at rest at its first sample."""
+        """Output (N,) of one run, at rest in the start memory at its first sample."""
         y = np.asarray(self.cascade.pi.weights) @ self.plays(self.play_input(run), run)
         behind = [effect for effect in self.effects if effect.place not in (Place.DRIVE, Place.PLAYS)]
         offset = self.cascade.output_offset
@@ -164,7 +164,7 @@ class Chain:
         return through_stages(self.cascade.stages, a, rising)
 
     def plays(self, w: Array, run: Run) -> Array:
-        """Rows (n+1, N) that the weights sum, from the start memory."""
+        """Rows (n+1, N) of the plays that the weights sum, beginning at the start memory."""
         pi = self.cascade.pi
         return plays(self._of(Place.PLAYS), w, run, np.asarray(pi.thresholds), np.asarray(pi.start))
 
@@ -173,7 +173,8 @@ class Chain:
 
 
 def plays(effects: Sequence[Effect], w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-    """Rows (n+1, N) that the weights sum: the plays, moved by the one effect that does so, behind all that bend them.
+    """Rows (n+1, N) that the weights sum: the plays, as the one effect that may do so moves them and all others bend
+    them.
 
     `effects`: those of Place.PLAYS, in order.
     """
@@ -189,7 +190,7 @@ def moved(effects: Sequence[Effect], w: Array, run: Run, thresholds: Array, star
 
 
 def bent(effects: Sequence[Effect], rows: Array, thresholds: Array) -> Array:
-    """The rows behind all effects that bend them."""
+    """The rows as all effects bend them."""
     for effect in effects:
         if effect.bends_plays():
             rows = effect.bent(rows, thresholds)

@@ -19,29 +19,29 @@ EDGE = 1e-9
 """s of the step itself, far below what any amplifier or converter does."""
 
 HORIZON = 3600.0
-"""s for which the answer to the step is followed: whoever waits for longer drives no faster than creep."""
+"""s for which the response to the step is computed: a drive that waits for longer is no faster than creep."""
 
 FOREVER = 1e15
 """s after which everything has come to rest; the filters take steps of any length."""
 
 A_DECADE = 8
-"""Samples a decade of time from which the refinement starts."""
+"""Samples per decade of time at which the refinement starts."""
 
 CLOSE, FINE = 0.03, 3e-4
 """Shares of the error and of the step by which the output may leave the straight line between two samples."""
 
 GOLDEN = 0.381966011250105
-"""Where in a stretch the output is compared with the straight line: halves may be whole periods, all of them."""
+"""Place in an interval at which the output is compared with the straight line: halves could all be whole periods."""
 
 GRADED = 4.0
-"""Most times by which a stretch between samples may be longer than its neighbour: an oscillation that happens to
-cross zero at the test point of one stretch is found from the next."""
+"""Largest ratio of an interval between samples to its neighbour: an oscillation that happens to cross zero at the test
+point of one interval is found from the next."""
 
 NARROWEST = 1e-6
-"""Share of the time since the step below which no stretch is split: an edge behind a delay stays an edge."""
+"""Share of the time since the step below which no interval is split: an edge behind a delay stays an edge."""
 
 MOST_SAMPLES = 2**18
-"""Most samples of an answer; a mode whose damping is 0.001 takes a third of them."""
+"""Most samples of a response; a mode with a damping of 0.001 takes a third of them."""
 
 MOSTLY = 0.5
 """An effect is the main reason if the answer without it settles in this share of the time or less."""
@@ -49,12 +49,12 @@ MOSTLY = 0.5
 
 @dataclass(frozen=True)
 class Settling:
-    """Time after a step of the drive over the whole of its range until the output stays close to its final value.
+    """Time after a step of the drive over its whole range until the output stays close to its final value.
 
-    `within`: the error, share of the final step of the output; `error`: the same in output units; `up`, `down`: s
-    after a step to the upper and to the lower end of the range, 0 where the output is there at once, inf where it was
-    not within `followed` seconds; `because`: the effect, or the effects, that take the time; `left_out`: effects that
-    move the output whatever the drive does.
+    `within`: the error as a share of the final step of the output; `error`: the same in output units; `up`, `down`: s
+    after a step to the upper and to the lower end of the range, 0 if the output is there at once, inf if it was not
+    there within `followed` seconds; `because`: the effect, or the effects, that take the time; `left_out`: effects that
+    move the output independently of the drive.
     """
 
     within: float
@@ -71,7 +71,7 @@ class Settling:
         return max(self.up, self.down)
 
     def content(self) -> dict[str, Any]:
-        """The fields as JSON has them; times that are not finite are None."""
+        """The fields for JSON; infinite times are None."""
         content = asdict(self)
         return content | {key: content[key] if math.isfinite(content[key]) else None for key in ("up", "down")}
 
@@ -105,7 +105,7 @@ def settling(chain: Chain, within: float) -> Settling:
     """Settling of a chain after a step over its input range, in both directions.
 
     Before the step the drive has gone over the range and back, and everything is at rest. Effects that are added to the
-    output, or that follow a column of the record, do not answer to the drive and are left out.
+    output, or that follow a column of the record, do not respond to the drive and are left out.
     """
     answering = [effect for effect in chain.effects if effect.place is not Place.ADDED and not effect.columns]
     left_out = tuple(dict.fromkeys(effect.name for effect in chain.effects if effect not in answering))
@@ -135,7 +135,7 @@ def settling(chain: Chain, within: float) -> Settling:
 
 @dataclass(frozen=True)
 class _Answer:
-    """An answer to a step: s until it has settled, its final size, and for how many s it was followed."""
+    """A step response: s until it has settled, its final size, and the s for which it was followed."""
 
     seconds: float
     size: float
@@ -156,17 +156,18 @@ class _Answer:
             inner = -inner
         share = (outer - within * size) / (outer - inner)
         seconds = float(times[k] + share * (times[k + 1] - times[k]))
-        # Up to here the edge itself still moves, or plays that wait for its end
+        # up to here the edge itself still moves, or plays that wait for its end
         return cls(seconds if seconds > dead + 2.0 * EDGE else dead, size, HORIZON)
 
 
 def _left(chain: Chain, begin: float, end: float, within: float, dead: float) -> tuple[Array, Array, float]:
-    """Times (N,) since the step from its arrival on, what the output is from its final value there, the final step.
+    """Times (N,) since the step, beginning at its arrival, the output's distance from its final value, and the size of
+    the final step.
 
     `dead`: s after which the step arrives.
 
-    The chain is exact for a drive that is straight between samples, but behind a filter the next block takes a curve as
-    straight too: every stretch inside which the output leaves the straight line is split there, until none does.
+    The chain is exact for a drive that is straight between samples, but a block behind a filter also takes the filter's
+    curve as straight: every interval in which the output leaves the straight line is split, until none does.
     """
     decades = math.log10(HORIZON / EDGE)
     times = dead + np.geomspace(EDGE, HORIZON, round(A_DECADE * decades) + 1)
@@ -194,7 +195,7 @@ def _left(chain: Chain, begin: float, end: float, within: float, dead: float) ->
 
 
 def _answered(chain: Chain, begin: float, end: float, times: Array, dead: float) -> tuple[Array, float]:
-    """What the output is from its final value at some times after a step, and the size of the final step."""
+    """Distance of the output from its final value at some times after a step, and the size of the final step."""
     edge = [EDGE, dead] if dead > EDGE else []
     t = np.concatenate([[-3.0 * FOREVER, -2.0 * FOREVER, -FOREVER, 0.0], edge, times, [FOREVER]])
     v = np.where(t > 0.0, end, begin)

@@ -19,14 +19,14 @@ Array = NDArray[np.float64]
 
 
 def directions(v: Array, ascending: bool) -> NDArray[np.bool_]:
-    """Whether the drive rises at each sample; where it stands still the last direction, at first `ascending`."""
+    """Whether the drive rises at each sample; the last direction while it stands still, `ascending` before it moves."""
     moved = np.diff(v, prepend=v[:1])
     last = np.maximum.accumulate(np.where(moved != 0.0, np.arange(len(v)), -1))
     return np.asarray(np.where(last >= 0, moved[np.maximum(last, 0)] > 0.0, ascending))
 
 
 def through_stages(stages: Sequence[Stage], v: Array, rising: NDArray[np.bool_] | None) -> Array:
-    """`w = G[v]` sample by sample; `rising` may be None where no stage has two branches."""
+    """`w = G[v]` sample by sample; `rising` may be None if no stage has two branches."""
     w = v
     for stage in stages:
         if stage.branches_differ:
@@ -44,7 +44,7 @@ UNBOUNDED = (-math.inf, math.inf)
 class StaticModel:
     """The actuator: `y = PI[G[v]] + output_offset` (39), `G` the stages in order from the drive.
 
-    `input_range`: the drive it is used in (two numbers, or unbounded). `hystgen.Cascade` is one that runs.
+    `input_range`: the range of drives that it is used in (two numbers, or unbounded). `hystgen.Cascade` also runs it.
     """
 
     pi: PlaySum
@@ -72,7 +72,7 @@ class StaticModel:
         return np.asarray(v)
 
     def stage_ranges(self, ascending: bool) -> tuple[tuple[float, float], ...]:
-        """The input range of every stage when the drive stays inside `input_range`."""
+        """The input range of every stage while the drive stays inside `input_range`."""
         return self._stage_ranges[ascending]
 
     @cached_property
@@ -108,7 +108,7 @@ class StaticModel:
     def output_range(self) -> tuple[float, float]:
         """Extremes of the output over every drive history inside `input_range` from the start memory.
 
-        The straight way to an end of the range leaves every play at its extreme, so that the ends are attained.
+        A straight move to an end of the range takes every play to its extreme, so that the ends are attained.
         """
         low, high = (self._after(w) for w in self.play_range)
         return low, high
@@ -121,10 +121,10 @@ class StaticModel:
 
     @cached_property
     def swung(self) -> tuple[float, float]:
-        """The output at either end of `input_range` after the other end: inside `output_range`, or right at its ends.
+        """The output at either end of `input_range` after the other end: inside `output_range`, or exactly at its ends.
 
-        References between an end of that and this need a drive out of range, once the drive has been at the other end.
-        Where plays that begin at 0, as after a reset, need it for more references, theirs count.
+        References between these and the ends of `output_range` need a drive out of range, once the drive has been at
+        the other end. If plays that begin at 0, as after a reset, need that for more references, their output counts.
         """
         low, high = self.play_range
         starts = (self.pi.start, (0.0,) * (self.pi.n + 1))
@@ -134,9 +134,9 @@ class StaticModel:
         )
 
     def _after(self, *drives: float, start: Sequence[float] | None = None) -> float:
-        """The output when the plays have been led from their start memory to inputs, one after the other.
+        """The output after the plays have been led from their start memory to inputs, one after the other.
 
-        In fractions: an offset may cancel most of the sum, and limits are rounded inward from here.
+        In fractions, since an offset may cancel most of the sum, and limits are rounded inward from the result.
         """
         thresholds = [Fraction(r) for r in self.pi.thresholds]
         states = [Fraction(s) for s in (self.pi.start if start is None else start)]
@@ -157,7 +157,7 @@ class StaticModel:
     def branch_gap(self) -> float:
         """Bound of the distance between the branches of G within `input_range`; 0 with one branch.
 
-        Both rise, so that between two drives a < b they are nowhere farther apart than L(b) - R(a).
+        Both rise, so that between two drives a < b they are at most L(b) - R(a) apart.
         """
         if not self.branches_differ:
             return 0.0
@@ -181,7 +181,7 @@ class StaticModel:
 
     @cached_property
     def slope_ratio(self) -> float:
-        """Largest slope over the smallest, the factor by which the inverse can amplify a relative error."""
+        """Largest slope over smallest, the factor by which the inverse can amplify a relative error."""
         least = self.front_slopes[0] * min(self.pi.slopes)
         most = self.front_slopes[1] * max(self.pi.slopes)
         return most / least if least > 0.0 else math.inf
@@ -197,11 +197,11 @@ class StaticModel:
         return tuple(problems)
 
     def inverse_problems(self) -> list[str]:
-        """Why there is no inverse over `input_range`; empty when there is one."""
+        """Reasons why there is no inverse over `input_range`; empty if there is one."""
         return list(self._inverse_problems)
 
     def _branch_problems(self) -> list[str]:
-        """Where the descending branch runs below the ascending one: there the inverse would move the wrong way."""
+        """Ranges in which the descending branch lies below the ascending one: the inverse would move the wrong way."""
         low, high = self.input_range
         if not (math.isfinite(low) and math.isfinite(high)):
             return ["with two branches the input range has to be finite"]

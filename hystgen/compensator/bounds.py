@@ -4,22 +4,23 @@ Forward, engine `loop`: rounded thresholds, start memory and stage constants mov
 error, because a play never amplifies a difference of its input, threshold or start value (3); sums and products add
 their unit roundoffs.
 
-Engine `corners`: an answer is computed from the corner that it hangs on, which was an answer itself, so that the
-roundings of up to n + 1 corners and of the answer add up. `CornerRoundings` counts those of one of them.
+Engine `corners`: an answer is computed from the corner below it, which was an answer itself, so that the roundings of
+up to n + 1 corners and of the answer add up. `CornerRoundings` counts the roundings of one of them.
 
 Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
-residual eta. That needs solving to stop where another play would follow: on the straight piece before, of slope P_k,
-rounding of eta is one of eta / P_k in w, which behind that place would count with a steeper slope. Engine `loop`
-stops there, engine `corners` goes over to the steeper piece as much earlier as rounding can carry; neither answers a
-move with one the other way, which would do the same to the plays that follow behind a turn. The exact inverse turns a
-reference error eta into at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the sum of |q_i|), and the front
-into that over its smallest slope. A clamp or commit gives both the same drive and adds nothing.
+residual eta. This requires that a solution stops where another play would follow: on the straight piece before, of
+slope P_k, an error eta of the output is one of eta / P_k in w, which would count with a steeper slope beyond that
+place. Engine `loop` stops there; engine `corners` changes to the steeper piece as much earlier as rounding can reach.
+Neither answers a move with one in the other direction, which would have the same effect on plays that follow after a
+turn. The exact inverse turns a reference error eta into at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the
+sum of |q_i|), and the front divides that by its smallest slope. A clamp or commit gives both the same drive and adds
+nothing.
 
-With two branches two drives can give the same output, one on each, and rounding decides between them where the
-reference moves by no more than that. Both outputs are right to within the bound; the drives then differ by what the
-gap between the branches makes at the input of the plays, now and in what the plays remember. The bound counts that.
-The first move starts from the drive that the start memory stands for, G_R^-1(s_0), which need not be a number of the
-type. The forward operator knows on which side of it every drive lies, to the rounding of G_R^-1 in double precision.
+With two branches, two drives can give the same output, one on each branch, and rounding decides between them where
+the reference moves by less than a rounding. Both outputs are right to within the bound; the drives then differ by the
+gap between the branches at the input of the plays, now and in what the plays remember. The bound counts that. The
+first move starts from the drive of the start memory, G_R^-1(s_0), which need not be a number of the type. The forward
+operator knows on which side of it every drive lies, up to the rounding of G_R^-1 in double precision.
 """
 
 from __future__ import annotations
@@ -79,10 +80,9 @@ def _stage_errors(
 class CornerRoundings:
     """Roundings of the corner engine, derived operation by operation from `c_runtime/corners_float.c`.
 
-    `forward`, `inverse`: what one answer adds to the difference between the sum of the plays and the exact one, for
-    plays that have seen the same inputs, in output units; `early`: how much earlier than exactly the inverse has plays
-    follow, in output units; `margin`: how far an answer along a line can lie beyond the exact one, in units of the
-    plays' input.
+    `forward`, `inverse`: what one answer adds to the error of the sum of the plays, for plays that have seen the same
+    inputs, in output units; `early`: how much too early plays follow in the inverse, in output units; `margin`: how far
+    an answer along a line can lie beyond the exact one, in units of the plays' input.
 
     With u the unit roundoff, C the sum of |p_i|, W the largest input of the plays, T its travel: no output is larger
     than C W, no change of it larger than C T. A table entry or an operation adds u times the size of its result; an
@@ -96,7 +96,7 @@ class CornerRoundings:
 
     @classmethod
     def of(cls, cascade: StaticModel, kind: str) -> CornerRoundings:
-        """Those of a model in 'float32' or 'float64'; zero where the range of the drive is not bounded."""
+        """The roundings of a model in 'float32' or 'float64'; zero if the range of the drive has no ends."""
         if not all(math.isfinite(end) for end in cascade.input_range):
             return cls(0.0, 0.0, 0.0, 0.0)
         u = float(np.finfo(kind).eps) / 2
@@ -112,7 +112,7 @@ class CornerRoundings:
         inverse = line + c * drives + early
         # forward: begin (table, sum), its distance, gain and product; reach (table), two sums of outputs; blocks
         forward = c * (w + travel) + 3 * c * travel + c * (2 * w + travel) + c * (w + travel)
-        # the place of the limit: two differences of drives, slope, product and sum; then as for an answer
+        # where the limit is reached: two differences of drives, slope, product and sum; then as for an answer
         least = min(abs(p) for p in np.cumsum(pi.weights)) if not cascade.inverse_problems() else math.inf
         margin = drives + 2 * travel + (line + c * (w + 4 * travel) + early) / least
         return cls(u * forward, u * inverse, u * early, SECOND_ORDER * u * margin)

@@ -1,8 +1,7 @@
 """The inverse of a model with effects for a known reference, in double precision and for any sample times.
 
-One principle: the compensator keeps the actuator's states only. In each sample it solves for the drive from the output
-backwards, block by block, limits it, and absorbs forwards what is applied. What a block may not do without is seeing
-ahead: a delay and a mode take the reference before its time.
+The compensator keeps only the actuator's states. In each sample it solves for the drive from the output backwards,
+block by block, limits it, and absorbs the applied drive forwards. A delay and a mode need the reference ahead of time.
 """
 
 from __future__ import annotations
@@ -33,15 +32,15 @@ from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.model import SelfHeating
 
 EVEN = 1e-3
-"""Share of a step by which steps may differ where they are taken for equal: as much as the error of a mode's inverse,
-`w0^2 T^2/12`, 9e-4 with 60 samples a period."""
+"""Largest relative difference of steps that count as equal: about the error of a mode's inverse, `w0^2 T^2/12`, which
+is 9e-4 with 60 samples in a period."""
 
 ROUNDING = 1e-14
-"""Share of a number below which a change of it is rounding: some tens of roundings of 1.1e-16."""
+"""Relative change of a number below which it counts as rounding: some tens of roundings of 1.1e-16."""
 
 TURNS = 8
-"""Most repetitions of a sample in which the gain depends on the drive that is sought. 500 jumps over a quarter of the
-range, with a loss of 1 % a decade from half the range on, take 5 in the mean and 7 at most to the last bit."""
+"""Most iterations in a sample, if the gain depends on the drive to be found. 500 jumps over a quarter of the range,
+with a loss of 1 % per decade from half the range on, converge to the last bit in 5 iterations on average, 7 at most."""
 
 TAKEN_IN = frozenset({
     "creep", "rate_dependence", "resonance", "lag", "delay", "slew_limit", "saturation", "thermal", "ageing",
@@ -78,7 +77,7 @@ class Actuator:
         self.seconds = seconds
 
     def moved(self, w: float) -> Array:
-        """Where the plays (n + 1) are once their input is at w."""
+        """The plays (n + 1) after their input has gone to w."""
         if self.movement is None or math.isinf(self.seconds):
             return np.asarray(np.minimum(np.maximum(self.plays, w - self.r), w + self.r))
         return self.movement.after(self.plays, float(self.plays[0]), w, self.seconds)
@@ -99,7 +98,8 @@ class Actuator:
         return self.absorb(x)
 
     def solve(self, y: float) -> float:
-        """The drive on the branch of its own move: that of the output's move first, the other one next, else none."""
+        """The drive on the branch of its own move: tries the branch of the output's move, then the other one; if
+        neither fits, the drive holds."""
         w = self._input(y)
         if not self.static.branches_differ:
             return float(self.static.front_inverse(w))
@@ -110,12 +110,12 @@ class Actuator:
             back = abs(v - self.drive) <= ROUNDING * self.static.slope_ratio * max(abs(v), abs(self.drive))
             if (v > self.drive) == ascending and not back:
                 return v
-            if back and ascending == self.ascending:  # stepped back by rounding alone, or stands still
+            if back and ascending == self.ascending:  # moves back only by rounding, or not at all
                 return self.drive
         return self.drive
 
     def absorb(self, x: float) -> float:
-        """The plays follow; a move picks the branch."""
+        """The plays follow; the direction of the move picks the branch."""
         if x != self.drive:
             self.ascending = x > self.drive
         self.drive = x
@@ -130,7 +130,7 @@ class Actuator:
         before = self.total(self.moved(w))
         if y == before:
             return w
-        way = (y - before) / float(self.p[0])  # no slope is below p_0 but where an effect bends the plays
+        way = (y - before) / float(self.p[0])  # the least slope, unless an effect bends the plays
         for _ in range(64):
             far = w + way
             if (self.total(self.moved(far)) - y) * (before - y) <= 0.0:
@@ -140,7 +140,7 @@ class Actuator:
         raise EffectsError(f"no input of the plays gives {y:g}")
 
     def _scan(self, y: float) -> float:
-        """The same for plays alone: on which piece of the curve that the move draws the sum is `y`."""
+        """The same for plain plays: finds the straight piece of the move's curve on which the sum is `y`."""
         sign = 1.0 if y >= float(self.p @ self.plays) else -1.0
         held = np.append(np.cumsum((self.p * self.plays)[:0:-1])[::-1], 0.0)  # by the plays above each
         inputs = self.plays + sign * self.r  # where each begins to follow
@@ -151,10 +151,12 @@ class Actuator:
 
 
 SWITCH = "; to have it all the same, write emit: {compensation: {compensate: [%s]}}"
+"""Advice for effects that nothing measures."""
 
 
 def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
-    """Why a compensator cannot take an effect in; empty where it can. `compensate`: those asked for all the same."""
+    """Why a compensator cannot include an effect; empty if it can. `compensate`: effects asked for although nothing
+    measures them."""
     if effect.name == "drift":
         ask = SWITCH % "drift"
         return "" if "drift" in compensate else f"drift (a clock that runs alone; nothing says when it began{ask})"
@@ -169,7 +171,7 @@ def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
 
 
 def filter_block(effect: Effect) -> Block | None:
-    """The block of an effect that filters what passes, in front of the plays or behind them; none of any other."""
+    """The block of an effect that is a filter in front of the plays or behind them; None for any other effect."""
     if isinstance(effect, creep.EFFECTS):
         return creep.block(effect)
     if isinstance(effect, Lag):
@@ -178,10 +180,10 @@ def filter_block(effect: Effect) -> Block | None:
 
 
 class Compensator:
-    """Drives for a reference; a sensor's own nonlinearity is left out, the reference being true displacement.
+    """Drives for a reference; leaves out a sensor's own nonlinearity, since the reference is the true displacement.
 
-    `compensate`: `drift`, which begins at t = 0, and `self_heating`, where these are to be taken in although nothing
-    measures them. Raises NotInvertibleError and UnsupportedEffectsError with all reasons.
+    `compensate`: `drift`, which begins at t = 0, and `self_heating`, to include them although nothing measures them.
+    Raises NotInvertibleError and UnsupportedEffectsError with all reasons.
     """
 
     def __init__(self, chain: Chain, compensate: Collection[str] = ()) -> None:
@@ -210,8 +212,9 @@ class Compensator:
     def drives(self, reference: Run, ends: tuple[float, float], asked: NDArray[np.bool_] | None = None) -> Array:
         """Drives (N,) within `ends` for the reference in `reference.v`.
 
-        `asked` (N,): where `reference.v` is a reference; it is a drive before the first of them, and between them the
-        drive holds. Everything is at rest at the first sample. After the last one the reference keeps its value.
+        `asked` (N,): the samples of `reference.v` that are references. Samples before the first of them are drives;
+        between references the drive holds. Everything is at rest at the first sample. After the last sample the
+        reference keeps its value.
         """
         asked = np.ones(len(reference.t), dtype=bool) if asked is None else asked
         first = int(np.argmax(asked))
@@ -264,20 +267,20 @@ class Compensator:
     def _warm(
         heating: Sequence[SelfHeating], rises: list[float], before: float, drive: float, seconds: float
     ) -> list[float]:
-        """The rise of each temperature behind a step in which the drive moves from `before`; at first there is none."""
+        """The rise of each temperature after the drive has moved from `before`; unchanged at the first sample."""
         if math.isnan(before) or math.isnan(drive) or seconds == 0.0:
             return rises
         pairs = zip(heating, rises, strict=True)
         return [thermal.risen(effect, rise, before, drive, seconds) for effect, rise in pairs]
 
     def _slewed(self, drive: float, before: float, seconds: float) -> float:
-        """The nearest drive that the amplifier reaches in this time."""
+        """The nearest drive that the amplifier can reach in this time."""
         for effect in self.slew if seconds > 0.0 else ():
             drive = min(max(drive, before - effect.falling_rate * seconds), before + effect.rate * seconds)
         return drive
 
     def _gains(self, reference: Run) -> list[tuple[Array, Array]]:
-        """Gain and offset (N,) of each logged temperature, when the drive of a sample arrives."""
+        """Gain and offset (N,) by each logged temperature, at the time when the drive of a sample takes effect."""
         ahead = reference.t + self.delay
         extra = {name: np.interp(ahead, reference.t, column) for name, column in reference.extra.items()}
         later = Run(reference.t, reference.v, extra)
@@ -285,7 +288,7 @@ class Compensator:
         return [(effect.gain(later), effect.offset(later)) for effect in logged]
 
     def _targets(self, reference: Run, asked: NDArray[np.bool_]) -> Array:
-        """What creep, or the gain behind it, has to give at each sample (N,) for the reference to arrive."""
+        """The output (N,) that creep, or the gain behind it, has to reach at each sample to follow the reference."""
         wanted = reference.v - self.static.output_offset
         for effect in self._called("drift"):
             wanted = wanted - np.where(asked, effect.added(reference), 0.0)
@@ -300,7 +303,7 @@ class Compensator:
             raise EffectsError("the inverse of a resonance needs samples at even times; resample the reference")
 
         def given(modes: Sequence[Any], times: Array) -> Array:
-            """What the first of the modes in series has to be given."""
+            """The input that the first of the modes in series needs."""
             if not modes:
                 return np.asarray(np.interp(times, t, wanted))
             before, now, after = (given(modes[1:], times + way) for way in (-step, 0.0, step))

@@ -1,7 +1,7 @@
-"""The engine of a model, and its size in code: tables measured on emulated cores, and a rule.
+"""The engine of a model and its code size, from tables measured on emulated cores.
 
-Both tables are made by `benchmarks/engine_costs.py`. `engine_costs.csv` has the instructions of a sample, the mean over
-a decaying multisine; `code_sizes.csv` the bytes of code of a module, of both compilers the larger one.
+`benchmarks/engine_costs.py` makes both tables. `engine_costs.csv` has the instructions per sample, as a mean over a
+decaying multisine; `code_sizes.csv` the bytes of code of a module, the larger figure of two compilers.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ SMALL, FLASH, CYCLES = "cortex-m0plus", 32768, 4800
 
 
 def choose(engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str) -> str:
-    """The engine that `auto` stands for; any other one is kept, but without plays nothing is listed.
+    """The engine that `auto` stands for; an explicit one is kept, but a model without plays always takes `loop`.
 
-    `optimize` speed: fewer instructions, the geometric mean of both cores. size: less code on both cores. auto: the
-    smaller share of a small controller, flash and time added. The break-even is `FLASH / CYCLES`, 6.8 bytes of code for
-    an instruction of each sample. For both operators instructions add up. Raises ValueError for other words.
+    `optimize` speed: fewer instructions, as a geometric mean over both cores. size: less code on both cores. auto: the
+    smaller share of a small controller's flash plus its time; the break-even is `FLASH / CYCLES`, 6.8 bytes of code for
+    one instruction per sample. For both operators the instructions add up. Raises ValueError for other words.
     """
     for what, value, known in (("engine", engine, ("auto", *ENGINES)), ("optimize", optimize, OPTIMIZE)):
         if value not in known:
@@ -47,8 +47,8 @@ def code_bytes(cascade: StaticModel, operator: str, arithmetic: str, engine: str
 
 
 def kind(cascade: StaticModel, arithmetic: str) -> str:
-    """The properties of a model on which its code depends: the stages in front (in fixed point only whether it has any)
-    and the branches."""
+    """The properties of a model on which its code depends: the memoryless stages (in fixed point only whether there are
+    any) and the branches."""
     if not cascade.stages:
         return "pi"
     tanh = [isinstance(stage, TanhEnvelope) for stage in cascade.stages]
@@ -73,7 +73,7 @@ def _cost(engine: str, optimize: str, cascade: StaticModel, operator: str, arith
 
 @functools.cache
 def _instructions() -> dict[tuple[str, str, str, str], dict[int, dict[str, float]]]:
-    """Instructions of a sample on each core, by number of plays; for each operator, arithmetic, kind and engine."""
+    """Instructions per sample on each core by number of plays, for each operator, arithmetic, kind and engine."""
     found: dict[tuple[str, str, str, str], dict[int, dict[str, float]]] = {}
     for row in _rows("engine_costs.csv"):
         about = (row["operator"], row["arithmetic"], row["kind"], row["engine"])

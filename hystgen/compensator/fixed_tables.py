@@ -4,12 +4,13 @@ Everything is computed with fractions from the parameters as they are, so that t
 anywhere; only the curves of the memoryless part are sampled in double precision, with the package's own tanh.
 
 Ranges. The drive is limited to `input_range`, so that the input w of the plays, every play and every corner stay
-between the least and largest of the range's images, the start memory and 0, where a reset begins. That bounds every
-sum; a format is chosen as the finest for which all of them keep one bit clear of 64 (sums) or 32 (tables), and those
-that a corner keeps fit it. In q15 these are 47 bits, which the input of the plays and the slopes share: 26 and 21 or
-22. Against 30 and 31 bits that widens the bounds of 160 models of the oracle (seeds 100 to 259) by 0.8 % in the median
-without a memoryless part and 1.5 % with one, a tenth by more than 2.1 and 3.5 %; with 25 bits of input these are 0.5
-and 1.8 %, 1.4 and 5.5 %, with 27 all are wider.
+between the least and the largest of three things: the image of the range, the start memory, and 0, where a reset
+begins. That bounds every sum. The format is the finest one in which sums leave one of 64 bits unused, table entries one
+of 32, and the outputs that corners keep fit their fields. In q15 those have 47 bits, which the input of the plays and
+the slopes share: 26 and 21 or 22. Compared with 30 and 31 bits, that widens the bounds of 160 models of the oracle
+(seeds 100 to 259) by a median of 0.8 % without a memoryless part and 1.5 % with one, and those of a tenth of the models
+by more than 2.1 and 3.5 %. With 25 bits of input these figures are 0.5 and 1.8 %, 1.4 and 5.5 %; with 27 all are
+larger.
 
 Errors. With the drive exact, as it is sent: rounded thresholds and start states move a play by no more than their own
 error (3); rounded sums of weights are summed by parts, because neighbouring plays differ by no more than their
@@ -51,10 +52,10 @@ FAR = 2.0**40
 class Format:
     """The meaning of a model's codes, and its accuracy.
 
-    `drive_lsb`, `output_lsb`: physical units a code; `forward_error` in output codes, `inverse_error` in drive codes
-    (None: no inverse), `inverse_rounding` the part of it without taking another branch; `largest_sum`: bound of every
-    sum that is formed, below 2^62; `largest_held`: of every output that a corner is left at; `sum_bits`: fraction bits
-    of an output code.
+    `drive_lsb`, `output_lsb`: physical units per code; `forward_error` in output codes, `inverse_error` in drive codes
+    (None: no inverse), `inverse_rounding` the part of it on the same branch; `largest_sum`: bound of every sum, below
+    2^62; `largest_held`: bound of every output that a corner keeps; `sum_bits`: fraction bits of a sum below an output
+    code.
     """
 
     drive_lsb: Fraction
@@ -88,7 +89,7 @@ def nearest(x: Fraction | float) -> int:
 
 
 def reciprocal(slope: int) -> tuple[int, int]:
-    """`2^(32 + shift)/slope`, and the shift; of the slope 0 that nothing has, 0."""
+    """`2^(32 + shift)/slope` and the shift; a reciprocal of 0 for the slope 0, which is never used."""
     if slope <= 0:
         return 0, 1
     shift = slope.bit_length() + 30
@@ -105,10 +106,10 @@ def lsbs(
     output_lsb: float | None = None,
     output_range: tuple[float, float] | None = None,
 ) -> tuple[Fraction, Fraction]:
-    """Physical units a drive code and an output code: those given, else the finest that reach the ends of the ranges.
+    """Physical units per drive code and per output code: as given, else the finest that reach the ends of the ranges.
 
-    `output_range`: that of a model with effects. Raises FormatError for one that is too small, and for an output that
-    stays 0.
+    `output_range`: that of a model with effects. Raises FormatError for an LSB that is too small, and for an output
+    that stays 0.
     """
     code_max = ARITHMETICS[arithmetic].code_max
     found: list[Fraction] = []
@@ -136,22 +137,22 @@ def lsbs(
 
 
 def _rounded_up(x: Fraction) -> str:
-    """Six digits of a number that is positive, not less than it is."""
+    """A positive number to six digits, rounded up."""
     up = Context(prec=6, rounding=ROUND_CEILING)
     return f"{float(up.divide(Decimal(x.numerator), Decimal(x.denominator))):.6g}"
 
 
 def decimal(x: float) -> Fraction:
-    """The number as it is written: 0.001 is a thousandth, which no double is."""
+    """The number as it is written: 0.001 is exactly a thousandth, which no double is."""
     return Fraction(repr(float(x)))
 
 
 class Builder:
-    """The steps of `build`, each with what the ones before it found.
+    """The steps of `build`, each of which uses the results of those before it.
 
-    `given`: which LSB was asked for; `beyond`: spans of their input by which plays may be asked for more than the drive
-    gives, and `led`: whether what arrives in front of the memoryless part has bits below a drive code, as behind a lag;
-    `bent`: most that an effect adds to what a play contributes, in units of its input.
+    `given`: which LSB was asked for; `beyond`: how far beyond its range the input of the plays may be asked for, in
+    spans; `led`: whether signals in front of the memoryless part have bits below a drive code, as they do behind a lag;
+    `bent`: the most that an effect adds to the contribution of a play, in units of its input.
     """
 
     def __init__(
@@ -181,18 +182,18 @@ class Builder:
         return self._tables(), self._format()
 
     def gain(self) -> Fraction:
-        """Largest change of the drive in front of the memoryless part for one of what the plays are to give."""
+        """Largest change of the drive in front of the memoryless part per change of the wanted sum of the plays."""
         return (2 / Fraction(self.cascade.pi.weights[0]) - 1 / Fraction(self.cascade.pi.slopes[-1])) / Fraction(
             self.cascade.front_slopes[0]
         )
 
     def solved(self) -> Fraction:
-        """Rounding of the input of the plays that is solved for, in physical units."""
+        """Rounding of a solution for the input of the plays, in physical units."""
         travel = self.hull[1] - self.hull[0]
         return self.step * (Fraction(1, 2) + Fraction(travel, 2**31) + Fraction(1, 2**8))
 
     def back(self) -> Fraction:
-        """Error of the way back through the memoryless part, in units of what arrives in front of it."""
+        """Error of the inverse of the memoryless part, in units of its input."""
         return Fraction(max((curve.error / 2**curve.below for curve in self.front[2:]), default=0.0))
 
     # ------------------------------------------------------------ codes
@@ -201,8 +202,8 @@ class Builder:
         low, high = (decimal(end) / self.drive_lsb for end in self.cascade.input_range)
         self.drive = (math.ceil(low), math.floor(high))
         low, high = (decimal(end) / self.output_lsb for end in self.cascade.output_range)
-        # an end that double precision may have moved off a code is that code: 2^-50 is 8 roundoffs, and no more than
-        # a thousandth of a code where the rest of a sum cancels
+        # an end that double precision may have moved off a code is that code: by 2^-50, which is 8 roundoffs, but not
+        # by more than a thousandth of a code where the terms of a sum cancel
         size = Fraction(largest_sum(self.cascade)) + abs(Fraction(self.cascade.output_offset))
         slack = min(size / 2**50 / self.output_lsb, Fraction(1, 1024))
         self.output = (math.ceil(low - slack), math.floor(high + slack))
@@ -222,7 +223,7 @@ class Builder:
             raise FormatError(*self.refused)
 
     def _finer(self, key: str) -> str:
-        """Advice for codes that are too coarse; those that nobody set are already as fine as possible."""
+        """Advice for codes that are too coarse; unless an LSB is set, they are already as fine as possible."""
         return f"use {f'a smaller emit.{key} or ' if self.given[key] else ''}a finer arithmetic"
 
     # ------------------------------------------------------------ the input of the plays
@@ -230,7 +231,7 @@ class Builder:
     def _plays(self) -> None:
         """Least step of w, thresholds, start states and curves in it."""
         c, pi = self.cascade, self.cascade.pi
-        # where plays can be: in the range of their input, at the start memory, or at 0 behind a reset
+        # where plays can be: in the range of their input, at the start memory, or at 0 after a reset
         low = min(Fraction(c.play_range[0]), *(Fraction(s) for s in pi.start), Fraction(0))
         high = max(Fraction(c.play_range[1]), *(Fraction(s) for s in pi.start), Fraction(0))
         self.span = high - low
@@ -249,10 +250,10 @@ class Builder:
 
         states = [nearest(Fraction(s) / self.step) for s in pi.start]
         if c.stages:
-            cap = math.floor(self.span / self.step) + 8  # what rounding of the curves can add
+            cap = math.floor(self.span / self.step) + 8  # rounding of the curves can add 8 steps
         else:
             cap = max(self.drive[1] << self.fine, *states, 0) - min(self.drive[0] << self.fine, *states, 0)
-        # no input comes farther than `cap` from a play: one this wide never moves
+        # no input is farther than `cap` from a play, so that one with such a threshold never moves
         self.threshold = [min(nearest(Fraction(r) / self.step), cap) for r in pi.thresholds]
         self.still = max(bisect.bisect_left(self.threshold, cap), 1)
         for i in range(2, self.still):
@@ -285,13 +286,13 @@ class Builder:
             raise FormatError((("model", "pi", "initial_state"), message))
         self.start = states
         self._curves()
-        self.hull = (min(self.play[0], *states, 0), max(self.play[1], *states, 0))  # of all that plays can be
+        self.hull = (min(self.play[0], *states, 0), max(self.play[1], *states, 0))  # where plays can be
 
     def _hold(self, states: list[int]) -> None:
-        """Puts all plays that never move where their weighted mean is: their part of the output is the same.
+        """Put all plays that never move at their weighted mean, which leaves their part of the output the same.
 
-        Their thresholds, cut to what fits, leave their own start states too little room: they become wide enough for
-        the mean to be admissible beside the play before them, or as wide as the type is, with the mean cut to that.
+        Their thresholds, cut to what fits, may leave too little room for their own start states: they are widened
+        until the mean is admissible beside the play before them, or to the width of the type, with the mean limited.
         """
         pi, k = self.cascade.pi, self.still
         weights = [Fraction(p) for p in pi.weights[k:]]
@@ -330,7 +331,7 @@ class Builder:
         for up in (True, False):
             bottom, top = (math.floor(min(max(end / step, -FAR), FAR)) for end in _envelope_ends(c, up))
             self.arguments.append((bottom, top))
-            if top < FAR:  # far enough for the argument to be noticed
+            if top < FAR:  # far enough for an input beyond the envelope to be noticed
                 noticed = max(top - self.play[1], self.play[0] - bottom)
                 self.margin = max(self.margin, min(noticed, 1 << self.play_bits) + 2)
         self.arguments *= 2
@@ -353,7 +354,7 @@ class Builder:
     # ------------------------------------------------------------ weights and sums
 
     def _weights(self) -> None:
-        """Fraction bits of a sum, rounded sums of weights, and a bound of everything that is added up."""
+        """Fraction bits of a sum, rounded sums of weights, and a bound of every sum."""
         pi = self.cascade.pi
         gain = [Fraction(p) * self.step / self.output_lsb for p in pi.weights]
         sums = [Fraction(0), *itertools.accumulate(gain)]
@@ -416,7 +417,7 @@ class Builder:
         limits[slots.MARGIN], limits[slots.FRACTION] = self.margin, self.bits
         limits[slots.FINE], limits[slots.CODE_MAX] = self.fine, self.code_max
         limits[slots.SATURATED] = self._saturated()
-        # output codes of half a drive code and of what the reciprocal can be off, on the steepest piece
+        # output codes of half a drive code and of the error of a reciprocal, on the steepest piece
         limits[slots.SHY] = (max(self.slope) * ((2**self.fine + 1) // 2 + 8) >> self.bits) + 2
         curves = self.front
         pieces = [piece for curve in curves for piece in curve.pieces]
@@ -455,9 +456,9 @@ class Builder:
         )
 
     def _saturated(self) -> int:
-        """Size of an output code beyond which limiting it to the type is reported.
+        """Size of an output code above which limiting it to the type is reported.
 
-        Outputs after `init` fit the type but for rounding; those after `reset` may not.
+        Outputs after `init` fit the type except for rounding; outputs after `reset` may not.
         """
         largest = max(abs(Fraction(y)) for y in self.cascade.reset_range) / self.output_lsb
         reported: int = self.code_max if largest > self.code_max + Fraction(1, 2) else 2**SUM_BITS
@@ -466,7 +467,7 @@ class Builder:
     def _play_errors(self) -> list[Fraction]:
         """How far each play can be from that of the exact model, in physical units of w.
 
-        Those that never move count together; the exact one may, by what rounding of its threshold hides.
+        Plays that never move count together; in the exact model one may move, by less than its rounded threshold shows.
         """
         pi = self.cascade.pi
         front = self.step * Fraction(max((curve.error for curve in self.front[:2]), default=0.0))
@@ -481,7 +482,7 @@ class Builder:
         return errors
 
     def sum_error(self) -> Fraction:
-        """How far a sum can be from the exact model's output, in output codes, before it is rounded."""
+        """How far a sum, before it is rounded to a code, can be from the exact model's output, in output codes."""
         pi = self.cascade.pi
         plays = sum(Fraction(p) * e for p, e in zip(pi.weights, self._play_errors(), strict=True)) / self.output_lsb
         travel = self.hull[1] - self.hull[0]
@@ -530,7 +531,7 @@ class Builder:
         return upward(min((self.gain() * residual + self._own_error()[1]) / self.drive_lsb, whole))
 
     def _inverse_error(self) -> float | None:
-        """With what another branch makes, as in `hystgen.compensator.bounds`."""
+        """The same plus the effect of taking another branch, as in `hystgen.compensator.bounds`."""
         rounding = self._inverse_rounding()
         if rounding is None or not self.cascade.branches_differ:
             return rounding
@@ -588,7 +589,7 @@ def _breaks(cascade: StaticModel) -> dict[bool, list[float]]:
 
 
 def _envelope_ends(cascade: StaticModel, ascending: bool) -> tuple[float, float]:
-    """What w comes to where the last envelope saturates; infinite without one."""
+    """The values of w at which the last envelope saturates; infinite without one."""
     last = max((j for j, stage in enumerate(cascade.stages) if isinstance(stage, TanhEnvelope)), default=None)
     if last is None:
         return -math.inf, math.inf
@@ -604,7 +605,7 @@ def _envelope_ends(cascade: StaticModel, ascending: bool) -> tuple[float, float]
 
 
 def _drive_at(cascade: StaticModel, j: int, value: float, ascending: bool) -> float:
-    """Drive at which the input of stage j has the value; every stage before it rises or the model is refused."""
+    """Drive at which the input of stage j has a value; every stage before it rises, or the model is refused."""
     low, high = cascade.input_range
     for _ in range(200):
         middle = (low + high) / 2
@@ -628,11 +629,11 @@ class _Piece:
 
 
 class FixedCurve:
-    """A function on whole numbers as pieces of polynomials; `error`: how far its values can be from the function's.
+    """A function of whole numbers as a piecewise polynomial; `error`: how far its values can be from the function's.
 
     Interpolates at the Chebyshev points of ever shorter pieces until the sampled error is at most `allowed`.
-    `corners` are places of kinks, `below` the least steps of a value per code as a power of 2, `edge` how far beyond
-    the domain an argument is no more than rounding.
+    `corners` are the places of kinks, `below` the bits of a value below a code, `edge` how far rounding can take an
+    argument out of the domain.
     """
 
     def __init__(
@@ -666,7 +667,7 @@ class FixedCurve:
                 continue
             self.fit_error = max(self.fit_error, miss)
             self.pieces.append(piece)
-        # each coefficient and each product is rounded; a quarter for what lies between the samples
+        # each coefficient and each product is rounded; a quarter more for errors between the samples
         self.error = 1.25 * self.fit_error + degree + 0.5
 
     def _fit(self, a: int, b: int) -> tuple[_Piece, float]:

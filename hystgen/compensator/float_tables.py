@@ -1,5 +1,5 @@
-"""From a model to the numbers that the kernels work with in floating point; those of the corner engine are computed in
-fractions, each rounded once."""
+"""From a model to the numbers that the kernels work with in floating point. Those of the corner engine are computed as
+fractions and rounded once."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def _forward_curve(cascade: StaticModel, dtype: Any) -> Curve:
 def _inverse_curve(cascade: StaticModel, dtype: Any, limits: Sequence[Any] | None) -> Curve:
     """Input: the sum of the plays; output: their input w. `limits`: of the drive, then of the sum; None for no limits.
 
-    Each play follows a little early, by what rounding could otherwise carry an answer beyond that place.
+    Each play follows a little early, by as much as rounding could otherwise carry an answer beyond that place.
     """
     s = _sums(cascade)
     roundings = CornerRoundings.of(cascade, np.dtype(dtype).name)
@@ -139,12 +139,12 @@ def _start(
 ) -> Start:
     """The memory in which play k holds `states[k]`; `curve` is the operator's, `seen` the range of the plays' input.
 
-    A play is left at that side of its state at which it can begin to follow within the range: far beyond it, lines
-    would lose digits. Those that can at neither side are part of the bottom, and so are all with larger thresholds.
+    A play is left on the side of its state on which it can begin to follow within the range, since lines from far
+    outside would lose digits. Plays that cannot on either side belong to the bottom, as do all with larger thresholds.
     """
     s, dtype = _sums(cascade), curve.way.dtype.type
     held = [Fraction(state) for state in states]
-    # input and output while plays 0 .. k hold what play k does
+    # input and output if plays 0 .. k hold what play k holds
     centers = [(w, c * w + aside) for w, c, aside in zip(held, s.c, _aside(s, held), strict=True)]
     if inverse:
         centers = [(y, w) for w, y in centers]
@@ -159,9 +159,10 @@ def _start(
     plays = range(1, len(held))
     risen = next((k - 1 for k in plays if risen_to(k, 1) > seen[1]), len(held) - 1)
     top = next((k for k in plays if k > risen and risen_to(k, -1) < seen[0]), len(held))
-    # Where plays 0 .. top-1 all follow, a rising move gives y = C w - Q and a falling one C w + Q, what the others hold
-    # aside: the lines behind two turning points of the same output, with inputs to either side of the center's. If no
-    # play is held for good, any center does: one for every start memory, so that a start is forgotten to the last bit
+    # Where plays 0 .. top-1 all follow, a rising move gives y = C w - Q and a falling one y = C w + Q, apart from what
+    # the others hold: lines from two turning points with the same output and inputs on either side of the center. If
+    # every play can move, any center will do: it is the same for all start memories, so that a start is forgotten to
+    # the last bit
     k = top - 1
     w = held[top] if top < len(held) else Fraction(min(max(0.0, seen[0]), seen[1]))
     y = s.c[k] * w + _aside(s, held)[k]
@@ -172,7 +173,7 @@ def _start(
 
 
 def _aside(s: _Sums, held: Sequence[Fraction]) -> list[Fraction]:
-    """What the plays above each play add to the sum."""
+    """What all plays with larger thresholds add to the sum, for each play."""
     above = [p * w for p, w in zip(s.p, held, strict=True)]
     return [*itertools.accumulate(above[:0:-1], initial=Fraction(0))][::-1]
 
@@ -180,7 +181,8 @@ def _aside(s: _Sums, held: Sequence[Fraction]) -> list[Fraction]:
 def _corners(
     cascade: StaticModel, dtype: Any, limits: Sequence[float] | None, seen: tuple[float, float]
 ) -> dict[str, Any]:
-    """What `Tables` has of the corner engine; `limits` as there, up to OFFSET, None for none; `seen` by the plays."""
+    """The entries of `Tables` for the corner engine; `limits` as there, up to OFFSET, None for no limits; `seen`: the
+    range of the plays' input."""
     forward = _forward_curve(cascade, dtype)
     inverse = forward
     if not cascade.inverse_problems():
@@ -221,7 +223,7 @@ def build_float(
     products = [p * r for p, r in zip(pi.weights, pi.thresholds, strict=True)]
     slope = [math.fsum(pi.weights[:k]) for k in range(n + 2)]
     lift = [math.fsum(products[:k]) for k in range(n + 2)]
-    # the thresholds z of the inverse (36): output gained by the time play k starts to follow
+    # the thresholds z of the inverse (36): output gained before play k starts to follow
     exact = [Fraction(0), *itertools.accumulate(map(Fraction, pi.weights))]
     rises = [Fraction(b) - Fraction(a) for a, b in itertools.pairwise(pi.thresholds)]
     start_level = [
@@ -300,7 +302,7 @@ def build_float(
     for kind, first in zip(kinds, firsts, strict=True):
         if kind == slots.TANH:
             tables.stage_data[[first + 6, first + 13]] = np.nextafter(dtype(1), dtype(0))
-    for j, w in ((2, pi.start[0]), (3, 0.0)):  # a move from farther out passes the end of the range first
+    for j, w in ((2, pi.start[0]), (3, 0.0)):  # a move from outside enters through the end of the range
         tables.begin[j] = min(max(w, seen[0]), seen[1])
     if bounded:
         w = max(abs(x) for x in (*cascade.play_range, *pi.start))

@@ -21,29 +21,29 @@ class Tables(NamedTuple):
     lift: Reals  # n + 2
     start_level: Reals  # n + 1
     inverse_slope: Reals  # n + 2
-    start: Reals  # n + 1 plays, or 1 where all start at the same value
+    start: Reals  # n + 1 plays, or 1 if all start at the same value
     limits: Reals  # DRIVE_MIN .. ZERO
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
-    ascending: Counts  # direction before the first move, likewise
+    ascending: Counts  # direction before the first move, in the same order
     stage_kind: Counts  # TANH or DEAD_ZONE, in order from the drive
     stage_first: Counts  # where the stage's numbers begin in stage_data
     stage_size: Counts  # break points of a dead zone
     stage_data: Reals
-    forward: Curve  # of the corner engine, as what follows
+    forward: Curve  # of the corner engine, like the next six
     inverse: Curve
     forward_first: Start
     forward_zero: Start
     inverse_first: Start
     inverse_zero: Start
-    begin: Reals  # input of the plays before the first move, as `applied`
+    begin: Reals  # input of the plays before the first move, in the order of `applied`
     engine: int
-    branches: int  # 1 where an ascending and a descending branch differ
+    branches: int  # 1 if the ascending and the descending branch differ
     tanh: TanhTables
     atanh: AtanhTables
 
     @property
     def fixed(self) -> bool:
-        """Whether it is fixed point."""
+        """Whether the arithmetic is fixed point."""
         return False
 
     @property
@@ -57,33 +57,33 @@ class FixedTables(NamedTuple):
 
     threshold: Reals
     weight: Reals
-    slope: Reals  # of sums per least step of the plays' input
+    slope: Reals  # change of the sum per least step of the plays' input
     start_level: Reals
-    way: Reals  # 2 threshold: input gained behind a corner by the time play k begins to follow; one never does
-    reach: Reals  # 2 start_level: the output likewise
+    way: Reals  # 2 threshold: input gained since a corner when play k begins to follow; the last one never does
+    reach: Reals  # 2 start_level: the output gained
     reciprocal: Reals  # 2^(32 + shift) / slope
     shift: Reals
     start: Reals
     zero: Reals  # all plays 0
     limits: Reals
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
-    ascending: Reals  # direction before the first move, likewise
+    ascending: Reals  # direction before the first move, in the same order
     knot: Reals  # where the pieces of the curves begin, curve after curve
     coefficient: Reals  # (pieces, degree + 1)
     scale: Reals  # left shift that stretches a piece to 2^31
     first: Reals  # first piece of each curve
     pieces: Reals
     domain: Reals  # (4, 2): first and last argument of a curve
-    edge: Reals  # (4, 2): how far beyond them an argument is still no more than rounding
-    argument: Reals  # (4, 2): least and greatest argument that the envelopes themselves can take
-    below: Reals  # (4,): least steps of a curve's value per code, as a power of 2
+    edge: Reals  # (4, 2): how far rounding can take an argument beyond them
+    argument: Reals  # (4, 2): least and largest argument of the envelopes themselves
+    below: Reals  # (4,): bits of a curve's value below a code
     engine: int
     branches: int
     fronts: int
 
     @property
     def fixed(self) -> bool:
-        """Whether it is fixed point."""
+        """Whether the arithmetic is fixed point."""
         return True
 
     @property
@@ -133,10 +133,10 @@ def first_moves(
 ) -> tuple[list[Any], list[int]]:
     """Drive and direction before the first move, for `Tables.applied` and `Tables.ascending`, within `limits`.
 
-    `not_above` gives the largest number of the type that is not above a drive, and whether it is that drive. The
-    forward operator has to know which way the actuator moves from the drive that the start memory stands for, also
-    where that is not a number of the type or lies beyond the limits: seen from the number below it, every move has its
-    true direction if no move counts as descending. The inverse starts at the nearest number, where it may stay.
+    `not_above` gives the largest number of the type that does not exceed a drive, and whether the two are equal. The
+    forward operator has to know in which direction the actuator moves from the drive of the start memory, even if that
+    is not a number of the type or lies beyond the limits. Seen from the number below it, every move has its true
+    direction if staying there counts as descending. The inverse starts at the nearest number, where it may stay.
     """
     low, high = limits
     applied, ascending = [0, 0, 0, 0], [1, 1, 1, 1]

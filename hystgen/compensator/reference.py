@@ -1,5 +1,5 @@
-"""The bit reference, which computes what the emitted C does, operation for operation; and sessions, which run it, or
-the same in double precision, over sampled signals."""
+"""The bit reference, which repeats the emitted C operation by operation, and sessions, which run it, or the same in
+double precision, over sampled signals."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def _chain_operations(
 def _corner_operations(
     forward: ModuleType, inverting: ModuleType, front_forward: Any, front_inverse: Any
 ) -> Operations:
-    """The operations of engine corners, from a module with the functions of each operator, and of the front."""
+    """The operations of engine corners, from a module for each operator and the two functions of the front."""
     forward_init, forward_reset, forward_step = forward.forward_init, forward.forward_reset, forward.forward_step
     inverse_init, inverse_reset, inverse_step = inverting.inverse_init, inverting.inverse_reset, inverting.inverse_step
     forward_visit, inverse_visit = forward.forward_visit, inverting.inverse_visit
@@ -107,7 +107,7 @@ def _corner_operations(
 
     @jit.jit
     def run(t: Any, m: Any, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
-        """Operations op[i] with argument x[i]; answers[i] is that of a step, else 0; status[i] is read and cleared."""
+        """Run op[i] with argument x[i]. answers[i] is the answer of a step, else 0; status[i] is read and cleared."""
         for i in range(len(op)):
             answers[i] = t.limits[ZERO]
             if op[i] == OP_INIT:
@@ -130,7 +130,7 @@ def _corner_operations(
 
 
 def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
-    """Memory for one instance of an operator; `init` of its operations gives it its values."""
+    """Memory for one instance of an operator; `init` of its operations sets it."""
     if isinstance(t, ChainTables):
         return chain_step.new_state(t, inverse)
     if t.engine == LOOP:
@@ -141,7 +141,7 @@ def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
 
 def codes(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[Any]:
     """Samples as codes of fixed point. Raises ValueError for numbers that are not codes."""
-    with np.errstate(invalid="ignore"):  # what is not a code is found below
+    with np.errstate(invalid="ignore"):  # numbers that are not codes are found below
         found = np.ascontiguousarray(x, dtype=t.threshold.dtype)
     most = int(t.limits[CODE_MAX])
     if np.any(x != found) or np.any(found < -most - 1) or np.any(found > most):
@@ -152,7 +152,8 @@ def codes(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[Any
 def answers(
     t: Tables | FixedTables | ChainTables, inverse: bool, call: Any, x: Any, compiled: bool = True
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
-    """Answers and status of the bit reference for operations `call` with arguments `x`, from the start memory on."""
+    """Answers and status of the bit reference for operations `call` with arguments `x`, beginning at the start
+    memory."""
     code, state = operations(t), new_state(t, inverse)
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
@@ -166,8 +167,8 @@ class Session:
     """One instance of an operator, run over records that follow one another.
 
     `operator`: 'forward' or 'inverse'. Without `arithmetic` it computes in double precision and limits nothing unless
-    `clamp`; with one it is the bit reference of the emitted C, which clamps, in codes of `lsb` (drive and output, None
-    for the finest) where it is fixed point. Raises NotInvertibleError and FormatError.
+    `clamp` is set; with one it is the bit reference of the emitted C, which clamps. `lsb`: drive and output units per
+    code in fixed point, None for the finest. Raises NotInvertibleError and FormatError.
     """
 
     def __init__(
@@ -186,7 +187,7 @@ class Session:
             if problems:
                 raise NotInvertibleError(problems)
         limited = clamp or arithmetic is not None
-        if engine == "corners" and min(cascade.pi.weights) < 0:  # outputs that fall in a rising move have no corners
+        if engine == "corners" and min(cascade.pi.weights) < 0:  # corners need an output that rises with the drive
             engine = "loop"
         self._build = functools.partial(
             tables.build, cascade, arithmetic or "float64", engine, limited, lsb, bool(self._inverse)
@@ -211,7 +212,7 @@ class Session:
         return self._range
 
     def visit(self, drives: Iterable[float]) -> None:
-        """Let the actuator see these drive values, in range or not, after `init` and before what comes next."""
+        """Let the actuator see these drive values, in range or not, after `init` and before the next samples."""
         seen = self._samples(list(drives))
         if not self._fixed:
             inputs = [self._cascade.front(float(v), up) for v in seen for up in (True, False)]
@@ -236,7 +237,8 @@ class Session:
         return np.ascontiguousarray(given, dtype=self.tables.threshold.dtype)
 
     def operate(self, op: Bytes, x: NDArray[Any]) -> tuple[NDArray[Any], Bytes]:
-        """A sequence of init, reset, step and commit with their arguments; answers are those of the steps."""
+        """Run a sequence of init, reset, step and commit with their arguments. Returns the answers of the steps, and
+        the status bits."""
         answers = np.zeros_like(x)
         status = np.zeros(len(x), dtype=np.uint8)
         self._code.run(self.tables, self.state, self._inverse, op, x, answers, status)

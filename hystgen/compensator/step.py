@@ -1,8 +1,8 @@
 """One step of engine loop, and the operations around it: commit, reset, init.
 
-Every function has its counterpart of the same name in `c_runtime/`. Functions that both operators share exist twice in
-C (`forward_begin`, `inverse_begin`); here they are written once (`begin`). Engine corners has its own in
-`hystgen.compensator.corners`, and shares the memoryless part and the tables.
+Every function has a counterpart of the same name in `c_runtime/`. Functions that both operators share exist twice in C
+(`forward_begin`, `inverse_begin`) and once here (`begin`). Engine corners has its own functions in
+`hystgen.compensator.corners` and shares the memoryless part and the tables.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def inverse_answer(s: State, v: Any) -> Any:
 
 @jit
 def inverse_fits(t: Tables | FixedTables, s: State, v: Any, ascending: int) -> bool:
-    """Whether going to v is a move of the branch that v was computed on."""
+    """Whether the move to v belongs to the branch that v was computed on."""
     inside = clamp_drive(t, v)
     if inside == s.real[DRIVE]:
         return bool(s.counts[ASCENDING] == ascending)
@@ -78,7 +78,7 @@ def inverse_fits(t: Tables | FixedTables, s: State, v: Any, ascending: int) -> b
 
 @jit
 def inverse_replace(s: State, applied: Any, v: Any) -> None:
-    """Drive v, which is `applied` once it is limited, is pending in place of the last answer."""
+    """Drive v, which is `applied` after limiting, is pending in place of the last answer."""
     if v != applied:
         s.counts[STATUS] |= INPUT_CLAMPED
     s.counts[REPEAT] = 0
@@ -87,8 +87,8 @@ def inverse_replace(s: State, applied: Any, v: Any) -> None:
 
 
 class PlayOperations(NamedTuple):
-    """What plays behind a memoryless part do, in any chain: `init` and `reset` to a start memory, `arrive` at a drive,
-    and the `drive` that gives an input of the plays."""
+    """Operations of plays behind a memoryless part, in any chain: `init` and `reset` set a start memory, `arrive` moves
+    to a drive, `drive` finds the drive that gives an input of the plays."""
 
     init: Callable[..., Any]
     reset: Callable[..., Any]
@@ -99,11 +99,12 @@ class PlayOperations(NamedTuple):
 def plays_of(
     front_forward: Callable[..., Any], front_inverse: Callable[..., Any], output: Callable[..., Any]
 ) -> PlayOperations:
-    """The operations of plays, with the memoryless part and the output for the memory as it is."""
+    """The operations of plays, from the two functions of the memoryless part and `output`, the output for the present
+    memory."""
 
     @jit
     def begin(t: Tables | FixedTables, s: State, which: int) -> None:
-        """What init and reset have in common once the plays are set; `which` as in `Tables.applied`."""
+        """The part common to init and reset, once the plays are set; `which` as in `Tables.applied`."""
         drive = t.applied[which]
         s.counts[ASCENDING] = t.ascending[which]
         s.counts[HAS_PENDING] = 0
@@ -128,13 +129,13 @@ def plays_of(
 
     @jit
     def reset(t: Tables | FixedTables, s: State, inverse: int) -> None:
-        """All plays 0, status cleared; the step that belongs to a reset is the caller's."""
+        """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
         loop_rest(s, t.limits[ZERO])
         begin(t, s, 2 * inverse + 1)
 
     @jit(inline=True)
     def arrive(t: Tables | FixedTables, s: State, v: Any) -> Any:
-        """The actuator is at drive v, whose own move picks the branch; the input of the plays."""
+        """The actuator is at drive v; its move picks the branch. Returns the input of the plays."""
         if t.branches:
             if v > s.real[DRIVE]:
                 s.counts[ASCENDING] = 1
@@ -145,8 +146,8 @@ def plays_of(
 
     @jit
     def inverse_choose(t: Tables | FixedTables, s: State, level: Any, w: Any) -> tuple[Any, int]:
-        """The drive on the branch of its own move: that of the reference's move first, the other one next, else no
-        move."""
+        """The drive that gives w on the branch of its own move: tries the branch of the reference's move, then the
+        other one; if neither fits, the drive holds."""
         if not t.branches:
             return front_inverse(t, w, 1)  # type: ignore[no-any-return]
         up = s.counts[ASCENDING]
@@ -184,8 +185,8 @@ def made_of(
     inverse_solve: Callable[..., Any],
     finite: Callable[..., Any],
 ) -> Operations:
-    """The operations with the parts in which arithmetics differ: the memoryless part, the output for the memory as it
-    is, the input of the plays that gives an output, and whether an argument is a number."""
+    """The operations, from the parts in which arithmetics differ: the memoryless part, the output for the present
+    memory, the input of the plays that gives an output, and whether an argument is finite."""
     init, reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, output)
 
     @jit(inline=True)
@@ -214,14 +215,14 @@ def made_of(
 
     @jit
     def inverse_take(t: Tables | FixedTables, s: State) -> None:
-        """What is pending is what the actuator has seen."""
+        """The actuator has seen the pending drive."""
         if s.counts[HAS_PENDING]:
             absorb(t, s, s.real[PENDING])
             s.counts[HAS_PENDING] = 0
 
     @jit(inline=True)
     def inverse_search(t: Tables | FixedTables, s: State, u: Any, level: Any, bits: int) -> Any:
-        """Answer reference u, which is `level` once it is limited; `bits` is its status so far."""
+        """Answer reference u, which is `level` after limiting; `bits` is its status so far."""
         if s.counts[REPEAT] and u == s.real[REFERENCE]:
             s.counts[STATUS] |= s.counts[BITS]
             return inverse_answer(s, s.real[ANSWER])
@@ -247,7 +248,7 @@ def made_of(
 
     @jit
     def inverse_commit(t: Tables | FixedTables, s: State, applied: Any) -> None:
-        """What the drive really applied in place of the last answer."""
+        """`applied` is the drive that was really applied in place of the last answer."""
         if not finite(t, applied):
             s.counts[STATUS] |= HELD
             return
@@ -257,7 +258,7 @@ def made_of(
     def run(
         t: Tables | FixedTables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes
     ) -> None:
-        """Operations op[i] with argument x[i]; answers[i] is that of a step, else 0; status[i] is read and cleared."""
+        """Run op[i] with argument x[i]. answers[i] is the answer of a step, else 0; status[i] is read and cleared."""
         for i in range(len(op)):
             if op[i] == OP_INIT:
                 init(t, s, inverse)

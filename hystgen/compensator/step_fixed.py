@@ -1,4 +1,4 @@
-"""The parts of a step of engine loop that differ in fixed point: limiting the output code, solving for one."""
+"""The parts of a step of engine loop that differ in fixed point."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hystgen.plays.slots import FRACTION, OFFSET
 
 @jit
 def output(t: FixedTables, s: State) -> Any:
-    """Output code for the memory as it is, limited to the type."""
+    """Output code for the present memory, limited to the type."""
     found, bits = code(t, loop_output(t, s) + t.limits[OFFSET])
     s.counts[STATUS] |= bits
     return found
@@ -26,6 +26,6 @@ def inverse_solve(t: FixedTables, s: State, level: Any) -> Any:
 
 
 @jit
-def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  every code is
-    """Whole numbers are."""
+def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  as in floating point
+    """Whether a code is finite: every one is."""
     return True

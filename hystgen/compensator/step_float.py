@@ -12,7 +12,7 @@ from hystgen.plays.slots import OFFSET, REAL_MAX
 
 @jit(inline=True)
 def output(t: Tables, s: State) -> Any:
-    """Output for the memory as it is, offset included."""
+    """Output for the present memory, offset included."""
     return loop_output(t, s) + t.limits[OFFSET]
 
 
@@ -24,5 +24,5 @@ def inverse_solve(t: Tables, s: State, level: Any) -> Any:
 
 @jit(inline=True)
 def finite(t: Tables, x: Any) -> bool:
-    """Neither NaN nor infinite."""
+    """Whether x is neither NaN nor infinite."""
     return bool(-t.limits[REAL_MAX] <= x <= t.limits[REAL_MAX])

@@ -1,6 +1,6 @@
 """From a model to the numbers that the kernels work with, in one arithmetic.
 
-Everything a compiled operator knows comes from here, once, for the bit reference and for the C text alike.
+The bit reference and the C text both take all constants of an operator from here.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ def build(
 ) -> Tables | FixedTables:
     """Tables of `cascade` in 'float32', 'float64', 'q31' or 'q15' for engine 'corners' or 'loop'.
 
-    Without `clamp` the drive and output limits are those of the (float) arithmetic, and without `inverse` too the
-    stages are not cut to where they can be inverted; `lsb` are the physical units of a drive and an output code in
-    fixed point; `visited` are inputs of the plays that they may see beyond the range, in floating point. Raises
-    FormatError when the model does not fit the arithmetic.
+    Without `clamp`, drive and output are limited only by the (float) arithmetic; without `inverse` as well, the stages
+    are not cut to the part that can be inverted. `lsb`: physical units per drive code and per output code in fixed
+    point; `visited`: inputs beyond the range that the plays may see, in floating point. Raises FormatError if the model
+    does not fit the arithmetic.
     """
     if not ARITHMETICS[arithmetic].fixed:
         return build_float(cascade, arithmetic, engine, clamp, inverse, visited)

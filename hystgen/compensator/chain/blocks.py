@@ -1,4 +1,4 @@
-"""The blocks on both sides of the plays with their numbers, in the order of the chain."""
+"""The blocks on both sides of the plays with their constants, in the order of the chain."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from hystgen.effects.thermal import fixed as thermal_fixed
 KINDS = (
     creep.KIND, lag.KIND, lag.EXACT_KIND, ageing.KIND, thermal.HEAT_KIND, thermal.KIND, resonance.KIND, drift.KIND,
 )  # fmt: skip
-"""Those of the catalogue, each with a file of its name in `c_runtime/`."""
+"""The kinds of blocks in the catalogue, each with a file of its name in `c_runtime/`."""
 
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constants]]:
-    """The blocks of an operator in front of the plays, from the drive on, and those behind them."""
+    """The blocks of an operator in front of the plays, starting at the drive, and those behind them."""
     modes = (resonance_fixed if t.fixed else resonance).constants(t.mode) if operator == "forward" else ()
     given = own.constants(t.own, t.own_effects) if isinstance(t, OwnChainTables) else []
     ahead, behind = given[: t.own.ahead], given[t.own.ahead :]
@@ -40,10 +40,10 @@ def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constant
 
 
 def every(t: ChainTables, operator: str) -> list[Constants]:
-    """These, and the clock of a drift."""
+    """The blocks of both sides and the clock of a drift."""
     return [*itertools.chain(*sides(t, operator)), *clocks(t)]
 
 
 def clocks(t: ChainTables) -> list[Constants]:
-    """The clock of a drift, where there is one."""
+    """The clock of a drift, if there is one."""
     return drift_fixed.constants(t.clock) if t.fixed else drift.constants(t.clock)

@@ -1,20 +1,20 @@
 """How far a compiled operator with effects can be from the model in double precision, block by block.
 
-Every block adds the roundings of its own operations to the error that reaches it, and passes the sum on with the
-largest gain that it has from sample to sample. Where a drive is limited to its range or committed, in one of two
-computations or in both, they come no farther apart than they would else: limiting is not expansive, and both absorb
-what was applied. A slew limit keeps drives apart as far as they were, and a lag in front of the plays follows them
-meanwhile, so that with both only the range of the drive bounds what comes behind; `rounding` leaves that out.
+Every block adds the roundings of its own operations to the error that reaches it, and passes the sum on with its
+largest gain from sample to sample. A drive that is limited to its range or committed, in one of two computations or in
+both, never increases their difference: limiting is not expansive, and both absorb the applied drive. A slew limit
+leaves drives as far apart as they were, while a lag in front of the plays follows them; with both, only the range of
+the drive bounds the errors behind, and `rounding` leaves that out.
 
-Inverse. The reference less its offsets, through what saturates (slope at the ends of the output), through the taps
-(sum of their sizes), gains (at most 1/LEAST_GAIN); then creep, whose inverse passes an error of its output on to its
-input, and from there through all states to later ones: `e <= R eta + R g e`, `g = sum c_i (1 - b1_i)` the states' share
-of the input before, hence `e <= eta/(d + 2 sum c_i b1_i - sum c_i)`. The plays as in `hystgen.compensator.bounds`. A
-lag's lead multiplies by `(2 - rate)/rate`, what it is led to by `(1 + 2 theta)/(1 - theta)`: the target before counts
-too, also where it was shifted by a limit. A block of the user's own as in `hystgen.compensator.chain.own`.
+Inverse. The reference less its offsets passes through saturation (slope at the ends of the output), the taps (sum of
+their sizes) and gains (at most 1/LEAST_GAIN); then creep, whose inverse passes an error of its output on to its input,
+and from there through all states to later inputs: `e <= R eta + R g e`, with `g = sum c_i (1 - b1_i)` the states' share
+of the input before, hence `e <= eta/(d + 2 sum c_i b1_i - sum c_i)`. The plays as in `hystgen.compensator.bounds`. The
+lead of a lag multiplies an error by `(2 - rate)/rate`, its goal by `(1 + 2 theta)/(1 - theta)`: the target before
+counts too, even if a limit has shifted it. A block of the user's own as in `hystgen.compensator.chain.own`.
 
-States that move by less than their last bit are kept in two parts; their roundings are shares of their steps, so that
-they add up to a few units of the state however slow it is, and the second part's own to `u^2/rate` of it.
+States that move by less than their last bit are kept in two parts. Their roundings are proportional to their steps, so
+that they add up to a few units of the state, however slow it is, and those of the second part to `u^2/rate` of it.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ from hystgen.plays import slots
 
 @dataclasses.dataclass(frozen=True)
 class _Sizes:
-    """Largest sizes: drive, sum of the plays, output behind creep, displacement with what may be set beside it."""
+    """Largest sizes: drive, sum of the plays, output behind creep, displacement with all settings."""
 
     drive: float
     plays: float
@@ -62,8 +62,8 @@ def _sizes(compiled: Compiled) -> _Sizes:
 
 
 def _saturation(compiled: Compiled, u: float, kind: str) -> tuple[float, float, float]:
-    """Of what saturates: the slope of its inverse at the ends of the output, and the roundings of the inverse, as
-    errors of the input, and of the map."""
+    """Saturation: the slope of its inverse at the ends of the output, the roundings of the inverse as errors of its
+    input, and those of the map."""
     slope, back, there = 1.0, 0.0, 0.0
     limits = compiled.tables.limits
     ends = np.array([float(limits[slots.OUTPUT_MIN]), float(limits[slots.OUTPUT_MAX])]) - compiled.static.output_offset
@@ -96,7 +96,7 @@ def _creep(compiled: Compiled, j: int, size: float, u: float) -> tuple[float, fl
 
 
 def _late(compiled: Compiled) -> float:
-    """Share of the output that the gain changes at most in one step at the fastest rate, and that of its table."""
+    """Largest share of the output by which the gain changes in one step at the fastest rate, plus its table's error."""
     return max(ageing.most_at_once(each, compiled.largest_step) for each in compiled.parts.ageing) + TABLE_ERROR
 
 
@@ -111,8 +111,10 @@ def _warmed(compiled: Compiled) -> float:
 
 
 def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float]:
-    """Errors of the sum of plays that an effect moves or bends, and of that at the input that a search finds for it;
-    `emitted`: with what the C takes in place of the model's law, which double precision itself does not."""
+    """Errors of the sum of plays that an effect moves or bends, and of the same at the input that a search finds.
+
+    `emitted`: include the approximations of the C, which double precision does not make.
+    """
     u = float(np.finfo(kind).eps) / 2
     t, static = compiled.tables.moving, compiled.static
     p, r = np.abs(np.array(static.pi.weights)), np.array(static.pi.thresholds)
@@ -124,13 +126,13 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float]
         slow = t.first[1:].astype(float)
         play = 8.0 * u * size / float(np.min(slow))
         if emitted:
-            play += compiled.largest_step / 4.0  # contacts inside a step, taken at the first touch
+            play += compiled.largest_step / 4.0  # contact within a step counts from the first touch
     if t.moves == moving.DASHPOT:
         effect, way = next(filter(dashpot.nonlinear, compiled.parts.plays)), compiled.largest_step
         rows = t.yields.astype(float)
         play = 8.0 * u * size + dashpot.stretch_error(effect, float(r[-1]), compiled.seconds, rows, way)
         if emitted:
-            play += float(t.number[moving.SEEN]) * way  # at which the input stands still
+            play += float(t.number[moving.SEEN]) * way  # where the input counts as standing still
     each = steep * play + (12.0 + len(static.pi.weights)) * u * size * steep
     error = float(np.sum(p)) * each
     width = 3.0 * (high - low) * 2.0 ** -t.halves + u * size
@@ -138,9 +140,11 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float]
 
 
 def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[float, float]:
-    """Errors of the forward operator's displacement, and of the sum of the plays that the inverse asks for, for one
-    arithmetic and without the plays' own; `emitted` as for `_moving`, `same`: of compensators whose states have seen
-    the same drives."""
+    """Errors of the forward operator's displacement, and of the sum of the plays that the inverse asks for.
+
+    For one arithmetic and without those of the plays; `emitted` as for `_moving`; `same`: for compensators whose states
+    have seen the same drives.
+    """
     u = float(np.finfo(kind).eps) / 2
     t, sizes = compiled.tables, _sizes(compiled)
     slope, back, there = _saturation(compiled, u, kind)
@@ -152,10 +156,10 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
         inverse = taps * (inverse + u * (len(compiled.taps.weights) + 1) * sizes.displacement * slope)
     inverse = gain * (inverse + 3.0 * u * gains * taps * sizes.output)
     late = 0.0
-    if t.ageing.turns.size and emitted:  # the gain of the travel one sample before, and its table
+    if t.ageing.turns.size and emitted:  # the C takes the gain at the travel one sample before, from a table
         late = _late(compiled) * sizes.output
         inverse += gain * late
-    if t.heat.turns.size and emitted:  # the heat of one sample
+    if t.heat.turns.size and emitted:  # the C leaves out the heat of one sample
         inverse += gain * _warmed(compiled) * (1.0 / LEAST_GAIN)
     moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.lag.block)
     moved += 4.0 * u * sizes.drive * (t.delay.samples > 0)
@@ -163,7 +167,7 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
     static = compiled.static
     forward = static.front_slopes[1] * math.fsum(abs(p) for p in static.pi.weights) * moved
     followed = len(t.lag.exact) or t.own.ahead
-    if emitted and followed and static.branches_differ:  # what arrives comes to rest on either branch
+    if emitted and followed and static.branches_differ:  # the input of the front may come to rest on either branch
         forward += static.pi.slopes[-1] * static.branch_gap
     size = sizes.plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
     roundings = []
@@ -189,10 +193,10 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
 
 
 def _lags(compiled: Compiled, error: float, u: float, same: bool) -> float:
-    """The error of the drive, for one of what is in front of the plays; `same` as for `_one`.
+    """The error of the drive for an error in front of the plays; `same` as for `_one`.
 
-    States that have seen the same drives pass on `goal/rate`, and of the target before, which followed from targets,
-    `W = theta^2 e + theta (1 - theta) W`.
+    States that have seen the same drives pass on `goal/rate`, and the target before, which follows from earlier
+    targets, `W = theta^2 e + theta (1 - theta) W`.
     """
     drive = _sizes(compiled).drive
     for each in reversed(compiled.own[: compiled.tables.own.ahead]):
@@ -212,8 +216,8 @@ def _lags(compiled: Compiled, error: float, u: float, same: bool) -> float:
 
 
 def _seen(compiled: Compiled) -> float:
-    """Error that the states of creep and of the user's own blocks, which see the sum of the plays, make of an error of
-    their target."""
+    """Factor by which the states of creep and of the user's own blocks, which see the sum of the plays, multiply an
+    error of the plays."""
     t, found = compiled.tables.creep, 1.0
     for j, slope in enumerate(t.block[:, creep.SLOPE].astype(float).tolist()):
         found *= slope * _creep(compiled, j, 0.0, 0.0)[1]
@@ -223,11 +227,11 @@ def _seen(compiled: Compiled) -> float:
 
 
 def condition(compiled: Compiled) -> str:
-    """What `rounding` holds for where drives can part without a bound but the range, in words; "" where they cannot.
+    """The condition of `rounding` in words, if only the range bounds the difference of two drives; else "".
 
-    A lag that is led follows its target but for a second difference, so that plays and creep behind it have not seen
-    what was solved for; what they remember differs with the drives, and the lead makes more of that. Thresholds that
-    grow with the rate make more of a difference of the drives before.
+    A led lag misses its target by a second difference, so that plays and creep behind it have not seen what was solved
+    for; their memory then differs between two drives, and the lead amplifies that. Thresholds that grow with the rate
+    amplify an earlier difference of the drives.
     """
     led = not all(compiled.tables.lag.exact)
     remembered = compiled.static.pi.n > 0 or len(compiled.tables.creep.block) > 0
@@ -236,7 +240,7 @@ def condition(compiled: Compiled) -> str:
 
 
 def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
-    """Bounds for `arithmetic` 'float32' or 'float64', with no more set from outside than gains and temperatures."""
+    """Bounds for `arithmetic` 'float32' or 'float64', if nothing but gains and temperatures is set from outside."""
     static = dataclasses.replace(compiled.static, output_offset=0.0)
     plays = error_bounds(static, arithmetic, "loop")
     pi = static.pi

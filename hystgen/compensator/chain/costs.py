@@ -16,11 +16,11 @@ PARTS = (
     "any", "creep", "lag", "lag_exact", "ageing", "heat", "gain", "clock", "preview", "slew", "tanh", "dead_zone",
     "relaxing", "dilated", "dashpot", "polynomial", "centre", "mode", "delay",
 )  # fmt: skip
-"""What is counted: `any` once for a model with effects, the others for each kind of block that there is; `dilated`
-for all plays that a search finds."""
+"""Parts of the code: `any` once for a model with effects, the others once for each kind of block in it; `dilated` for
+all plays whose input is found by a search."""
 
 OPERATORS = {"preview": "inverse", "mode": "forward", "delay": "forward"}
-"""Of those that not both operators have, the one that does."""
+"""Parts that only one operator has, and that operator."""
 
 
 def parts(t: ChainTables, operator: str) -> list[str]:

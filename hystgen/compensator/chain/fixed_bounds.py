@@ -1,15 +1,15 @@
 """How far a model with effects in fixed point can be from the one in double precision, block by block.
 
-As in `hystgen.compensator.chain.bounds`: every block adds the roundings of its own operations and constants to the
+As in `hystgen.compensator.chain.bounds`, every block adds the roundings of its own operations and constants to the
 error that reaches it, and passes the sum on with its largest gain. Signals are rounded to their last bit in every
-operation; a state to bits below that, each rounding kept by it for 1/rate samples. The drive is rounded to a code, and
-absorbed as sent: without a lag the plays are given that, with one `rate/2` codes of it. Errors are in signals in front
-of the plays and in output codes behind them.
+operation; states to bits below that, and a state keeps each rounding for 1/rate samples. The drive is rounded to a code
+and absorbed as sent: the plays see that rounding, or behind a lag `rate/2` codes of it. Errors are in units of signals
+in front of the plays and in output codes behind them.
 
-A lag that is led follows its target but for a second difference, so that plays behind it have not seen what they were
-solved for: what they remember differs with the drives, and the lead makes more of that, without a bound but the range
-of the drive. `rounding` is then the difference from a compensator in double precision that has seen the same drives;
-behind a memoryless part while nothing is limited, since there is nothing beyond the drive's range to which to lead.
+A led lag misses its target by a second difference, so that plays behind it have not seen what was solved for: their
+memory differs between two drives, and the lead amplifies that up to the range of the drive. `rounding` is then the
+difference from a compensator in double precision that has seen the same drives. Behind a memoryless part it holds only
+while nothing is limited, since a lag cannot be led beyond the drive's range there.
 """
 
 from __future__ import annotations
@@ -52,15 +52,17 @@ from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
 from hystgen.effects.thermal.fixed import GAIN_BITS
 
 DOUBLE = 2.0**-40
-"""Share of a size that double precision itself may be off by: a thousand roundings."""
+"""Relative error of double precision itself: a thousand roundings."""
 
 
 @dataclass(frozen=True)
 class Sizes:
-    """Largest sizes of the signals behind the plays, in output codes: forwards the sum of the plays, the input of each
-    creep, mode and saturation, the output if modes stand still, and the output; back what is left of a reference behind
-    each saturation, the target that the output side is given, and the sum that is asked of the plays; of blocks of the
-    user's own the input, and the output asked for."""
+    """Largest sizes of the signals behind the plays, in output codes.
+
+    Forwards: the sum of the plays, the input of each creep, mode and saturation, the output without motion of the
+    modes, and the output. Backwards: the reference after the inverse of each saturation, the target of the output side,
+    and the sum asked of the plays. For each block of the user's own: the input, and the output asked for.
+    """
 
     plays: float
     creeps: list[float]
@@ -75,7 +77,7 @@ class Sizes:
 
     @property
     def largest(self) -> float:
-        """Of all of them."""
+        """The largest of them."""
         own = (size for pair in self.owns for size in pair)
         forwards = (self.plays, *self.creeps, *own, *self.modes, *self.saturations, self.output)
         return max(*forwards, *self.undone, self.target, self.asked)
@@ -83,14 +85,14 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Bend:
-    """A curve of what saturates: bits of a signal that arguments and values leave out."""
+    """The curve of a saturation, with the bits of a signal that arguments and values leave out."""
 
     curve: FixedCurve
     drop: int
     lift: int
 
     def error(self, slope: float) -> float:
-        """In signals, for the largest slope."""
+        """Error in units of signals, for the largest slope."""
         argument = 0.5 * 2.0**self.drop if self.drop else 0.0
         return self.curve.error * 2.0**self.lift + argument * slope
 
@@ -99,11 +101,11 @@ class Bend:
 class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
-    `ahead`, `behind`: blocks of the user's own in front of the plays and behind; `bends`: there and back of each tanh;
-    `ends`: of the output; `slowed`: share of its rates that a slew limit loses in whole codes; `drifted`: error of
-    drifts in signals; `reached`: whether all that is asked in front of the plays can be led to; `largest_step`: as in
-    `Compiled`; `finer`: bits of what arrives in front of the plays below their input; `bumps`: of bent plays; `heats`:
-    errors of temperatures of own heat, degrees.
+    `ahead`, `behind`: blocks of the user's own in front of the plays and behind; `bends`: the curve and inverse curve
+    of each tanh; `ends`: of the output; `slowed`: share of its rates that a slew limit loses in whole codes; `drifted`:
+    error of drifts in units of signals; `reached`: whether the lag can be led to every input asked of the plays;
+    `largest_step`: as in `Compiled`; `finer`: bits of a signal in front of the plays below their input; `bumps`: of
+    bent plays; `heats`: errors of temperatures of own heat, degrees.
     """
 
     static: StaticModel
@@ -137,12 +139,12 @@ class Bounds:
 
     @property
     def _signal(self) -> float:
-        """A signal in output codes."""
+        """The unit of signals behind the plays, in output codes."""
         return 2.0**-self.bits
 
     @property
     def _arriving(self) -> float:
-        """A signal in front of the plays in drive units."""
+        """The unit of signals in front of the plays, in drive units."""
         return float(self.inner.drive_lsb) / 2.0**self._fine
 
     # ------------------------------------------------------------ blocks
@@ -176,9 +178,9 @@ class Bounds:
         return 1.0 / around if around > 0.0 else 2.0 / numbers.slope - 1.0 / numbers.rest
 
     def _lag(self, j: int, given: float, asked: float) -> tuple[float, float, float]:
-        """Roundings of what arrives behind lag j, of its state in its inverse, and of the answer, in signals.
+        """Roundings of the output of lag j, of its state in the inverse, and of the answer, in units of signals.
 
-        `given`, `asked`: sizes of what it is given, and of what is asked of it.
+        `given`, `asked`: sizes of the input, and of the output asked for.
         """
         exact, (rate, second, late, inverse) = self.lags[j]
         bits, drop = (int(x) for x in self.tables.lag.block[j, [lag_fixed.BITS, lag_fixed.DROP]])
@@ -194,7 +196,7 @@ class Bounds:
         return 3.0 * kept + product + 0.5, kept + 3.0 * product, answer + 1.0
 
     def _lag_sizes(self) -> list[tuple[float, float]]:
-        """Of each lag, the largest input and the largest output that is asked for, in signals."""
+        """The largest input of each lag, and the largest output asked for, in units of signals."""
         given = float(max(map(abs, self.inner.drive)) << self._fine) + 1.0
         asked = given + 1.0
         if not self.static.stages:
@@ -208,13 +210,13 @@ class Bounds:
         return found[::-1]
 
     def _passed(self, each: Formats, error: float, own: float) -> float:
-        """Error of the input that a block of the user's own is solved for, by one of the output and an own one."""
+        """Error of the input that a user's own block is solved for, by an error of its output and a rounding `own`."""
         if self.condition:
             return error / abs(each.linear.forward.d) + own
         return each.linear.passed(error, own)
 
     def _gains(self) -> tuple[int, float]:
-        """How many gains there are, and the error of each as a share of the output."""
+        """The number of gains, and the error of each as a share of the output."""
         return len(self.parts.ageing) + len(self.parts.heat) + len(self.parts.thermal), 8.0 * 2.0**-GAIN_BITS
 
     def _warmed(self, degrees: Sequence[float]) -> float:
@@ -231,8 +233,8 @@ class Bounds:
         return self._warmed([thermal.most_at_once(each, ends, way, self.seconds) for each in self.parts.heat])
 
     def _saturation(self) -> tuple[float, float, float]:
-        """Of what saturates: the slope of its inverse at the ends of the output, the error of the inverse, and that of
-        the map, in output codes."""
+        """Saturation: the slope of its inverse at the ends of the output, the error of the inverse, and that of the
+        map, in output codes."""
         size = max(abs(end - self.static.output_offset) for end in self.ends)
         slope, back, there = 1.0, 0.0, 0.0
         bends = [self.bends[i : i + 2] for i in range(0, len(self.bends), 2)]
@@ -254,7 +256,7 @@ class Bounds:
         return slope, back, there
 
     def _late(self) -> float:
-        """Share of the output by which a gain is late, as in floating point."""
+        """Share of the output by which the gain is late, as in floating point."""
         if not self.parts.ageing:
             return 0.0
         moved = max(ageing.most_at_once(each, self.largest_step) for each in self.parts.ageing)
@@ -263,8 +265,8 @@ class Bounds:
     # ------------------------------------------------------------ operators
 
     def _arrival(self) -> tuple[float, float]:
-        """Roundings of what arrives in front of the plays for the drive as sent, forwards, and what rounding the drive
-        to a code makes of it, in signals."""
+        """Roundings of the signal in front of the plays for the drive as sent, and its change by rounding the drive to
+        a code, in units of signals."""
         places = zip(range(len(self.lags)), self._lag_sizes(), strict=True)
         here = sum(self._lag(j, *sizes)[0] for j, sizes in places) + sum(each.output for each in self.ahead)
         here += 0.5 * 2.0**self.finer if self.finer else 0.0
@@ -277,7 +279,7 @@ class Bounds:
 
     @cached_property
     def _shares(self) -> list[tuple[float, float]]:
-        """Factors of how each play moves, as in `FixedMovingTables`."""
+        """The factors `first` and `second` of each play, as in `FixedMovingTables`."""
         t = self.tables.moving
         return [
             (float(m) / 2.0 ** int(shift), float(n) / 2.0 ** int(second))
@@ -286,11 +288,11 @@ class Bounds:
 
     @cached_property
     def _bent(self) -> float:
-        """Largest change of what a play contributes for one of the play."""
+        """Largest change of a play's contribution per change of the play."""
         return 1.0 + steepest_bend(self.static, self.parts.plays) if self.bumps.curves else 1.0
 
     def _moved(self) -> float:
-        """What roundings, and contacts inside a step, make of the sum of plays that an effect moves or bends, in
+        """Error of the sum of plays that an effect moves or bends, by roundings and by contacts within a step, in
         codes."""
         t = self.tables.moving
         if not t.used:
@@ -308,14 +310,14 @@ class Bounds:
             else:
                 plays.append(step * (t.moves != PLAIN))
         slopes = 0.5 * len(t.relaxed.slope) * 2.0**-self.inner.bits * travel * t.scanned
-        slopes += len(plays) * 2.0**-self.inner.bits * self.bumps.largest  # weights, of what a bend adds
+        slopes += len(plays) * 2.0**-self.inner.bits * self.bumps.largest  # rounded weights of the bends
         each = (self._bent * play + self.bumps.error * step for play in plays)
         found = math.fsum(abs(p) * play for p, play in zip(self.static.pi.weights[1:], each, strict=True))
         return float(found / float(self.inner.output_lsb) + slopes)
 
     def _dashpot(self, step: float) -> float:
-        """How far plays with a nonlinear dashpot can be from where they are in the model, by its table and by where on
-        its way an input counts as standing still."""
+        """How far plays with a nonlinear dashpot can be from those of the model: by the table, and because the input
+        counts as standing still within a step."""
         t, way = self.tables.moving, self.largest_step
         effect, scale = next(filter(dashpot.nonlinear, self.parts.plays)), self.static.pi.thresholds[-1]
         seen = float(t.seen[0]) / 2.0 ** int(t.seen[1])
@@ -323,7 +325,7 @@ class Bounds:
 
     @cached_property
     def _steepest(self) -> float:
-        """Largest change of the sum of the plays for one of their input, at all samples."""
+        """Largest change of the sum of the plays per change of their input, at all samples."""
         first, *others = map(abs, self.static.pi.weights)
         dilated = self.tables.moving.moves == DILATED
         if not dilated and not self.bumps.curves:
@@ -332,17 +334,17 @@ class Bounds:
         return float(first + self._bent * math.fsum(more))
 
     def _plays(self, arriving: float) -> float:
-        """Error of the sum of the plays for one of what arrives in front of the memoryless part, in output codes."""
+        """Error of the sum of the plays, in output codes, for an error in front of the memoryless part."""
         steep = self.static.front_slopes[1] * self._steepest / float(self.inner.output_lsb)
         level = 0.5 * self._signal if self.drop else 0.0
         return self._bent * float(self.inner.sum_error()) + self._moved() + steep * arriving * self._arriving + level
 
     def forward(self) -> float:
-        """In output codes."""
+        """Bound of the forward operator, in output codes."""
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         waited = 0.5 * 2.0**self._fine * bool(self.tables.delay.samples and self.tables.delay.share[0])
         error = self._plays(self._arrival()[0] + short + waited)
-        if (self.lags or self.ahead) and self.static.branches_differ:  # what arrives comes to rest on either branch
+        if (self.lags or self.ahead) and self.static.branches_differ:  # the front may settle on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)
         for j, numbers in enumerate(self.creeps):
             error = error * numbers.rest + self._creep(j)
@@ -374,7 +376,7 @@ class Bounds:
         late = self._late() * self.sizes.still + self._warmed(self.heats) + self._warmed_at_once() / LEAST_GAIN
         error = (1.0 / LEAST_GAIN) ** gains * (error + gains * (share * self.sizes.still + self._signal) + late)
         whole = float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
-        apart = self._plays(self.slowed * whole) if self.slowed else 0.0  # states behind drives that a rate holds
+        apart = self._plays(self.slowed * whole) if self.slowed else 0.0  # states behind a slew limit in whole codes
         seen = apart * math.prod(numbers.rest for numbers in self.creeps)
         seen *= math.prod(max(each.linear.forward.largest, 1.0) for each in self.behind)
         for each in reversed(self.behind):
@@ -386,7 +388,7 @@ class Bounds:
         return error
 
     def _arriving_error(self) -> float:
-        """Error of what the inverse asks to arrive in front of the memoryless part, in signals."""
+        """Error of the signal that the inverse asks for in front of the memoryless part, in units of signals."""
         code = self._arrival()
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         steep = self.static.front_slopes[1]
@@ -394,9 +396,9 @@ class Bounds:
         solution = 1.5 * float(self.inner.step) if t.used and not t.scanned else float(self.inner.solved())
         solved = solution / self._arriving + steep * float(self.inner.back())
         slowed = self.slowed * float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
-        solved += steep * (code[0] if self.condition else sum(code) + short + slowed)  # what both have seen, or not
+        solved += steep * (code[0] if self.condition else sum(code) + short + slowed)  # both have seen it, or not
         missed_by = self._plays(0.0) * float(self.inner.output_lsb) + self._steepest * solved * self._arriving
-        for numbers in self.creeps:  # whose states have seen what the plays gave
+        for numbers in self.creeps:  # their states have seen the sum of the plays
             missed_by *= numbers.slope * self._creep_gain(numbers)
         for each in self.behind:
             missed_by = self._passed(each, 0.0, missed_by)
@@ -404,20 +406,20 @@ class Bounds:
         return self._gain() * residual / self._arriving
 
     def _gain(self) -> float:
-        """Largest change of the drive in front of the memoryless part for one of the plays' sum."""
+        """Largest change of the drive in front of the memoryless part per change of the plays' sum."""
         if self.tables.moving.moves == DILATED:  # for plays that have seen the same drives
             least = least_dilated(self.static, self.parts.plays, self.seconds)
             if self.bumps.curves:
                 least = min(least, 0.5 * least_slope(self.static, self.parts.plays))
             return 1.0 / least / self.static.front_slopes[0]
-        if self.tables.moving.used:  # as in floating point: each play is stretched further than it would be
+        if self.tables.moving.used:  # as in floating point
             bent = bool(self.bumps.curves)
             least = least_slope(self.static, self.parts.plays) if bent else self.static.pi.weights[0]
             return 2.0 / least / self.static.front_slopes[0]
         return float(self.inner.gain())
 
     def _led(self, error: float) -> float:
-        """The error of the drive in signals, for one of what is in front of the plays."""
+        """The error of the drive for an error in front of the plays, both in units of signals."""
         for j in range(len(self.ahead) - 1, -1, -1):
             code = 0.5 * 2.0**self._fine if j == 0 and not self.lags else 0.5
             error = self._passed(self.ahead[j], error + self.ahead[j].output, self.ahead[j].answer + code)
@@ -425,7 +427,7 @@ class Bounds:
             exact, (rate, second, late, _) = self.lags[j]
             _, kept, answer = self._lag(j, *self._lag_sizes()[j])
             code = 0.5 * 2.0**self._fine if j == 0 else 0.5
-            if not exact:  # whose states have seen the same drives
+            if not exact:  # its states have seen the same drives
                 goal = lag.shifted(second) * error + (1.0 + 2.0 * second) / (1.0 - second) * kept
                 error = (goal + kept) / rate + answer + code
             elif self.condition:
@@ -435,20 +437,20 @@ class Bounds:
         return error
 
     def _codes(self, error: float) -> float:
-        """An error of the drive, in signals in front of the plays, in drive codes."""
+        """The error of the drive in drive codes, for an error in front of the plays in units of signals."""
         own = SECOND_ORDER * self._led(error) / 2.0**self._fine
         whole = float(self.inner.drive[1] - self.inner.drive[0])
         return upward(Fraction(min(own + DOUBLE * whole, whole)))
 
     def hold(self) -> int:
-        """Signals in front of the plays by which the drive steps back by rounding alone."""
+        """Steps back of the drive that come only from rounding, at most this long, in units of signals."""
         if not self.static.branches_differ or not self.inner.invertible:
             return 0
         return math.floor(2.0 * self._arriving_error())
 
     @property
     def condition(self) -> str:
-        """What `rounding` holds for where drives in front of a lag can part without a bound but the range."""
+        """The condition of `rounding` in words, if only the range bounds the difference of two drives; else ""."""
         led = any(not exact for exact, _ in self.lags)
         dilated = self.tables.moving.moves == DILATED
         followed = self.lags or self.ahead
@@ -457,11 +459,11 @@ class Bounds:
         return "both have seen the same drives" + (", nothing limited" if not self.reached else "")
 
     def rounding(self) -> float:
-        """Of the inverse, in drive codes, on the same branch, and under its `condition`."""
+        """Bound of the inverse on the same branch and under its `condition`, in drive codes."""
         return self._codes(self._arriving_error())
 
     def inverse(self) -> float:
-        """The same with what another branch and limits make."""
+        """Bound of the inverse in drive codes, with the effect of another branch and of limits."""
         if self.condition:
             return float(self.inner.drive[1] - self.inner.drive[0])
         if not self.static.branches_differ:

@@ -1,10 +1,10 @@
 """From a model with effects to whole numbers: signals, ranges and constants of fixed point.
 
-Signals. In front of the plays they are in units of the plays' input, which is a drive code or finer; behind the plays
-in a fraction of an output code, `LEVEL_BITS` bits. Every signal is bounded here, by intervals from the drive on and
-from the reference back, and these bits are as many as let all of them be factors of a product (`LARGEST`). States of
-filters have bits below that, as many as keep the slowest one from stalling. So no sum or product can overflow, whatever
-is called in whatever order; what does not fit is refused.
+Signals in front of the plays are in units of the plays' input, which is a drive code or finer; signals behind the plays
+have `LEVEL_BITS` bits below an output code. Every signal is bounded here, by intervals propagated forwards from the
+drive and backwards from the reference; there are as many bits as let every signal be a factor of a product (`LARGEST`).
+States of filters have as many bits below those of signals as keep the slowest state from stalling. No sum or product
+can overflow, whatever is called in whatever order; a model that does not fit is refused.
 """
 
 from __future__ import annotations
@@ -71,34 +71,36 @@ from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 
 TEMPERATURE_BITS = {15: 7, 31: 22}
-"""Fraction bits of a temperature in degC by the bits of a code: 256 or 512 degrees either way."""
+"""Fraction bits of a temperature in degC by the bits of a code: +-256 or +-512 degrees."""
 
 BEYOND = 7
-"""Spans of their input by which plays in front of a lag may be asked for more than the drive gives: 8 of 2^26 steps,
-with their sign, fit 32 bits."""
+"""Most spans beyond its range for which the input of plays behind a lag may be asked: 8 spans of 2^26 steps and a sign
+fit in 32 bits."""
 
 MOST_FINER = 16
-"""Bits of what arrives in front of the plays below their input: then a slope of 31 bits is still divided by in 64."""
+"""Most bits of a signal in front of the plays below their input: the division by a slope of 31 bits then still fits in
+64."""
 
 BEND_BITS = 30
 """Bits of the arguments and values of a curve, without their sign."""
 
 STEEP = 4.0
-"""Levels of a tanh to which a displacement is led back: the slope is 750 there."""
+"""Largest argument of a tanh to which a displacement is inverted, in its levels: the slope of the inverse is 750
+there."""
 
 
 def build(
     chain: Chain, arithmetic: str, seconds: float, how: Compensation, lsb: tuple[float | None, float | None]
 ) -> Compiled:
-    """The model in 'q31' or 'q15' at steps of `seconds`, whose effects have no `tables.refusals`.
+    """The model in 'q31' or 'q15' at steps of `seconds`, if none of its effects is among the `tables.refusals`.
 
-    Raises FormatError when a given LSB does not fit the type, or a signal or a constant the arithmetic.
+    Raises FormatError if a given LSB does not fit the type, or a signal or a constant does not fit the arithmetic.
     """
     return _Builder(chain, arithmetic, seconds, how, lsb).build()
 
 
 class _Builder:
-    """The steps of `build`, each with what the ones before it found."""
+    """The steps of `build`, each of which uses the results of those before it."""
 
     def __init__(
         self, chain: Chain, arithmetic: str, seconds: float, how: Compensation, lsb: tuple[float | None, float | None]
@@ -253,20 +255,20 @@ class _Builder:
         return Sizes(plays, creeps, pairs, modes, saturations, still + away, size + away, undone, target, asked)
 
     def led_back(self, effect: TanhSaturation, settled: float, size: float) -> float:
-        """Largest input to which a displacement is led back: any that the model has at rest at least."""
+        """Largest input to which a displacement is inverted; never less than the model reaches at rest."""
         return max(settled, min(size, STEEP * self._code(effect.level)))
 
     def _beyond(self) -> tuple[int, bool]:
-        """Spans of their input by which plays have to be asked for more than the drive gives, and whether they are.
+        """How far beyond its range the input of the plays has to be asked for, in spans, and whether all of it can be.
 
-        The lag leads to what is asked, and goes on from there; behind a memoryless part there is nothing beyond.
+        A lag is led there and goes on; behind a memoryless part there is nothing beyond the range.
         """
         if self.static.stages:
             return 0, False
         low, high = self.static.play_range
         most = self.sizes.asked * float(self.output_lsb) / self.static.pi.slopes[-1]
         spans = math.ceil((most + max(abs(low), abs(high))) / (high - low)) + 1
-        straight = not any(effect.bends_plays() for effect in self.parts.plays)  # bent ones are straight beyond
+        straight = not any(effect.bends_plays() for effect in self.parts.plays)  # bent ones are straight outside
         return min(spans, BEYOND), spans <= BEYOND and straight
 
     # ------------------------------------------------------------ constants
@@ -284,7 +286,7 @@ class _Builder:
 
     @cached_property
     def bumps(self) -> Bumps:
-        """What bent plays contribute beyond themselves."""
+        """What bent plays contribute in addition to the plays themselves."""
         end = max(map(abs, self.inner.hull))
         try:
             return moving.bumps(self.static, self.parts.plays, float(self.inner.step), end, self.about.degree)
@@ -296,7 +298,7 @@ class _Builder:
         """Those of the whole chain."""
         limits = plays.copy()
         low, high = Fraction(self.low) / self.output_lsb, Fraction(self.high) / self.output_lsb
-        slack = Fraction(1, 1024)  # as much as double precision may have moved an end off a code
+        slack = Fraction(1, 1024)  # double precision may have moved an end off a code by as much
         limits[slots.OUTPUT_MIN], limits[slots.OUTPUT_MAX] = math.ceil(low - slack), math.floor(high + slack)
         limits[slots.OFFSET] = 0
         most = self.about.code_max
@@ -329,18 +331,18 @@ class _Builder:
         return found
 
     def _max_rate(self) -> float:
-        """As in `Compiled`, for rates in whole codes."""
+        """`Compiled.max_rate`, for slew limits in whole codes."""
         found = fastest(self.static, self.parts, self.seconds, self.how)
         whole = (math.floor(rate) * float(self.drive_lsb) / self.seconds for rate in self.rates())
         return min(found, *whole) if self.parts.slew else found
 
     def _largest_step(self) -> float:
-        """As in `Compiled`."""
+        """`Compiled.largest_step`."""
         low, high = self.static.input_range
         return min(self._max_rate() * self.seconds, high - low)
 
     def rates(self) -> tuple[Fraction, ...]:
-        """Drive codes by which the drive may rise and fall in one step, where anything limits that."""
+        """Drive codes by which the drive may rise and fall in one step; empty without a slew limit."""
         if not self.parts.slew:
             return ()
         pairs = [(each.rate, each.falling_rate) for each in self.parts.slew]
@@ -369,9 +371,10 @@ class _Builder:
         return None
 
     def _finest(self) -> int:
-        """Bits below the plays' input that keep the lead of the lags from making more of its rounding than half a code.
+        """Bits below the plays' input with which the lead of the lags amplifies rounding to no more than half a code.
 
-        Plays alone have them, in an arithmetic that has none below a drive code.
+        Only models without a memoryless part and effects on plays have them, and only if the input of the plays has no
+        bits below a drive code.
         """
         if self.static.stages or self.parts.plays or self.inner.fine:
             return 0
@@ -409,7 +412,7 @@ class _Builder:
 
     @cached_property
     def clocks(self) -> list[ClockNumbers]:
-        """Drifts that are counted, for references as far ahead as they may come."""
+        """The clocks of the drifts, for references as far ahead as they may come."""
         ahead = self.how.preview if self.how.preview is not None else max(self.taps.ahead, 0) if self.taps else 0
         signal = self.output_lsb / 2**self.bits
         farthest = float(self.signal(self.high - self.low))
@@ -499,7 +502,7 @@ class _Builder:
         )
 
     def _bends(self, level: float, size: float, back: float) -> tuple[Bend, Bend]:
-        """The curves of a tanh for inputs up to `size` codes, and those that lead back up to `back`."""
+        """The curve of a tanh for inputs up to `size` codes, and its inverse for results up to `back`."""
         scale = 2.0**self.bits
 
         def curve(function: Callable[[float], float], most: float, value: float) -> Bend:
@@ -523,6 +526,6 @@ class _Builder:
 
 
 def setting_codes(tables: ChainTables) -> tuple[float, float]:
-    """Codes of a degree, and of a gain of 1."""
+    """Codes per degree, and the code of the gain 1."""
     most = int(tables.limits[slots.CODE_MAX]) + 1
     return 2.0 ** TEMPERATURE_BITS[most.bit_length() - 1], most / 4

@@ -45,7 +45,7 @@ from hystgen.plays import slots
 
 
 def _behind(parts: Parts, arithmetic: str) -> Stages:
-    """The stages of saturation: an envelope, or three straight pieces."""
+    """The stages of saturation, each an envelope or three straight pieces."""
     dtype = ARITHMETICS[arithmetic].computed.type
     kinds: list[int] = []
     firsts: list[int] = []
@@ -106,8 +106,7 @@ def _heat(
 def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> Compiled:
     """The model in 'float32' or 'float64' at steps of `seconds`.
 
-    None of its effects is among the `refusals`. Raises FormatError when a
-    number does not fit the arithmetic.
+    None of its effects is among the `tables.refusals`. Raises FormatError if a number does not fit the arithmetic.
     """
     dtype = ARITHMETICS[arithmetic].computed.type
     largest = float(np.finfo(dtype).max) / 16

@@ -31,22 +31,23 @@ from hystgen.parameters.schema import Compensation
 from hystgen.plays.slots import Counts, Reals
 
 OFFSET, FARTHEST, RISING, FALLING, SHARE = range(5)
-"""Places in `ChainTables.number`: output offset, how far another one may be set, how far the drive may move in a step,
-and the share that verification corrects with."""
+"""Places in `ChainTables.number`: output offset, the largest offset that may be set, how far the drive may rise and
+fall in a step, and the share with which verification corrects."""
 
 LEVEL_BITS, LEVEL_DROP, LARGEST_LEVEL, LEAST_CODE, MOST_CODE, SHARE_BITS, DRIVE_BITS, ARRIVING_BITS = range(5, 13)
-"""More of them in fixed point: bits of a signal behind the plays below an output code, those that a sum of the plays
-has beyond that, the largest sum that is asked of the plays, between which codes a drive is kept before it is limited,
+"""Further places in fixed point: bits of a signal behind the plays below an output code, bits of a sum of the plays
+below those of a signal, the largest sum asked of the plays, the least and largest code of a drive before it is limited,
 bits of a mantissa below a code, and bits of a signal in front of the plays below a drive code and below their input."""
 
 TRAVEL_BITS = 16
-"""In fixed point verification sets travels of whole multiples of 2^16 drive codes."""
+"""In fixed point, verification sets travels in multiples of 2^16 drive codes."""
 
 VERIFIED_SHARE = 0.125
+"""The share with which verification corrects: a number of every arithmetic."""
 
 SAMPLES_A_SWEEP = 50
-"""A drive that takes no fewer samples from one end of its range to the other is what bounds are stated for: at a
-hundredth of the sample rate a triangle still has shape, and what ageing and contacts inside a step leave is small."""
+"""Fewest samples from one end of the drive's range to the other for which bounds are stated: a triangle at a hundredth
+of the sample rate still has its shape, and errors by ageing and by contacts within a step are small."""
 
 
 class Stages(NamedTuple):
@@ -63,8 +64,8 @@ class Stages(NamedTuple):
 class ChainTables(NamedTuple):
     """The constants of one model with effects in one arithmetic.
 
-    `limits`: as in `Tables`, of the whole chain; `plays`: front and plays, in floating point with the same limits, in
-    fixed point with those of a drive that may have bits below a code, both without an offset; `behind`: saturation.
+    `limits`: as in `Tables`, of the whole chain; `plays`: front and plays without an offset, with the same limits in
+    floating point, and in fixed point with limits of a drive that may have bits below a code; `behind`: saturation.
     """
 
     plays: Any  # `Tables` or `FixedTables`
@@ -82,11 +83,11 @@ class ChainTables(NamedTuple):
     behind: Any  # `Stages`, or in fixed point `hystgen.effects.saturation.fixed.Saturations`
     tap: Reals  # (L,), in fixed point factors (L, 2); none without a preview
     number: Reals
-    slew: int  # 1 where the drive is kept within a rate
+    slew: int  # 1 if the rate of the drive is limited
 
     @property
     def fixed(self) -> bool:
-        """Whether it is fixed point."""
+        """Whether the arithmetic is fixed point."""
         return bool(self.plays.fixed)
 
     @property
@@ -97,20 +98,20 @@ class ChainTables(NamedTuple):
 
 
 class OwnChainTables(ChainTables):
-    """The same of a model with effects of the user's own; their classes are those of `own`, in its order."""
+    """The same of a model with effects of the user's own, whose classes are in the order of `own`."""
 
     own_effects: tuple[type[Effect], ...]
 
     @property
     def own_blocks(self) -> tuple[tuple[OwnBlock, ...], tuple[OwnBlock, ...]]:
-        """What they are made of, in front of the plays and behind."""
+        """Their blocks, in front of the plays and behind."""
         blocks = tuple(effect.block for effect in self.own_effects if effect.block is not None)
         return blocks[: self.own.ahead], blocks[self.own.ahead :]
 
 
 @dataclass(frozen=True)
 class Parts:
-    """The effects of a model by what the chain makes of them, those in order that the chain meets one by one."""
+    """The effects of a model by their part in the chain, each list in the order of the chain."""
 
     lags: list[Any]
     creeps: list[Any]
@@ -128,7 +129,7 @@ class Parts:
 
     @classmethod
     def of(cls, effects: Sequence[Effect]) -> Parts:
-        """Those of a chain's effects."""
+        """Sort the effects of a chain."""
 
         def called(name: str) -> list[Any]:
             return [effect for effect in effects if effect.name == name]
@@ -147,10 +148,10 @@ class Parts:
 
 @dataclass(frozen=True)
 class Codes:
-    """What fixed point makes of a model with effects: physical units a code, bounds in codes, and ranges.
+    """A model with effects in fixed point: physical units per code, bounds in codes, and ranges.
 
     `forward_error` in output codes, `inverse_error` and the part of it on the same branch, `inverse_rounding`, in drive
-    codes; `condition`: what else that holds for, in words; `largest`: bound of every signal.
+    codes; `condition`: the condition of `inverse_rounding` in words; `largest`: bound of every signal.
     """
 
     drive_lsb: Fraction
@@ -189,7 +190,7 @@ class Compiled:
 
     @property
     def needed(self) -> int:
-        """Samples that the reference has to be ahead for the motion to be in time."""
+        """Samples by which the reference has to be ahead for the motion to be in time."""
         return max(self.taps.ahead, 0) if self.taps else 0
 
     @cached_property
@@ -204,7 +205,7 @@ class Compiled:
 
     @cached_property
     def noise_gain(self) -> float:
-        """Largest gain, over all frequencies, from the reference to the drive, over that at rest."""
+        """Largest gain from reference to drive over all frequencies, divided by the gain at rest."""
         z = np.exp(-1j * np.linspace(0.0, np.pi, 2001))
         gain = np.ones_like(z)
         if self.taps:
@@ -226,16 +227,16 @@ class Compiled:
 
 
 def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> float:
-    """NAME_MAX_RATE, in drive units a second: what is asked for, or a slow sweep, and no more than the amplifier does.
+    """NAME_MAX_RATE in drive units per second: as asked for, else a slow sweep, and no more than the amplifier can do.
 
-    A drive beyond a slew limit is another than the one that the C is given, by where in a step it is reached.
+    Beyond a slew limit the drive differs from the one given to the C, depending on when in a step it is reached.
     """
     asked = how.max_rate or (static.input_range[1] - static.input_range[0]) / (SAMPLES_A_SWEEP * seconds)
     return float(min([asked, *(rate for each in parts.slew for rate in (each.rate, each.falling_rate))]))
 
 
 def taps_of(parts: Parts, seconds: float, how: Compensation) -> Taps | None:
-    """The weights of the reference that are asked for; None where it is taken as it comes."""
+    """The weights of the reference in the preview; None if the reference is taken as it comes."""
     delay = parts.delay + (0.5 * seconds if how.drive_hold == "held" else 0.0)
     modes = parts.modes if how.resonance == "inverse" else []
     needed = preview.taps(delay, modes, seconds, how.taps, how.corner)
@@ -244,7 +245,7 @@ def taps_of(parts: Parts, seconds: float, how: Compensation) -> Taps | None:
 
 
 def settled(static: StaticModel, effects: Sequence[Effect], w: float) -> float:
-    """The sum of the plays once their input has gone straight to w from the start memory."""
+    """The sum of the plays after their input has gone straight to w from the start memory."""
     pi = static.pi
     r = np.array(pi.thresholds)
     rows = np.clip(np.array(pi.start), w - r, w + r)[:, None]

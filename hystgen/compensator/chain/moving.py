@@ -1,13 +1,14 @@
 """Plays that an effect moves or bends in its own way: the constants of `c_runtime/chain_moving.c`.
 
-Play i is kept as where it would come to rest and what it contributes there. A plain play rests where it is; a viscous
-one is on its way there, `z = q + b1 dz_r(w - q)` at the end of a step, whose rest a step later is
-`q = z + (1 - E/M) dz_r(w - z)` with `M = (1 - E) tau/T` and dz_r what lies beyond +-r: the exact response to a straight
+The state of play i is where it would come to rest, and what it contributes there. A plain play rests where it is. A
+viscous one, with the state q before a step, is at `z = q + b1 dz_r(w - q)` at the end of the step, and its new state is
+`q = z + (1 - E/M) dz_r(w - z)`, with `M = (1 - E) tau/T` and dz_r the part beyond +-r: the exact response to a straight
 input while the play slides or rests.
 
-A play with a nonlinear dashpot is kept where it is, in two parts: in a step its input counts as if it stood at a share
-a of the way, `z' = z + D(dz_r(x + a (w - x) - z))` with D what a stretch yields in a step by the dashpot's own law. Two
-such plays with inputs that differ by at most e stay within e of each other, so that the error is at most a of the way.
+The state of a play with a nonlinear dashpot is where it is, in two parts. In a step its input counts as if it stood
+still at a fraction a of the way: `z' = z + D(dz_r(x + a (w - x) - z))`, with D the yield of a stretch in a step by the
+dashpot's own law. Two such plays whose inputs differ by at most e stay within e of each other, so that the error is at
+most a times the way.
 """
 
 from __future__ import annotations
@@ -42,23 +43,23 @@ SCALE, INVERSE_SCALE, MIDDLE, INVERSE_WIDTH, BUMP, TANH_CENTRE, LEAST_INPUT, LAR
 """Places in `MovingTables.number`."""
 
 CELLS = 4096
-"""Inputs at which the slope of bent plays is looked at: a cell of 1/4096 of the range is far below the width of any
-bump that a record shows, of which a search takes none below a twentieth of it."""
+"""Cells in which the slope of bent plays is computed: 1/4096 of the range is far below the width of any bump that a
+record shows; a search accepts none below a twentieth of the range."""
 
 YIELD_BEGIN, YIELD_C0, YIELD_C1, YIELD_C2, YIELD_C3, YIELD_SCALE, YIELD_LIFT = range(7)
-"""Columns of what a nonlinear dashpot yields in fixed point, as `hystgen_yield_t` has them."""
+"""Columns of the yields of a nonlinear dashpot in fixed point, as in `hystgen_yield_t`."""
 
 MOST_YIELD_BITS = 30
-"""Bits of a yield below a step of the plays' input: what is lost of one is kept in 32 bits."""
+"""Most bits of a yield below a step of the plays' input: its rounding error is kept in 32 bits."""
 
 FINEST_BUMP = 8
-"""Most bits of what a bent play contributes below a step of its input: with them its curve adds a 16th of a step."""
+"""Most bits of a bent play's contribution below a step of its input: the error of its curve is then a 16th of a
+step."""
 
 
 class MovingTables(NamedTuple):
-    """`first`, `second` (n + 1,): of dilated plays how much wider a threshold is per unit of the way of a step, of
-    viscous ones b1 and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials; `halves` of the search; `used`: 0
-    for plain plays that nothing bends, which engine loop solves."""
+    """`first`, `second` (n + 1,): for dilated plays the growth of a threshold per unit of a step, for viscous ones b1
+    and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials; `halves`: bisections of the search."""
 
     moves: int
     bends: int
@@ -67,24 +68,24 @@ class MovingTables(NamedTuple):
     curve: Reals
     number: Reals
     halves: int
-    scanned: int  # 1 for viscous plays of one time constant that nothing bends
-    share: Reals  # of these, p_i b1 (n + 1,)
+    scanned: int  # 1 for viscous plays with one time constant that nothing bends
+    share: Reals  # for those, p_i b1 (n + 1,)
     inverse: Reals  # 1 / (p_0 + b1 (p_1 + ... + p_i))
-    yields: Reals  # (K, 5): what a nonlinear dashpot yields, by pieces
+    yields: Reals  # (K, 5): yields of a nonlinear dashpot, by pieces
 
     @property
     def used(self) -> bool:
-        """Whether plays are other than those of engine loop."""
+        """Whether an effect moves or bends the plays; engine loop solves them if not."""
         return self.moves != PLAIN or self.bends != STRAIGHT
 
 
 class FixedMovingTables(NamedTuple):
     """The same in fixed point: `first`, `second` are factors (n + 1, 2), `farthest` the largest input that a search
-    takes, and `relaxed` tables of plays whose sums have the slopes that viscous ones of one time constant have in a
-    step. `bump`: curves of what bent plays contribute beyond the play itself, with `bump_bits` bits below a step of
-    their input; `bump_of` (n + 1,): which of them is a play's.
-    `yields` (K, 7): what a nonlinear dashpot yields with `yield_bits` bits below a step, in pieces as `YIELD_BEGIN` and
-    so on have it, for stretches up to `stretch`; `seen`: a factor."""
+    tries, and `relaxed` tables of plays with the slopes that viscous plays with one time constant have in a step.
+    `bump`: curves of what bent plays contribute in addition to the play itself, with `bump_bits` bits below a step of
+    their input; `bump_of` (n + 1,): the curve of each play.
+    `yields` (K, 7): yields of a nonlinear dashpot with `yield_bits` bits below a step, with columns `YIELD_BEGIN` and
+    so on, for stretches up to `stretch`; `seen`: a factor."""
 
     moves: int
     bends: int
@@ -103,15 +104,15 @@ class FixedMovingTables(NamedTuple):
 
     @property
     def used(self) -> bool:
-        """Whether plays are other than those of engine loop."""
+        """Whether an effect moves or bends the plays; engine loop solves them if not."""
         return self.moves != PLAIN or self.bends != STRAIGHT
 
 
 @dataclass(frozen=True)
 class Bumps:
-    """What bent plays contribute beyond the play itself, in fixed point: curves for whole inputs up to `end` of either
-    sign, whose values have `bits` bits below a step of the input and leave out `lift`; `of` (n + 1): which one is a
-    play's; `largest`: of all values, in steps."""
+    """What bent plays contribute in addition to the play itself, in fixed point: curves for whole inputs from -`end` to
+    `end`, whose values have `bits` bits below a step of the input and leave out `lift` of them; `of` (n + 1): the curve
+    of each play; `largest`: the largest value, in steps."""
 
     curves: list[FixedCurve]
     of: list[int]
@@ -128,7 +129,7 @@ class Bumps:
 
 
 def problems(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
-    """Which effects on plays the C cannot solve for at steps of `seconds`, and why."""
+    """The effects on plays that the C cannot solve for at steps of `seconds`, each with its reason."""
     bending = [effect for effect in effects if effect.bends_plays()]
     yield from ((effect, "one effect bends the plays, and there is another one") for effect in bending[1:])
     if not bending:
@@ -141,21 +142,21 @@ def problems(static: StaticModel, effects: Sequence[Effect], seconds: float) -> 
 
 
 def _dilated(static: StaticModel, effects: Sequence[Effect], seconds: float) -> bool:
-    """Whether thresholds grow with the rate as they are, without viscous plays in their place."""
+    """Whether thresholds grow with the rate and are emitted as such, without viscous plays in their place."""
     r, p = np.array(static.pi.thresholds), np.array(static.pi.weights)
     thresholds = [effect for effect in effects if isinstance(effect, ThresholdRate)]
     return any(Movement(effect, r, p).by_threshold(seconds) for effect in thresholds)
 
 
 def beyond_forward(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
-    """Thresholds that grow so fast with the rate that viscous plays stand in for them, in the inverse alone."""
+    """Thresholds that grow so fast with the rate that viscous plays replace them, which only the inverse may do."""
     for effect in effects:
         if isinstance(effect, ThresholdRate) and not _dilated(static, [effect], seconds):
             yield effect, "viscous plays stand in for it, which only the inverse may; emit the inverse alone"
 
 
 def least_dilated(static: StaticModel, effects: Sequence[Effect], seconds: float) -> float:
-    """Least change of the sum per change of the plays' input in one step, of plays whose thresholds grow with it."""
+    """Least change of the sum per change of the plays' input in one step, for thresholds that grow with the rate."""
     p = np.array(static.pi.weights)
     found = float(p[0])
     steep = 1.0 + steepest_bend(static, effects)
@@ -166,7 +167,8 @@ def least_dilated(static: StaticModel, effects: Sequence[Effect], seconds: float
 
 
 def least_slope(static: StaticModel, effects: Sequence[Effect]) -> float:
-    """Least change of the sum per change of the plays' input, over what they can reach and any number that follow."""
+    """Least change of the sum per change of the plays' input, over their reach and over any number of plays that
+    follow."""
     low, high = static.play_range
     p, r = np.array(static.pi.weights), np.array(static.pi.thresholds)
     at = np.linspace(low - r[-1], high + r[-1], CELLS + 1)
@@ -179,7 +181,7 @@ def least_slope(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 
 def steepest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
-    """Largest slope by which a bent play differs from the play itself."""
+    """Largest difference between the slope of a bent play and 1, the slope of the play itself."""
     low, high = static.play_range
     r = np.array(static.pi.thresholds)
     at = np.linspace(low - r[-1], high + r[-1], CELLS + 1)
@@ -238,7 +240,7 @@ def build(
 
 
 def largest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
-    """Most by which what a bent play contributes differs from the play itself, over where plays can be."""
+    """Largest difference between the contribution of a bent play and the play itself, over the reach of plays."""
     r, far = np.array(static.pi.thresholds), _far(static)
     rows = np.tile(np.linspace(-far, far, CELLS + 1), (len(r), 1))
     away = np.zeros_like(rows)
@@ -249,13 +251,12 @@ def largest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 
 def _far(static: StaticModel) -> float:
-    """Farthest from 0 that plays can be, and a little more."""
+    """Largest distance of plays from 0, and a little more."""
     return 1.001 * max(*map(abs, static.play_range), *map(abs, static.pi.start))
 
 
 def bumps(static: StaticModel, effects: Sequence[Effect], step: float, end: int, degree: int) -> Bumps:
-    """Curves of bent plays for inputs in steps of `step`, up to `end`. Raises FormatError for those that bend too
-    sharply."""
+    """Curves of bent plays for inputs in steps of `step`, up to `end`. Raises FormatError if one bends too sharply."""
     largest = largest_bend(static, effects) / step
     room = 30 - max(0, math.ceil(math.log2(max(largest, 1.0))))
     bits, lift = max(0, min(room, FINEST_BUMP)), max(0, -room)
@@ -277,7 +278,7 @@ def bumps(static: StaticModel, effects: Sequence[Effect], step: float, end: int,
 
 
 def _bump(effect: Effect, i: int, scale: float) -> tuple[Any, Callable[[float], float]]:
-    """What a bent play contributes beyond itself, and what distinguishes it from other plays."""
+    """A key that plays with the same bend share, and the contribution of a bent play in addition to itself."""
     if isinstance(effect, PlayFunctions):
         row = effect.coefficients[i - 1]
 
@@ -330,9 +331,9 @@ def build_fixed(
 def _yields(
     law: Callable[[float], tuple[float, float]], begins: Sequence[int], end: int, step: float, bits: int
 ) -> list[tuple[int, ...]]:
-    """Pieces of what stretches up to `end` yield, cubic between whole knots; the first one is straight."""
+    """Pieces of the yields of stretches up to `end`, cubic between whole knots; the first one is straight."""
     knots = sorted({0, end + 1, *(x for x in begins if 0 < x <= end)})
-    while knots[-2] and dashpot.LONGEST * knots[-2] < end:  # beyond what the model's own table reaches
+    while knots[-2] and dashpot.LONGEST * knots[-2] < end:  # beyond the end of the table in floating point
         knots.insert(-1, int(dashpot.LONGEST) * knots[-2])
     while (wide := max(b - a for a, b in itertools.pairwise(knots))) > 2**30:
         k = next(i for i, (a, b) in enumerate(itertools.pairwise(knots)) if b - a == wide)
@@ -356,7 +357,8 @@ def _yields(
 def yield_error(
     t: FixedMovingTables, effect: RelaxingPlays, scale: float, seconds: float, step: float, way: float
 ) -> float:
-    """As `dashpot.stretch_error`, of tables in fixed point with steps of `step`: what rounding holds back, too."""
+    """As `dashpot.stretch_error`, for tables in fixed point with steps of `step`, plus the stretch that rounding holds
+    back."""
     rows, held = [], 0.0
     for begin, *c, shift, lift in t.yields.tolist():
         unit, run = step * 2.0 ** (lift - t.yield_bits), step * 2.0 ** (31 - shift)
@@ -367,7 +369,7 @@ def yield_error(
 
 
 def _relaxed(plays: FixedTables, late: float) -> FixedTables:
-    """Plays with the slopes that viscous ones have in a step, of which they gain a share of `late`."""
+    """Plays with the slopes of viscous ones that gain the share `late` of their stretch in a step."""
     weight = plays.weight
     sums = [0, int(weight[0])]
     for p in weight[1:].tolist():
@@ -391,7 +393,7 @@ def stretch(x: Any, r: Any) -> Any:
 
 
 def _viscous(seconds: float, tau: float) -> tuple[float, float]:
-    """b1 and 1 - E/M of a step; a play without time constant follows at once."""
+    """b1 and 1 - E/M of a step; a play with the time constant 0 follows at once."""
     if not tau > 0.0:
         return 1.0, 0.0
     decay, _, late = (float(x[0]) for x in decays(np.array([seconds]), tau))

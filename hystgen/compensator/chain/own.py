@@ -1,9 +1,9 @@
-"""Blocks of effects of the user's own: their numbers, what they do to signals, and to errors.
+"""Blocks of effects of the user's own: their numbers, and their gains for signals and errors.
 
-Such a block is linear, so that its functions, called with one number after the other, say what it does: forwards
-`s <- A s + B x`, `y = C s + D x` by absorb, and backwards from y to x by solve and then absorb. Sums over all later
-samples are bounded mode by mode: `sum |C A^k B| <= sum |c_j b_j|/(1 - |lambda_j|)` in the eigenvectors of A, or by sums
-of powers of A, whichever is smaller; where two modes are one, only by powers.
+Such a block is linear, so that calls of its functions with unit states and inputs give its matrices: forwards
+`s <- A s + B x`, `y = C s + D x` from absorb, and backwards from y to x from solve followed by absorb. Sums over all
+later samples are bounded mode by mode, `sum |C A^k B| <= sum |c_j b_j|/(1 - |lambda_j|)` in the eigenvectors of A, or
+by sums of powers of A, whichever is smaller; if two modes coincide, only by powers.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from hystgen.effects.kinds import Constants
 from hystgen.plays.slots import Counts, Reals
 
 SAME = 1e-9
-"""Relative difference up to which two answers of a block are the same but for rounding, with a time constant of up to a
-million samples: their quotient is what a difference of states loses."""
+"""Relative difference up to which two answers of a block differ only by rounding, for time constants of up to a million
+samples, with which a difference of states loses as many digits."""
 
 
 class OwnTables(NamedTuple):
-    """Blocks in front of the plays, then those behind: `number` (m,), in fixed point (m, 4), those of each from `first`
-    (k + 1) on; the memory of each from `place` (k + 1) on; `bits` (k,): of its signals below those of the chain, in
-    fixed point; `ahead`: how many stand in front."""
+    """Blocks in front of the plays, then those behind: `number` (m,), in fixed point (m, 4), of block j from `first[j]`
+    (k + 1) on; its memory from `place[j]` (k + 1) on; `bits` (k,): bits of its signals below those of the chain, in
+    fixed point; `ahead`: the number of blocks in front."""
 
     first: Counts
     number: Reals
@@ -49,9 +49,9 @@ class System:
     d: float
 
     def _modes(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]] | None:
-        """Reciprocals of what each mode loses in a sample, eigenvectors, and their inverse.
+        """Reciprocals of each mode's loss in a sample, the eigenvectors, and their inverse.
 
-        None where two modes are one, so that the eigenvectors do not span the states.
+        None if two modes coincide, so that the eigenvectors do not span the states.
         """
         values, vectors = np.linalg.eig(self.a)
         if np.linalg.matrix_rank(vectors) < len(values):
@@ -66,13 +66,13 @@ class System:
             while not np.max(np.sum(np.abs(power), axis=1), initial=0.0) <= 0.5:
                 total = total + total @ np.abs(power)
                 power = power @ power
-                if not np.all(np.isfinite(total)):  # nothing is lost
+                if not np.all(np.isfinite(total)):  # a mode does not decay
                     return np.full_like(total, math.inf)
         return total @ np.linalg.inv(np.eye(len(self.b)) - np.abs(power))
 
     @property
     def radius(self) -> float:
-        """Largest share of a disturbance that is left after a sample, in the end."""
+        """Spectral radius: the share of a disturbance that a sample leaves in the long run."""
         return float(np.max(np.abs(np.linalg.eigvals(self.a)), initial=0.0))
 
     def states(self) -> Array:
@@ -84,7 +84,7 @@ class System:
         return np.asarray(bound)
 
     def after(self) -> Array:
-        """Sum (n,) of all that one disturbance of each state makes of the output."""
+        """Sum (n,) of the output's absolute changes by one disturbance of each state."""
         bound = np.abs(self.c) @ self._sums()
         if (modes := self._modes()) is not None:
             lost, vectors, back = modes
@@ -92,7 +92,7 @@ class System:
         return np.asarray(bound)
 
     def once(self) -> Array:
-        """Largest output (n,) that a disturbance of each state makes at any later sample."""
+        """Largest change (n,) of the output at any later sample by one disturbance of each state."""
         bound = self.after()
         if (modes := self._modes()) is not None:
             _, vectors, back = modes
@@ -100,7 +100,7 @@ class System:
         return bound
 
     def before(self) -> float:
-        """Largest output that inputs within 1 up to the sample before make."""
+        """Largest output from earlier inputs within 1."""
         bound = float(self.after() @ np.abs(self.b))
         if (modes := self._modes()) is not None:
             lost, vectors, back = modes
@@ -113,7 +113,7 @@ class System:
         return abs(self.d) + self.before()
 
     def response(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Response (N,) where the sample before is z^-1 = `z` (N,) of the sample."""
+        """Response (N,) at `z` (N,), the factor z^-1 of a delay by one sample."""
         eye = np.eye(len(self.b))
         return np.array([self.d + x * self.c @ np.linalg.solve(eye - x * self.a, self.b) for x in z])
 
@@ -131,7 +131,7 @@ class Linear:
 
     @property
     def exact(self) -> bool:
-        """Whether the inverse solves for the very input that absorb takes."""
+        """Whether solve gives the input for which absorb returns the output asked for."""
         f, b = self.forward, self.backward
         return abs(b.d * f.d - 1.0) <= SAME and bool(np.all(np.abs(b.c + b.d * f.c) <= SAME * (1.0 + np.abs(f.c))))
 
@@ -140,8 +140,8 @@ class Linear:
         return self.forward.states() + np.abs(self.settled)
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output for inputs within `size`, and of the input that the inverse gives, errors of the
-        output asked for left out."""
+        """Roundings of the output for inputs within `size`, and of the input that the inverse gives, without errors of
+        the output asked for."""
         shares = self._shares(u)
         sizes = [Rounded(each, 0.0, u) for each in (size * self.sizes()).tolist()]
         state = np.array(sizes, dtype=object)
@@ -156,11 +156,11 @@ class Linear:
         return forward, self.passed(forward, x.error)
 
     def passed(self, error: float, own: float = 0.0) -> float:
-        """Error of the input for one of the output, and for roundings `own` of solve.
+        """Error of the input for an error of the output, and for roundings `own` of solve.
 
-        Limits let an error of the input through in part, or not at all: a single state then comes to lie between what
-        either way makes of it, and what inputs before make of an output smaller than the present one does is a
-        contraction of errors of the input.
+        A limit may pass an error of the input on in part or not at all. A single state then lies between its values for
+        the two cases. If earlier inputs count less in an output than the present one does, errors of the input
+        contract.
         """
         before, now, back = self.forward.before(), abs(self.forward.d), self.backward
         bounds = []
@@ -176,7 +176,7 @@ class Linear:
 
 @dataclass(frozen=True)
 class Rounded:
-    """A number within `size`, of which roundings `u` have taken no more than `error`."""
+    """A number within `size`, no farther than `error` from the exact one; each operation rounds by `u`."""
 
     size: float
     error: float
@@ -204,7 +204,7 @@ def _apply(effect: Effect, verb: str, *given: Any) -> Any:
 
 
 def linear(effect: Effect, seconds: float) -> Linear:
-    """The block of an effect at steps of `seconds`. Raises EffectsError where its functions fail, or are none for C."""
+    """The block of an effect at steps of `seconds`. Raises EffectsError if its functions fail or cannot become C."""
     assert effect.block is not None
     own.check(type(effect))
     one, n = own.Instance(effect), len(effect.block.state)
@@ -229,7 +229,7 @@ def linear(effect: Effect, seconds: float) -> Linear:
 
 
 def problems(effect: Effect, seconds: float, fixed: bool) -> Iterator[str]:
-    """Why the C cannot have the block of an effect, in fixed point or else in floating point."""
+    """Reasons why the C cannot have the block of an effect, in fixed point or else in floating point."""
     assert effect.block is not None
     one = linear(effect, seconds)
     if not _adds_up(one, seconds):
@@ -278,7 +278,7 @@ def _stays_for_solve(effect: Effect, seconds: float) -> bool:
 
 
 def _adds_up(one: Linear, seconds: float) -> bool:
-    """Whether a block answers as the system that its single answers make, from states and inputs of either sign."""
+    """Whether a block is linear: for random states and inputs it answers as the system from its unit answers does."""
     rng = np.random.default_rng(0)
     instance = own.Instance(one.effect)
     instance.advance(seconds)
@@ -334,5 +334,5 @@ def product(number: Any, x: Any) -> Any:
 
 @jit(inline=True)
 def passed(t: OwnTables, j: int, x: Any) -> Any:  # noqa: ARG001  as in fixed point
-    """A signal of the chain is one of block j, and the other way round."""
+    """A signal of the chain as one of block j, and the reverse: the same number."""
     return x

@@ -1,8 +1,8 @@
 """Blocks of effects of the user's own in fixed point: formats that follow from their functions, and roundings.
 
-The functions are those of floating point. A block computes with signals that have bits below those of the chain, as
-many as keep what its states lose in a sample, and keep of that, below a fraction of a signal. A number of its table is
-a factor, of a product that leaves out the last bits of what it multiplies where that has more than a product takes.
+The functions are those of floating point. Signals in a block have as many bits below those of the chain as keep the
+accumulated roundings of its states below a fraction of the chain's last bit. A number of its table is a factor; its
+product leaves out the last bits of an argument that has more bits than a product takes.
 """
 
 from __future__ import annotations
@@ -20,17 +20,18 @@ from hystgen.compensator.chain.own import Linear, OwnTables
 from hystgen.plays.fixed import nearest
 
 GUARD = 3
-"""Bits of a signal below what the roundings of a block's states make of its output: where there is room an eighth of
-the chain's last bit, beside the half that rounding takes. Held by `test_fixed_point_stays_within_its_bounds`."""
+"""Bits of a signal beyond those that keep the roundings of a block's states below the chain's last bit. If there is
+room for them, an eighth of that bit is left, beside the half by rounding the output. Held by
+`test_fixed_point_stays_within_its_bounds`."""
 
 MANTISSA, SHIFT, DROP, LIFT = range(4)
 
 
 @dataclass(frozen=True)
 class Formats:
-    """A block in fixed point: `table` (n, 4) of its numbers, a factor and the bits that a product leaves out of its
-    argument and of its result; `bits` of its signals below those of the chain; `output` and `answer`: roundings of what
-    absorb and solve give, in signals of the chain."""
+    """A block in fixed point: `table` (n, 4) of its numbers, each a factor and the bits that a product leaves out of
+    its argument and of its result; `bits` of its signals below those of the chain; `output` and `answer`: roundings of
+    the results of absorb and solve, in units of the chain's signals."""
 
     linear: Linear
     table: list[tuple[int, int, int, int]]
@@ -41,7 +42,7 @@ class Formats:
 
 @dataclass
 class _Number:
-    """A number of a table, and the largest size that it multiplies."""
+    """A number of a table, and the largest size of its arguments."""
 
     value: float
     row: tuple[int, int, int, int]
@@ -58,7 +59,7 @@ class _Number:
 
 @dataclass(frozen=True)
 class _Traced:
-    """A whole number within `size`, no farther than `error` from the exact one; `most`: the largest size of all."""
+    """A whole number within `size`, no farther than `error` from the exact one; `most`: the largest of all sizes."""
 
     size: float
     error: float
@@ -86,15 +87,15 @@ def _row(value: float, seen: float) -> tuple[int, int, int, int]:
 
 @dataclass(frozen=True)
 class _Trace:
-    """What the functions of a block make of an input and an output asked for up to these sizes."""
+    """The sizes and errors in the functions of a block, for an input and an output asked for up to these sizes."""
 
     linear: Linear
     given: float
     asked: float
 
     def run(self, rows: Sequence[tuple[int, int, int, int]], bits: int) -> tuple[list[float], float, float, float]:
-        """With signals of `bits` more: the sizes that each number multiplies, the largest size, and the roundings of
-        absorb and of solve."""
+        """For signals with `bits` more bits: the largest argument of each number, the largest size, and the roundings
+        of absorb and of solve."""
         most = [0.0]
         numbers = [_Number(*each) for each in zip(self.linear.numbers.tolist(), rows, strict=True)]
 
@@ -118,7 +119,7 @@ class _Trace:
 
 
 def asked_of_input(linear: Linear, given: float, asked: float) -> float:
-    """Largest input that solve or resting give for an output up to `asked`, behind inputs up to `given`."""
+    """Largest input that solve or resting can give for an output up to `asked`, after inputs up to `given`."""
     now, before = abs(linear.forward.d), linear.forward.before()
     return max((asked + before * given) / now, asked / linear.rest)
 
@@ -126,7 +127,7 @@ def asked_of_input(linear: Linear, given: float, asked: float) -> float:
 def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
     """A block for an input and an output asked for up to these sizes, in signals of the chain.
 
-    These have `code` bits below a code. Raises OverflowError where its numbers do not fit, or its states would stall.
+    Those have `code` bits below a code. Raises OverflowError if its numbers do not fit or its states would stall.
     """
     trace = _Trace(linear, given, asked)
     values = linear.numbers.tolist()

@@ -1,7 +1,8 @@
-"""What is taken ahead of its time: the reference's samples around the present one, and their weights.
+"""The preview: a weighted sum of the reference's samples around the present one.
 
-A delay is straight interpolation between two samples, a mode three of them (`hystgen.effects.resonance.compensator`).
-One behind the other they are one row of weights, which sum to 1: no recursion, hence stable whatever the numbers are.
+A delay takes straight interpolation between two samples, a mode three samples
+(`hystgen.effects.resonance.compensator`). In series they are one row of weights, which sum to 1: without a recursion it
+is stable for all numbers.
 """
 
 from __future__ import annotations
@@ -27,15 +28,15 @@ class Taps(NamedTuple):
 
     @property
     def ahead(self) -> int:
-        """Samples that the last one lies ahead."""
+        """Samples by which the last one lies ahead."""
         return self.first + len(self.weights) - 1
 
 
 def taps(delay: float, modes: Sequence[Resonance], seconds: float, number: int = 3, corner: int = 0) -> Taps:
-    """The weights for a delay in s and modes in series at samples `seconds` apart; the reference alone for none.
+    """The weights for a delay in s and modes in series at samples `seconds` apart; only the reference itself for none.
 
-    A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`, which with 5 is undone but
-    for the fourth difference. `corner`: three centred moving averages of this number of samples round the reference.
+    A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`; 5 undo that up to a fourth
+    difference. `corner`: three centred moving averages over this number of samples smooth the reference.
     """
     samples = delay / seconds
     whole = math.floor(samples)
@@ -60,7 +61,7 @@ def taps(delay: float, modes: Sequence[Resonance], seconds: float, number: int =
 
 
 def led(needed: Taps, samples: int | None) -> Taps:
-    """The weights for a reference that is taken `samples` ahead, where that is more than needed."""
+    """The weights for a reference `samples` ahead, if that is more than needed."""
     more = (samples or 0) - max(needed.ahead, 0)
     return needed if more <= 0 else Taps(needed.first, np.append(needed.weights, np.zeros(more)))
 
@@ -77,7 +78,7 @@ class Line(NamedTuple):
 
 @jit
 def preview_put(line: Line, x: Any) -> None:
-    """The next sample; the first one stands for all before it too."""
+    """Append a sample; the first one fills the line."""
     n = len(line.sample)
     for i in range(n - 1):
         line.sample[i] = line.sample[i + 1] if line.filled[0] else x
@@ -87,14 +88,14 @@ def preview_put(line: Line, x: Any) -> None:
 
 @jit
 def preview_repeat(line: Line) -> None:
-    """The newest sample once more, where there is one."""
+    """Append the newest sample again, if there is one."""
     if line.filled[0]:
         preview_put(line, line.sample[len(line.sample) - 1])
 
 
 @jit
 def preview_target(tap: Reals, line: Line) -> Any:
-    """The weighted sum of the oldest samples."""
+    """The output to reach at this sample: the weighted sum of the line."""
     total = tap[0] * line.sample[0]
     for i in range(1, len(tap)):
         total = total + tap[i] * line.sample[i]

@@ -1,4 +1,4 @@
-"""Running the bit reference of a model with effects over a record, all of which is known."""
+"""Run the bit reference of a model with effects over a whole record."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from hystgen.plays import slots
 
 
 def answers(compiled: Compiled, record: Run, inverse: bool) -> NDArray[Any]:
-    """Answers (N,) for the drives or references in `record.v`; a preview sees what follows, the last sample stays.
+    """Answers (N,) for the drives or references in `record.v`; for a preview the last sample repeats.
 
-    Fixed point takes and gives codes, temperatures apart, which are in degC. Raises ValueError for what is not a code.
+    Fixed point takes and gives codes, except temperatures, which are in degC. Raises ValueError for numbers that are
+    not codes.
     """
     t = compiled.tables
     x = reference.codes(t, record.v) if t.fixed else record.v

@@ -1,7 +1,7 @@
-"""What stands in front of the plays and what behind them: every block of a kind, one kind after the other.
+"""The two sides of the plays, in front of them and behind: all blocks of a kind, one kind after the other.
 
-Blocks of the user's own come behind the lag in front of the plays, and behind creep: these are all linear and do not
-change with time, so that their order makes no difference.
+Blocks of the user's own come after the lag in front of the plays, and after creep behind them. All of these are linear
+and time-invariant, so that their order makes no difference.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Function = Callable[..., Any]
 
 
 class Blocks(NamedTuple):
-    """What the blocks of a chain do in one arithmetic: modules with functions named as in the C, and functions."""
+    """The blocks of a chain in one arithmetic: modules with functions named as in the C, and functions."""
 
     lag: ModuleType
     creep: ModuleType
@@ -30,15 +30,15 @@ class Blocks(NamedTuple):
     drift: ModuleType
     saturation: tuple[Function, Function]  # forward, inverse
     target: Function  # of the preview's line
-    delayed: Function  # drive, of the line of those that wait
+    delayed: Function  # the delayed drive, from those that wait
     front: tuple[Function, Function]  # forward, inverse
     plays: tuple[Function, Function, Function]  # follow, started, inverse input
-    finer: Function  # what has to arrive, with bits below an input of the plays
-    own: tuple[Function, Function, Function]  # of the user's own: product; a signal as one of a block; and back
+    finer: Function  # the signal in front of the plays, with bits below their input
+    own: tuple[Function, Function, Function]  # of the user's own: product, signal into a block, signal out of it
 
 
 class Sides(NamedTuple):
-    """What both sides of the plays do, of tables, state and a number."""
+    """The verbs of both sides of the plays, as functions of tables, state and a number."""
 
     drive_rest: Function
     drive_absorb: Function
@@ -50,7 +50,7 @@ class Sides(NamedTuple):
 
 
 def _each(verb: Function) -> Function:
-    """What n blocks of a kind do one after the other, of their tables and memory."""
+    """A verb applied by n blocks of a kind, one after the other."""
 
     @jit
     def through(t: Any, s: Any, n: int, x: Any) -> Any:
@@ -62,7 +62,7 @@ def _each(verb: Function) -> Function:
 
 
 def _back(verb: Function) -> Function:
-    """The same from the last one to the first."""
+    """The same from the last block to the first."""
 
     @jit
     def through(t: Any, s: Any, n: int, x: Any) -> Any:
@@ -84,7 +84,7 @@ def _tabled(verb: Function) -> Function:
 
 
 def _one(arithmetic: tuple[Function, Function, Function], block: OwnBlock, verb: str, j: int) -> Function:
-    """What block `j` of the user's own does."""
+    """A verb of block `j` of the user's own, with its numbers and memory picked."""
     product, entered, left = arithmetic
     function = block.compiled(verb, product)
     if verb == "resting":
@@ -104,7 +104,7 @@ def _one(arithmetic: tuple[Function, Function, Function], block: OwnBlock, verb:
 
 
 def _through(calls: Sequence[Function]) -> Function:
-    """What blocks of the user's own do one after the other."""
+    """A verb applied by blocks of the user's own, one after the other."""
     if not calls:
 
         @jit(inline=True)
@@ -126,7 +126,7 @@ def _through(calls: Sequence[Function]) -> Function:
 def sides_of(blocks: Blocks, drives: Sequence[OwnBlock], outputs: Sequence[OwnBlock]) -> Sides:
     """Both sides in one arithmetic, with blocks of the user's own in front of the plays and behind them.
 
-    Modes have memory in the forward operator alone, so that the inverse passes over them.
+    Modes have memory only in the forward operator, so that the inverse skips them.
     """
     lag, creep, mode = blocks.lag, blocks.creep, blocks.resonance
     lag_rest, lag_absorb, lag_solve = _each(lag.lag_rest), _each(lag.lag_absorb), _back(lag.lag_solve)
@@ -150,12 +150,12 @@ def sides_of(blocks: Blocks, drives: Sequence[OwnBlock], outputs: Sequence[OwnBl
 
     @jit
     def drive_side_rest(t: ChainTables, s: Any, v: Any) -> Any:
-        """Everything in front of the plays settles at drive v; what arrives there."""
+        """Everything in front of the plays settles at drive v. Returns the signal there."""
         return own_drive_rest(t.own, s.own, lag_rest(t.lag, s.lag, len(t.lag.exact), v))
 
     @jit
     def drive_side_absorb(t: ChainTables, s: Any, v: Any) -> Any:
-        """The drive is v at this sample; what arrives in front of the plays."""
+        """The drive is v at this sample. Returns the signal in front of the plays."""
         return own_drive_absorb(t.own, s.own, lag_absorb(t.lag, s.lag, len(t.lag.exact), v))
 
     @jit
@@ -165,27 +165,27 @@ def sides_of(blocks: Blocks, drives: Sequence[OwnBlock], outputs: Sequence[OwnBl
 
     @jit(inline=True)
     def gains_absorb(t: ChainTables, s: Any, x: Any) -> Any:
-        """What gains make of x."""
+        """The output of the gains for the input x."""
         x = ageing_absorb(t.ageing, s.ageing, len(t.ageing.turns), x)
         x = heats_absorb(t.heat, s.heat, len(t.heat.turns), x)
         return gain_absorb(t.gain, s.gain, len(t.gain), x)
 
     @jit(inline=True)
     def gains_solve(t: ChainTables, s: Any, y: Any) -> Any:
-        """What gains make y of."""
+        """The input of the gains that gives the output y."""
         y = gain_solve(t.gain, s.gain, len(t.gain), y)
         y = heats_solve(t.heat, s.heat, len(t.heat.turns), y)
         return ageing_solve(t.ageing, s.ageing, len(t.ageing.turns), y)
 
     @jit
     def output_side_rest(t: ChainTables, s: Any, h: Any) -> Any:
-        """Everything behind the plays settles at their sum h; the output."""
+        """Everything behind the plays settles at their sum h. Returns the output."""
         x = own_output_rest(t.own, s.own, creep_rest(t.creep, s.creep, len(t.creep.block), h))
         return mode_rest(t.mode, s.mode, len(s.mode), gains_absorb(t, s, x))
 
     @jit
     def output_side_absorb(t: ChainTables, s: Any, h: Any) -> Any:
-        """The sum of the plays is h at this sample; the output."""
+        """The sum of the plays is h at this sample. Returns the output."""
         x = own_output_absorb(t.own, s.own, creep_absorb(t.creep, s.creep, len(t.creep.block), h))
         return mode_absorb(t.mode, s.mode, len(s.mode), gains_absorb(t, s, x))
 

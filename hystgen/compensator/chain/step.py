@@ -1,8 +1,8 @@
 """One step of a model with effects: the bit reference of `c_runtime/chain.c`, and the operations around it.
 
-Blocks in front of the plays (lag) and behind them (creep, gain) take what was applied forwards and are solved
-backwards; the plays between them are those of engine loop. What a block computes, and what a code is as a signal
-between blocks, is the arithmetic's (`step_float`, `step_fixed`).
+Blocks in front of the plays (lag) and behind them (creep, gain) absorb the applied drive forwards and are solved
+backwards; the plays between them are those of engine loop. The functions of the blocks, and the conversion between
+codes and signals, come from the arithmetic (`step_float`, `step_fixed`).
 """
 
 from __future__ import annotations
@@ -67,12 +67,12 @@ MOVING = 0
 
 
 class ChainState(NamedTuple):
-    """One instance. `real`: the offset that was set, what the output side gave last, the drive applied last, and what a
-    slew limit in the forward operator made of that; `flags`: whether any drive has been applied yet."""
+    """One instance. `real`: the offset set from outside, the last result of the output side, the last applied drive,
+    and the drive behind a slew limit of the forward operator; `flags`: whether any drive has been applied yet."""
 
     plays: State
-    lost: Reals  # (n + 1,), what each play has lost below its last bit, where a nonlinear dashpot moves them
-    bent: Reals  # (n + 1,), what each contributes, where an effect moves or bends them
+    lost: Reals  # (n + 1,), what rounding took from each play that a nonlinear dashpot moves
+    bent: Reals  # (n + 1,), what each play contributes, if an effect moves or bends them
     lag: Reals  # (k, 5)
     creep: CreepState
     ageing: AgeingState
@@ -88,7 +88,7 @@ class ChainState(NamedTuple):
 
 
 def new_state(t: ChainTables, inverse: bool) -> ChainState:
-    """Memory for one instance of an operator; `init` gives it its values."""
+    """Memory for one instance of an operator; `init` sets it."""
     dtype = t.threshold.dtype
     modes, waiting = (0, 0) if inverse else (len(t.mode), t.delay.samples)
     return ChainState(
@@ -111,7 +111,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
 
 
 class Codes(NamedTuple):
-    """What the numbers that the operators take and give are between the blocks, in one arithmetic."""
+    """Conversion of an operator's arguments and answers to signals and back, in one arithmetic."""
 
     finite: Callable[..., Any]
     entered_drive: Callable[..., Any]
@@ -150,7 +150,7 @@ def made_of(
 
     @jit(inline=True)
     def displacement(t: ChainTables, s: ChainState, y: Any) -> Any:
-        """What leaves the actuator: the output side's answer through what saturates, and its offsets."""
+        """The displacement: the result of the output side after saturation, plus the offsets."""
         offset = t.number[OFFSET] + s.real[SET]
         for j in range(len(t.clock)):
             offset = offset + clock_drift(t.clock, s.clock, j, t.limits[ZERO])
@@ -158,7 +158,7 @@ def made_of(
 
     @jit(inline=True)
     def undisplaced(t: ChainTables, s: ChainState, u: Any) -> tuple[Any, int]:
-        """What the output side has to give for the displacement u, and whether nothing does."""
+        """The result that the output side has to give for the displacement u, and whether none gives it."""
         offset = t.number[OFFSET] + s.real[SET]
         for j in range(len(t.clock)):
             lead = s.clock[j, LEAD] if s.line.filled[0] else t.limits[ZERO]
@@ -168,7 +168,7 @@ def made_of(
 
     @jit
     def led(t: ChainTables, s: ChainState) -> None:
-        """A reference has come: the next one is a sample more ahead, up to the preview."""
+        """A reference has come: the next one lies one sample further ahead, up to the preview."""
         for j in range(len(t.clock)):
             lead = t.clock[j, ONE]
             if s.line.filled[0]:
@@ -202,13 +202,13 @@ def made_of(
 
     @jit
     def expected(t: ChainTables, s: ChainState) -> Any:
-        """Displacement that the model expects of the drive absorbed last."""
+        """The displacement that the model expects from the last absorbed drive."""
         code, _ = output_code(t, displacement(t, s, s.real[OUTPUT]))
         return code
 
     @jit
     def begin(t: ChainTables, s: ChainState) -> None:
-        """What init and reset have in common once the plays are set: everything rests at the start memory."""
+        """The part common to init and reset, once the plays are set: everything rests at the start memory."""
         s.line.filled[0] = 0
         s.flags[MOVING] = 0
         drive = s.plays.real[DRIVE]
@@ -229,7 +229,7 @@ def made_of(
 
     @jit
     def reset(t: ChainTables, s: ChainState, inverse: int) -> None:
-        """All plays 0, status cleared; the step that belongs to a reset is the caller's."""
+        """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
         plays_reset(t.plays, s.plays, inverse)
         begin(t, s)
         if not inverse:
@@ -237,7 +237,8 @@ def made_of(
 
     @jit
     def absorb(t: ChainTables, s: ChainState, v: Any, reached: Any) -> None:
-        """The actuator has seen drive v, which `reached` came of; the first one finds everything at rest."""
+        """The actuator has seen drive v, and `reached` behind its delay and slew limit; the first drive finds
+        everything at rest."""
         moving = s.flags[MOVING] != 0
         if moving:
             travelled(t, s, v)
@@ -251,7 +252,7 @@ def made_of(
 
     @jit
     def slewed(t: ChainTables, s: ChainState, before: Any, v: Any) -> Any:
-        """The drive nearest to v that can be reached from another one in one step."""
+        """The drive nearest to v that the amplifier can reach from `before` in one step."""
         if not t.slew or not s.flags[MOVING]:
             return v
         if v > before + t.number[RISING]:
@@ -262,7 +263,7 @@ def made_of(
 
     @jit
     def forward_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
-        """The drive is v: it waits, and the amplifier follows."""
+        """The drive is v: it passes the delay, and the amplifier follows."""
         late = v
         if len(s.waiting.sample):
             if s.flags[MOVING]:
@@ -278,7 +279,7 @@ def made_of(
 
     @jit
     def seen(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
-        """The drive is v."""
+        """The actuator of either operator has seen drive v."""
         if inverse:
             absorb(t, s, v, v)
         else:
@@ -286,7 +287,7 @@ def made_of(
 
     @jit
     def settle(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
-        """Everything is at rest at drive v, where the plays move like with any other."""
+        """Everything comes to rest at drive v; the plays move there as in any step."""
         if not finite(t, v):
             s.plays.counts[STATUS] |= HELD
             return
@@ -314,14 +315,14 @@ def made_of(
 
     @jit
     def inverse_take(t: ChainTables, s: ChainState) -> None:
-        """What is pending is what the actuator has seen."""
+        """The actuator has seen the pending drive."""
         if s.plays.counts[HAS_PENDING]:
             absorb(t, s, s.plays.real[PENDING], s.plays.real[PENDING])
             s.plays.counts[HAS_PENDING] = 0
 
     @jit
     def inverse_put(t: ChainTables, s: ChainState, u: Any) -> Any:
-        """The next reference, in the line of the preview where there is one; what the output side has to give now."""
+        """Take the next reference, through the preview if there is one. Returns the output to reach at this sample."""
         level = inverse_clamp(t, u)
         if level != u:
             s.plays.counts[STATUS] |= INPUT_CLAMPED
@@ -336,7 +337,7 @@ def made_of(
 
     @jit
     def inverse_push(t: ChainTables, s: ChainState, u: Any) -> None:
-        """The next reference of the preview, no drive."""
+        """Take the next reference of the preview, without an answer."""
         if finite(t, u):
             inverse_put(t, s, u)
         else:
@@ -369,7 +370,7 @@ def made_of(
 
     @jit
     def inverse_commit(t: ChainTables, s: ChainState, applied: Any) -> None:
-        """What the drive really applied in place of the last answer."""
+        """`applied` is the drive that was really applied in place of the last answer."""
         if not finite(t, applied):
             s.plays.counts[STATUS] |= HELD
             return
@@ -377,7 +378,7 @@ def made_of(
 
     @jit
     def put_offset(t: ChainTables, s: ChainState, d: Any) -> None:
-        """An offset of the displacement, from the next step on, within its limits."""
+        """Set the offset of the displacement, within its limits."""
         if not finite(t, d):
             s.plays.counts[STATUS] |= HELD
             return
@@ -392,7 +393,7 @@ def made_of(
 
     @jit
     def set_offset(t: ChainTables, s: ChainState, d: Any) -> None:
-        """An offset of the displacement, from the next step on; drift begins anew."""
+        """Set the offset of the displacement; drift starts again."""
         put_offset(t, s, d)
         if finite(t, d):
             for j in range(len(t.clock)):
@@ -400,13 +401,13 @@ def made_of(
 
     @jit
     def correct(t: ChainTables, s: ChainState, measured: Any, share: Any) -> None:
-        """Trim the offset by a share of what a sensor sees beyond the expected displacement."""
+        """Trim the offset by a share of what a sensor measures beyond the expected displacement."""
         more = shared(t, share, entered_level(t, measured) - displacement(t, s, s.real[OUTPUT]))
         put_offset(t, s, s.real[SET] + more)
 
     @jit
     def set_temperature(t: ChainTables, s: ChainState, degrees: Any) -> None:
-        """The temperature, from the next step on."""
+        """Set the temperature."""
         if not finite(t, degrees):
             s.plays.counts[STATUS] |= HELD
             return
@@ -416,7 +417,7 @@ def made_of(
 
     @jit
     def set_gain(t: ChainTables, s: ChainState, gain: Any) -> None:
-        """A gain in place of that of the travel, from the next step on."""
+        """Set a gain in place of the one that follows the travel."""
         if not finite(t, gain):
             s.plays.counts[STATUS] |= HELD
         elif ageing_set(t.ageing, s.ageing, 0, gain):
@@ -424,7 +425,7 @@ def made_of(
 
     @jit
     def set_travel(t: ChainTables, s: ChainState, travel: Any) -> None:
-        """The distance travelled, from the next step on."""
+        """Set the distance travelled."""
         if not finite(t, travel):
             s.plays.counts[STATUS] |= HELD
         elif ageing_set_travel(t.ageing, s.ageing, 0, travel):
@@ -432,7 +433,7 @@ def made_of(
 
     @jit
     def run(t: ChainTables, s: ChainState, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
-        """Operations op[i] with argument x[i]; answers[i] is that of a step or of `expected`, else 0; status[i] is read
+        """Run op[i] with argument x[i]. answers[i] is the answer of a step or of `expected`, else 0; status[i] is read
         and cleared."""
         for i in range(len(op)):
             answers[i] = t.limits[ZERO]

@@ -1,6 +1,6 @@
-"""What a step of a model with effects does in fixed point, where signals are whole numbers finer than codes.
+"""The parts of a step of a model with effects that differ in fixed point, where signals have bits below codes.
 
-In front of the plays a signal is in units of their input, behind them a fraction of an output code.
+Signals in front of the plays are in units of their input, those behind the plays in fractions of an output code.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ from hystgen.plays.slots import CODE_MAX, OUTPUT_CLAMPED, Reals, zero
 
 @jit
 def front_forward(t: FixedTables, a: Any, ascending: int) -> Any:
-    """Input of the plays for what arrives in front of the memoryless part."""
+    """Input of the plays for a signal in front of the memoryless part."""
     return curve.front_forward(t, a, ascending) if t.fronts else a
 
 
 @jit
 def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
-    """What has to arrive for an input of the plays, and whether an envelope limits that."""
+    """The signal in front of the memoryless part for an input of the plays, and whether an envelope limits it."""
     if t.fronts:
         return curve.front_inverse(t, w, ascending)
     return w, 0
@@ -61,8 +61,8 @@ def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
 
 @jit
 def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
-    """What has to arrive in front of the plays, with bits below their input w: what is left of h there, over the
-    slope."""
+    """The signal in front of the plays that gives their sum h, with more bits than their input w: the remainder of h at
+    w, divided by the slope."""
     bits = t.number[ARRIVING_BITS]
     if bits == 0:
         return a
@@ -95,7 +95,7 @@ def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
 
 @jit
 def preview_target(tap: Reals, line: Line) -> Any:
-    """The weighted sum of the oldest samples."""
+    """The output to reach at this sample: the weighted sum of the line."""
     total = zero(line.sample[0])
     for i in range(len(tap)):
         total = total + times(line.sample[i], tap[i, 0], tap[i, 1])
@@ -113,7 +113,7 @@ def entered_drive(t: ChainTables, v: Any) -> Any:
 
 @jit
 def arriving(t: ChainTables, a: Any) -> Any:
-    """What arrives in front of the plays, in units of their input."""
+    """A signal in front of the plays, in units of their input."""
     return nearest(a, t.number[ARRIVING_BITS])
 
 
@@ -125,7 +125,7 @@ def entered_level(t: ChainTables, u: Any) -> Any:
 
 @jit
 def drive_code(t: ChainTables, x: Any) -> Any:
-    """Drive code of a signal, kept near the range."""
+    """Drive code of a signal, limited to two spans beyond the range."""
     code = nearest(x, t.number[DRIVE_BITS])
     if code > t.number[MOST_CODE]:
         return t.number[MOST_CODE]
@@ -147,13 +147,13 @@ def output_code(t: ChainTables, y: Any) -> tuple[Any, int]:
 
 @jit
 def entered_travel(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in floating point
-    """A travel in drive codes for an argument that has no more bits than a code."""
+    """A travel in drive codes for an argument that is a code."""
     return x << TRAVEL_BITS
 
 
 @jit
 def shared(t: ChainTables, share: Any, x: Any) -> Any:
-    """A share of a signal, given as a code of which 1 is one more than the largest."""
+    """A share of a signal. The share is a code, and the largest code is the share just below 1."""
     return times(x, share << t.number[SHARE_BITS], 31)
 
 

@@ -1,4 +1,4 @@
-"""What a step of a model with effects does in floating point, where every signal is a number of the same type."""
+"""The parts of a step of a model with effects that differ in floating point, where all signals have one type."""
 
 from __future__ import annotations
 
@@ -25,31 +25,31 @@ from hystgen.front.compensator import front_forward, front_inverse
 
 @jit(inline=True)
 def saturated(t: Stages, x: Any) -> Any:
-    """What saturates makes of x."""
+    """The output of the saturation for the input x."""
     return front_forward(t, x, 1)
 
 
 @jit(inline=True)
 def unsaturated(t: Stages, y: Any) -> tuple[Any, int]:
-    """What gives y behind what saturates, and whether nothing does."""
+    """The input of the saturation that gives y, and whether none does."""
     return front_inverse(t, y, 1)
 
 
 @jit(inline=True)
 def entered(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in fixed point
-    """A number of the caller's, as a signal."""
+    """A number from the caller as a signal."""
     return x
 
 
 @jit(inline=True)
 def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:  # noqa: ARG001  as in fixed point
-    """What has to arrive in front of the plays."""
+    """The signal in front of the plays, as fine as it is."""
     return a
 
 
 @jit(inline=True)
 def output_code(t: ChainTables, y: Any) -> tuple[Any, int]:  # noqa: ARG001  as in fixed point
-    """A displacement as it is given to the caller, and its status."""
+    """A displacement as the caller gets it, and its status."""
     return y, 0
 
 

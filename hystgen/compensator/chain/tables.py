@@ -28,8 +28,7 @@ def build(
 ) -> Compiled:
     """The model in an arithmetic at steps of `seconds`; `lsb` as in `hystgen.compensator.tables.build`.
 
-    None of its effects is among the `refusals`. Raises FormatError when a
-    number does not fit the arithmetic.
+    None of its effects is among the `refusals`. Raises FormatError if a number does not fit the arithmetic.
     """
     if ARITHMETICS[arithmetic].fixed:
         return fixed_tables.build(chain, arithmetic, seconds, how, lsb)
@@ -44,7 +43,7 @@ def _behind_slew(chain: Chain) -> int:
 def refusals(
     chain: Chain, operator: str, seconds: float, arithmetic: str, how: Compensation = STANDARD
 ) -> Iterator[tuple[Effect, str]]:
-    """The effects that an operator cannot have in the C in an arithmetic, each with its reason."""
+    """The effects that the C of an operator cannot have in an arithmetic, each with its reason."""
     low, high = chain.cascade.input_range
     parts = Parts.of(chain.effects)
     for effect in chain.effects:

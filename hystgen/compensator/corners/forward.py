@@ -1,4 +1,4 @@
-"""The forward operator of plays alone: `c_runtime/forward.c`."""
+"""The forward operator without a memoryless part: `c_runtime/forward.c`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def forward_step(t: Tables, m: Memory, v: Any) -> Any:
 
 @jit
 def forward_begin(t: Tables, m: Memory, which: Start) -> None:
-    """What init and reset have in common."""
+    """The part common to init and reset."""
     start(t.forward, m, which)
     m.counts[STATUS] = 0
 

@@ -15,7 +15,7 @@ from hystgen.plays.slots import INPUT_CLAMPED, Reals
 
 @jit
 def forward_arrive(t: FixedTables, m: FixedMemory, v: Any) -> None:
-    """The actuator is at drive v, which decides the direction of its move and so the branch."""
+    """The actuator is at drive v; its move sets the direction, and so the branch."""
     if v > m.real[DRIVE]:
         m.counts[ASCENDING] = 1
     elif v < m.real[DRIVE]:
@@ -38,7 +38,7 @@ def forward_step(t: FixedTables, m: FixedMemory, v: Any) -> Any:
 
 @jit
 def forward_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> None:
-    """What init and reset have in common; `first` as in `FixedTables.applied`."""
+    """The part common to init and reset; `first` as in `FixedTables.applied`."""
     start(t, m, play)
     m.real[NEXT] = m.real[INPUT]
     m.real[DRIVE] = t.applied[first]

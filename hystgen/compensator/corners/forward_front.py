@@ -13,7 +13,7 @@ from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, HELD, INPUT_CLAMPED, OFFSE
 
 @jit
 def forward_arrive(m: Memory, v: Any) -> None:
-    """The actuator is at drive v, which decides the direction of its move and so the branch."""
+    """The actuator is at drive v; its move sets the direction, and so the branch."""
     if v > m.real[DRIVE]:
         m.counts[ASCENDING] = 1
     elif v < m.real[DRIVE]:
@@ -36,7 +36,7 @@ def forward_step(t: Tables, m: Memory, v: Any) -> Any:
 
 @jit
 def forward_begin(t: Tables, m: Memory, which: Start, first: int) -> None:
-    """What init and reset have in common; `first` as in `Tables.applied`."""
+    """The part common to init and reset; `first` as in `Tables.applied`."""
     start(t.forward, m, which)
     m.real[DRIVE] = t.applied[first]
     m.counts[ASCENDING] = t.ascending[first]

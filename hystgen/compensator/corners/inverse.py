@@ -1,4 +1,4 @@
-"""The inverse of plays alone: `c_runtime/inverse.c`."""
+"""The inverse without a memoryless part: `c_runtime/inverse.c`."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ from hystgen.plays.slots import (
 
 @jit
 def inverse_search(t: Tables, m: Memory, u: Any) -> Any:
-    """Any other sample than a usual one."""
+    """Any sample but a usual one."""
     x = u - t.limits[OFFSET]
     bits = 0
     copy_place(m, UNDO, HERE)
@@ -100,7 +100,7 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
 
 @jit
 def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
-    """What the drive really applied in place of the last answer."""
+    """`applied` is the drive that was really applied in place of the last answer."""
     v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
     if not (-t.limits[REAL_MAX] <= applied <= t.limits[REAL_MAX]):
         m.counts[STATUS] |= HELD
@@ -122,7 +122,7 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
 
 @jit
 def inverse_begin(t: Tables, m: Memory, which: Start) -> None:
-    """What init and reset have in common."""
+    """The part common to init and reset."""
     start(t.inverse, m, which)
     move_to_output(t.inverse, m, clamp_drive(t, m.real[OUTPUT]))
     copy_place(m, UNDO, HERE)

@@ -1,4 +1,4 @@
-"""The inverse of plays alone in fixed point: `c_runtime/inverse_fixed.c`."""
+"""The inverse without a memoryless part, in fixed point: `c_runtime/inverse_fixed.c`."""
 
 from __future__ import annotations
 
@@ -42,20 +42,20 @@ NEVER = -(2**31)
 
 @jit(inline=True)
 def inverse_sees(m: FixedMemory, u: Any) -> Any:
-    """A reference as the present move sees it: ~u is one less than -u, and no less than the least number."""
+    """A reference along the present move; ~u is -u - 1, which overflows for no code."""
     return u if m.counts[RISING] else ~u
 
 
 @jit
 def inverse_stay(m: FixedMemory) -> None:
-    """The next sample searches; the next step begins here."""
+    """No step is usual before another search, which begins here."""
     m.real[NEXT] = NEVER
     m.counts[ON] = 0
 
 
 @jit
 def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
-    """Steps are usual up to where another play begins to follow or something is limited, less what rounding can add."""
+    """Steps are usual up to the next kink or limit, less rounding, but not below the least reference."""
     rising = m.counts[RISING]
     most = inverse_sees(m, t.limits[OUTPUT_MAX] if rising else t.limits[OUTPUT_MIN])
     end = (t.limits[DRIVE_MAX] if rising else t.limits[DRIVE_MIN]) << t.limits[FINE]
@@ -69,7 +69,7 @@ def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
 
 @jit
 def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
-    """Any other sample than a usual one."""
+    """Any sample but a usual one."""
     copy_place(m, UNDO, HERE)
     m.counts[ON] = 0
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
@@ -106,7 +106,7 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
 
 @jit
 def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
-    """What the drive really applied in place of the last answer."""
+    """`applied` is the drive that was really applied in place of the last answer."""
     v = clamp_drive(t, applied)
     if v != applied:
         m.counts[STATUS] |= INPUT_CLAMPED
@@ -122,7 +122,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
 
 @jit
 def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals) -> None:
-    """What init and reset have in common."""
+    """The part common to init and reset."""
     start(t, m, play)
     copy_place(m, UNDO, HERE)
     inverse_stay(m)

@@ -49,7 +49,7 @@ from hystgen.plays.slots import (
 
 @jit
 def inverse_keep(m: Memory) -> None:
-    """The next step begins here."""
+    """Keep the place for a commit to go back to."""
     copy_place(m, UNDO, HERE)
     m.real[UNDO_DRIVE] = m.real[DRIVE]
     m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
@@ -57,7 +57,7 @@ def inverse_keep(m: Memory) -> None:
 
 @jit
 def inverse_arrive(m: Memory, v: Any) -> None:
-    """The actuator is at drive v, which decides the direction of its move and so the branch."""
+    """The actuator is at drive v; its move sets the direction, and so the branch."""
     if v > m.real[DRIVE]:
         m.counts[ASCENDING] = 1
     elif v < m.real[DRIVE]:
@@ -67,7 +67,7 @@ def inverse_arrive(m: Memory, v: Any) -> None:
 
 @jit
 def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
-    """The actuator has gone to v in place of where the last step led."""
+    """Undo the last step: the actuator has gone to v instead."""
     copy_place(m, HERE, UNDO)
     forget_line(t.inverse, m)
     m.real[DRIVE] = m.real[UNDO_DRIVE]
@@ -80,7 +80,7 @@ def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
 
 @jit
 def inverse_hold(t: Tables, m: Memory) -> Any:
-    """A sample that is not a number: the last answer once more."""
+    """A sample that is not finite: repeat the last answer."""
     inverse_keep(m)
     inverse_replace(t, m, m.real[RETURNED] if m.counts[STEPPED] and m.counts[COMMITTED] else m.real[DRIVE])
     m.counts[STEPPED] = 1
@@ -91,7 +91,7 @@ def inverse_hold(t: Tables, m: Memory) -> Any:
 
 @jit
 def inverse_fits(t: Any, m: Any, v: Any, ascending: int) -> bool:
-    """Whether going to v is a move of the branch that v was computed on."""
+    """Whether the move to v belongs to the branch that v was computed on."""
     inside = clamp_drive(t, v)
     if inside == m.real[DRIVE]:
         return bool(m.counts[ASCENDING] == ascending)
@@ -161,7 +161,7 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
 
 @jit
 def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
-    """What the drive really applied in place of the last answer."""
+    """`applied` is the drive that was really applied in place of the last answer."""
     v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
     if not (-t.limits[REAL_MAX] <= applied <= t.limits[REAL_MAX]):
         m.counts[STATUS] |= HELD
@@ -177,7 +177,7 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
 
 @jit
 def inverse_begin(t: Tables, m: Memory, which: Start, first: int) -> None:
-    """What init and reset have in common; `first` as in `Tables.applied`."""
+    """The part common to init and reset; `first` as in `Tables.applied`."""
     start(t.inverse, m, which)
     m.real[LEVEL] = m.real[INPUT] + t.limits[OFFSET]
     move_to_output(t.inverse, m, t.begin[first])

@@ -33,7 +33,7 @@ inverse_choose = choosing(front_inverse)
 
 @jit
 def inverse_keep(m: FixedMemory) -> None:
-    """The next step begins here."""
+    """Keep the place for a commit to go back to."""
     copy_place(m, UNDO, HERE)
     m.real[UNDO_DRIVE] = m.real[DRIVE]
     m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
@@ -41,7 +41,7 @@ def inverse_keep(m: FixedMemory) -> None:
 
 @jit
 def inverse_arrive(t: FixedTables, m: FixedMemory, v: Any) -> Any:
-    """The actuator is at drive v, which decides the direction of its move and so the branch; the input of the plays."""
+    """The actuator is at drive v; its move sets the direction, and so the branch. Returns the input of the plays."""
     if v > m.real[DRIVE]:
         m.counts[ASCENDING] = 1
     elif v < m.real[DRIVE]:
@@ -72,7 +72,7 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
 
 @jit
 def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
-    """What the drive really applied in place of the last answer."""
+    """`applied` is the drive that was really applied in place of the last answer."""
     v = clamp_drive(t, applied)
     if v != applied:
         m.counts[STATUS] |= INPUT_CLAMPED
@@ -86,7 +86,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
 
 @jit
 def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> None:
-    """What init and reset have in common; `first` as in `FixedTables.applied`."""
+    """The part common to init and reset; `first` as in `FixedTables.applied`."""
     start(t, m, play)
     m.real[DRIVE] = t.applied[first]
     m.counts[ASCENDING] = t.ascending[first]
