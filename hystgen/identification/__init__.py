@@ -39,21 +39,21 @@ MODELS = (*gpi.KINDS, "auto")
 """Names of the contract."""
 
 P0_FLOOR = 0.05
-"""Share of the sum of weights below which p_0 is raised where the data allow it."""
+"""Share of the sum of weights below which p_0 is raised if the data allow it."""
 
 NEAR_ZERO = 0.01
 """[share of the drive range] A loading curve may miss 0, and fall back, by this much."""
 
 PASSES = 60.0
-"""Approximate number of times that the search for a front runs through all samples, for the progress bar."""
+"""Approximate number of passes of the search for a front through all samples, for the progress bar."""
 
 MOST_PLAYS = 1000
 
 MOST_BREAKS = 64
 
 BEYOND = 0.1
-"""Share of the range of the fitted drive by which a held-out part of a record may leave it; further out every model is
-a guess."""
+"""Largest excursion of a held-out part of a record beyond the fitted drive range, as a share of it; further out every
+model is a guess."""
 
 MODEL_PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
@@ -93,16 +93,16 @@ def identify(
     - `holdout`: records that take no part in any choice but that of `auto`; without them the last quarter of each
       record gives the held-out figures, from a trial model that has not seen it, and the model written is then
       fitted to everything.
-    - `history`: drive values visited before every record from a virgin state; without it the start of each record
-      is ignored until the drive has wiped the memory that matters, or where less than half of it would be left its
-      start memory estimated with the weights.
+    - `history`: drive values visited before every record, beginning in a virgin state. Without it, the start of each
+      record is ignored until the drive has wiped the memory that matters; if less than half of the record would be
+      left, its start memory is estimated together with the weights.
     - `rest`: seconds of pause after the history; a PI model does not depend on time, so it changes nothing here.
     - `name`: C identifier of the model.
     - `units`: `input` and `output`, by default those of the records.
-    - `skip`: seconds at the start of every record that are not compared, though their drive counts.
-    - `loading_curve`: the records are initial loading curves, the drive rising from 0 in a virgin actuator, and
+    - `skip`: seconds at the start of every record that are not compared, although their drive counts.
+    - `loading_curve`: the records are initial loading curves, with the drive rising from 0 in a virgin actuator, and
       nothing is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22).
-    - `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as it comes.
+    - `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as fitted.
     - `progress`: a bar on a terminal's stderr when it takes more than a second.
 
     The start memory in the parameter file is the one that `history` leads to. Without it, it is 0, that of a virgin
@@ -170,7 +170,7 @@ def identify(
         for item in compared
         if item.used < SHORTEST
     ]
-    if not loading_curve:  # all of one depends on the start
+    if not loading_curve:  # every sample of one depends on the start
         largest = float(fitted.solution.thresholds[-1])
         reported += [text for each in errors if (text := quality.about_start(each, largest))]
     reported += quality.about_model(fitted.solution, how.wanted, [fitted.inner(item) for item in compared], own)
@@ -222,7 +222,7 @@ class _How:
 
 @dataclass(frozen=True)
 class _Tried:
-    """A model of one kind, the courses it was fitted to, those it has not seen, and how it does on them."""
+    """A model of one kind, the courses it was fitted to, those it has not seen, and its errors on them."""
 
     fitted: Fitted
     compared: list[Course]
@@ -257,10 +257,10 @@ def _try(
 
 
 def _choose(tried: Sequence[_Tried]) -> int:
-    """The first, that is the simplest, whose held-out error is about as small as any.
+    """The first, and so the simplest, whose held-out error is close to the smallest.
 
-    Samples whose drive lies far outside the fitted range do not choose, if there are others: there every model is a
-    guess.
+    Samples whose drive lies far outside the fitted range do not count, if there are others: every model is a guess
+    there.
     """
     found = [_rms_inside(each) for each in tried]
     enough = MODEL_PARSIMONY * min(found)
@@ -268,7 +268,7 @@ def _choose(tried: Sequence[_Tried]) -> int:
 
 
 def _rms_inside(tried: _Tried) -> float:
-    """Held-out rms error over the samples whose drive lies within `BEYOND` of the fitted range; of too few over all."""
+    """Held-out rms error over samples whose drive is within `BEYOND` of the fitted range; over all if those are few."""
     low, high = _drive(tried.compared)
     low, high = low - BEYOND * (high - low), high + BEYOND * (high - low)
     if all(low <= np.min(each.course.v) and np.max(each.course.v) <= high for each in tried.errors):
@@ -293,7 +293,7 @@ def _compare(item: Course, fitted: Fitted) -> pi.Errors:
 
 
 def _check_loading_curve(record: Record) -> None:
-    """Raise IdentificationError unless the drive rises from near 0 on."""
+    """Raise IdentificationError unless the drive starts near 0 and keeps rising."""
     v = np.asarray(record.v)
     top = float(np.max(v))
     if not (top > 0.0 and abs(float(v[0])) <= NEAR_ZERO * top and np.all(np.diff(v) >= -NEAR_ZERO * top)):
@@ -344,8 +344,8 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
 def _trial(
     courses: Sequence[Course], kinds: Sequence[str], how: _How, bar: Progress
 ) -> tuple[list[Row], str, list[pi.Errors], str]:
-    """Rows of models fitted to the first part of each record and compared with the rest, the kind that they choose, the
-    errors of that one, and the reason if there are no rows."""
+    """Rows of models fitted to the first part of each record and compared with the rest, the kind chosen by them, its
+    errors, and the reason if there are no rows."""
     if not courses:
         if len(kinds) > 1:
             raise ValueError("model auto needs something held out: give holdout records beside the loading curve")
@@ -368,14 +368,17 @@ def _trial(
     own = Row.of("fit", "trial", [_compare(item, best.fitted) for item in best.compared])
     rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
     rows += [own, replace(best.held_out, model="trial")]
-    # of an amplitude that fades the end alone is a smaller range, and no measure for the errors of both
+    # if the amplitude fades, the end by itself has a smaller range, which is no measure for the errors of both
     whole = max(item.output_range for item in courses)
     return [replace(row, output_range=whole) for row in rows], kinds[chosen], best.errors, ""
 
 
 def _parted(item: Course) -> tuple[Course, Course]:
-    """The part of a record to fit and the share of it to hold out: its end, unless the drive goes there far beyond what
-    it does before, as where amplitudes grow. Then it is the last part of that length that stays within the rest."""
+    """The part of a record to fit, and the part to hold out.
+
+    That is the record's end, unless the drive goes far beyond its earlier range there, for example with growing
+    amplitudes; then the last part of the same length that stays within the range of the rest.
+    """
     number = round(len(item.v) * HELD_OUT)
     last = len(item.v)
     beyond = {}
@@ -437,7 +440,7 @@ def stage_content(stage: Stage) -> dict[str, object]:
 
 
 def _start(r: NDArray[np.float64], history: tuple[float, ...] | None) -> float | list[float]:
-    """The start memory to write: after the history, or virgin; one number where all plays agree."""
+    """The start memory to write: after the history, or virgin; a single number if all plays agree."""
     if history is None or len(r) < 2:
         return 0.0
     states, _ = play_sum.project(reduction.start_states(np.zeros(1), history, r).tolist(), r.tolist())
@@ -445,7 +448,7 @@ def _start(r: NDArray[np.float64], history: tuple[float, ...] | None) -> float |
 
 
 def identifier_from(text: str) -> str:
-    """A C identifier made from any text, such as a file's stem: `stage` where nothing is left of it."""
+    """A C identifier made from any text, such as a file's stem; `stage` if nothing is left of it."""
     words = re.sub(r"[^0-9A-Za-z]+", "_", text).strip("_")
     if not words:
         return "stage"

@@ -1,4 +1,4 @@
-"""Faults of a recording that a fit has to be kept from: isolated wrong samples, gaps, and stretches of the output.
+"""Faults of a recording that must not reach a fit: isolated wrong samples, gaps, and stretches of the output.
 
 Samples that are not compared have no `y` (NaN) in a course; their drive still runs through the plays.
 """
@@ -20,14 +20,14 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 LONGEST = 4
-"""Most samples in a row that count as an isolated fault; more are something that the actuator or the sensor did."""
+"""Most samples in a row that count as an isolated fault; more must come from the actuator or the sensor."""
 
 OUTLYING = 8.0
 """[standard deviations of the scatter around it] An outlier is farther than this from the median around it."""
 
 LITTLE = 5e-4
-"""Least scatter, as a share of the peak-to-peak output: a model of a simulation leaves next to nothing but at its
-kinks, and an error of `OUTLYING` times that in a single sample spoils no fit."""
+"""Least scatter, as a share of the peak-to-peak output: a model of a simulation has hardly any error except at kinks,
+and an error of `OUTLYING` times this in a single sample spoils no fit."""
 
 WINDOW = 15
 """Samples of the running median, more than twice `LONGEST`."""
@@ -36,29 +36,29 @@ AROUND, CLEAR = 6, 2.5
 """An outlier jumps away and back by more than `CLEAR` times the steps of the `AROUND` samples on either side."""
 
 AT_ONCE = 0.7
-"""Least share of an outlier's distance from the line between its neighbours that each of the two jumps makes up."""
+"""Each of an outlier's two jumps covers at least this share of its distance from the line between its neighbours."""
 
 TAIL, NORMAL_TAIL = 0.98, 2.326
-"""A quantile of the deviations, and what it is for normal ones of standard deviation one."""
+"""A quantile of the deviations, and its value for a normal distribution with standard deviation 1."""
 
 STEP, STEP_OF_RANGE = 3.0, 0.02
 """A step of the drive is `STEP` times the quantile `TAIL` of its moves, and at least this share of its range."""
 
 MOST_OUTLIERS = 0.01
-"""Largest share of samples that is left out as outliers; beyond it they are no outliers."""
+"""Largest share of samples that is left out as outliers; more of them are no outliers."""
 
 FEW = 2
-"""Number of samples that may be left out of a record of any length: its first and its last."""
+"""Number of samples that may be left out of a record of any length: its first and its last one."""
 
 LONG_GAP = 25.0
 """Median steps of a gap after which the drive in between, and with it the memory, counts as unknown."""
 
 SEEN, SIGMAS = 0.05, 4.0
-"""The output responds to a pulse of the drive where it moves by this share of the expected motion, and by this number
-of standard deviations of its noise."""
+"""The output responds to a pulse of the drive if it moves by this share of the expected motion, and by this number of
+standard deviations of its noise."""
 
 OUT_OF_SCALE = 3.0
-"""Outputs this many ranges of the others beyond them are wrong, unless the drive is as far out."""
+"""Outputs that lie beyond all others by this many of their ranges are wrong, unless the drive is as far out."""
 
 
 def most(samples: int) -> int:
@@ -67,11 +67,10 @@ def most(samples: int) -> int:
 
 
 def outliers(error: Array, v: Array, swing: float) -> Flags:
-    """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN is not one.
+    """Isolated samples of an error signal (N,) that lie far from their neighbours; never NaN.
 
-    `swing`: peak-to-peak output, against which an error may be too small to spoil anything.
-
-    Those at a step of the drive `v` (N,) are not: a model that lacks a lag or a resonance misses them.
+    `swing`: peak-to-peak output; errors far below it spoil nothing. Samples at a step of the drive `v` (N,) do not
+    count: a model that lacks a lag or a resonance misses them.
     """
     found = np.zeros(len(error), dtype=bool)
     stepped = _stepped(v)
@@ -85,7 +84,7 @@ def outliers(error: Array, v: Array, swing: float) -> Flags:
 
 
 def far_from_others(error: Array, swing: float) -> list[tuple[int, int]]:
-    """Runs [first, last) of few samples of an error signal (N,) that lie far from their neighbours; NaN is skipped.
+    """Short runs [first, last) of an error signal (N,) that lie far from their neighbours; NaN is skipped.
 
     `swing`: as in `outliers`.
 
@@ -108,8 +107,8 @@ def far_from_others(error: Array, swing: float) -> list[tuple[int, int]]:
 
 
 def _scatter(sizes: Array, faulty: int) -> float:
-    """Standard deviation of a normal distribution with the same median, or tail, as these sizes without the `faulty`
-    largest: a model that misses sharp corners has wide tails, and so has a drive with sharp corners."""
+    """Standard deviation of a normal distribution with the same median or tail, whichever is larger, as these sizes
+    without the `faulty` largest: a model that misses sharp corners has wide tails, and so has a drive with corners."""
     tail = float(np.quantile(np.sort(sizes)[:-faulty], TAIL)) / NORMAL_TAIL
     return max(1.4826 * float(np.median(sizes)), tail)
 
@@ -124,9 +123,10 @@ def _stepped(v: Array) -> Flags:
 
 
 def _jump(x: Array, first: int, last: int) -> tuple[float, Array]:
-    """The smaller one of the jumps to and from samples [first, last), and how far these lie off their neighbours' line.
+    """The smaller one of the jumps to and from samples [first, last), and their distances from the line between their
+    neighbours.
 
-    At either end of a record there is one jump only.
+    At either end of a record there is only one jump.
     """
     ends = [k for k in (first - 1, last) if 0 <= k < len(x)]
     inner = [first if k < first else last - 1 for k in ends]
@@ -137,23 +137,23 @@ def _jump(x: Array, first: int, last: int) -> tuple[float, Array]:
 def _stands_out(x: Array, first: int, last: int) -> bool:
     """Whether samples [first, last) jump away and back at once, by far more than the signal moves around them.
 
-    The tip of a triangle does not, nor a move of few samples, where a model misses what happens there.
+    The tip of a triangle does not, nor does a move of a few samples that a model misses.
     """
     jump, away = _jump(x, first, last)
     if jump < AT_ONCE * float(np.max(away)):
         return False
     before, after = np.diff(x[max(first - AROUND, 0) : first]), np.diff(x[last : last + AROUND])
     around = np.sort(np.abs(np.concatenate([before, after])))
-    # between two others an outlier near by makes two large steps; at an end what settles is fastest
+    # between two others, a nearby outlier makes two large steps; at an end, a transient is fastest
     fewer = 1 if first == 0 or last == len(x) else 3
     return len(around) >= 3 and bool(jump > CLEAR * around[-fewer])
 
 
 def wrong_drive(v: Array, y: Array) -> Flags:
-    """Isolated samples of the drive that jump away and back while the output (NaN: not known) takes no notice.
+    """Isolated samples of the drive that jump away and back without a response of the output (NaN: not known).
 
     A real pulse of the drive shows in the output, at once or a little later; one that does not is a fault of the
-    recording. At the ends of a record the drive jumps once. Numbers that stand for no value are found in any case.
+    recording. At the ends of a record the drive jumps once. Numbers that stand for no value always count.
     """
     found = no_value(v)
     known = np.isfinite(y)
@@ -176,10 +176,10 @@ def wrong_drive(v: Array, y: Array) -> Flags:
 
 
 def pulses(v: Array) -> list[tuple[int, int]]:
-    """Runs [first, last) of few samples of the drive that jump away and back, or stand apart at an end.
+    """Short runs [first, last) of the drive that jump away and back, or stand apart at an end.
 
-    They may be real, or rows of which all is wrong: zeros, another sample's numbers, the converter's end. None where
-    there are enough of them to be the drive.
+    They may be real, or rows that are wrong altogether: zeros, another sample's numbers, the converter's end. Empty if
+    there are so many that they must be the drive.
     """
     span = _span(v)
     found = [(first, last) for first, last, _ in _pulses(v, span)] if span > 0.0 and len(v) > WINDOW else []
@@ -189,7 +189,7 @@ def pulses(v: Array) -> list[tuple[int, int]]:
 def returns(v: Array, first: int, last: int) -> bool:
     """Whether the drive leaves its course at samples [first, last), by a part of its range, and comes back.
 
-    Where there is nothing to come back to, at an end, it has to stand out as well.
+    At an end, where it cannot come back, it has to stand out as well.
     """
     _, away = _jump(v, first, last)
     if first == 0 or last == len(v):
@@ -200,14 +200,14 @@ def returns(v: Array, first: int, last: int) -> bool:
 
 
 def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
-    """Runs [first, last) of samples that jump away and back, or stand apart at an end, and by how much."""
+    """Runs [first, last) of samples that jump away and back, or stand apart at an end, and the size of the jump."""
     from scipy.ndimage import rank_filter
 
     step = np.abs(np.diff(v))
-    # three of them are not small at a sample that stands apart
+    # a sample that stands apart makes three of them large
     usual_bend = _scatter(np.abs(v[1:-1] - 0.5 * (v[:-2] + v[2:])), 3 * FEW)
     least = max(STEP_OF_RANGE * span, OUTLYING * usual_bend)
-    # of as many steps around the two jumps at most `LONGEST` + 1 belong to the pulse, and two to another one
+    # of the steps around the two jumps at most `LONGEST` + 1 belong to the pulse, and two to another one
     usual = rank_filter(step, -(LONGEST + 4), size=2 * (AROUND + LONGEST) + 1, mode="mirror")
     large = np.flatnonzero((step > least) & (step > CLEAR * usual))
     n = len(v)
@@ -224,9 +224,9 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
 
 
 def _notice(follows: Array, y: Array, first: int, last: int) -> float:
-    """How far the output leaves the line through its surroundings at samples [first, last), and soon after.
+    """How far the output leaves the line through its surroundings at samples [first, last) and soon after.
 
-    `follows`: the output's motion expected without the pulse, which is no response to it.
+    `follows`: the motion of the output expected without the pulse, which is no response to it.
     """
     at_once = _bent(y[max(first - 1, 0) : last + 1])
     near = slice(max(first - 1, 0), last + LONGEST)
@@ -243,7 +243,7 @@ def _bent(x: Array) -> float:
 
 
 def wrong_output(v: Array, y: Array) -> Flags:
-    """Outputs that stand for no value, and those out of all scale where the drive is not."""
+    """Outputs that stand for no value, and outputs out of all scale while the drive is not."""
     found = no_value(y)
     known = np.flatnonzero(~found)
     if len(known) < WINDOW:
@@ -255,7 +255,7 @@ def wrong_output(v: Array, y: Array) -> Flags:
 
 
 def smooth(record: Record) -> Record:
-    """The record with straight lines across the wrong samples that show without a model, to judge it as a whole."""
+    """The record with straight lines across samples that are wrong even without a model, to judge it as a whole."""
     assert record.y is not None
     v, y = record.v, np.asarray(record.y, dtype=np.float64)
     wrong = wrong_output(v, y)
@@ -264,14 +264,14 @@ def smooth(record: Record) -> Record:
 
 
 def _beyond(x: Array, times: float) -> Flags:
-    """Samples that lie `times` ranges beyond all but the outermost ones."""
+    """Samples that lie beyond all but the outermost ones by `times` their range."""
     low, high = _ends(x)
     away = times * (high - low)
     return np.asarray((x < low - away) | (x > high + away))
 
 
 def _ends(x: Array) -> tuple[float, float]:
-    """Least and largest sample, not counting as many as may be isolated faults."""
+    """Least and largest sample without as many of the outermost as may be isolated faults."""
     x = np.sort(x)
     return float(x[min(most(len(x)), len(x) // 2)]), float(x[max(len(x) - 1 - most(len(x)), len(x) // 2)])
 
@@ -282,7 +282,7 @@ def _span(x: Array) -> float:
 
 
 def _noise(x: Array) -> float:
-    """Standard deviation of white noise, robust: third differences have 20 times its variance."""
+    """Robust estimate of the standard deviation of white noise: third differences have 20 times its variance."""
     third = np.diff(x, 3)
     return 1.4826 * float(np.median(np.abs(third - np.median(third)))) / math.sqrt(20.0)
 
@@ -295,7 +295,7 @@ def bridged(v: Array, wrong: Flags) -> Array:
 
 @dataclass(frozen=True)
 class Piece:
-    """A part of a record without a gap in it, from sample `first` on. `after_gap`: its start memory is unknown."""
+    """A part of a record without a gap, which begins at sample `first`. `after_gap`: its start memory is unknown."""
 
     record: Record
     first: int
@@ -303,7 +303,7 @@ class Piece:
 
 
 def between_gaps(record: Record) -> list[Piece]:
-    """The record, cut where the time missing is so long that the drive in between is unknown."""
+    """The record, cut at gaps so long that the drive in between is unknown."""
     steps = np.diff(record.t)
     cuts = [0, *(np.flatnonzero(steps > LONG_GAP * record.sample_time) + 1).tolist(), len(record)]
     if len(cuts) == 2:
@@ -315,11 +315,11 @@ def between_gaps(record: Record) -> list[Piece]:
 
 
 BRIDGED, NOT_COMPARED = "v that y does not bear out, bridged", "y far from the neighbours, not compared"
-"""What is done about isolated wrong samples."""
+"""Phrases for isolated wrong samples and what was done with them."""
 
 
 def sentence(name: str, found: NDArray[np.intp], what: str) -> str:
-    """The sentence that counts isolated wrong samples, given where they are."""
+    """The sentence that counts isolated wrong samples, given their indices."""
     return f"{name}: {counted(len(found), 'isolated sample')} of {what}; the first is sample {found[0]}"
 
 
@@ -330,52 +330,51 @@ FEWEST_HELD = 6
 """Fewest equal samples in a row, while the drive moves, that count as held."""
 
 CHANCE = 1e-6
-"""Largest probability of a run of equal samples by chance, in a whole record."""
+"""Largest probability that a record contains a run of equal samples by chance, for it to count as held."""
 
 RAIL = 12
-"""Fewest samples at the very end of the output's range that count as saturated."""
+"""Fewest samples in a row, exactly at the end of the output's range, that count as saturated."""
 
 SHARP, USUAL = 8.0, 0.98
 """A drop-out begins and ends with a step of `SHARP` times the quantile `USUAL` of the steps."""
 
 SWINGS = 0.4
-"""A step beside steps of more than this share of it, but for one, is part of a swing."""
+"""A step is part of a swing if all but one of the steps beside it exceed this share of it."""
 
 LONGEST_DROP_OUT = 200
-"""Most samples of a drop-out, though never more than a twentieth of the record."""
+"""Most samples of a drop-out, but never more than a twentieth of the record."""
 
 SHORT = 3
-"""Fewer samples are isolated ones, which the fit leaves out by itself."""
+"""Fewer samples count as isolated; the fit leaves those out by itself."""
 
 MOVES_ON = 0.01
 """[share of its range] The drive goes on outwards by at least this while the output stands at a converter's end."""
 
 SUDDEN = 4.0
-"""A converter's end is reached in steps of less than this many times the steps that the drive makes."""
+"""A converter's end is reached in steps below this many times the steps expected from the drive."""
 
 GRAINS = 8.0
-"""A coarse output is held where the drive moves it by this many of its steps."""
+"""A coarse output is held if it stays while the drive should move it by this many of its steps."""
 
 NEAR = 4
-"""Equal samples are counted over this many lengths of the run on either side too: where the drive is slow for a while,
-a coarse converter repeats its codes."""
+"""Equal samples are also counted over this many lengths of the run on either side: while the drive is slow, a coarse
+converter repeats its codes."""
 
 NOISE_FREE = 1e-9
-"""Noise below this share of the output's range is rounding: a simulation, in which backlash repeats a number too."""
+"""Noise below this share of the output's range is rounding: the record is a simulation, in which backlash also repeats
+a number."""
 
 
 def sensitivity(y: Array, v: Array) -> float:
-    """Robust sensitivity: the output's spread over the drive's, from quartiles."""
+    """Robust sensitivity: the interquartile range of the output over that of the drive."""
     spread = float(np.subtract(*np.quantile(v, (0.75, 0.25))))
     return float(np.subtract(*np.quantile(y, (0.75, 0.25)))) / spread if spread > 0.0 else 0.0
 
 
 def drop_outs(y: Array, v: Array) -> list[tuple[int, int]]:
-    """Runs [a, b) over which the output leaves at a step, stays away and comes back at a step, as the drive does not.
+    """Runs [a, b) in which the output leaves by a step, stays away and comes back by a step, while the drive does not.
 
-    What rings does so in several steps.
-
-    `y`: NaN where it is not compared.
+    Ringing takes several steps. `y`: NaN where it is not compared.
     """
     known = np.flatnonzero(np.isfinite(y))
     if len(known) < 100:
@@ -407,7 +406,7 @@ def drop_outs(y: Array, v: Array) -> list[tuple[int, int]]:
 
 
 def held(y: Array, v: Array) -> list[tuple[int, int]]:
-    """Runs [a, b) of equal outputs while the drive moves on, longer than noise and a converter's steps make them."""
+    """Runs [a, b) of equal outputs while the drive moves on, longer than noise and a converter's steps explain."""
     step = np.diff(y)
     same = step == 0.0
     runs = [(a, b) for a, b in runs_of(same) if b - a + 1 >= FEWEST_HELD]
@@ -433,7 +432,7 @@ def held(y: Array, v: Array) -> list[tuple[int, int]]:
             around = np.concatenate([same[max(a - NEAR * (b - a), 0) : a], same[b : b + NEAR * (b - a)]])
             likely = max(chance, float(np.mean(around))) if len(around) else chance
             wrong = likely ** (b - a) * len(y) < CHANCE and moved > 0.25 * noise and (real or catches_up)
-        else:  # a coarse converter repeats codes without any fault, and then moves on by one of them
+        else:  # without any fault, a coarse converter repeats codes and then moves on by one of them
             wrong = moved > GRAINS * grain and catches_up
         if wrong:
             found.append((a, b + 1))
@@ -441,10 +440,11 @@ def held(y: Array, v: Array) -> list[tuple[int, int]]:
 
 
 def rails(y: Array, v: Array) -> list[tuple[str, float]]:
-    """Ends of the output, with their level, at which many samples in a row are equal while the drive moves on outwards.
+    """Ends of the output's range at which many samples in a row are equal while the drive moves on outwards, with their
+    levels.
 
-    An end that is reached and left at a step is none: those are drop-outs. Nor is one where the drive only turns: that
-    is backlash, or a coarse converter.
+    An end that is reached and left by a step does not count, since that is a drop-out, nor one where the drive only
+    turns: that is backlash or a coarse converter.
     """
     known = np.isfinite(y)
     if not known.any():
@@ -471,7 +471,7 @@ def rails(y: Array, v: Array) -> list[tuple[str, float]]:
 
 
 def flags_of(runs: Iterable[tuple[int, int]], samples: int) -> Flags:
-    """Flags (samples,) that are set over stretches [a, b)."""
+    """Flags (samples,) that are set in stretches [a, b)."""
     found = np.zeros(samples, dtype=bool)
     for a, b in runs:
         found[a:b] = True
@@ -479,6 +479,6 @@ def flags_of(runs: Iterable[tuple[int, int]], samples: int) -> Flags:
 
 
 def runs_of(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """Stretches [a, b) over which flags are set."""
+    """Stretches [a, b) in which flags are set."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

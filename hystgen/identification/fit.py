@@ -26,17 +26,17 @@ if TYPE_CHECKING:
 
 
 HELD_OUT = 0.25
-"""Share of each record, its end, that is held out for the figures when no record is given for that."""
+"""Share of each record, at its end, that is held out for the figures if no record is given for that."""
 
 
 @dataclass(frozen=True, repr=False)
 class Fit:
     """A fitted model and how good it is.
 
-    `parameters`: as a parameter file holds them; `rows`: the fit table; `warnings`: what the user should know, one
-    sentence each; `intervals`: 95 % confidence intervals; `used`: what was compared of each record, those held out
-    last; `history`: drive values visited before each record, None when unknown; `records`: those that `used` is about;
-    `draw`: makes the figure of `plot`, None where nothing is drawn.
+    `parameters`: as in a parameter file; `rows`: the fit table; `warnings`: what the user should know, one sentence
+    each; `intervals`: 95 % confidence intervals; `used`: the compared samples of each record, held-out records last;
+    `history`: drive values visited before each record, None if unknown; `records`: those of `used`, in that order;
+    `draw`: makes the figure of `plot`, None if nothing is drawn.
     """
 
     parameters: Parameters
@@ -65,7 +65,7 @@ class Fit:
         return Model(self.parameters)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
-        """A picture: loop of a record, held out if there is one, with the model's; residuals along time; weights.
+        """A picture: the loop of a record, held out if there is one, and the model's; residuals over time; weights.
 
         Returns matplotlib's Figure, which a notebook shows; with `path`, a .png or .svg, it is written there as well.
         Needs matplotlib, of the extra `plot`. Raises PlotError, OSError.
@@ -83,9 +83,9 @@ class Fit:
     ) -> NDArray[np.float64]:
         """Free-run output (N,) of the model along a record's drive, in output units.
 
-        The start memory comes from `history`, else from the history of the fit, else the plays are at rest at the
-        first drive value: then the samples before the drive has swept its range count little. `free_offset` shifts the
-        result to the mean of the record's `y`. Warns when the drive leaves the fitted range.
+        The start memory comes from `history`, else from the history of the fit; else the plays are at rest at the first
+        drive value, so that samples before the drive has swept its range mean little. `free_offset` shifts the result
+        to the mean of the record's `y`. Warns if the drive leaves the fitted range.
         """
         data = _read(record)
         outside = quality.outside(data.name, data.v, self.parameters.input_range)
@@ -103,8 +103,8 @@ class Fit:
     def along(self, record: Record, used: Used) -> NDArray[np.float64]:
         """Free-run output (N,) along a record as the fit compared it.
 
-        Where the drive was bridged it is here too; every part between gaps starts anew and has the free offset that
-        fits its compared samples best; NaN in parts that were left out. Raises ValueError where `used` is of another
+        The drive is bridged where the fit bridged it; every part between gaps starts anew and has the free offset that
+        fits its compared samples best; NaN in parts that were left out. Raises ValueError if `used` belongs to another
         record.
         """
         if (record.name, len(record)) != (used.name, used.samples) or record.y is None:
@@ -124,7 +124,7 @@ class Fit:
         return found
 
     def settled(self, record: Source) -> int:
-        """First sample of a record at which no play remembers an unknown start; 0 where a history was given."""
+        """First sample of a record at which no play remembers an unknown start; 0 if a history was given."""
         if self.history is not None:
             return 0
         largest = self.parameters.model.pi.thresholds[-1]
@@ -142,7 +142,7 @@ class Fit:
         """The parameter file: models and records of the fit as comments, then the parameters."""
         from hystgen.parameters.files import dump_parameters
 
-        lines = ["Identified by hystgen; errors have a free offset a record."]
+        lines = ["Identified by hystgen; errors have a free offset per record."]
         lines += [row.sentence() for row in self.rows]
         sure = self.intervals
         lines.append(f"95 % intervals from a bootstrap by blocks of {sure.block} samples: {self._interval_sentence()}")
@@ -165,7 +165,7 @@ class Fit:
 
     @property
     def unit(self) -> str:
-        """Unit of the output, empty where it is not known."""
+        """Unit of the output, empty if it is not known."""
         units = self.parameters.units
         return (units.output or "") if units is not None else ""
 
@@ -174,8 +174,8 @@ class Fit:
         """Explanations of the words in the fit table, one or two sentences each."""
         n = len(self.parameters.model.pi.thresholds) - 1
         reported = [
-            f"{counted(n, 'play')}. Errors of a free run with a free offset a record; % of the largest "
-            "peak-to-peak output that was compared of one of the row's records."
+            f"{counted(n, 'play')}. Errors of a free run with a free offset per record; % of the largest compared "
+            "peak-to-peak output of one of the row's records."
         ]
         if any(row.model == "trial" for row in self.rows):
             reported.append(
@@ -203,7 +203,7 @@ def visited(values: Sequence[float]) -> tuple[float, ...]:
     return arguments.numbers("history", values, "[100, -100]")
 
 
-# What a fit compared of each record and what it left out, sample by sample -----------------------------------
+# Samples of each record that a fit compared and left out -----------------------------------------------------
 
 
 Indices = NDArray[np.intp]
@@ -211,15 +211,14 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Used:
-    """What a fit made of one record; arrays are ascending indices into its samples.
+    """How a fit used one record; arrays are ascending indices into its samples.
 
     `name`: of the record; `held_out`: whether it took no part in the fit; `samples`: its length; `parts`: first and
-    last sample (exclusive) of each part that was run, one where there is no gap; `starts`: the start memory that was
-    found for each of them, None where it was given or not found; `skipped`: samples at the start not compared because
-    that was asked for; `ignored`: at the start of a part, because its start memory is not known;
-    `outliers`: of y, not compared; `stretches`: the same in drop-outs, held samples or a converter's end; `bridged`: of
-    v, replaced by a straight line; `gaps`: first sample behind each gap; `left_out`: between gaps, too little to be of
-    use.
+    last sample (exclusive) of each part that was run, a single part if there is no gap; `starts`: the start memory
+    found for each of them, None if it was given or not found; `skipped`: not compared at the start because that was
+    asked for; `ignored`: not compared at the start of a part because its start memory is not known; `outliers`: of y,
+    not compared; `stretches`: the same in drop-outs, held samples or a converter's end; `bridged`: of v, replaced by a
+    straight line; `gaps`: first sample after each gap; `left_out`: parts between gaps that are too short to use.
     """
 
     name: str
@@ -261,7 +260,7 @@ class Used:
 
 
 def used_of(records: Sequence[Record], courses: Sequence[Course], held_out: bool) -> tuple[Used, ...]:
-    """How the samples of `records` were used, given the courses that were compared in the end."""
+    """How the samples of `records` were used, given the courses that were finally compared."""
     return tuple(
         _of_record(record, [item for item in courses if item.origin[0] == number], held_out)
         for number, record in enumerate(records)

@@ -1,7 +1,7 @@
 """Fitting a play sum with a memoryless part in front of it.
 
 The front's shape and the weights are found together (`joint`); then the plays are placed and weighted as for a plain
-play sum, on the drive as it comes out of the front (`pi`), and both are polished once more.
+play sum, on the drive behind the front (`pi`), and both are refined once more.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ FRONT_PARSIMONY = 1.02
 """A front with fewer shape numbers is taken if its validation error is within this factor of the best."""
 
 INVERSE_PLAYS = 10
-"""Plays of the measured output in the convex problem that gives a dead-zone sum its start."""
+"""Plays of the measured output in the convex problem that starts the search for a dead-zone sum."""
 
 LEAST_SLOPE = 0.1
-"""Least slope of a piece of the drive, and of the inverse play sum, in that problem; as a share of the mean slope."""
+"""Least slope of a piece of the front, and of the inverse play sum, in that problem, as a share of the mean slope."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class Fitted:
         return joint.through_front(item, self.stages)
 
     def begun(self, courses: Sequence[Course]) -> list[Course]:
-        """Courses that had no part in the fit, with start memories where their history is not known."""
+        """Courses that took no part in the fit, with start memories if their history is not known."""
         return start.of_model(courses, self.stages, self.solution.thresholds, self.solution.weights)
 
 
@@ -69,17 +69,17 @@ def solve(
     floor: float,
     tick: Tick = None,
 ) -> tuple[Fitted, list[Course]]:
-    """Fit a model of one kind; also the courses, their drive as measured, over the samples that were compared.
+    """Fit a model of one kind; also returns the courses, their drive as measured, over the compared samples.
 
-    Of several fronts of a kind the one with the fewest shape numbers is taken that predicts blocks of the records left
-    out of the fit about as well as any. Raises IdentificationError.
+    Of several fronts of a kind, takes the one with the fewest shape numbers whose prediction of blocks left out of the
+    fit is close to the best. Raises IdentificationError.
     """
-    # a start memory found without the front is not the one behind it, but better than too little to compare
+    # a start memory found without the front is not exact behind it, but better than too few samples to compare
     courses = start.needed(courses, (), wanted if kind == "pi" else None)
     plain, compared = pi.solve(courses, wanted, floor, tick)
     if kind == "pi":
         return Fitted(Kept(), np.empty(0), plain), compared
-    # What a play sum alone would choose is bent by the front that it lacks: the shape is sought over a dense list
+    # the missing front distorts the choice of a plain play sum: search the shape with a dense list of plays
     fine = plain.thresholds
     if not isinstance(wanted, tuple) and plain.reach > 0.0:
         fine = np.array(pi.dense(plain.reach, sum(item.used for item in compared)).thresholds)
@@ -95,7 +95,7 @@ def solve(
     _, front, shape = best
     courses = start.needed(courses, front.stages(shape), wanted)
     fitted = _solve_behind(courses, front, shape, wanted, floor, tick)
-    # the plays may have moved, and the shape is to be the best one for them
+    # the plays may have moved: find the best shape for them again
     r = fitted.solution.thresholds
     shape = joint.refine(compared, front, shape, r, tick).shape
     fitted = _solve_behind(courses, front, shape, tuple(float(x) for x in r), floor, tick)
@@ -121,7 +121,7 @@ def _solve_behind(
 
 
 def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, ...] | None) -> list[Front]:
-    """The fronts of a kind, those with fewer shape numbers first."""
+    """The fronts of a kind, in rising order of their numbers of shape parameters."""
     drive = (min(item.drive_range[0] for item in courses), max(item.drive_range[1] for item in courses))
     if kind == "gpi-tanh":
         return [Tanh(drive), Tanh(drive, 2)]
@@ -150,7 +150,7 @@ def _shaped(
 
 
 def validation(shaped: joint.Shaped, front: Front) -> float:
-    """rms error on blocks of the records that the weights and the last step of the shape have not seen."""
+    """rms error on blocks of the records that took no part in the weights and in the last step of the shape."""
     squares = 0.0
     for fold, left_out in enumerate(shaped.system.folds):
         training = reduction.others(shaped.system, fold)
@@ -165,8 +165,8 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
 
     `PI^-1[y] = G[v]`: plays of the measured output, with weights q_0 > 0 and q_i <= 0, on the one side, pieces of the
     drive with positive slopes on the other (Kuhnen, European Journal of Control 9, 2003, 407-418, where the memoryless
-    part lies behind the plays). It is convex, but the error that it makes small is one of the drive, and noise of the
-    output enters the plays: a start for the fit of the output, no more. None where no sample is left.
+    part lies behind the plays). It is convex, but it minimises an error of the drive, and noise of the output
+    enters the plays: only a start for the fit of the output. None if no sample is left.
     """
     low, high = front.drive
     places = np.array([low, *front.breaks, high])
@@ -176,7 +176,7 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
     z = np.linspace(0.0, 0.4 * swing, INVERSE_PLAYS + 1)
     turned = []
     for item in courses:
-        # the memory of the inverse is not known even where that of the plays is
+        # the memory of the inverse is not known even if that of the plays is
         measured = faults.bridged(item.y, ~np.isfinite(item.y))
         first = max(item.first, reduction.settled(measured[: item.last], math.inf))
         pieces = np.clip(item.v[None, :], places[:-1, None], places[1:, None]) - places[:-1, None]
@@ -194,7 +194,7 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
             nonlocal states
             moved = operators.plays(item.v[start:stop], thresholds, states)
             states = np.ascontiguousarray(moved[:, -1])
-            # the mean slope is 1: the last piece makes up for the others
+            # the mean slope is 1: the last piece follows from the others
             part = pieces[:, start:stop]
             others = part[:-1] - part[-1] * (length[:-1] / length[-1])[:, None]
             found = np.vstack([np.ones(stop - start), moved, -others, item.y[start:stop]]).T

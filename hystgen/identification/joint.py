@@ -1,8 +1,8 @@
 """The shape of a front and the weights of the plays fitted together: least squares on the free-run output error.
 
-The weights enter linearly, the shape does not: a Gauss-Newton method with a trust region, whose every step solves for
-all weights and the change of the shape at once, under the constraints that keep the model invertible. Derivatives by
-the shape are differences of free runs, so that they count what the plays remember of earlier samples.
+The weights enter linearly, the shape does not: a Gauss-Newton method with a trust region, in which every step solves
+for all weights and the change of the shape at once, under the constraints that keep the model invertible. Derivatives
+with respect to the shape are differences of free runs, which include what the plays remember of earlier samples.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ Array = NDArray[np.float64]
 # Fronts whose shape a fit may change -------------------------------------------------------------------------
 #
 # A front and the play sum behind it share a scale: `a G` with thresholds `a r` and weights `p / a` is the same model.
-# Every front here maps the fitted drive range onto a range of the same length and 0 onto 0, so that thresholds keep the
-# meaning they have without one.
+# Every front here maps the fitted drive range onto a range of the same length, and 0 onto 0, so that thresholds mean
+# the same as without a front.
 
 
 STEEPEST = math.log(20.0)
@@ -42,18 +42,18 @@ FLATTER = math.log(200.0)
 """Largest ratio of the slopes of a limiter, as its logarithm."""
 
 SMOOTH = 16
-"""Pieces of a dead-zone sum that stands for a smooth curve: its slope changes by at most a fifth from one to the next
-where the whole range has a ratio of 20."""
+"""Pieces of a dead-zone sum that approximates a smooth curve: with a ratio of 20 over the whole range, slopes of
+neighbours differ by at most a fifth."""
 
 FLATTEST = 3.0
-"""Largest argument of a tanh within the drive range; its slope there is a hundredth of the largest."""
+"""Largest argument of a tanh within the drive range, where its slope is a hundredth of the largest."""
 
 CURVED = (0.02, 3.0)
 """Least and largest half drive range in units of the tanh's argument."""
 
 
 class Front(Protocol):
-    """A family of memoryless parts, a member for every `shape` (m,)."""
+    """A family of memoryless parts, with one member for every `shape` (m,)."""
 
     @property
     def name(self) -> str:
@@ -61,14 +61,14 @@ class Front(Protocol):
 
     @property
     def straight(self) -> Array:
-        """The shape that is (nearly) a straight line: where a search starts."""
+        """The shape of a (nearly) straight line, at which a search starts."""
 
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Least and largest value of every shape number."""
 
     def slack(self, shape: Array) -> Array:
-        """Values that must not be negative for the front to be invertible, beyond the bounds; may be empty."""
+        """Values that must not be negative for the front to be invertible, in addition to the bounds; may be empty."""
 
     def stages(self, shape: Array) -> tuple[Stage, ...]:
         """The stages of the model."""
@@ -92,11 +92,11 @@ class Kept:
         return np.empty(0), np.empty(0)
 
     def slack(self, shape: Array) -> Array:
-        """Nothing to hold."""
+        """No constraints."""
         return np.empty(0)
 
     def stages(self, shape: Array) -> tuple[Stage, ...]:
-        """The stages as they are."""
+        """The given stages."""
         return self.given
 
 
@@ -104,8 +104,8 @@ class Kept:
 class DeadZones:
     """Dead-zone sums with given breaks (41); the shape is the logarithm of each piece's slope over the first one's.
 
-    `drive`: the fitted range; `breaks`: places inside it where the slope may change, strictly rising, none of them 0:
-    a threshold of 0 is the line that every dead-zone sum has.
+    `drive`: the fitted range; `breaks`: places inside it where the slope may change, strictly rising, none of them 0,
+    since a threshold of 0 is the straight line in every dead-zone sum.
     """
 
     drive: tuple[float, float]
@@ -119,7 +119,7 @@ class DeadZones:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Every piece rises, none is far steeper than another."""
+        """Every piece rises, and none is far steeper than another."""
         most = np.full(len(self.breaks), STEEPEST)
         return -most, most
 
@@ -128,7 +128,7 @@ class DeadZones:
         return np.empty(0)
 
     def slopes(self, shape: Array) -> Array:
-        """Slopes of the pieces, from the lowest drive up."""
+        """Slopes of the pieces, beginning at the lowest drive."""
         ratio = np.exp(np.concatenate([[0.0], shape]))
         low, high = self.drive
         length = np.diff([low, *self.breaks, high])
@@ -141,7 +141,7 @@ class DeadZones:
         return np.asarray(np.clip(logs[1:] - logs[0], -STEEPEST, STEEPEST))
 
     def stages(self, shape: Array) -> tuple[Stage, ...]:
-        """The dead-zone sum; its weight at 0 is the slope of the piece that 0 lies in."""
+        """The dead-zone sum; its weight at 0 is the slope of the piece that contains 0."""
         slopes = self.slopes(shape)
         middle = int(np.searchsorted(self.breaks, 0.0, side="right"))
         terms = {0.0: float(slopes[middle])}
@@ -154,10 +154,10 @@ class DeadZones:
 
 @dataclass(frozen=True)
 class Ends:
-    """A limiter: a straight line that is flatter near the ends of the drive range, two dead zones (41).
+    """A limiter: a straight line that becomes flatter near the ends of the drive range, with two dead zones (41).
 
-    The shape is how far inside the range each place lies where that begins, as a share of it, and the logarithm of the
-    slope beyond them over that between them.
+    The shape is the distance from each end at which that begins, as a share of the range, and the logarithm of the
+    ratio of the outer slope to the inner one.
     """
 
     drive: tuple[float, float]
@@ -165,12 +165,12 @@ class Ends:
 
     @property
     def straight(self) -> Array:
-        """Hardly flatter, so that the derivatives to the places are not zero."""
+        """Slightly flatter at the ends, so that the derivatives with respect to the places are not zero."""
         return np.array([0.1, 0.1, -0.1])
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """A place may lie at its end, where it does nothing; the two do not meet."""
+        """A place may lie at its end, where it has no effect; the two do not meet."""
         return np.array([1e-3, 1e-3, -FLATTER]), np.array([0.45, 0.45, 0.0])
 
     def slack(self, shape: Array) -> Array:
@@ -203,7 +203,7 @@ class Bent:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """No slope is steeper against another than where they are sought piece by piece."""
+        """Ratios of slopes are limited as in a search piece by piece."""
         most = np.full(self.degree, 0.5 * STEEPEST / self.degree)
         return -most, most
 
@@ -226,9 +226,9 @@ class Bent:
 class Tanh:
     """Tanh envelopes with one branch or two (45).
 
-    The shape of a branch is `a1` times half the drive range, and the place of its steepest point, from the middle of
-    the range in units of its half length. The descending branch has two more: the logarithm of its length over the
-    ascending one's and its lift above it in the middle of the range, as a share of the range.
+    The shape of a branch is `a1` times half the drive range, and the place of its steepest point, counted from the
+    middle of the range in units of half its length. The descending branch has two more numbers: the logarithm of its
+    height over that of the ascending one, and its lift above it in the middle of the range, as a share of the range.
     """
 
     drive: tuple[float, float]
@@ -236,12 +236,12 @@ class Tanh:
 
     @property
     def name(self) -> str:
-        """With the number of branches, which distinguishes rows of the table."""
+        """The name with the number of branches, which distinguishes rows of the table."""
         return "gpi-tanh" if self.branches == 1 else "gpi-tanh, two branches"
 
     @property
     def straight(self) -> Array:
-        """A gently bent branch, so that the derivative to its place is not zero; no gap between two."""
+        """A gently bent branch, so that the derivative with respect to its place is not zero; no gap between two."""
         return np.array([0.3, 0.0] if self.branches == 1 else [0.3, 0.0, 0.3, 0.0, 0.0, 0.0])
 
     def doubled(self, single: Array) -> Array:
@@ -256,7 +256,7 @@ class Tanh:
         return np.array(low), np.array(high)
 
     def slack(self, shape: Array) -> Array:
-        """How far the ends stay from where a branch is flat, and the descending branch above the ascending one."""
+        """Distances of the ends from where a branch becomes flat, and of the descending branch above the ascending."""
         held = [FLATTEST - shape[2 * b] * (1.0 + abs(shape[2 * b + 1])) for b in range(self.branches)]
         if self.branches == 2 and min(held) < -FLATTEST:  # a branch may be flat to the last digit, and have no length
             held += [-1.0] * len(self._places)
@@ -272,7 +272,7 @@ class Tanh:
         return np.linspace(*self.drive, 61)
 
     def stages(self, shape: Array) -> tuple[Stage, ...]:
-        """The envelope with rounded numbers; the descending branch is lifted where rounding would put it too low."""
+        """The envelope with rounded numbers; the descending branch is lifted if rounding would put it too low."""
         return (self._stage(shape, DIGITS),)
 
     def _stage(self, shape: Array, digits: int | None) -> TanhEnvelope:
@@ -317,7 +317,7 @@ def even_breaks(drive: tuple[float, float], count: int) -> tuple[float, ...]:
 
 
 def aside(places: Sequence[float], least: float) -> tuple[float, ...]:
-    """The places, one within `least` of 0 moved to `least`: a dead zone of threshold 0 is the line itself."""
+    """The places; one within `least` of 0 moves to `least`, since a dead zone with threshold 0 is the line itself."""
     return tuple(rounded(least, 6) if abs(x) < least else x for x in places)
 
 
@@ -325,12 +325,12 @@ def aside(places: Sequence[float], least: float) -> tuple[float, ...]:
 
 
 DIFFERENCE = 1e-6
-"""Change of a shape number for a derivative; shapes are of the order of one."""
+"""Change of a shape number for a derivative; shape numbers are of the order of one."""
 
 MOST_STEPS = 25
 
 DAMPING = 1e-3
-"""Of the first step, against the diagonal of its equations."""
+"""Damping of the first step, relative to the diagonal of its equations."""
 
 ENOUGH = 0.005
 """The search ends when the sum of squares falls by less than this many times its share of one sample.
@@ -339,21 +339,21 @@ A step of one standard deviation of an estimate changes it by one such share.
 """
 
 LEAST_CHANGE = 1e-8
-"""It ends too when no shape number changes by more than this."""
+"""The search also ends when no shape number changes by more than this."""
 
 COMPARED = 200_000
-"""Samples that are compared while the shape is sought; of longer records an even selection, though all run through the
-plays."""
+"""Samples compared in the search for the shape: an even selection from longer records, although all samples run through
+the plays."""
 
 Tick = Callable[[int], None] | None
 
 
 @dataclass(frozen=True)
 class Shaped:
-    """A shape, weights over a list of thresholds, and the system that is linear about both.
+    """A shape, weights over a list of thresholds, and the system linearised about both.
 
-    `rms`: error of the `best` weights for the shape, to which `weights` are near. `derived` gives the system: a step
-    that is not taken does not need it.
+    `rms`: error of the `best` weights for the shape, to which `weights` are close. `derived` computes the system, which
+    a rejected step does not need.
     """
 
     shape: Array
@@ -365,12 +365,12 @@ class Shaped:
 
     @cached_property
     def system(self) -> Reduced:
-        """The system; its derivatives cost most of a search."""
+        """The linearised system; its derivatives take most of the time of a search."""
         return self.derived()
 
 
 def through_front(item: Course, stages: Sequence[Stage]) -> Course:
-    """The course as the plays see it: their input in place of the drive, and of what was visited before."""
+    """The course as the plays see it: their input in place of the drive and of the history."""
     if not stages:
         return item
     rising, visited = _session(item, stages)
@@ -381,7 +381,7 @@ def through_front(item: Course, stages: Sequence[Stage]) -> Course:
 
 
 def _session(item: Course, stages: Sequence[Stage]) -> tuple[NDArray[np.bool_] | None, tuple[float, ...] | None]:
-    """Directions of the drive along the course, and what was visited before it, behind the front."""
+    """Directions of the drive along the course, and its history behind the front."""
     branched = any(stage.branches_differ for stage in stages)
     if item.visited is None:
         return (directions(item.v, True) if branched else None), None
@@ -424,11 +424,11 @@ def search(
     little: float = 0.0,
     damping: float = DAMPING,
 ) -> tuple[Shaped, float]:
-    """The best shape near that of `now`, and the damping with which the search goes on from there.
+    """The best shape near that of `now`, and the damping with which the search would continue.
 
-    `linear` gives the system that is linear about a shape and weights. `little`: the search ends with a step that
-    lowers the error by less than this share, too. Steps that fail are damped more, and counted. It ends before a step
-    of which the linear system promises less than `ENOUGH`.
+    `linear` linearises the system about a shape and weights. `little`: the search also ends after a step that lowers
+    the error by less than this share. Steps that fail count, and the next one is damped more. It ends before a step for
+    which the linear system promises less than `ENOUGH`.
     """
     shape = now.shape
     low, high = limits.bounds
@@ -436,7 +436,7 @@ def search(
         if damping > 1e6 or now.rms == 0.0 or not math.isfinite(now.rms):
             break
         system = now.system.whole
-        if not np.isfinite(system).all():  # numbers next to these make none
+        if not np.isfinite(system).all():  # the derivatives overflow
             break
         try:
             change, p = solve_linear(system, now.weights, now.shape, limits, damping)
@@ -448,7 +448,7 @@ def search(
         least = 0.5 * ENOUGH / now.samples
         residual = system[:, -1] - system[:, :-1] @ np.concatenate([p, change])
         promised = root_mean_square(float(residual @ residual), now.samples)
-        if now.rms - promised < least * now.rms:  # most of these steps fail, and each costs as much as any other
+        if now.rms - promised < least * now.rms:  # most such steps fail, at full cost
             break
         trial = linear(moved, p) if _allowed(limits, moved) else None
         if trial is not None and trial.rms < now.rms:
@@ -469,19 +469,19 @@ def _allowed(limits: Limits, shape: Array) -> bool:
 def _linear(
     courses: Sequence[Course], front: Front, shape: Array, p: Array, thresholds: Array, tick: Tick
 ) -> Shaped:
-    """The best weights for a shape, and the system that is linear about the shape and weights `p` near to them."""
+    """The best weights for a shape, and the system linearised about the shape and weights `p` close to them."""
     every = max(1, sum(item.used for item in courses) // COMPARED)
     source = linear_source(front, shape, p, every)
     system = reduction.reduce(courses, thresholds, tick, source, len(shape))
     columns = np.arange(len(thresholds))
     best = pi.non_negative(system.whole, columns)
     rms = root_mean_square(pi.residual(system.whole, columns, best), system.samples)
-    # About the weights that the derivatives were taken with: they are what the next step of the shape refers to
+    # `p`, with which the derivatives were taken: the next step of the shape refers to it
     return Shaped(shape, p, rms, best, system.samples, lambda: system)
 
 
 def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[[Course, Array], Source]:
-    """Rows of the system that is linear about a shape and weights, for one in `every` samples."""
+    """Rows of the system linearised about a shape and weights, for one in `every` samples."""
     versions = [front.stages(shape)]
     for j in range(len(shape)):
         one = shape.copy()
@@ -497,7 +497,7 @@ def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[
 def _rows_with_derivatives(
     course: Course, thresholds: Array, versions: Sequence[Sequence[Stage]], p: Array, every: int
 ) -> Source:
-    """The plays behind the first version of a front, and the change of their weighted sum with every other version."""
+    """The plays behind the first version of a front, and the changes of their weighted sum by the other versions."""
     carried = []
     for stages in versions:
         rising, visited = _session(course, stages)
@@ -529,7 +529,7 @@ def _rows_with_derivatives(
 def solve_linear(
     system: Array, p: Array, shape: Array, limits: Limits, damping: float
 ) -> tuple[Array, Array]:
-    """Change of the shape and new weights that fit a linear system best, under the constraints."""
+    """Change of the shape, and new weights, that fit a linear system best under the constraints."""
     k, m = len(p), len(shape)
     matrix, target = system[:, :-1], system[:, -1]
     tied = np.zeros((m, k + m))

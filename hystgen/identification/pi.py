@@ -21,17 +21,17 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 DIGITS = 10
-"""Significant digits of fitted numbers: more than a record determines, fewer than depend on the linear algebra
-library."""
+"""Significant digits of fitted numbers: more than a record determines, and few enough not to depend on the linear
+algebra library."""
 
 DUST = 1e-9
-"""A weight of less than this share of their sum is rounding, not a play."""
+"""A weight below this share of their sum is rounding, not a play."""
 
 FALLS = (
     "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign of y, "
     "else check which column is which"
 )
-"""The message where no play is left in the model."""
+"""The message if no play is left in the model."""
 
 
 class IdentificationError(ValueError):
@@ -42,15 +42,15 @@ class IdentificationError(ValueError):
 class Sense:
     """How the output moves with the drive.
 
-    `falls`: it goes down where the drive goes up; `clockwise`: loops run the other way than those of plays, and weights
-    of either sign explain the records clearly better than positive ones.
+    `falls`: it goes down when the drive goes up; `clockwise`: loops run in the opposite direction to those of plays,
+    and weights of either sign explain the records clearly better than positive ones.
     """
 
     falls: bool
     clockwise: bool
 
     def sentences(self, plays: int) -> list[str]:
-        """What the user should know, one sentence each; `plays`: how many the fitted model has."""
+        """What the user should know, one sentence each; `plays`: their number in the fitted model."""
         found = [FALLING] if self.falls else [CLOCKWISE] if self.clockwise else []
         return [*found, NO_PLAYS] if plays == 0 else found
 
@@ -59,7 +59,7 @@ class Sense:
 class Solution:
     """A fitted play sum.
 
-    `reach`: largest threshold that the records support; `fitted`: what was done about p_0; `sense`: of the records.
+    `reach`: largest threshold that the records support; `fitted`: the weights as fitted; `sense`: of the records.
     """
 
     thresholds: Array
@@ -69,7 +69,7 @@ class Solution:
     sense: Sense
 
     def without_idle_plays(self) -> Solution:
-        """The same without plays of weight 0, which are not part of the model."""
+        """The same without plays of weight 0, which have no effect."""
         kept = (self.weights > 0.0) | (self.thresholds == 0.0)
         return replace(self, thresholds=self.thresholds[kept], weights=self.weights[kept])
 
@@ -80,7 +80,7 @@ def solve(
     floor: float,
     tick: Callable[[int], None] | None = None,
 ) -> tuple[Solution, list[Course]]:
-    """Choose thresholds (unless given as a list), fit the weights; also the courses as they were compared.
+    """Choose thresholds (unless given as a list) and fit the weights; also returns the courses as they were compared.
 
     Raises IdentificationError.
     """
@@ -119,7 +119,7 @@ def solve(
 
 @dataclass(frozen=True)
 class Errors:
-    """Error samples of one course from `first` to `last`, its free offset taken out; NaN where not compared."""
+    """Errors of one course from `first` to `last` without its free offset; NaN where samples are not compared."""
 
     course: Course
     offset: float
@@ -133,19 +133,19 @@ def compare(item: Course, r: Array, p: Array) -> Errors:
     return Errors(item, offset, error - offset)
 
 
-# Which way the output goes with the drive, and which way round its loops run. A play sum with positive weights rises
-# with its drive, and its loops run counterclockwise: the output is behind. Weights of either sign also follow clockwise
-# loops, such as those of a force over the displacement of a damper.
+# Sense of the output, and direction of its loops. A play sum with positive weights rises with its drive, and its loops
+# run counterclockwise: the output is behind. Weights of either sign can also follow clockwise loops, such as those of a
+# force over the displacement of a damper.
 
 
 SENSED_PLAYS = 8
-"""[plays] About this many have weights of either sign: of many more, the weights of neighbours cancel."""
+"""[plays] Number of plays with weights of either sign: with many more, the weights of neighbours cancel."""
 
 SENSED_RANK = 1e-6
-"""Share of the largest singular value below which a combination of plays is not determined by the records."""
+"""Share of the largest singular value below which the records do not determine a combination of plays."""
 
 CLEARLY = 0.9
-"""Weights of either sign have to leave less than this times what positive ones leave to be believed."""
+"""Weights of either sign count only if their rms error is below this share of that of positive weights."""
 
 FALLING = (
     "y falls where v rises; if the sensor counts the other way, change the sign of y, else check which column is which"
@@ -173,13 +173,13 @@ def sense_of(reduced: Reduced, courses: Sequence[Course], squares: float) -> Sen
 
 
 def _covaried(item: Course) -> float:
-    """Sum of products of drive and output, each from its mean: negative where one falls while the other rises."""
+    """Covariance of drive and output times the number of samples; negative if one falls while the other rises."""
     v, y = item.v[item.compared], item.y[item.compared]
     return float((v - np.mean(v)) @ (y - np.mean(y)))
 
 
 def _travelled(item: Course, r: Array) -> Array:
-    """Distance that each play moves; times its weight and threshold that is the area that its loops enclose."""
+    """Distance travelled by each play; times its weight and threshold, that is the area enclosed by its loops."""
     states = reduction.start_states(item.v, item.visited, r)
     moved = operators.plays(item.v[: item.last], r, states)[:, item.first :]
     return np.asarray(np.abs(np.diff(moved, axis=1)).sum(axis=1))
@@ -191,17 +191,17 @@ def _travelled(item: Course, r: Array) -> Array:
 LEAST_TRAVEL = 0.15
 """The largest play still moves over this share of the drive's peak-to-peak range.
 
-A play of threshold r moves over `p-p - 2 r` in a settled loop. As that goes to zero its weight is set by the last few
-samples before each reversal and can take any value, while a slightly larger drive multiplies it by a real travel. At
-15 % of the range (r = 0.85 of half the range) the weight is a slope measured over about as much drive as the gap to
-the play below, and the error at the ends of the loop is already within 10 % of what plays up to 0.9 reach.
+A play of threshold r moves over `p-p - 2 r` in a settled loop. As that goes to zero, its weight depends only on the
+last few samples before each reversal and can take any value, while a slightly larger drive multiplies it by a real
+travel. At 15 % of the range (r = 0.85 of half the range) the weight is a slope measured over about as much drive as the
+gap to the play below, and the error at the ends of the loop is within 10 % of that with plays up to 0.9.
 """
 
 LEAST_RETURN = 0.05
-"""The same, there and back, of a play whose start memory is not known: less is hardly more than a straight line.
+"""The same, there and back, for a play whose start memory is not known: less is hardly more than a straight line.
 
-A drive whose amplitude grows to the end moves its widest plays once. In 10 simulated plants errors were 1.9 times those
-with a known start in the median; with 0.15 here too, 3.0 times, and weights of plays that exist were missing.
+A drive whose amplitude grows to the end moves its widest plays once. In 10 simulated plants the median error was 1.9
+times that with a known start; with 0.15 here as well it was 3.0 times, and weights of existing plays were missing.
 """
 
 COUNTS = (6, 8, 12, 16, 24)
@@ -214,13 +214,13 @@ PLAYS_PARSIMONY = 1.01
 """The fewest plays whose validation error is within this factor of the best are chosen."""
 
 DENSE = 16
-"""Plays of the list that other parts of a model are sought with."""
+"""Plays in the list with which other parts of a model are searched for."""
 
 MANY_PLAYS = 100
 """More plays than this are spaced evenly."""
 
 SAMPLES_A_PLAY = 8
-"""The default never places more plays than one for this many samples."""
+"""By default there is at most one play per this many samples."""
 
 
 @dataclass(frozen=True)
@@ -238,8 +238,8 @@ class Candidate:
 def largest(courses: Sequence[Course]) -> float:
     """The largest threshold whose play moves far enough in the record that moves it most.
 
-    The movement of a play falls steadily with its threshold, so bisection finds the place; nothing is assumed about
-    the waveform, and a first loading from a known start counts as what it is.
+    The movement of a play decreases with its threshold, so bisection finds the place; nothing is assumed about the
+    waveform, and a first loading from a known start counts as such.
     """
     found = 0.0
     for course in courses:
@@ -263,7 +263,7 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
         counts = [n for n in COUNTS if n * SAMPLES_A_PLAY <= samples] or (max(1, samples // SAMPLES_A_PLAY),)
     lists = []
     for n in counts:
-        # A single play has one place; very many leave nothing to choose
+        # a single play has one place; with very many the spacing does not matter
         for power in POWERS[: 1 if n < 2 or n > MANY_PLAYS else None]:
             places = (rounded(reach * (i / n) ** power, 6) for i in range(1, n + 1))
             lists.append(Candidate((0.0, *places)))
@@ -271,7 +271,7 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
 
 
 def dense(reach: float, samples: int, most: int = DENSE) -> Candidate:
-    """One list of `most` plays, fine enough to show what else a record contains."""
+    """One list of `most` plays, fine enough to show the other effects in a record."""
     return candidates(reach, samples, min(most, max(1, samples // SAMPLES_A_PLAY)))[:2][-1]
 
 
@@ -281,19 +281,19 @@ def rounded(x: float, digits: int) -> float:
 
 
 def union(lists: Sequence[Candidate]) -> Array:
-    """All thresholds that occur, each once."""
+    """All thresholds in the lists, each once."""
     return np.array(sorted({r for candidate in lists for r in candidate.thresholds}))
 
 
 def columns(reduced: Reduced, candidate: Candidate) -> Columns:
-    """Where the candidate's plays are among the reduced ones."""
+    """Columns of the candidate's plays in the reduced systems."""
     return np.asarray(np.searchsorted(reduced.thresholds, candidate.thresholds))
 
 
 def choose(reduced: Reduced, lists: Sequence[Candidate]) -> Candidate:
-    """The fewest plays that predict blocks of the records left out of the fit about as well as any candidate does.
+    """The fewest plays whose prediction of blocks left out of the fit is close to that of the best candidate.
 
-    Each of four consecutive blocks is predicted by weights fitted to the other three. Ties go to the smaller error.
+    Weights fitted to three of four consecutive blocks predict the fourth. Ties go to the smaller error.
     """
     if len(lists) == 1:
         return lists[0]
@@ -317,14 +317,14 @@ def choose(reduced: Reduced, lists: Sequence[Candidate]) -> Candidate:
 Columns = NDArray[np.intp]
 
 STILL = 1e-9
-"""A column of less than this share of the first or longest one in its unit is rounding: a play that does not move."""
+"""A column shorter than this share of the first or longest one in its unit is rounding: its play does not move."""
 
 TIE = 1e-12
 """Weight of the tie break between solutions that fit equally well, as a share of the squared output.
 
-Where the drive stays between few turning points several plays move alike, and how the weight is divided among them is
-left to rounding. Of such solutions the one with the least sum of squares is taken. A play of which a thousandth part
-moves like no other keeps its weight to about six digits.
+If the drive stays between a few turning points, several plays move alike, and rounding decides how they share their
+weight. The tie break takes the solution with the least sum of squares. A play whose movement differs from all others by
+a thousandth keeps its weight to about six digits.
 """
 
 FLOOR_COST = 0.05
@@ -344,8 +344,8 @@ def _least_squares(matrix: Array, target: Array) -> Array:
     length = float(np.linalg.norm(target))
     weights = np.zeros(len(size))
     if moving.any() and length > 0.0:
-        # Columns and target of length one: the solution is the same, whatever the units, and the solver's absolute
-        # tolerance fits all of them
+        # columns and target of length one: the solution does not depend on units, and the solver's absolute tolerance
+        # fits
         n = int(np.count_nonzero(moving))
         unit = np.concatenate([matrix[:, moving] / size[moving], math.sqrt(TIE) * np.eye(n)])
         scaled, _ = nnls(unit, np.concatenate([target / length, np.zeros(n)]), maxiter=100 * n)
@@ -360,9 +360,9 @@ def residual(system: Array, columns: Columns, weights: Array) -> float:
 
 @dataclass(frozen=True)
 class Weights:
-    """Result of `fit`: the weights, their rms error, and whether p_0 was raised.
+    """Result of `fit_weights`: the weights, their rms error, and whether p_0 was raised.
 
-    `free_p0`, `free_rms`: the values before p_0 was raised to the floor; None when it was not.
+    `free_p0`, `free_rms`: the values before p_0 was raised to the floor; None if it was not.
     """
 
     p: Array
@@ -372,13 +372,13 @@ class Weights:
 
 
 def fit_weights(reduced: Reduced, columns: Columns, floor: float) -> Weights:
-    """Weights for the chosen plays, with p_0 at least the share `floor` of their sum where the data allow it.
+    """Weights for the chosen plays, with p_0 at least the share `floor` of their sum if the data allow it.
 
     p_0 is the slope just after a reversal, and the inverse divides by it. A record shows it only over the first,
     smallest travel, where a slight lag of sensor or amplifier already flattens the loop and drives the least-squares
-    p_0 to zero. So when it falls below the floor, the fit is repeated under `p_0 >= floor * sum p`; this is taken when
-    the rms error grows by at most 5 %, that is when the data hardly determine p_0. Otherwise the smaller p_0 is
-    what the actuator does (series backlash for p_0 = 0: no inverse) and stays.
+    p_0 to zero. If it falls below the floor, the fit is repeated under `p_0 >= floor * sum p`. The result is taken if
+    the rms error grows by at most 5 %, so that the data hardly determine p_0. Otherwise the smaller p_0 belongs to the
+    actuator (series backlash for p_0 = 0: no inverse) and stays.
     """
     matrix, target = reduced.whole[:, columns], reduced.whole[:, -1]
 
@@ -415,12 +415,12 @@ class InfeasibleError(ValueError):
 def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array, plays: int = 0) -> Array:
     """The x that minimises `|matrix x - target|` under `bounds x >= limits`.
 
-    `matrix`: (rows, k); `bounds`: (inequalities, k); `plays`: number of leading columns with a unit of their own, the
-    others have that of the target. Where the matrix does not determine x the shortest one, in the measure of its
-    columns, is taken. Raises InfeasibleError.
+    `matrix`: (rows, k); `bounds`: (inequalities, k); `plays`: number of leading columns with a unit of their own; the
+    others have that of the target. If the matrix does not determine x, the shortest one, measured by its columns, is
+    taken. Raises InfeasibleError.
 
-    Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23: the triangular factor makes of the problem
-    the one of the shortest vector under inequalities (LDP), whose dual is a non-negative least-squares problem.
+    Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23: the triangular factor turns the problem into
+    that of the shortest vector under inequalities (LDP), whose dual is a non-negative least-squares problem.
     """
     from scipy.linalg import solve_triangular
     from scipy.optimize import nnls
@@ -435,7 +435,7 @@ def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array, pl
     stacked = np.concatenate([np.where(idle, 0.0, matrix / size), RIDGE * np.eye(k)])
     q, triangle = np.linalg.qr(stacked)
     free = q.T @ np.concatenate([target, np.zeros(k)])
-    # In the coordinates e = triangle (x size) - free the objective is |e|
+    # in the coordinates e = triangle (x size) - free, the objective is |e|
     rows = np.asarray(solve_triangular(triangle, (bounds / size).T, trans="T")).T
     least = limits - rows @ free
     if np.all(least <= 0.0):
@@ -450,7 +450,7 @@ def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array, pl
         multipliers, rest = nnls(dual_matrix, dual_target, maxiter=100 * (k + len(bounds)))
         if rest < INFEASIBLE:
             raise InfeasibleError("the inequalities contradict each other")
-        # over the last component of the residual, which is the square of its length, and as that does not cancel to 0
+        # divided by the last component of the residual, computed as the square of its length, which does not cancel
         shortest = dual_matrix[:k] @ multipliers / rest**2 * scale
     return np.asarray(solve_triangular(triangle, shortest + free) / size)
 

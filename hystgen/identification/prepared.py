@@ -1,7 +1,7 @@
 """Records as a fit compares them: cut at gaps, faults of the drive bridged, wrong samples of the output left out.
 
-What shows without a model is looked for when a course is made, before anything is fitted; isolated samples far from
-what a first, robust fit makes of their neighbours behind it.
+Faults that show without a model are found when a course is made, before any fit; isolated samples far from a first,
+robust fit of their neighbours are found after it.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from hystgen.records import LARGEST, SHORTEST, Record, no_value
 Array = NDArray[np.float64]
 
 LEAST_SOUND = 0.1
-"""Least share of a record that has to be left of it where its output stood at a converter's end."""
+"""Least share of a record that has to be left without the samples at a converter's end."""
 
 MOST_FITS = 4
-"""Most robust fits; the first that finds the same faults is the last."""
+"""Most robust fits; the first that finds the same faults as the one before is the last."""
 
 LESS_MISSED = 0.25
-"""The drive, not the output, is wrong where bridging it reduces the squared error to less than this share."""
+"""The drive, not the output, is wrong if bridging it reduces the squared error to less than this share."""
 
 
 LEAST_MOVEMENT = 1e-20
-"""Drive or output that moves by less is no measurement: squares of it, and ratios to the other one, leave the numbers
-that there are in double precision and in parameter files."""
+"""Drive or output that moves by less is no measurement: its squares, and its ratios to the other one, leave the range
+of double precision and of parameter files."""
 
 
 def courses(
@@ -41,7 +41,7 @@ def courses(
 ) -> tuple[list[Course], list[str]]:
     """The courses of the records, and a sentence about each change.
 
-    `history` precedes every record; behind a gap the memory is unknown again. `skip`: seconds at the start of every
+    `history` precedes every record; after a gap the memory is unknown again. `skip`: seconds at the start of every
     record that are not compared. Raises IdentificationError.
     """
     made: list[Course] = []
@@ -79,10 +79,10 @@ def samples_in(record: Record, seconds: float) -> int:
 
 
 def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
-    """The record as it takes part: its start ignored as far as the start memory is unknown, isolated faults that show
-    without a model bridged (drive) or left out (output).
+    """The record as it takes part in a fit: without the start for which the memory is unknown, and with isolated faults
+    that show without a model bridged (drive) or left out (output).
 
-    Raises IdentificationError for a record without what a fit needs.
+    Raises IdentificationError for a record that a fit cannot use.
     """
     if record.y is None:
         raise IdentificationError(f"{record.name} has no measured column y; name one with --columns")
@@ -123,7 +123,7 @@ def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> C
 def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
     """The course without the samples at a converter's end; name, level and number of samples of each end.
 
-    Raises IdentificationError where next to nothing is left.
+    Raises IdentificationError if hardly anything is left.
     """
     levels = faults.rails(item.y, item.v)
     if not levels:
@@ -139,7 +139,7 @@ def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
 
 
 def _without_runs(item: Course) -> tuple[Course, list[tuple[str, list[tuple[int, int]]]]]:
-    """The course without drop-outs and held samples, and where these are."""
+    """The course without drop-outs and held samples, and their places."""
     found = []
     for what, find in (("drop-out", faults.drop_outs), ("run", faults.held)):
         runs = find(item.y, item.v)
@@ -156,7 +156,7 @@ def _less(item: Course, wrong: NDArray[np.bool_]) -> Course:
 
 
 def _without_stretches(item: Course) -> tuple[Course, list[str]]:
-    """The course without the samples of y in stretches that are plainly wrong, and what they were."""
+    """The course without the samples of y in stretches that are plainly wrong, and a sentence about each kind."""
     left, ends = without_rails(item)
     reported = [
         f"{item.name}: {counted(number, 'sample')} of y at the converter's end, the {name} of {level:.6g}, not compared"
@@ -178,11 +178,11 @@ def mask_outliers(
 ) -> None:
     """Leave out isolated samples of y that lie far from the prediction of a play sum fitted to their neighbours.
 
-    Those at the start too: how much of it is compared is known only in the end. Where it is the drive that is wrong,
-    that is bridged. Pulses of the drive have no part in the first fit, which is then asked whether they are real: a
-    false one may make the memory known where it is not. The play sum is one of least trimmed squares (Rousseeuw and Van
-    Driessen, Data Mining and Knowledge Discovery 12, 2006): it is fitted again without the samples that it misses most,
-    as many as may be left out, so that none of them draws it near.
+    This includes the start, since only the final fit decides how much of it is compared. If the drive is wrong instead,
+    it is bridged. Pulses of the drive take no part in the first fit, which then decides whether they are real: a false
+    one could make the memory seem known. The play sum is fitted by least trimmed squares (Rousseeuw and Van Driessen,
+    Data Mining and Knowledge Discovery 12, 2006): again without the samples that it misses most, as many as may be left
+    out, so that none of them attracts it.
     """
     first = start.needed([_without_pulses(_without_runs(item)[0]) for item in to_fit])
     solution, _ = pi.solve(first, wanted, floor)
@@ -216,12 +216,12 @@ def _without_pulses(item: Course) -> Course:
 def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Course:
     """The course with its drive bridged at isolated samples that the output does not bear out.
 
-    There, where a model then misses it by far less, and the rest of it by no more: a wrong drive is remembered, where a
-    wrong output is not. Or where the whole row is wrong, which shows in the output there, or behind it: a pulse that
-    was real has left its memory. A pulse right before the end of a record does not help a fit, and looks the same as
-    a fault: it would only widen the range, and hide when the memory became known. A `robust` solution is asked about
-    the largest and the least drive too, if it misses the output there by as much as anywhere: what they spoil may hide
-    them, and the range of the model ends at them.
+    A sample of the drive is wrong if bridging it makes the model's error there far smaller and the rest no larger: a
+    wrong drive stays in the memory, a wrong output does not. Or if the whole row is wrong, which shows in the output
+    there or after it: a real pulse would have left its memory. A pulse right before the end of a record does not help a
+    fit and looks like a fault: it would only widen the range and hide when the memory became known. With a `robust`
+    solution the largest and the least drive are also tested, if its error there is among the largest: the samples that
+    they spoil may hide them, and the range of the model ends at them.
     """
     error = _errors(item, solution)
     far = faults.far_from_others(error, item.output_range)
@@ -245,19 +245,18 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
 
 
 def _neither(error: Array, less: Array) -> bool:
-    """Whether outputs, of which some are known, are further from those with a pulse of the drive, and from those
-    without it, than the two are apart: neither following nor lagging behind the drive brings them there."""
+    """Whether outputs lie further from the predictions with and without a pulse of the drive than these are apart, so
+    that neither following the drive nor lagging behind it explains them."""
     known = np.isfinite(error)
     nearer = np.minimum(np.abs(error[known]), np.abs(less[known]))
     return bool(known.any() and (nearer > np.abs(error[known] - less[known])).all())
 
 
 def _not_remembered(error: Array, less: Array) -> bool:
-    """Whether errors beside a pulse of the drive are those of a memory without it: the effect that the pulse has on
-    them is missing.
+    """Whether the errors beside a pulse of the drive show a memory without the pulse, because its effect is missing.
 
-    Judged where it is larger than the model's own errors without the pulse, `less`, and only if it is in all as sure as
-    an outlier is.
+    Judged where that effect exceeds the model's own errors without the pulse, `less`, and only if the sum is as
+    significant as an outlier.
     """
     own = np.abs(less[np.isfinite(less)])
     usual = np.sort(own)[: -faults.most(len(own))]
@@ -278,18 +277,18 @@ def _size(error: Array) -> float:
 
 
 def _errors(item: Course, solution: pi.Solution) -> Array:
-    """Errors (N,) of a course from its very start."""
+    """Errors (N,) of a course, its whole start included."""
     return pi.compare(replace(item, first=0, last=len(item.v)), solution.thresholds, solution.weights).error
 
 
 def _most_missed(item: Course, error: Array) -> NDArray[np.intp]:
-    """The samples compared with the largest errors, as many as may be isolated faults."""
+    """The compared samples with the largest errors, as many as may be isolated faults."""
     compared = item.compared
     return compared[np.argsort(-np.abs(error[compared]), kind="stable")[: faults.most(len(compared))]]
 
 
 def _trimmed(item: Course, error: Array) -> Course:
-    """The course without those."""
+    """The course without its most missed samples."""
     y = item.y.copy()
     y[_most_missed(item, error)] = np.nan
     return replace(item, y=y)

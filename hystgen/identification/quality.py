@@ -27,9 +27,9 @@ class Row:
     """One line of the fit table.
 
     `part`: 'fit', 'held out' or 'all'; `model`: 'written' or 'trial'; `samples` were compared, `ignored` were not;
-    `rms`, `max`: errors in output units with a free offset a record; `output_range`: the largest peak-to-peak output
-    that was compared of one of the row's records, of which `rms_percent` and `max_percent` are taken; for a trial that
-    of both its rows.
+    `rms`, `max`: errors in output units with a free offset per record; `output_range`: the largest compared
+    peak-to-peak output of one of the row's records, to which `rms_percent` and `max_percent` refer; both rows of a
+    trial have the larger one.
     """
 
     part: str
@@ -43,7 +43,7 @@ class Row:
 
     @classmethod
     def of(cls, part: str, model: str, errors: Sequence[Errors]) -> Row:
-        """The row of some errors."""
+        """The row for the errors of some courses."""
         joined = np.concatenate([e.error for e in errors])
         joined = joined[np.isfinite(joined)]
         return cls(
@@ -118,13 +118,13 @@ def table(rows: Sequence[Row], unit: str, remarks: Sequence[str]) -> str:
 REDRAWS = 1000
 
 TAILS = (0.025, 0.975)
-"""Of 95 % intervals."""
+"""Quantiles of 95 % intervals."""
 
 FEWEST_BLOCKS, MOST_BLOCKS = 40, 4000
-"""Fewest blocks, however long the residuals' memory, and most: more improve nothing."""
+"""Fewest blocks, however long the residuals' memory, and most, since more do not improve the intervals."""
 
 MANY_WEIGHTS = 100
-"""Of more weights than this, those that are zero stay so in every redraw: then one factorisation serves all."""
+"""With more weights than this, zero weights stay zero in every redraw, so that one factorisation serves all."""
 
 MEMORY = 4.0
 """Length of a block in correlation times of the residuals."""
@@ -136,8 +136,8 @@ SEED = 1
 class Intervals:
     """95 % intervals, and the redraws behind them.
 
-    `weights`: low and high of each; `width`: of the widest loop; `held_out`: of the held-out rms error, None
-    where nothing was held out; `redrawn`: the weights of every redraw (REDRAWS, n+1); `block`: samples in a block.
+    `weights`: low and high end for each; `width`: for the widest loop; `held_out`: for the held-out rms error, None if
+    nothing was held out; `redrawn`: the weights of every redraw (REDRAWS, n+1); `block`: samples in a block.
     """
 
     weights: tuple[tuple[float, float], ...]
@@ -154,13 +154,13 @@ class Intervals:
 
 
 def intervals(fitted: Fitted, courses: Sequence[Course], errors: Sequence[Errors], held: Sequence[Errors]) -> Intervals:
-    """Intervals of a fit to `courses` (drive as measured) with those `errors`; `held`: those of held-out records.
+    """Intervals of a fit to `courses` (drive as measured) with those `errors`; `held`: errors of held-out records.
 
-    The residuals of a hysteresis model are coloured: what it misses comes back at every reversal. So they are not
-    redrawn one by one but in blocks longer than they remember. A block enters the normal equations only by its score
-    `X_b^T e_b`; random signs of all the scores (a dependent wild bootstrap; Shao, Journal of the American Statistical
-    Association 105, 2010, 218-235) redraw the record, and the weights that go with each redraw are found under the
-    constraints of the fit. The cost does not grow with the number of samples.
+    The residuals of a hysteresis model are coloured: what it misses comes back at every reversal. They are therefore
+    not redrawn one by one but in blocks longer than their correlation. A block enters the normal equations only by its
+    score `X_b^T e_b`; random signs of all scores (a dependent wild bootstrap; Shao, Journal of the American Statistical
+    Association 105, 2010, 218-235) redraw the record, and the weights of each redraw are found under the constraints of
+    the fit. The cost does not grow with the number of samples.
     """
     r, p = fitted.solution.thresholds, fitted.solution.weights
     block = block_length([each.error for each in errors])
@@ -176,7 +176,7 @@ def intervals(fitted: Fitted, courses: Sequence[Course], errors: Sequence[Errors
     )
     random = np.random.default_rng(SEED)
     signs = random.integers(0, 2, (REDRAWS, len(scores))) * 2.0 - 1.0
-    lost = min(unknowns / len(scores), 0.5)  # a fit takes some of the scatter of the residuals away
+    lost = min(unknowns / len(scores), 0.5)  # a fit takes away some of the scatter of the residuals
     moved = signs @ scores / np.sqrt(1.0 - lost)
     target = triangle[:, : len(p)] @ p
     back, *_ = np.linalg.lstsq(triangle.T, moved.T, rcond=1e-12)
@@ -201,7 +201,7 @@ def intervals(fitted: Fitted, courses: Sequence[Course], errors: Sequence[Errors
 
 
 def _weights(fitted: Fitted, triangle: Array, target: Array) -> Array:
-    """Weights that fit a redrawn system best, the shape being free to follow."""
+    """Weights that fit a redrawn system best, with a free shape."""
     k = len(fitted.solution.weights)
     if not len(fitted.shape):
         return pi.non_negative(np.column_stack([triangle, target]), np.arange(k))
@@ -211,7 +211,7 @@ def _weights(fitted: Fitted, triangle: Array, target: Array) -> Array:
 
 
 def _scores(rows: reduction.Source, item: Course, errors: Errors, block: int) -> Array:
-    """`X_b^T e_b` of every block (blocks, unknowns), each record's mean taken out of its columns."""
+    """`X_b^T e_b` of every block (blocks, unknowns), without each record's mean in its columns."""
     size = block * max(1, reduction.CHUNK // block)
     for start in range(0, item.first, size):
         rows(start, min(start + size, item.first), False)
@@ -234,7 +234,7 @@ def _scores(rows: reduction.Source, item: Course, errors: Errors, block: int) ->
 
 
 def block_length(errors: Sequence[Array]) -> int:
-    """Samples in a block: a few correlation times of the residuals, but no more than leave enough blocks."""
+    """Samples in a block: a few correlation times of the residuals, but few enough to leave `FEWEST_BLOCKS` blocks."""
     samples = sum(len(e) for e in errors)
     longest, shortest = max(1, samples // FEWEST_BLOCKS), max(1, samples // MOST_BLOCKS)
     times = [correlation_time(e[np.isfinite(e)]) * len(e) for e in errors]
@@ -255,7 +255,7 @@ def correlation_time(e: Array) -> float:
 
 
 def _rms_interval(errors: Sequence[Array], random: np.random.Generator) -> tuple[float, float]:
-    """Interval of the rms of coloured errors, their blocks drawn with replacement."""
+    """Interval of the rms of coloured errors, with blocks drawn with replacement."""
     block = block_length(errors)
     squares, counts = [], []
     for e in errors:
@@ -274,11 +274,10 @@ def _rms_interval(errors: Sequence[Array], random: np.random.Generator) -> tuple
 
 
 AMPLIFIES = 100.0
-"""Ratio of the largest slope to p_0 beyond which the inverse is called hard to use."""
+"""Ratio of the largest slope to p_0 above which a warning says that the inverse amplifies small movements."""
 
 SMALL_REACH = 0.1
-"""Largest threshold, as a share of the drive range, below which a warning says that a record shows little
-hysteresis."""
+"""Largest threshold, as a share of the drive range, below which a warning says that records show little hysteresis."""
 
 
 def about_model(
@@ -324,7 +323,7 @@ def about_inverse(p: NDArray[np.float64], made: Weights) -> list[str]:
     if p[0] == 0.0:
         return [
             "p_0 is 0: after each reversal the output stands still (series backlash). The model has no inverse and is "
-            "of use forward only. If the actuator has no backlash, record more slowly or with more samples a second"
+            "of use forward only. If the actuator has no backlash, record more slowly or with more samples per second"
         ]
     if np.sum(p) > AMPLIFIES * p[0]:
         return [
@@ -334,7 +333,7 @@ def about_inverse(p: NDArray[np.float64], made: Weights) -> list[str]:
 
 
 def about_start(errors: Errors, largest: float) -> str:
-    """Whether a record's start disagrees with the history it was given."""
+    """A warning if a record's start disagrees with the given history; else empty."""
     item = errors.course
     end = reduction.settled(item.v, largest) - item.first
     if item.history is None or end < STARTS or len(errors.error) - end < STARTS:

@@ -1,13 +1,13 @@
-"""From records to a small triangular system, which is all that a fit needs of any number of samples.
+"""From records to a small triangular system, all that a fit needs of any number of samples.
 
 The regressors of a PI model are its plays, `y = sum p_i play_(r_i)[v] + offset`. They are formed a few thousand
 samples at a time and reduced by QR (a sequential TSQR; Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci. Comput. 34,
 2012, A206-A239), so that memory does not grow with samples times thresholds.
-The column of ones stands first: what is left below its row is the system with the offset projected out exactly.
+The column of ones comes first: the rows below its own are the system with the offset projected out exactly.
 
-While a move takes the same plays along, each of them is the drive plus a constant and the others stand still: all
-plays lie on one straight line over the drive. However many samples such a segment has, two rows hold what least
-squares can learn of its plays, and one number the part of y that no play can follow.
+While the same plays follow a move, each of them is the drive plus a constant, and the others stand still: all plays are
+straight lines over the drive. However many samples such a segment has, two rows hold all that least squares can learn
+about its plays, and one number the part of y that no play can follow.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ CHUNK = 8192
 """Samples that are reduced at a time."""
 
 BLOCKED = 64
-"""Columns for which the linear algebra library has room to work on at a time."""
+"""Columns that the linear algebra library gets work space to treat at a time."""
 
 AS_FAR = 1e-3
-"""[share of its range] A drive that misses its largest or least value by no more than this has still been there: four
-codes of a 12-bit converter. A play that reaches further is missed by no more than that share of the motion."""
+"""[share of its range] A drive that comes within this of its largest or least value counts as having been there: four
+codes of a 12-bit converter. The error for plays that reach further is no more than this share of the motion."""
 
 FOLDS = 4
 """Consecutive blocks of each record for the blocked validation."""
@@ -43,8 +43,8 @@ FOLDS = 4
 class Start:
     """A start memory found by a fit (`start`).
 
-    `turns`: drive values that lead virgin plays to it; `uncertainty`: half the width of the 95 % interval of what it
-    adds to the output at the first sample, output units.
+    `turns`: drive values that lead virgin plays to it; `uncertainty`: half the width of the 95 % interval of its
+    contribution to the output at the first sample, output units.
     """
 
     turns: tuple[float, ...]
@@ -55,11 +55,11 @@ class Start:
 class Course:
     """The samples of one record that take part: drive and output from the record's start, compared over [first, last).
 
-    The drive before `first` runs through the plays all the same, as it does where `y` is NaN: such a sample is not
-    compared. `history` are drive values visited before the record; None when it is not known, where `start` is the
-    memory that was found instead, if one was sought. `begin`: where comparing may begin, its start memory aside.
-    `origin`: which record it is a part of, counted from 0, and at which of its samples it begins. `stretches`: samples
-    whose y was left out in a stretch, and not as isolated; None for none.
+    The drive before `first` also runs through the plays, as it does at samples whose `y` is NaN, which are not
+    compared. `history`: drive values visited before the record; None if they are not known, and `start` is then the
+    memory found instead, if one was searched for. `begin`: first sample that may be compared, apart from the start
+    memory. `origin`: index of the record it is part of, and of its first sample there. `stretches`: samples whose y was
+    left out as part of a stretch, not as isolated; None for none.
     """
 
     name: str
@@ -90,7 +90,7 @@ class Course:
 
     @property
     def drive_range(self) -> tuple[float, float]:
-        """Least and largest drive among the samples compared; if there are none, among all from `first` on."""
+        """Least and largest drive of the samples compared; if there are none, of all from `first` to `last`."""
         part = self.v[self.compared] if self.used else self.v[self.first : self.last]
         return float(part.min()), float(part.max())
 
@@ -100,7 +100,7 @@ class Course:
         return float(np.ptp(self.y[self.compared])) if self.used else 0.0
 
     def resettled(self, largest: float) -> Course:
-        """The course with no more of its start ignored than a largest threshold makes necessary."""
+        """The course with only so much of its start ignored as a largest threshold requires."""
         first = 0 if self.visited is not None else settled(self.v[: self.last], largest)
         return replace(self, first=max(first, self.begin))
 
@@ -108,8 +108,8 @@ class Course:
 def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -> Array:
     """Play states just before the first sample.
 
-    With a history: virgin plays (state 0, as `simulate` starts them) led through it. Without one: at rest at the first
-    drive value, which is wrong by an unknown amount until the memory has been wiped.
+    With a history: virgin plays (state 0, as in `simulate`) led through it. Without one: at rest at the first drive
+    value, which is wrong by an unknown amount until the memory has been wiped.
     """
     if history is None:
         return np.full(len(thresholds), v[0])
@@ -120,17 +120,17 @@ def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -
 
 @functools.lru_cache(maxsize=256)
 def _behind(history: tuple[float, ...], thresholds: bytes) -> Array:
-    """Virgin plays behind a history; a search asks for those of the same few again and again."""
-    r = np.frombuffer(thresholds).copy()  # writable like all others, or the plays are compiled for it once more
+    """Virgin plays after a history; cached, since a search asks for the same few again and again."""
+    r = np.frombuffer(thresholds).copy()  # writable: for a read-only array the plays would be compiled once more
     return operators.plays(history, r, 0.0)[:, -1]
 
 
 def settled(v: Array, reach: float) -> int:
-    """First sample at which the plays no longer depend on an unknown start memory, but for an offset.
+    """First sample at which the plays depend on an unknown start memory only by an offset.
 
-    Once the drive has swept `2 reach`, every play up to threshold `reach` is exact (MODEL.md section 2). Once it has
-    visited its own largest and least value, plays that reach further never move again in this record: a constant.
-    Whichever comes first. Values that are `AS_FAR` apart are the same: or noise of the drive would choose among turns.
+    Once the drive has swept `2 reach`, every play up to threshold `reach` is exact. Once it has visited its own largest
+    and least value, plays that reach further never move again in this record: they are constant. Whichever comes first.
+    Values within `AS_FAR` of each other count as equal; otherwise noise of the drive would choose among turns.
     """
     extremes = max(_reached(v), _reached(-v))
     swept = np.maximum.accumulate(v) - np.minimum.accumulate(v) >= 2.0 * reach
@@ -138,7 +138,7 @@ def settled(v: Array, reach: float) -> int:
 
 
 def _reached(v: Array) -> int:
-    """The largest sample of the first visit to where the drive is largest."""
+    """The sample with the largest drive during its first visit to the region of its maximum."""
     there = v >= np.max(v) - AS_FAR * np.ptp(v)
     first = int(np.argmax(there))
     visit = v[first:] if there[first:].all() else v[first : first + int(np.argmin(there[first:]))]
@@ -146,10 +146,10 @@ def _reached(v: Array) -> int:
 
 
 def travel(course: Course, threshold: float) -> tuple[float, float]:
-    """Peak-to-peak movement of one play over the samples compared, and how far it goes there and back.
+    """Peak-to-peak movement of one play over the samples compared, and its movement there and back.
 
-    Where these begin before the memory of that play is known, the second is the lesser of the way up and the way down:
-    while a drive goes one way, a play behind an unknown start shows no more than a straight line.
+    If the samples begin before the memory of that play is known, the second is the shorter of the ways up and down:
+    while the drive goes one way, a play after an unknown start only shows a straight line.
     """
     start = start_states(course.v, course.history, np.array([threshold]))[0]
     moved = operators.play(course.v[: course.last], threshold, float(start))[course.first :]
@@ -159,7 +159,7 @@ def travel(course: Course, threshold: float) -> tuple[float, float]:
 
 
 def ways(x: Array) -> tuple[float, float]:
-    """The longest ways up and down that a signal goes, turns in between left out of account."""
+    """The longest ways up and down that a signal goes, regardless of turns in between."""
     return float(np.max(x - np.minimum.accumulate(x))), float(np.max(np.maximum.accumulate(x) - x))
 
 
@@ -177,8 +177,8 @@ def prediction(v: Array, history: Sequence[float] | None, thresholds: Array, wei
 class Reduced:
     """Triangular systems of several records over one list of thresholds; columns are the plays, then y.
 
-    `whole`: every record with a free offset of its own. `folds`: the same for each of the consecutive blocks, every
-    block with an offset of its own. `counts`: samples in each fold.
+    `whole`: every record with its own free offset. `folds`: the same for each of the consecutive blocks, every block
+    with its own offset. `counts`: samples in each fold.
     """
 
     thresholds: Array
@@ -195,12 +195,12 @@ class Reduced:
 Source = Callable[[int, int, bool], Array]
 """Rows `[1, columns.., y]` with the normal equations of the samples from start to stop of one course.
 
-Asked for in order, from sample 0; without rows where the samples are not compared.
+Called in order, beginning at sample 0; gives no rows if the samples are not compared.
 """
 
 
 def play_rows(course: Course, thresholds: Array) -> Source:
-    """Rows of the plays of one course, far fewer than samples where the drive runs smoothly (`segment_rows`)."""
+    """Rows of the plays of one course, far fewer than samples if the drive runs smoothly (`segment_rows`)."""
     states = start_states(course.v, course.visited, thresholds)
 
     def rows(start: int, stop: int, compared: bool) -> Array:
@@ -218,7 +218,7 @@ def reduce(
 ) -> Reduced:
     """Reduce the records; `tick` gets the number of samples done, chunk by chunk.
 
-    `source`: where the rows of a course come from, with `further` columns behind those of the plays of `thresholds`.
+    `source`: gives the rows of a course, with `further` columns after those of the plays of `thresholds`.
     """
     width = len(thresholds) + further + 1
     whole = np.empty((0, width))
@@ -250,14 +250,14 @@ def triangle(*parts: Array) -> Array:
 
 @dataclass(frozen=True)
 class Reflected:
-    """A table reduced to its triangular factor, with the reflections that did it, for columns that come later."""
+    """A table reduced to its triangular factor, with the reflections that did it, to be applied to later columns."""
 
     triangle: Array
     reflections: Array
     factors: Array
 
     def extended(self, columns: Array) -> Array:
-        """The triangular factor of the table with these columns behind its own; they are overwritten."""
+        """The triangular factor of the table with these columns after its own; they are overwritten."""
         from scipy.linalg import lapack
 
         rank = len(self.factors)
@@ -269,7 +269,7 @@ class Reflected:
 
 
 def reflected(table: Array) -> Reflected:
-    """Householder's reduction of a table; overwritten where its columns are contiguous."""
+    """Householder's reduction of a table, which is overwritten if its columns are contiguous."""
     from scipy.linalg import lapack
 
     if not len(table):
@@ -280,7 +280,7 @@ def reflected(table: Array) -> Reflected:
 
 @functools.cache
 def _upper(size: int) -> NDArray[np.bool_]:
-    """Where a triangular factor has its numbers."""
+    """Mask of the upper triangle."""
     return np.triu(np.ones((size, size), dtype=bool))
 
 
@@ -293,7 +293,7 @@ def others(reduced: Reduced, fold: int) -> Array:
     return triangle(*(part for k, part in enumerate(reduced.folds) if k != fold))
 
 
-# Samples to rows with the same normal equations, as many as the memory has segments --------------------------
+# From samples to rows with the same normal equations, about two per segment of the memory --------------------
 
 
 @jit
@@ -325,10 +325,10 @@ def _close_segment(
 
 @jit
 def _segment_rows(v: Array, y: Array, thresholds: Array, states: Array, sums: Array, out: Array) -> int:
-    """Rows of the samples whose y is a number into `out`, none where it has no room, and how many they are.
+    """Write the rows of the samples whose y is a number into `out`, none if it has no room; return their number.
 
-    `states` of the plays run on. `sums`: room for seven numbers. The memory is admissible:
-    a play that stands still keeps all larger ones still.
+    Updates `states` of the plays. `sums`: room for seven numbers. The memory is admissible: if a play stands still, so
+    do all larger ones.
     """
     wanted = len(out) > 0
     sums[:] = 0.0
@@ -372,6 +372,6 @@ def _segment_rows(v: Array, y: Array, thresholds: Array, states: Array, sums: Ar
 
 
 def segment_rows(v: Array, y: Array, thresholds: Array, states: Array, wanted: bool) -> Array:
-    """Rows `[1, plays.., y]` for the samples, none unless `wanted`; `states` of the plays run on."""
+    """Rows `[1, plays.., y]` for the samples, none unless `wanted`; updates `states` of the plays."""
     out = np.empty((len(v) + 1 if wanted else 0, len(thresholds) + 2))
     return out[: _segment_rows(v, y, thresholds, states, np.empty(7), out)]

@@ -1,4 +1,4 @@
-"""Settings that a fit takes over from the parameter file it replaces: everything that no record determines."""
+"""Settings that a fit takes over from the parameter file that it replaces: everything that records do not determine."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ KEPT_KEYS = ("description", "sample_time", "emit")
 class Settings:
     """Settings of an older parameter file.
 
-    `values`: those of KEPT that it has; `name` and `units`, which stand where neither the user nor the records give
-    any; `effects`: names of its effects, which went with its weights; `problem`: why nothing could be read.
+    `values`: its values for `KEPT_KEYS`; `name` and `units`: used if neither the user nor the records give any;
+    `effects`: names of its effects, which are dropped with its weights; `problem`: why nothing could be read.
     """
 
     file: str = ""
@@ -39,7 +39,7 @@ class Settings:
         return replace(fit, parameters=make_parameters(data))
 
     def sentences(self, fit: Fit) -> list[str]:
-        """Sentences about settings kept and left out; `fit` as it was before."""
+        """Sentences about settings kept and left out; `fit`: without these settings."""
         said = []
         if self.problem:
             said.append(f"{self.file}: nothing of what was there is kept, it is not a parameter file: {self.problem}")

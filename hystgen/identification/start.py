@@ -1,13 +1,13 @@
 """The start memory of records whose history is not known, estimated together with the weights.
 
-A memory is admissible if it is `s(0) = v_0`, and changes over the thresholds by no more than these do (MODEL.md
-section 3): `s_i = s_(i-1) + d_i (r_i - r_(i-1))` with every `d_i` from -1 to 1. Until the drive moves it for the first
-time, a play adds the constant `p_i s_i` to the output, and from then on the start makes no difference to it. So the
-output is piecewise linear in the `d` of every record, which join the weights as further unknowns under bounds (`joint`
-has the search). What no sample determines is held at `d = 0` by a prior as wide as the bounds allow.
+A memory is admissible if `s(0) = v_0` and it changes over the thresholds by no more than these do:
+`s_i = s_(i-1) + d_i (r_i - r_(i-1))` with every `d_i` from -1 to 1. Until the drive moves it for the first time, a play
+adds the constant `p_i s_i` to the output; after that it no longer depends on the start. The output is therefore
+piecewise linear in the `d` of every record, which join the weights as further unknowns under bounds (`joint` has the
+search). A prior as wide as the bounds allow keeps slopes that no sample determines at `d = 0`.
 
-The result is a course's `Start`: drive values that would have left that memory. They mean the same behind any front and
-with any thresholds, as a known history does.
+The result is a course's `Start`: drive values that would have left that memory. Like a known history, they mean the
+same behind any front and with any thresholds.
 """
 
 from __future__ import annotations
@@ -29,35 +29,36 @@ from hystgen.identification.reduction import Course, Reduced, Start
 Array = NDArray[np.float64]
 
 STARTS, UNLIKE = 8, 3.0
-"""Fewest samples of a start, and times the rms error of the rest above which its error shows that the memory it was
-given or found to begin with is not that of the actuator."""
+"""Fewest samples of a start, and the ratio of its rms error to that of the rest above which the memory given or found
+for it is not that of the actuator."""
 
 ROUNDING = 1e-6
-"""Share of the output range below which errors are those of the arithmetic, that of records computed without noise."""
+"""Share of the output range below which errors are only rounding, as in records computed without noise."""
 
 LEAST_KNOWN = 0.5
-"""Share of the samples of a record from which on those before its memory is known are left out: a start memory fitted
-to them flatters a model that it judges. Of 56 simulated records without a history none is refused then, with a held-out
-error of 1.00 times that with the true history in the median; 0.25 makes it 1.02."""
+"""If at least this share of a record's samples has a known memory, those before are left out: a start memory fitted to
+them would flatter the model that it judges. This rejects none of 56 simulated records without a history, with a median
+held-out error of 1.00 times that with the true history; 0.25 makes it 1.02."""
 
 PLAYS = 12
-"""Thresholds over which start memories are sought: as many as default fits have in the middle of their range. Those of
-the model itself where they are given, no more, and moved by the records: time grows with the cube of their number."""
+"""Thresholds over which start memories are searched for: the middle of the numbers that default fits choose from. Given
+thresholds are taken instead if they are no more than this and the records move them: time grows with the cube of their
+number."""
 
 SPREAD = math.sqrt(3.0)
-"""One over the standard deviation of a slope that may be anywhere from -1 to 1."""
+"""Reciprocal of the standard deviation of a slope that is uniform from -1 to 1."""
 
 NORMAL = 1.96
-"""Standard deviations on either side of 95 % of a normal distribution."""
+"""Standard deviations on either side that hold 95 % of a normal distribution."""
 
 ZIGZAGS = 4
-"""Pairs of turns that stand for a slope between two thresholds: off it by at most 1/16 of their distance."""
+"""Pairs of turns that approximate a slope between two thresholds, with an error of at most 1/16 of their distance."""
 
 TOGETHER = 6
 """Most courses that share weights in a search: its cost grows with the cube of their number."""
 
 ROUNDS = 2
-"""Searches; the first one gives the errors by which the prior is weighed in the next."""
+"""Searches; the errors of the first one set the weight of the prior in the next."""
 
 
 def estimated(
@@ -65,9 +66,9 @@ def estimated(
 ) -> list[Course]:
     """The courses compared from their beginning, with a start memory for those whose history is not known.
 
-    `stages`: the front of the plays; `wanted`: their thresholds, over which a memory is then sought that is exact for
-    them, or anything else. A start stays ignored whose errors are far larger than those behind it, a transient, or
-    whose drive does not go up and down again.
+    `stages`: the front of the plays; `wanted`: their thresholds, for which the memory is then exact, or any other value
+    of that option. A start stays ignored if its errors are far larger than those after it (a transient), or if its
+    drive does not go up and down again.
     """
     if all(item.history is not None for item in courses):
         return list(courses)
@@ -94,9 +95,9 @@ def needed(
     wanted: int | tuple[float, ...] | None = None,
     least: float = LEAST_KNOWN,
 ) -> list[Course]:
-    """The courses with a start memory (`estimated`) where too little of them could be compared without one.
+    """The courses, with a start memory (`estimated`) for those of which too little could be compared without one.
 
-    `least`: share of the samples of a course that would be enough.
+    `least`: share of the samples of a course that is enough.
     """
     short = [lacking(item, least) for item in courses]
     if not any(short):
@@ -112,7 +113,7 @@ def of_model(
     weights: Array,
     least: float = LEAST_KNOWN,
 ) -> list[Course]:
-    """Courses by which a model is judged: its weights stay as they are, and starts of those not `lacking` ignored."""
+    """Courses by which a model is judged: its weights stay, and the starts of courses not `lacking` are ignored."""
     if len(thresholds) == 1:  # without plays there is nothing to know
         return [replace(item, start=Start((), 0.0), first=item.begin) for item in courses]
     begun = [unknown(item) for item in courses]
@@ -124,7 +125,7 @@ def of_model(
 
 
 def unknown(item: Course) -> Course:
-    """The course without a start memory found for it, its start ignored where no history is known either."""
+    """The course without an estimated start memory, and without its start if no history is known either."""
     return replace(item, start=None).resettled(math.inf)
 
 
@@ -137,14 +138,14 @@ def findable(item: Course) -> bool:
 
 
 def lacking(item: Course, least: float) -> bool:
-    """Whether less than a share of a course can be compared without a start memory, and one can be found for it."""
+    """Whether less than the share `least` of a course can be compared without a start memory, and one can be found."""
     return findable(item) and unknown(item).used < least * _whole(item).used
 
 
 def _started(
     courses: Sequence[Course], stages: Sequence[Stage], r: Array, weights: Array | None
 ) -> list[Course]:
-    """The courses with the start memories found, but for transients."""
+    """The courses with the start memories that were found, except for transients."""
     inner = [joint.through_front(item, stages) for item in courses]
     search = _Search(tuple(_System.of(_whole(item), r) for item in inner), r, weights)
     found = search.result()
@@ -160,7 +161,7 @@ def _started(
 
 
 def _whole(item: Course) -> Course:
-    """The course compared from where that may begin."""
+    """The course compared from its first permitted sample."""
     return replace(item, first=item.begin)
 
 
@@ -176,7 +177,7 @@ def _in_front(turns: tuple[float, ...], stages: Sequence[Stage]) -> tuple[float,
 
 
 def _transient(item: Course, settled: int, r: Array, p: Array) -> bool:
-    """Whether the errors of a model before the memory is known are far larger than those behind it."""
+    """Whether the errors of a model before the memory is known are far larger than those after."""
     known = np.isfinite(item.y)
     if min(np.count_nonzero(known[item.first : settled]), np.count_nonzero(known[settled : item.last])) < STARTS:
         return False
@@ -187,16 +188,16 @@ def _transient(item: Course, settled: int, r: Array, p: Array) -> bool:
 
 
 def memory_of(slopes: Array, r: Array) -> Array:
-    """States (n+1,) less the first drive, of the slopes (n,) of a memory over the thresholds (n+1,)."""
+    """States (n+1,) less the first drive, from the slopes (n,) of a memory over the thresholds (n+1,)."""
     return np.concatenate([[0.0], np.cumsum(slopes * np.diff(r))])
 
 
 def turns_of(r: Array, states: Array) -> tuple[float, ...]:
     """Drive values that leave virgin plays of thresholds r (n+1,) in an admissible memory (n+1,).
 
-    Over the thresholds a history leaves a line of slopes -1 and 1 alone: from the outermost play inwards one that falls
-    with the threshold comes from a turn at `s + r`, one that rises from a turn at `s - r`. Slopes in between are
-    `ZIGZAGS` pairs of both, which are exact at the thresholds.
+    Over the thresholds, a history leaves a line with slopes of only -1 and 1: going inwards from the outermost play, a
+    part that falls with the threshold comes from a turn at `s + r`, one that rises from a turn at `s - r`. Slopes in
+    between become `ZIGZAGS` pairs of both, which are exact at the thresholds.
     """
     outermost = states[-1] + r[-1] if states[-1] >= 0.0 else states[-1] - r[-1]
     turns = [float(outermost)]
@@ -224,13 +225,13 @@ class _Bounds:
         return -np.ones(self.number), np.ones(self.number)
 
     def slack(self, shape: Array) -> Array:
-        """Nothing beyond."""
+        """No further constraints."""
         return np.empty(0)
 
 
 @dataclass(frozen=True)
 class _System:
-    """One course: rows behind the sample from which no play depends on the start, and the samples before it."""
+    """One course: the rows after the sample at which no play depends on the start any more, and the samples before."""
 
     item: Course
     r: Array
@@ -257,7 +258,7 @@ class _System:
         return len(self.r) - 1 if self.item.history is None else 0
 
     def simple(self) -> list[Array]:
-        """Slopes of simple memories: at rest, virgin, and those behind one turn before the first sample."""
+        """Slopes of simple memories: at rest, virgin, and with one turn before the first sample."""
         if not self.slopes:
             return []
         first, n = float(self.item.v[0]), self.slopes
@@ -268,7 +269,7 @@ class _System:
     def rows(self, slopes: Array, p: Array) -> Array:
         """Rows `[plays (n+1), change with the slopes.., y]` about these slopes and weights, the offset projected out.
 
-        A play that has not moved yet is a constant: the change of the output with it is one until then, and 0 after.
+        A play that has not moved yet is a constant; once it has moved, the output does not depend on its start.
         """
         if not self.slopes:
             return reduction.triangle(self.tail)[1:, 1:]
@@ -287,11 +288,11 @@ class _System:
         return table[1:, 1:]
 
     def change(self, held: Array) -> Array:
-        """Change of the output with each slope, for the weights of the plays that have not moved."""
+        """Change of the output with each slope, for the weights `held` of the plays that have not moved."""
         return np.asarray(np.cumsum(held[::-1])[::-1][1:] * np.diff(self.r))
 
     def _moved(self, states: Array) -> NDArray[np.intp]:
-        """The sample (n+1,) at which each play moves for the first time; `settled` for none before it."""
+        """The sample (n+1,) at which each play moves for the first time, at most `settled`."""
         v = self.item.v[: self.settled]
         if not len(v):
             return np.zeros(len(states), dtype=np.intp)
@@ -313,7 +314,7 @@ class _Search:
         return sum(each.slopes for each in self.systems)
 
     def result(self) -> Shaped:
-        """The best slopes, and their weights as `best`."""
+        """The best slopes, with their weights in `best`."""
         shape, rms = self._first_slopes(), 0.0
         for _ in range(ROUNDS):
             linear = functools.partial(self._linear, rms)
@@ -323,7 +324,7 @@ class _Search:
         return found
 
     def parted(self, found: Shaped) -> list[tuple[Array, float]]:
-        """Slopes of each course, and the half width of the 95 % interval of the output that they add at its start."""
+        """Slopes of each course, and half the width of the 95 % interval of their contribution at its start."""
         k = 0 if self.known is not None else len(self.r)
         system, p = found.system.whole[:, :-1], found.best
         free = np.concatenate([p[:k] > 0.0, np.abs(found.shape) < 1.0])
@@ -340,7 +341,7 @@ class _Search:
         return parts
 
     def _first_slopes(self) -> Array:
-        """Of every course the best of the memories with at most one turn, each with weights of its own."""
+        """The best memory with at most one turn for every course, each with its own weights."""
         shape = [np.empty(0)]
         for each in self.systems:
             alone = replace(self, systems=(each,))
@@ -350,14 +351,14 @@ class _Search:
         return np.concatenate(shape)
 
     def _first_weights(self, shape: Array) -> Array:
-        """Weights that fit best about some slopes."""
+        """Weights that fit best for some slopes."""
         if self.known is not None:
             return np.empty(0)
         system = self._whole(shape, np.zeros(len(self.r)), 0.0)
         return pi.non_negative(system, np.arange(len(self.r)))
 
     def _linear(self, rms: float, shape: Array, p: Array) -> Shaped:
-        """The system that is linear about slopes and weights; `rms`: of the errors by which the prior is weighed."""
+        """The system linearised about slopes and weights; `rms`: the errors that set the weight of the prior."""
         samples = sum(each.item.used for each in self.systems)
         if self.known is None:
             system = self._whole(shape, p, rms)
@@ -372,7 +373,7 @@ class _Search:
         return Shaped(shape, p, size, best, samples, lambda: Reduced(self.r, system, (), (samples,)))
 
     def _whole(self, shape: Array, p: Array, rms: float) -> Array:
-        """Rows `[plays, slopes of all courses, y]` of all courses, and those of the prior."""
+        """Rows `[plays, slopes of all courses, y]` of all courses and of the prior."""
         n1, number, at = len(self.r), self._slopes, 0
         tables = []
         for each in self.systems:
