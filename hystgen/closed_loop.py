@@ -4,14 +4,14 @@
                 -^                                                           |
                  +-----------------------------------------------------------+
 
-At sample k, at t_k = k T and in this order: the sensor takes the output y_k, before anything moves; the controller
-answers the error r_k - y_k with u_k; the compensator turns u_k into the drive v_k; the actuator, without a delay,
-into h_k; and v_k, with it h_k, is held up to t_(k+1). So y_k has seen the drives up to v_(k-1), which leaves no
-algebraic loop even where the plant passes its input straight on. A controller or compensator that takes a whole sample
-to compute is a factor 1/z in the controller.
+At sample k, at t_k = k T, in this order: the sensor takes the output y_k before anything moves; the controller answers
+the error r_k - y_k with u_k; the compensator turns u_k into the drive v_k; the actuator turns that into h_k without a
+delay; v_k, and with it h_k, is held until t_(k+1). So y_k depends on drives up to v_(k-1), and there is no algebraic
+loop even if the plant passes its input straight on. A controller or compensator that takes a whole sample to compute is
+a factor 1/z in the controller.
 
-Nothing is integrated numerically: hysteresis is rate-independent, so a held drive gives a held h, and zero-order hold
-is exact for a linear plant with a held input. Between the samples lies nothing that a finer step would change at them.
+Nothing is integrated numerically: hysteresis is rate-independent, so that a held drive gives a held h, and a zero-order
+hold is exact for a linear plant with a held input. A finer step would not change the values at the samples.
 
 >>> import math
 >>> from hystgen import PI
@@ -54,7 +54,7 @@ Array = NDArray[np.float64]
 
 @runtime_checkable
 class Block(Protocol):
-    """A part of the loop that remembers.
+    """A part of the loop with a memory.
 
     A controller (error in, demand out), a compensator (demand in, drive out) or an actuator (drive in, displacement
     out).
@@ -84,10 +84,10 @@ class PIController:
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """What a loop did: arrays (N,), one entry per sample.
+    """The response of a loop: arrays (N,), one entry per sample.
 
-    `t` in s; `reference`, `output` and `error` (reference less output) in units of the plant's output; `control`: what
-    the controller asks for; `drive`: what the compensator makes of it; `displacement`: the plant's input, behind the
+    `t` in s; `reference`, `output` and `error` (reference less output) in units of the plant's output; `control`: the
+    answer of the controller; `drive`: that of the compensator; `displacement`: the plant's input, behind the
     hysteresis. A loop that diverges ends in infinities and NaN.
     """
 
@@ -104,11 +104,11 @@ class Response:
         return float(np.max(np.abs(self._error_from(start))))
 
     def rms_error(self, start: float = 0.0) -> float:
-        """Root of the mean square error from `start` (s) on. Raises ValueError where nothing is left."""
+        """Root mean square error from `start` (s) on. Raises ValueError if no sample is left."""
         return float(np.sqrt(np.mean(self._error_from(start) ** 2)))
 
     def _error_from(self, start: float) -> Array:
-        # a start that is meant to be a sample is one, whatever its last digit
+        # a start that is meant to be a sample counts as one in spite of rounding
         kept = self.error[self.t >= start - 1e-9 * abs(start)]
         if not len(kept):
             raise ValueError(f"the response ends at {self.t[-1]:g} s, before {start:g} s")
@@ -119,11 +119,11 @@ class Response:
 class Loop:
     """A closed loop, sampled every `sample_time` seconds.
 
-    `plant`: a continuous system of scipy.signal, or what makes one, (num, den), (zeros, poles, gain) or (A, B, C, D),
+    `plant`: a continuous system of scipy.signal, or arguments of one, (num, den), (zeros, poles, gain) or (A, B, C, D),
     with one input and one output, at rest at first; or a discrete one with dt = sample_time. Controller, hysteresis
     and compensator are each one of
 
-    - None: passes on what it gets (not for the controller);
+    - None: passes its input on (not for the controller);
     - a number: a gain;
     - a model (`Model`, `Cascade`, `PI`), in double precision and unlimited, or the `inverse()` of one: that of a
       `Model` or `Cascade` keeps the drive inside its `input_range`;
@@ -132,8 +132,8 @@ class Loop:
     - a function of one number, without memory.
 
     Raises ValueError for a plant, gain or sample time that cannot be used and for one block in two places, TypeError
-    for a part that is none of these, UnsupportedEffectsError for a model with effects: what is linear there belongs
-    into the plant.
+    for a part that is none of these, UnsupportedEffectsError for a model with effects, whose linear ones belong in the
+    plant.
     """
 
     plant: Any
@@ -169,8 +169,8 @@ class Loop:
     def run(self, reference: ArrayLike | Callable[[float], float], duration: float | None = None) -> Response:
         """The response to `reference` from rest: N samples at t_k, or a function of the time in s with a `duration`.
 
-        Every run starts anew: plant at 0, all memories at their start. Raises ValueError for a reference that is not a
-        signal, or for an impossible duration.
+        Every run starts anew: the plant at 0, all memories at their start. Raises ValueError for a reference that is
+        not a signal, or for an impossible duration.
         """
         r = self._reference(reference, duration)
         controller, compensator, hysteresis = self._blocks
@@ -179,7 +179,7 @@ class Loop:
         a, b, c, d = self.sampled_plant
         x, h = np.zeros(len(b)), 0.0
         signals = np.empty((4, len(r)))
-        # a loop may diverge; that is an answer too
+        # a loop may diverge; that is a result too
         with np.errstate(over="ignore", invalid="ignore"):
             for k, wanted in enumerate(r.tolist()):
                 y = float(c @ x) + d * h
@@ -204,7 +204,7 @@ class Loop:
         except (TypeError, ValueError):
             r = np.empty(0)
         if r.ndim != 1 or not len(r) or not np.all(np.isfinite(r)):
-            raise ValueError("a reference is one finite number a sample, at least one")
+            raise ValueError("a reference is one finite number per sample, at least one")
         return r
 
 
@@ -232,7 +232,7 @@ def _sampled(system: Any, sample_time: float, what: str) -> tuple[Array, Array, 
     if not all(np.all(np.isfinite(m)) for m in (a, b, c, d)):
         raise ValueError(f"{what} has coefficients that are not finite")
     if space.dt is None:
-        # A companion matrix has entries of many magnitudes, which cost the exponential up to half its digits
+        # the entries of a companion matrix differ by orders of magnitude, which costs up to half of the digits
         a, (scale, _) = linalg.matrix_balance(a, permute=False, separate=True)
         a, b, c, d, _ = signal.cont2discrete((a, b / scale[:, None], c * scale, d), sample_time, "zoh")
     elif space.dt is True:
@@ -265,7 +265,7 @@ def _block(part: object, sample_time: float, what: str) -> Block:
         return _Function(lambda x: gain * x)
     if isinstance(part, signal.lti):
         discrete = f"to_discrete({sample_time:g})"
-        raise TypeError(f"{what} is a continuous system; give a discrete one, for example what its {discrete} returns")
+        raise TypeError(f"{what} is a continuous system; give a discrete one, for example the result of its {discrete}")
     if isinstance(part, Block) and not isinstance(part, type):
         return part
     if callable(part) and not isinstance(part, type):
@@ -274,7 +274,7 @@ def _block(part: object, sample_time: float, what: str) -> Block:
 
 
 class _Function:
-    """No memory."""
+    """A function without memory."""
 
     def __init__(self, function: Callable[[float], float]) -> None:
         self._function = function
@@ -316,7 +316,7 @@ class _Discrete:
 
 
 class _Operator:
-    """A model or its inverse, from its start memory, in what its session takes."""
+    """A model or its inverse, starting at its start memory, in the numbers of its session."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -329,9 +329,9 @@ class _Operator:
 
 
 class _InUnits:
-    """An operator that speaks an arithmetic's numbers, behind its converters: physical units in and out.
+    """An operator in an arithmetic's numbers between its converters: physical units in and out.
 
-    Fixed point gets the nearest code, ties away from zero, as far as codes go (the last one again for a NaN).
+    Fixed point gets the nearest code, ties away from zero, limited to the type; for a NaN the last code again.
     """
 
     def __init__(self, operator: _Operator | Instance, model: Model, options: Options) -> None:

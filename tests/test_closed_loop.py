@@ -623,12 +623,12 @@ def test_what_cannot_be_a_reference_or_an_operator(monkeypatch: pytest.MonkeyPat
         (wanted, None, "needs a duration"),
         (wanted, 0.01, "needs a duration"),
         ([1.0], 1.0, "has its own duration"),
-        ([], None, "one finite number a sample"),
-        ([1.0, math.nan], None, "one finite number a sample"),
-        ([[1.0]], None, "one finite number a sample"),
-        ("abc", None, "one finite number a sample"),
-        ([1j, 2.0], None, "one finite number a sample"),
-        (np.array([1j, 2.0]), None, "one finite number a sample"),
+        ([], None, "one finite number per sample"),
+        ([1.0, math.nan], None, "one finite number per sample"),
+        ([[1.0]], None, "one finite number per sample"),
+        ("abc", None, "one finite number per sample"),
+        ([1j, 2.0], None, "one finite number per sample"),
+        (np.array([1j, 2.0]), None, "one finite number per sample"),
     ):
         with pytest.raises(ValueError, match=said):
             loop.run(reference, duration)  # type: ignore[arg-type]

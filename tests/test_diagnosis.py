@@ -152,7 +152,7 @@ class TestBlindPlants:
         emitted = run("emit", tmp_path / "out" / "params.yaml", "-o", tmp_path / "fw", "--list-outputs")
         page = html.unescape(re.sub(r"\s+", " ", shown))
         reason = " ".join(emitted[2].split("error: ", 1)[-1].split())
-        assert ("As C they are not there yet" in page) == (emitted[0] != 0) == (f"yet: {reason}." in page)
+        assert ("They cannot be emitted as C yet" in page) == (emitted[0] != 0) == (f"yet: {reason}." in page)
         assert ("Error that the compensator would leave in the motion:" in page) == (emitted[0] == 0)
         assert (reason in " ".join(err.split())) == (emitted[0] != 0)
         assert page.count("Your next step: ") == 1

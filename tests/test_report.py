@@ -221,7 +221,7 @@ class TestPage:
     def test_sections_in_order(self, page: Page) -> None:
         assert page.declared.lower() == "doctype html"
         assert [title for title in page.sections if title != "lead"] == [
-            "How good it is", "Loops", "Along time", "What is left, and what it depends on", "Initial loading curve",
+            "How good it is", "Loops", "Over time", "The residual, and what it depends on", "Initial loading curve",
             "Thresholds and weights", "What was done to the data", "Warnings", "Drive range", "What the C costs",
             "Parameters", "Provenance",
         ]  # fmt: skip
@@ -252,7 +252,7 @@ class TestPage:
         assert int(first["samples"]) == len(fitted[1])
         assert int(first["compared"]) == fitted[0].rows[0].samples
         assert (other["part"], other["start, as asked"], other["gaps"]) == ("held out", str(SKIP), "0")
-        caption = " ".join(page.sections["Along time"].split())
+        caption = " ".join(page.sections["Over time"].split())
         assert f"{found} outliers, {len(SPIKES)} bridged drive samples, 1 gap;" in caption
 
     def test_fit_table_and_warnings(self, page: Page, fitted: tuple[Fit, Record, Record]) -> None:

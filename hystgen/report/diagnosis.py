@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from hystgen.effects.base import Effect
 
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
-"""How a compensator corrects a stage in front of the plays, and how exactly."""
+"""How exactly a compensator corrects a stage in front of the plays, and how."""
 
 VISIBLE = 0.01
-"""An error is visibly larger than another from this share on."""
+"""Relative difference above which an error is visibly larger than another."""
 
 
 P = ParamSpec("P")
@@ -44,7 +44,7 @@ def _with_page(find: Callable[P, Diagnosis]) -> Callable[P, Diagnosis]:
 
 
 diagnose = _with_page(diagnosis.diagnose)
-"""`hystgen.diagnose`: what the search finds, with a page to write and figures to draw."""
+"""`hystgen.diagnose`: the result of the search, with a page to write and figures to draw."""
 
 
 def html(found: Diagnosis, parameters_text: str) -> str:
@@ -61,18 +61,18 @@ def html(found: Diagnosis, parameters_text: str) -> str:
         Section("How the gap shrinks", [figures["gap"], *_refitted(result), _noise(result)]),
         Section("What was found", _found(result, found.parameters.model.effects, found.not_emitted())),
         Section("Settling", [Text(f"The output of the model with the effects is {settling(found.model)}.")]),
-        Section("What is left", _left(result)),
+        Section("Remaining error", _left(result)),
         Section("Faults of the data", _faults(result)),
         Section("Before and after, on held-out records", [figures["overlay"]]),
         Section("Where model and measurement disagree", [figures["records"], figures["time"], *_where(result)]),
-        Section("What the error goes with", [figures["against"], figures["frequency"]]),
+        Section("What the error depends on", [figures["against"], figures["frequency"]]),
         Section("What cannot be separated", _rivals(result)),
         Section("Shapes that were tried", _ranking(result)),
         Section("What was done to the data", [Listing(found.notes) if found.notes else Text("Nothing.")]),
         Section("Parameters", [Details("Parameter file with the effects added", parameters_text)]),
         Section("Provenance", [Text(f"hystgen {__version__}; the same records give the same page.")]),
     ]
-    warnings = [Text(f"Mind the inverse: {said}.") for said in found.warnings]
+    warnings = [Text(f"About the inverse: {said}.") for said in found.warnings]
     top = [Text(found.sentence()), *warnings, _next_step(found)]
     return page(f"{found.parameters.name}: diagnosis", top, sections)
 
@@ -97,16 +97,16 @@ def _chance(p_value: float) -> str:
 
 
 def _refitted(result: Result) -> list[Text]:
-    """An explanation of the second bar where it is visibly longer than the first."""
+    """An explanation of the second bar if it is visibly longer than the first."""
     given, refitted = result.gap.as_given, result.gap.refitted
     if refitted.holdout <= (1.0 + VISIBLE) * given.holdout:
         return []
     fitted = f"{given.fit:.4g} to {refitted.fit:.4g}"
     return [
         Text(
-            f"Refitting changes the {label('rms error', result.unit)} of the records that are fitted from "
-            f"{fitted}, and that of the held-out ones from {given.holdout:.4g} to {refitted.holdout:.4g}: "
-            "weights fitted where something is missing take some of it, and other records may miss it in another way."
+            f"Refitting changes the {label('rms error', result.unit)} of the fitted records from {fitted}, and that of "
+            f"the held-out ones from {given.holdout:.4g} to {refitted.holdout:.4g}: fitted weights take over some of a "
+            "missing effect, which may show differently in other records."
         )
     ]
 
@@ -148,18 +148,18 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
         Table(rows, (0,)),
         Text("What they mean for a compensator:"),
         Table(means, (0, 1, 2)),
-        Text(f"As C they are not there yet: {not_emitted}.") if not_emitted
+        Text(f"They cannot be emitted as C yet: {not_emitted}.") if not_emitted
         else Text("Error that the compensator would leave in the motion:", "hystgen track params.yaml RECORDS"),
         Text(
-            "Their numbers, with intervals that count the correlation of the residuals and the freedom of the weights, "
-            "but not that another shape may fit as well:"
+            "Their numbers. The intervals include the correlation of the residuals and the freedom of the weights, but "
+            "not that another shape may fit as well:"
         ),
         Table(numbers, (0, 1, 5)),
     ]
 
 
 def _kind(effect: NamedEffect, there: Sequence[Effect]) -> type[Effect] | None:
-    """The class of an entry, among the effects of the model; None for a stage in front of the plays."""
+    """The class of a named effect, among the effects of the model; None for a stage in front of the plays."""
     if effect.parameters.get("kind"):
         return None
     return next(type(each) for each in reversed(there) if each.name == effect.name)
@@ -195,14 +195,14 @@ def _left(result: Result) -> list[Text | Listing | Table]:
     if not seen:
         after, noise = result.gap.after.holdout, result.noise_floor
         if is_noise(after, noise):
-            return [Text("Nothing but noise.")]
-        times = f"The error that is left is {times_noise(after / noise)}"
+            return [Text("Only noise.")]
+        times = f"The remaining error is {times_noise(after / noise)}"
         return [Text(f"{times}, but nothing in it stands out: noise that is not white looks like this too.")]
     sentences = [each.sentence(result.unit) for each in seen]
     blocks: list[Text | Listing | Table] = [Listing(sentences)]
     for each in seen:
         if isinstance(each, Structure) and each.share_by_variable:
-            rows = [["what is left goes with", "share of its variance"]]
+            rows = [["the remaining error depends on", "share of its variance"]]
             shares = each.share_by_variable.items()
             rows += [[VARIABLE_NAMES[name], f"{100.0 * share:.0f} %"] for name, share in shares]
             blocks += [Table(rows, (0,)), Text("Each variable by itself, judged on samples that it has not seen.")]
@@ -250,20 +250,20 @@ def _rivals(result: Result) -> list[Text | Listing]:
     advice = result.advice
     more = [Text(f"{ONE_LOOP.capitalize()}.")] if ONE_LOOP in advice else []
     if not result.not_separable:
-        return [Text("Nothing came close to what was named." if result.effects else "Nothing was named."), *more]
+        return [Text("Nothing came close to the named effects." if result.effects else "Nothing was named."), *more]
     pairs = (" and ".join(pair) for pair in result.not_separable)
     return [Listing([f"{pair}: {text}" for pair, text in zip(pairs, advice, strict=False)]), *more]
 
 
 def _where(result: Result) -> list[Text | Table]:
     if not result.where:
-        return [Text("No stretch of a record of the refitted model is far above the noise.")]
-    rows = [["record", "what goes on there", "from (s)", "to (s)", label("rms", result.unit)]]
+        return [Text("The error of the refitted model is far above the noise in no stretch of a record.")]
+    rows = [["record", "what happens there", "from (s)", "to (s)", label("rms", result.unit)]]
     rows += [
         [each.record, each.kind.replace("_", " "), *(f"{x:.6g}" for x in each.interval), f"{each.rms:.3g}"]
         for each in result.where
     ]
-    return [Text("The stretches where the refitted model does worst:"), Table(rows, (0, 1))]
+    return [Text("The stretches with the largest error of the refitted model:"), Table(rows, (0, 1))]
 
 
 def _ranking(result: Result) -> list[Text | Table]:
@@ -279,5 +279,5 @@ def _ranking(result: Result) -> list[Text | Table]:
             errors = f"{each.fit:.4g}", f"{each.holdout:.4g}"
             rows.append([each.name, each.shape, *errors, margin, each.refused or "accepted"])
         after = "" if k < len(result.effects) else ", none of which removes enough to be named"
-        blocks += [Text(f"Round {k + 1}, the shapes that were fitted to the end{after}:"), Table(rows, (0, 1, 5))]
-    return blocks or [Text("None: the refitted model leaves no more than noise.")]
+        blocks += [Text(f"Round {k + 1}, the shapes that were fully fitted{after}:"), Table(rows, (0, 1, 5))]
+    return blocks or [Text("None: the refitted model leaves only noise.")]

@@ -28,15 +28,15 @@ BEFORE, AFTER, FLOOR = "#8a929c", drawing.RESIDUAL, drawing.FAULT
 WIDE, NARROW = 9.0, 4.2
 
 SHOWN = 2
-"""Number of held-out records that are drawn along time."""
+"""Number of held-out records drawn over time."""
 
 FAR = 25.0
-"""Ratio of the largest to the smallest value from which an axis is logarithmic."""
+"""Ratio of the largest to the smallest value above which an axis is logarithmic."""
 
 HOLD = 16
 
 WINDOWS = 12
-"""Stretches of a record whose rms is drawn over the session."""
+"""Number of stretches of a record whose rms is drawn over the session."""
 
 
 def steps(found: Diagnosis) -> list[tuple[str, float]]:
@@ -60,7 +60,7 @@ def gap(found: Diagnosis, width: float) -> Any:
     for place, (value, before) in enumerate(zip(values, [values[0], *values[:-1]], strict=True)):
         colour = FLOOR if place == len(values) - 1 else (BEFORE, drawing.MODEL)[place] if place < 2 else AFTER
         removed = 0 < place < len(values) - 1 and before > value
-        if far:  # a bar has to begin at zero, which such an axis does not have
+        if far:  # bars begin at zero, which a logarithmic axis does not have
             axes.plot(value, place, "o", color=colour, markersize=9)
             if removed:
                 axes.hlines(place, value, before, color=BEFORE, linestyle=":", linewidth=1.4)
@@ -99,7 +99,7 @@ def worst(found: Diagnosis) -> list[Signals]:
 
 
 def overlay(found: Diagnosis, width: float) -> Any:
-    """Measured and predicted along time, and the error before and after."""
+    """Measured and predicted motion over time, and the error before and after."""
     shown, unit = worst(found), found.result.unit
     named = bool(found.result.effects)
     drawn = drawing.figure(width, 4.9 * len(shown))
@@ -147,7 +147,7 @@ def records(found: Diagnosis, width: float) -> Any:
 
 
 def against(found: Diagnosis, width: float) -> Any:
-    """Mean and scatter of the error of all records over the variables it may depend on."""
+    """Mean and scatter of the error of all records over the variables that it may depend on."""
     shown = [each for each in found.signals if np.isfinite(each.before).any()]
     units, unit = found.parameters.units, found.result.unit
     wide = width == WIDE
@@ -197,7 +197,7 @@ def _binned(axes: Any, x: Array, e: Array, colour: str, what: str, log: bool) ->
 
 
 def _since_stop(each: Signals) -> Array:
-    """Seconds since the drive came to rest, NaN where it moves."""
+    """Seconds since the drive came to rest; NaN while it moves."""
     found = np.full(len(each.t), np.nan)
     for first, last in still(each.v, max(HOLD, len(each.t) // 200)):
         found[first + 1 : last] = each.t[first + 1 : last] - each.t[first]
@@ -205,7 +205,7 @@ def _since_stop(each: Signals) -> Array:
 
 
 def _direction(each: Signals) -> Array:
-    """1 where the drive went up when it last moved, -1 where it went down."""
+    """1 if the last move of the drive was upwards, -1 if it was downwards."""
     found = np.sign(np.diff(each.v, prepend=each.v[0]))
     tolerance = acceptance.HOLD_DRIVE * float(np.ptp(each.v))
     moved = np.flatnonzero(np.abs(np.diff(each.v, prepend=each.v[0])) > tolerance)

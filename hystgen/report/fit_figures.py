@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 BINS, FEWEST = 40, 5
-"""Bins of the residual's mean, and the fewest samples in one that is shown."""
+"""Bins of the residual's mean, and the fewest samples in a bin that is shown."""
 
 TAIL, FAR = 0.002, 3.0
 """[quantiles, times] An axis ends at these quantiles if the extremes lie this many times farther out."""
@@ -53,7 +53,7 @@ class Shown:
 
     @cached_property
     def measured(self) -> Array:
-        """The measured output; NaN where it is faulty."""
+        """The measured output; NaN for faulty samples."""
         assert self.record.y is not None
         y = np.array(self.record.y)
         y[self.used.outliers] = np.nan
@@ -84,7 +84,7 @@ class Shown:
 
     @property
     def noise(self) -> float | None:
-        """Standard deviation of white noise in y; None where the residual is not white on the scale of samples.
+        """Standard deviation of white noise in y; None if the residual is not white on the scale of samples.
 
         Second differences take the smooth part out of a residual and leave noise times the root of 6 (Gasser,
         Sroka and Jennen-Steinmetz, Biometrika 73, 1986, 625-633). Only where noise is white and all else is smooth do
@@ -102,7 +102,7 @@ class Shown:
 
 
 def of_fit(fit: Fit, records: Sequence[Record]) -> list[Shown]:
-    """The records of a fit as they are drawn; those held out last, as in `fit.used`."""
+    """The records of a fit as they are drawn, held-out records last, as in `fit.used`."""
     if len(records) != len(fit.used):
         raise ValueError(f"the fit compared {len(fit.used)} records, those held out among them, not {len(records)}")
     return [Shown(record, used, fit.along(record, used)) for record, used in zip(records, fit.used, strict=True)]
@@ -177,7 +177,7 @@ def _shade(axes: Any, each: Shown, named: bool) -> None:
 
 
 def overlay_panel(axes: Any, each: Shown, units: Units) -> None:
-    """Measured and model along time; samples that were not compared are shaded or marked."""
+    """Measured and model over time; samples that were not compared are shaded or marked."""
     _shade(axes, each, True)
     good = each.measured[np.isfinite(each.measured)]
     low, high = float(good.min()), float(good.max())
@@ -190,7 +190,7 @@ def overlay_panel(axes: Any, each: Shown, units: Units) -> None:
     t = each.time
     if len(each.used.outliers):
         assert each.record.y is not None
-        # beyond the axis they stand at its edge
+        # those beyond the axis are drawn at its edge
         places = np.clip(each.record.y[each.used.outliers], low - 0.7 * margin, high + 0.7 * margin)
         axes.plot(t[each.used.outliers], places, "x", color=drawing.FAULT, markersize=5, label="outlier")
     if len(each.used.bridged):
@@ -202,7 +202,7 @@ def overlay_panel(axes: Any, each: Shown, units: Units) -> None:
 
 
 def residual_panel(axes: Any, each: Shown, units: Units, colour: str = drawing.RESIDUAL) -> None:
-    """The residual along time."""
+    """The residual over time."""
     for k, (start, stop) in enumerate(each.used.parts):
         chosen = drawing.kept(start, stop, each.residual)
         axes.plot(
@@ -287,7 +287,7 @@ def loop(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
 
 
 def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
-    """Measured and model along time with the residual below, of a fitted and of a held-out record."""
+    """Measured and model over time with the residual below, of a fitted and of a held-out record."""
     pair, units = drawn_ones(shown), units_of(fit)
     figure = drawing.figure(9.6 if wide else 4.4, 4.3 * len(pair))
     rows = figure.subfigures(len(pair), 1, squeeze=False)
@@ -304,7 +304,7 @@ def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
 
 
 def residual(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
-    """Residual against drive, rate, time and displacement: of the held-out records, where there are any."""
+    """Residual against drive, rate, time and displacement; of the held-out records if there are any."""
     chosen, units = judged(shown), units_of(fit)
     noise = noise_of(chosen)
     left = np.concatenate([each.residual for each in chosen])
@@ -337,14 +337,14 @@ def judged(shown: Sequence[Shown]) -> list[Shown]:
 
 
 def noise_of(shown: Sequence[Shown]) -> float | None:
-    """The largest noise of the records, None if that of any is unknown."""
+    """The largest noise of the records; None if it is unknown for any of them."""
     found = [each.noise for each in shown]
     known = [sigma for sigma in found if sigma is not None]
     return max(known) if known and len(known) == len(found) else None
 
 
 def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
-    """Initial loading curve with its band; with a front, its curve and its distance from a straight line."""
+    """Initial loading curve with its band; with a front, also the front and its distance from a straight line."""
     units, cascade = units_of(fit), cascade_of(fit.parameters)
     bent = bool(cascade.stages)
     if wide:

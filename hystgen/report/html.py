@@ -1,4 +1,4 @@
-"""A self-contained HTML page: text, tables and figures, no script, nothing to load."""
+"""A self-contained HTML page: text, tables and figures, without scripts or external files."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture as SVG, in a layout for wide pages and one for phones; `alt` says in words what it shows."""
+    """A picture as SVG, in a layout for wide pages and one for phones; `alt` describes it in words."""
 
     name: str
     wide: bytes
@@ -54,7 +54,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Details:
-    """Text as it is, behind a summary that opens it."""
+    """Preformatted text that opens at a click on its summary."""
 
     summary: str
     text: str

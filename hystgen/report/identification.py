@@ -73,11 +73,11 @@ def report_fit(
     folder: str | os.PathLike[str],
     holdout: Source | Iterable[Source] = (),
 ) -> Path:
-    """Write the report of a fit: `report.html`, which needs nothing else, and its pictures; the path of the page.
+    """Write the report of a fit: `report.html`, which is self-contained, and its pictures. Returns the page's path.
 
-    `records`, `holdout`: as `identify` was given them, in the same order; records read with options such as `columns`
-    have to be given as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder stay. Raises
-    ValueError for other records, RecordError, OSError.
+    `records`, `holdout`: as given to `identify`, in the same order; records read with options such as `columns` have to
+    be given as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder stay. Raises ValueError for
+    other records, RecordError, OSError.
     """
     if not isinstance(fit, Fit):
         raise TypeError(f"fit is what hystgen.identify returns, not {arguments.kind(fit)}")
@@ -87,10 +87,10 @@ def report_fit(
 def write(
     fit: Fit, records: Sequence[Record], folder: str | os.PathLike[str], parameter_file: str | None = None
 ) -> Path:
-    """Write report.html and every picture as SVG and PNG into a folder, all or nothing; the path of the page.
+    """Write report.html and every picture as SVG and PNG into a folder, all or nothing. Returns the page's path.
 
-    `records`: those of the fit, then those held out. `parameter_file`: its name in the command to run next. Raises
-    PlotError without matplotlib, ValueError for other records than those of the fit, OSError.
+    `records`: those of the fit, then those held out. `parameter_file`: its name in the command for the next step.
+    Raises PlotError without matplotlib, ValueError for other records than those of the fit, OSError.
     """
     check_folder(folder)
     shown = fit_figures.of_fit(fit, records)
@@ -146,7 +146,7 @@ def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
         own = fit.rows[-1]
         error = (
             f" follows the records it was fitted to within {own.rms:.3g}{unit} rms ({_of_range(own)}); nothing was "
-            "held out, so that it is not known how it does on others"
+            "held out, so that its error on others is not known"
         )
     else:
         which = (
@@ -167,7 +167,7 @@ def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
     if problems:
         said.append("Why there is no inverse: " + "; ".join(problems) + ". It can be used forward.")
     operator = " --operator forward" if problems else ""
-    said += [f"Mind that {text}." for text in properties.warnings(Model(fit.parameters))]
+    said += [f"Note that {text}." for text in properties.warnings(Model(fit.parameters))]
     if fit.warnings:
         said.append(f"There {'is' if len(fit.warnings) == 1 else 'are'} {counted(len(fit.warnings), 'warning')} below.")
     command = f"hystgen emit {parameter_file} -o firmware/{operator}"
@@ -179,8 +179,8 @@ def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Figure]) -> l
     return [
         Section("How good it is", _table(fit)),
         Section("Loops", [figures["loop"]]),
-        Section("Along time", [figures["time"]]),
-        Section("What is left, and what it depends on", [figures["residual"]]),
+        Section("Over time", [figures["time"]]),
+        Section("The residual, and what it depends on", [figures["residual"]]),
         Section("Initial loading curve", [figures["loading"]]),
         Section("Thresholds and weights", [figures["weights"]]),
         Section("What was done to the data", _data(shown)),
@@ -234,14 +234,14 @@ def _data(shown: Sequence[Shown]) -> list[Text | Table | Listing]:
     blocks: list[Text | Table | Listing] = [
         Table([head, *rows], (0, 1)),
         Text(
-            "Not compared are samples at the start, before the drive has wiped an unknown memory, and outliers of y: "
-            "isolated samples far from their neighbours. Nor are faulty stretches: drop-outs, samples that are held "
-            "while the drive moves, a converter at its end. Isolated samples of v that y takes no notice of are "
-            "bridged by a straight line. A record is cut at gaps, behind which the memory is unknown again; every part "
-            "has a free offset."
+            "Three kinds of samples are not compared: those at the start, before the drive has wiped an unknown "
+            "memory; outliers of y, which are isolated samples far from their neighbours; and faulty stretches, which "
+            "are drop-outs, samples held while the drive moves, and a converter at its end. Isolated samples of v "
+            "without a response in y are bridged by a straight line. A record is cut at gaps, after which the memory "
+            "is unknown again; every part has a free offset."
         ),
     ]
-    return [*blocks, Text("On reading:"), Listing(notes)] if notes else blocks
+    return [*blocks, Text("When the records were read:"), Listing(notes)] if notes else blocks
 
 
 def _masks(each: Shown) -> tuple[Sequence[int], ...]:
@@ -268,12 +268,12 @@ def _range(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
         )  # fmt: skip
     said = (
         f"The model was fitted on drives from {low:.6g} to {high:.6g}{unit}, and the emitted code keeps its drive "
-        "inside them. "
+        "inside this range. "
     )
     said += (
-        f"{counted(beyond, 'sample')} of the records below lie outside: there the model is a guess."
+        f"{counted(beyond, 'sample')} of the records below lie outside, where the model is a guess."
         if beyond
-        else "No record leaves them."
+        else "No record leaves this range."
     )
     head = (
         "record", "part", f"least{unit and f' [{unit.strip()}]'}", f"largest{unit and f' [{unit.strip()}]'}",
@@ -299,7 +299,7 @@ def _provenance(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
 
 
 def _fingerprint(record: Record) -> str:
-    """Digest of the numbers as they were read, independent of the file's format."""
+    """Digest of the numbers as read, independent of the file's format."""
     digest = hashlib.sha256()
     for values in (record.t, record.v, record.y):
         assert values is not None
@@ -326,7 +326,7 @@ def _errors(shown: Sequence[Shown], fit: Fit) -> str:
 
 def _loop_caption(fit: Fit, shown: Sequence[Shown]) -> str:
     return (
-        "Measured loops and those of the model, a free run over the measured drive with a free offset: "
+        "Measured loops and the model's, from a free run over the measured drive with a free offset: "
         f"{_errors(shown, fit)}. Only compared samples are drawn.{_several(shown)}"
     )
 
@@ -349,13 +349,13 @@ def _time_caption(_fit: Fit, shown: Sequence[Shown]) -> str:
         counts += [counted(left_out, "sample") + " left out between gaps"] if left_out else []
         said.append(f"{each.used.name}: {', '.join(counts)}")
     return (
-        "Measured and model along time; below it, measured less model where it was compared. Grey: ignored; yellow: "
+        "Measured and model over time; below, measured less model where samples were compared. Grey: ignored; yellow: "
         f"gaps; crosses: outliers. {'; '.join(said)}.{_several(shown)}"
     )
 
 
 def _time_alt(fit: Fit, shown: Sequence[Shown]) -> str:
-    return f"Displacement along time, measured and model, with the residual below: {_errors(shown, fit)}"
+    return f"Displacement over time, measured and model, with the residual below: {_errors(shown, fit)}"
 
 
 def _residual_caption(fit: Fit, shown: Sequence[Shown]) -> str:
@@ -367,14 +367,14 @@ def _residual_caption(fit: Fit, shown: Sequence[Shown]) -> str:
         f"The noise, estimated from differences of neighbouring samples, is about {noise:.2g}{unit} (1 sd): a mean "
         "outside that band is structure that the model misses."
         if noise is not None
-        else "The noise cannot be estimated from these samples: it is not white, or small beside the model error."
+        else "The noise cannot be estimated from these samples: it is not white, or far below the model error."
     )
     compared = sum(int(np.count_nonzero(each.used.compared)) for each in judged)
     some = f" ({drawing.MOST_POINTS} of {compared} are drawn)" if compared > drawing.MOST_POINTS else ""
     return (
-        f"What is left of {said}: samples{some}, their mean and scatter in {fit_figures.BINS} bins. A mean that "
-        f"stays at zero means that nothing depends on what is on the axis. {level} The axis of the drive rate ends "
-        f"where {100 * (1 - fit_figures.TAIL):.3g} % of the samples do if a few lie far out."
+        f"The residual of {said}: samples{some}, their mean and scatter in {fit_figures.BINS} bins. If the mean stays "
+        f"at zero, the residual does not depend on the quantity of that axis. {level} The axis of the drive rate shows "
+        f"{100 * (1 - fit_figures.TAIL):.3g} % of the samples if a few lie far out."
     )
 
 
@@ -387,13 +387,14 @@ def _residual_alt(fit: Fit, shown: Sequence[Shown]) -> str:
 def _loading_caption(fit: Fit, _shown: Sequence[Shown]) -> str:
     said = (
         "Output of the model on the first rise of a virgin actuator, with the 95 % band of the bootstrap, and that "
-        "band alone. Loops inside the drive range use it up to the dotted line; only a virgin actuator goes on."
+        "band by itself. Loops inside the drive range use the curve up to the dotted line; only the first rise of a "
+        "virgin actuator goes further."
     )
     cascade = cascade_of(fit.parameters)
     if cascade.stages:
         said += (
-            " The horizontal axis is the input of the plays, that is the drive as it comes out of the front. Below: "
-            "the front against the straight line of slope one, and how far it departs from it"
+            " The horizontal axis is the input of the plays, that is, the drive behind the front. Below: the front and "
+            "the straight line with slope one, and the difference of the two"
         )
         said += ", while the drive rises and while it falls." if cascade.branches_differ else "."
     return said
@@ -410,7 +411,7 @@ def _loading_alt(fit: Fit, _shown: Sequence[Shown]) -> str:
 def _weights_caption(fit: Fit, _shown: Sequence[Shown]) -> str:
     return (
         "Weights over their thresholds; the lines are 95 % intervals. p_0 is the part without hysteresis, on a scale "
-        "of its own. Neighbouring plays can stand in for each other: a wide interval of one weight does not make the "
+        "of its own. Neighbouring plays can replace each other: a wide interval of one weight does not make the "
         "loading curve uncertain."
         + (" Thresholds are in the output of the front." if fit.parameters.model.memoryless else "")
     )

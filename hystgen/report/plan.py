@@ -57,7 +57,7 @@ def html(plan: Plan, folder: str | os.PathLike[str]) -> str:
     sections = [
         Section("What to do", [Listing(_steps(plan, home))]),
         Section("The drives", [figure, _times(plan)]),
-        Section("What each is for", [Listing([_purpose(drive) for drive in plan.drives])]),
+        Section("Purpose of each drive", [Listing([_purpose(drive) for drive in plan.drives])]),
         Section("Limits", [Listing([*_kept(plan), *_limits(plan)])]),
         Section("Provenance", [Text(f"hystgen {__version__}; the same parameter file gives the same drives.")]),
     ]
@@ -85,12 +85,12 @@ def _steps(plan: Plan, home: str) -> list[str]:
         return _played(plan, home, top, bottom)
     return [
         f"Before the first record go to {top}, then to {bottom}. Every record ends with the same two moves, so "
-        f"--history={','.join(map(repr, plan.history))} is true of all.",
+        f"--history={','.join(map(repr, plan.history))} holds for all.",
         f"Record them in the order of their numbers. Rest {plan.rest:g} s at {bottom} before each, or longer.",
-        "t is one session clock for all records: keep what the clock really showed, rests included. Drift, heat and "
-        "ageing are seen by it.",
+        "t is one session clock for all records: keep its true readings, rests included. They show drift, heat and "
+        "ageing.",
         f"Store each record as {home}/{MEASURED}/ and its name, with columns t, v and the displacement y; log "
-        "temperature (degC) as a further column, if there is a thermometer.",
+        "temperature (degC) as a further column if there is a thermometer.",
         "Let v be the drive as measured at the time of y. A generator that holds each value until the next is half a "
         "sample late, and a commanded v would show that as a delay.",
     ]
@@ -105,7 +105,7 @@ def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
         f"{lasting(plan.duration)}. It goes to {top} and {bottom} first, which is the history of the first record, and "
         f"rests {plan.rest:g} s before each.",
         f"Record drive and displacement all the while into one file, {home}/{RECORDING}, with columns t, v and y, at "
-        "this rate or another. It may start before the drive does; the two are aligned by the first rise.",
+        "this rate or another. It may start before the drive; the first rise aligns the two.",
         f"{SESSION} says at which sample each record begins, and which are held out: the recording is cut by it.",
         "Let v be the drive as measured at the time of y. A converter that holds each value until the next is half a "
         "sample late, and a commanded v would show that as a delay.",
@@ -114,9 +114,9 @@ def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
         size, corners = samples * plan.dac.bytes, header.nodes(plan.stretches)
         said.insert(
             1,
-            f"{CODES} has the same as one code per line: {samples} codes, {size / 1e6:.3g} MB of memory at "
+            f"{CODES} has the same drive as one code per line: {samples} codes, {size / 1e6:.3g} MB of memory at "
             f"{counted(plan.dac.bytes, 'byte')} each. The files of the single records have their codes in the column "
-            f"code. For firmware {header.file(plan.parameters)} has the {len(corners)} codes between which the drive "
+            f"code. For firmware, {header.file(plan.parameters)} has the {len(corners)} codes between which the drive "
             f"is straight, {len(corners) * plan.dac.bytes / 1e3:.3g} kB.",
         )
     return said
@@ -140,13 +140,13 @@ def _times(plan: Plan) -> Table:
 
 
 def _purpose(drive: Drive) -> str:
-    return f"{drive.name}: {drive.purpose} Tells apart: {', '.join(drive.shows)}."
+    return f"{drive.name}: {drive.purpose} Distinguishes: {', '.join(drive.shows)}."
 
 
 def _kept(plan: Plan) -> list[str]:
     unit = _unit(plan)
     top, bottom = (f"{value:g}{unit}" for value in plan.history)
-    steps = "" if plan.dac is None else ", steps of one code aside"
+    steps = "" if plan.dac is None else ", except for steps of one code"
     kept = f"No record goes below {bottom} or above {top}, and none changes faster than "
     resolution = [] if plan.dac is None else [plan.dac.sentence(unit, plan.history[0] - plan.history[1])]
     return [*plan.defaults, f"{kept}{_rate(plan, plan.max_rate)}{steps}.", *resolution]
@@ -162,8 +162,8 @@ def _limits(plan: Plan) -> list[str]:
     ]
     if fast > 1.5 * plan.sample_time:
         said.append(
-            f"Fast records are sampled every {fast:.3g} s, not every {plan.sample_time:g} s: at this rate limit a move "
-            "over the range takes so long. A larger --max-rate shows more, and sooner."
+            f"Fast records are sampled every {fast:.3g} s, not every {plan.sample_time:g} s, because of the time that "
+            "a move over the range takes at this rate limit. A larger --max-rate shows more, and sooner."
         )
     return said
 
@@ -189,4 +189,4 @@ def _drives(plan: Plan, width: float, columns: int) -> Any:
 
 CAPTION = "All drives in the order of recording, each on its own time axis; blue: to fit, orange: held out, to judge."
 
-ALTERNATIVE = "A panel for every record: its drive along time, with the names of the records as titles."
+ALTERNATIVE = "A panel for every record: its drive over time, with the names of the records as titles."

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def show_tracking(tracking: Tracking, path: str | os.PathLike[str]) -> None:
-    """The motion of each record and the tracking error of each compensator along time, as PNG or SVG.
+    """The motion of each record and the tracking error of each compensator over time, as PNG or SVG.
 
     Raises PlotError.
     """
@@ -47,9 +47,9 @@ def show_fit(fit: Fit, records: Sequence[Record], path: str | os.PathLike[str]) 
 
 
 def fit_figure(fit: Fit, records: Sequence[Record]) -> Any:
-    """Measured and predicted loop of one record, residuals along time, and the weights.
+    """Measured and predicted loop of one record, residuals over time, and the weights.
 
-    `records`: those of the fit, then those held out, of which the loop is one where there are any.
+    `records`: those of the fit, then those held out; the loop is that of a held-out record if there is one.
     """
     units = fit_figures.units_of(fit)
     shown = fit_figures.of_fit(fit, records)

@@ -17,20 +17,20 @@ from hystgen.model import SETTLED, Model
 HARD_RATIO = 1e6
 
 WIDE = 0.05
-"""Share of the drive's range from which an error of the inverse is mentioned."""
+"""Share of the drive's range above which an error of the inverse is mentioned."""
 
 UP = decimal.Context(prec=3, rounding=decimal.ROUND_CEILING)
 
 
 def properties(model: Model, within: float = SETTLED) -> str:
-    """The text of `hystgen show`: ranges, slopes, loop width, settling, invertible or why not, error bounds.
+    """The text of `hystgen show`: ranges, slopes, loop width, settling, whether there is an inverse, error bounds.
 
     `within`: error of settling, share of a step.
     """
     c, p = model.cascade, model.parameters
     pi = c.pi
     drive, output = (f" {unit}" if unit else "" for unit in (p.units.input, p.units.output))
-    # Behind a front the input of the plays has no unit
+    # behind a front, the input of the plays has no unit
     play = "" if c.stages else drive
     slope = f"{output}/{p.units.input}" if play and output else ""
     fronts = ["dead zone" if isinstance(stage, DeadZone) else "tanh envelope" for stage in c.stages]
@@ -55,7 +55,7 @@ def properties(model: Model, within: float = SETTLED) -> str:
     lines.append(f"settling           {settling(model, within)}")
     problems = c.inverse_problems()
     if model.effects:
-        said = "effects            the lines above but settling are those of the model without them"
+        said = "effects            the lines above, except settling, are for the model without them"
         lines += [said, *_effects(model)]
     elif problems:
         lines += ["inverse            none:", *(f"    {problem}" for problem in problems)]
@@ -104,7 +104,7 @@ def facts(model: Model, within: float = SETTLED) -> dict[str, Any]:
 
 
 def settling(model: Model, within: float = SETTLED) -> str:
-    """Settling of the model in a sentence, or why it is not known."""
+    """Settling of the model in a sentence, or the reason why it is not known."""
     try:
         return model.settling(within).sentence(model.parameters.units.output)
     except EffectsError as error:
@@ -112,7 +112,7 @@ def settling(model: Model, within: float = SETTLED) -> str:
 
 
 def cost(model: Model) -> str:
-    """Cost of the C that `emit` would write, of the forward operator without an inverse; "" if it refuses."""
+    """Cost of the C that `emit` would write, that of the forward operator if there is no inverse; "" if it refuses."""
     from hystgen.emission import module
 
     options = emit_options(model, operator="forward" if model.cascade.inverse_problems() else None)
@@ -149,14 +149,14 @@ def _effects(model: Model) -> list[str]:
 
 
 def _shown(value: Any) -> str:
-    """A number or a list; a long list is shortened."""
+    """The text of a number or a list; a long list is shortened."""
     if isinstance(value, tuple):
         return "[" + ", ".join(_shown(entry) for entry in value[:8]) + (", ..]" if len(value) > 8 else "]")
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _fixed(model: Model, drive: str, output: str) -> list[str]:
-    """Resolution and bounds of fixed point in physical units, or why it is refused."""
+    """Resolution and bounds of fixed point in physical units, or the reason for a refusal."""
     lines = []
     for arithmetic in (each.name for each in ARITHMETICS.values() if each.fixed):
         try:
