@@ -1,5 +1,5 @@
-"""Finding what a model is missing: where it disagrees with measured records, the name of the effect, and the model
-with it added.
+"""Find what a model is missing: where it disagrees with measured records, the name of the missing effect, and the model
+with that effect added.
 
 >>> found = hystgen.diagnose("stage.yaml", ["slow.csv", "steps.csv"], holdout=["other.csv"])
 >>> found.verdict

@@ -39,7 +39,7 @@ History = tuple[float, ...] | None
 Refit = Callable[[Prepared], Fitted]
 
 STEPS = 120
-"""Fits of a diagnosis, about, for the progress bar."""
+"""Approximate number of fits in a diagnosis, for the progress bar."""
 
 
 @arguments.checked
@@ -59,16 +59,15 @@ def diagnose(
 ) -> Diagnosis:
     """Find what a nominal model is missing.
 
-    `parameters`: a `Model`, a parameter file, or what `identify` found; `records`: measured, to be fitted, each as
-    `identify` takes them; `holdout`: records with other waveforms that judge; without them, or where too little of them
-    can be compared, every third record, or the end of one, is held out. `history`: drive values visited before every
-    record, ignored where the starts of the records contradict it; `rest`: seconds of pause after them. `skip`: seconds
-    at the start of every record that are not compared, though their drive counts. `effects`: further effects that take
-    part.
+    `parameters`: a `Model`, a parameter file, or a result of `identify`; `records`: measured records to fit, each as
+    for `identify`; `holdout`: records with other waveforms that judge; without them, or if too little of them can be
+    compared, every third record, or the end of each, is held out. `history`: drive values visited before every record,
+    ignored if the starts of the records contradict it; `rest`: seconds of pause after them. `skip`: seconds at the
+    start of every record that are not compared, although their drive counts. `effects`: further effects that take part.
 
-    The nominal model is refitted first. Then one effect after the other is added, each shape fitted jointly with the
-    weights on the free-run error, and accepted if it removes a worthwhile part of the held-out error that chance does
-    not explain. Raises RecordError, IdentificationError, ValueError.
+    The nominal model is refitted first. Then one effect after the other is added, with each shape fitted jointly with
+    the weights on the free-run error, and accepted if it removes a worthwhile part of the held-out error that chance
+    does not explain. Raises RecordError, IdentificationError, ValueError.
 
     >>> import numpy as np, hystgen
     >>> t = np.linspace(0.0, 4.0, 4000)
@@ -129,7 +128,7 @@ NO_FRONT = "the memoryless part of the model was left out: held-out records are 
 
 @dataclass(frozen=True)
 class _Done:
-    """A finished search, with the records that it was over, and what else is to be said of it."""
+    """A finished search, with its records and further notes about it."""
 
     cleaned: Cleaned
     noise: NoiseFloor
@@ -138,7 +137,7 @@ class _Done:
     notes: tuple[str, ...] = ()
 
     def noting(self, note: str) -> _Done:
-        """The same with a note more."""
+        """The same with one more note."""
         return replace(self, notes=(*self.notes, note))
 
 
@@ -156,7 +155,7 @@ class _Task:
     tick: Callable[[], None]
 
     def with_history(self, history: History, unit: str | None) -> tuple[_Done, OtherHistory | None]:
-        """The search with the history, or without it where the records contradict it, which is then returned too."""
+        """The search with the history, or without it and with a finding if the records contradict it."""
         done = None
         wrong = self._foreign(history)
         if wrong is None:
@@ -171,7 +170,8 @@ class _Task:
         return done, wrong
 
     def _begun(self, history: History) -> tuple[Prepared, Refit, Refit | None]:
-        """The records as they are compared, how the nominal model is refitted to such, and without its front if any."""
+        """The records as they are compared, the function that refits the nominal model to them, and the same without a
+        front, if there is one."""
         ready = preparing.prepare(self.to_fit, self.held, history, self.rest, self.skip)
         base, start = hypothesis.structure_of(self.cascade, self.given, ready)
         weights = hypothesis.nominal_weights(self.cascade, base)
@@ -183,21 +183,21 @@ class _Task:
         )
 
     def _foreign(self, history: History) -> OtherHistory | None:
-        """The finding about a history to which the model can be bent, and should not be."""
+        """The finding about a history that the model can follow, but only at the cost of the rest."""
         if history is None:
             return None
         ready, refit, _ = self._begun(history)
         try:
             others, refit_others, _ = self._begun(None)
-        except IdentificationError:  # everything that is compared depends on it
+        except IdentificationError:  # all compared samples depend on the history
             return None
         return preparing.bends(ready.to_fit, refit(ready), refit_others(others))
 
     def _searched(self, history: History) -> _Done:
-        """The search from the nominal model, or without its front where that misleads it.
+        """The search from the nominal model, or without its front if that misleads it.
 
-        A front fitted to one loop may follow what an effect does there. Where held-out records are predicted better
-        without it, it has to do better in the end than the names that are found without it.
+        A front fitted to one loop may follow an effect there. If held-out records are predicted better without the
+        front, the search with it has to do better in the end than the names that are found without it.
         """
         ready, refit, bare = self._begun(history)
         if bare is not None and selection.better(bare(ready), refit(ready), ready.held):
@@ -210,9 +210,9 @@ class _Task:
         return self._thorough(ready, refit)
 
     def _thorough(self, ready: Prepared, refit: Refit) -> _Done:
-        """The search, and another where nothing could be named though much is left.
+        """The search, and another one if nothing could be named although much error remains.
 
-        In that one the end of each fitted record judges too: the held-out records may not show what these do.
+        In the second, the end of each fitted record judges too, since it may show what held-out records do not.
         """
         done = self._search(ready, refit)
         left = rms(done.found.fitted.errors(done.records.to_fit))
@@ -229,7 +229,7 @@ class _Task:
             refitted = refit(cleaned.clean)
         noise, records = self._records(cleaned.clean, refitted)
         found = selection.select(records, refitted, cleaned.left_by)
-        if found.found and cleaned.left_by(found.fitted):  # beside the effects it can be seen as it is
+        if found.found and cleaned.left_by(found.fitted):  # a line that only shows clearly beside the effects
             cleaned = disturbances.taken_out(cleaned, found.fitted, partial(selection.again, found.fitted))
             refitted = refit(cleaned.clean)
             noise, records = self._records(cleaned.clean, refitted)
@@ -265,7 +265,7 @@ def _extended(
 ) -> Parameters:
     """The parameter file with the model refitted and the effects added; `cascade`: the nominal model.
 
-    Raises IdentificationError where nothing is left of it.
+    Raises IdentificationError if no play is left.
     """
     from hystgen.parameters.files import make_parameters
 
@@ -280,12 +280,12 @@ def _extended(
     if actuator.at(Place.PLAYS):  # an effect on the plays may refer to the largest threshold
         kept[-1] = True
     fewer = tuple(r[kept].tolist())
-    if any(True for effect in actuator.effects for _ in effect.problems(fewer)):  # numbers of its own for every play
+    if any(True for effect in actuator.effects for _ in effect.problems(fewer)):  # it has numbers for every play
         kept[:] = True
     offset = rounded(_offset(fitted, ready.to_fit[0]), DIGITS)
     plays: dict[str, Any] = {"thresholds": r[kept].tolist(), "weights": p[kept].tolist()}
     start = cascade.pi.start
-    if np.any(start) and not cascade.stages and not actuator.stages:  # in front of plays they see the drive
+    if np.any(start) and not cascade.stages and not actuator.stages:  # without a front the plays see the drive itself
         plays["initial_state"] = np.interp(r[kept], cascade.pi.thresholds, start).tolist()
     content = {
         **parameters.model_dump(),

@@ -1,7 +1,7 @@
-"""Disturbances in what a model leaves: lines over time, a ripple over the position, stick-slip.
+"""Disturbances in the errors of a model: lines over time, a ripple over the position, stick-slip.
 
 Lines and ripples that rule the errors are taken out of the records: hum hides effects, and a ripple would be taken for
-effects and for stick-slip. Stick-slip is reported with place and count, and never named.
+effects and for stick-slip. Stick-slip is reported with place and count, but never named as an effect.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ MAINS_HARMONICS = (1, 2, 3, 5)
 
 @dataclass(frozen=True)
 class Removed:
-    """A line or ripple, the errors without it, and the share of the variance of all errors that it takes."""
+    """A line or ripple, the errors without it, and its share of the variance of all errors."""
 
     finding: Line | Ripple
     errors: list[Array]
@@ -41,7 +41,7 @@ class Removed:
 
 
 def removed_share(before: Sequence[Array], after: Sequence[Array]) -> float:
-    """Share of the power of some errors that is gone in others."""
+    """Share of the power of the errors `before` that is gone in those `after`."""
     total = _power(before)
     return 1.0 - _power(after) / total if total > 0.0 else 0.0
 
@@ -51,7 +51,7 @@ def _power(errors: Sequence[Array]) -> float:
 
 
 def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
-    """The strongest line that is in most of the records long enough for it, or that rules a few."""
+    """The strongest line that is in most of the records long enough for it, or that rules the errors of a few."""
     found: list[tuple[float, float, int]] = []
     for k, (item, error) in enumerate(zip(items, errors, strict=True)):
         found += [(share, frequency, k) for share, frequency in peaks(item, error)]
@@ -70,7 +70,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
         common = len(seen) >= max(2, acceptance.SEEN_IN * len(able)) or len(able) == len(seen)
         rules = min(p[0] for p in near) > acceptance.RULING_SHARE
         if (common or rules) and (best is None or strength > best[0]):
-            longest = max(near, key=lambda p: lengths[p[2]])  # the frequency is sharpest there
+            longest = max(near, key=lambda p: lengths[p[2]])  # the frequency is most exact there
             best = strength, longest[1], seen, able
     if best is None:
         return None
@@ -78,14 +78,14 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
     frequency = _refined(items, errors, frequency, seen, lengths)
     after, sizes, has = [], [], []
     for k, (item, error) in enumerate(zip(items, errors, strict=True)):
-        if lengths[k] * frequency < 2.0:  # less than two periods are no line
+        if lengths[k] * frequency < 2.0:  # fewer than two periods are no line
             after.append(error)
             continue
         e, size = _without(error, _phase(item, frequency))
         after.append(e)
         if k in seen or (k in able and removed_share([error], [e]) > acceptance.LINE_SHARE):
             has.append(k)
-        # two samples a period do not show the amplitude
+        # two samples per period do not show the amplitude
         resolved = acceptance.AMPLITUDE_SAMPLES * frequency
         if k in seen and (resolved < rates[k] or all(resolved > rates[j] for j in seen)):
             sizes.append(size)
@@ -100,7 +100,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
 
 
 def _mains(frequency: float, width: float) -> float | str | None:
-    """The mains frequency that a line belongs to, or which harmonic of it the line is; `width`: its uncertainty, Hz."""
+    """The mains frequency of a line, or the harmonic of it that the line is; `width`: the line's uncertainty, Hz."""
     for mains in MAINS:
         for n in MAINS_HARMONICS:
             if abs(frequency - n * mains) < max(width, acceptance.MAINS_TOLERANCE * frequency):
@@ -109,9 +109,11 @@ def _mains(frequency: float, width: float) -> float | str | None:
 
 
 def steady(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
-    """The strongest line, if in most of the records that have it one half predicts the line of the other half.
+    """The strongest line, if one half of a record predicts the line of the other half, in most of the records that have
+    it.
 
-    An actuator answers with the lines of its drive, which are excluded, or it rings and fades.
+    Lines from the actuator are not steady: it answers with the lines of its drive, which are excluded, or its ringing
+    decays.
     """
     line = in_time(items, errors) if all(item.timed for item in items) else None
     if line is None or not isinstance(line.finding, Line):
@@ -172,16 +174,16 @@ MOST_SAMPLES = 20_000
 """Samples that a pitch is refined with: it is then as fine as the noise allows."""
 
 FINER = 4
-"""Zero padding of the spectrum over position, so that pitches between whole parts of the range have a bin."""
+"""Zero padding of the spectrum over position, so that pitches between integer fractions of the range have a bin."""
 
 
 @dataclass(frozen=True)
 class _Motion:
     """The motion of a record, at the samples `at` that are compared.
 
-    `places`: predicted positions; `errors`: there; `moves`: how far the prediction moves from the sample before, NaN
-    where the drive holds: there one position is measured again and again, and the model has been fitted to it. The
-    measured position would not do: a ripple that is large against its pitch is no sine over itself.
+    `places`: predicted positions; `errors`: at those; `moves`: the change of the prediction since the sample before,
+    NaN while the drive holds, since a hold measures one position repeatedly and the model has been fitted to it. Places
+    are predicted, not measured: over the measured position a ripple that is large against its pitch is no sine.
     """
 
     at: NDArray[np.bool_]
@@ -270,9 +272,9 @@ def _pitch(motions: Sequence[_Motion], pitch: float) -> float:
 def _ripple(
     items: Sequence[Item], errors: Sequence[Array], motions: Sequence[_Motion], pitch: float
 ) -> Removed | None:
-    """The ripple, if the ripple of all other passes holds in most of the passes up and down over several pitches.
+    """The ripple, if most passes up and down over several pitches show the ripple of all other passes.
 
-    What a lag or a loop leaves differs between the way up and the way down.
+    The error by a lag or a loop differs between passes up and down.
     """
     tables = [
         np.column_stack([np.cos(2.0 * np.pi * motion.places / pitch), np.sin(2.0 * np.pi * motion.places / pitch)])
@@ -327,7 +329,7 @@ def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | R
 
 
 def ruling(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | Ripple], list[Array]]:
-    """The same for lines that rule the errors and do not come from the actuator: steady ones and ripples."""
+    """The same for lines that rule the errors and do not come from the actuator: steady lines and ripples."""
     return _strongest_first(items, errors, (steady, in_position), acceptance.RULING_SHARE)
 
 
@@ -351,20 +353,20 @@ def _strongest_first(
 Fitted = TypeVar("Fitted", bound=Model)
 
 ROUNDS = 3
-"""Rounds of removal: a model fitted to a ripple is off the positions over which the ripple is seen, and comes nearer to
-them without it."""
+"""Rounds of removal: a model fitted to a ripple is wrong about the positions over which the ripple appears, and becomes
+better without it."""
 
 
 @dataclass(frozen=True)
 class Cleaned:
-    """Records as they were measured, the same without their lines, and these lines."""
+    """Records as measured, the same without their lines, and these lines."""
 
     measured: Prepared
     clean: Prepared
     lines: tuple[Line | Ripple, ...] = ()
 
     def seen_by(self, fitted: Model) -> Cleaned:
-        """The measured records without the lines that a model leaves, over the positions that it predicts."""
+        """The measured records without the lines in a model's errors, over the positions that it predicts."""
         measured, clean = _items(self.measured), _items(self.clean)
         errors = [
             error + (item.y - without.y)
@@ -380,7 +382,7 @@ class Cleaned:
         return replace(self, clean=replace(self.measured, to_fit=items[:number], held=items[number:]), lines=lines)
 
     def left_by(self, fitted: Model) -> bool:
-        """Whether a model leaves further such lines."""
+        """Whether a model's errors show further such lines."""
         clean = _items(self.clean)
         return bool(ruling(clean, fitted.errors(clean))[0])
 
@@ -390,7 +392,7 @@ class Cleaned:
 
 
 def taken_out(found: Cleaned, fitted: Fitted, refit: Callable[[Prepared], Fitted]) -> Cleaned:
-    """The records without the lines that a model shows; the model is refitted to them in every round."""
+    """The records without the lines in a model's errors; the model is refitted to them in every round."""
     for _ in range(ROUNDS):
         seen = found.seen_by(fitted)
         if not seen.lines:
@@ -400,7 +402,7 @@ def taken_out(found: Cleaned, fitted: Fitted, refit: Callable[[Prepared], Fitted
 
 
 def _moving(ready: Prepared) -> Prepared:
-    """The records without their holds, where a ripple is an offset to which the model would be fitted unnoticed."""
+    """The records without their holds, in which a ripple is an offset that the fit would take over unnoticed."""
 
     def without_holds(item: Item) -> Item:
         y = item.y.copy()
@@ -432,10 +434,10 @@ def stick_slip(items: Sequence[Item], errors: Sequence[Array], noise: float) -> 
 
 
 def _stick_slip(item: Item, error: Array, noise: float) -> StickSlip | None:
-    """How often the output stands and leaps over stretches in which the prediction moves by a few times the noise.
+    """Judge stretches in which the prediction moves by a few times the noise: how often the output stands, and leaps.
 
-    What a lag or ringing misses is smooth: it continues from one stretch to the next, where a leap makes up for the
-    standing before it. And a jump is one: the output hardly moves before and after it, whatever a model predicts.
+    The error by a lag or by ringing is smooth: it continues from one stretch to the next, while a leap makes up for the
+    standstill before it. And before and after a jump the output hardly moves, whatever a model predicts.
     """
     known = np.isfinite(error) & np.isfinite(item.y)
     e, y = error[known], item.y[known]
@@ -468,7 +470,7 @@ def _stick_slip(item: Item, error: Array, noise: float) -> StickSlip | None:
 
 
 def _alone(moves: Array, at: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Whether the moves at some samples are far larger than those around them; a filter may spread them to the next."""
+    """Whether moves at some samples are far larger than those around them; a filter may spread them to the next one."""
     beside = np.array([-5, -4, -3, -2, 2, 3, 4, 5])
     around = moves[np.clip(at[:, None] + beside, 0, len(moves) - 1)]
     return np.asarray(moves[at] > acceptance.SLIP_ALONE * np.median(around, axis=1))

@@ -1,6 +1,6 @@
 """Records as a diagnosis compares them: a record with its compared samples, and the same with fewer of them.
 
-A stretch over which drive and plays are straight needs no samples in it: plays depend on turning points alone, and
+A stretch in which drive and plays are straight needs no samples inside: plays depend only on turning points, and
 filters are exact on straight lines.
 """
 
@@ -23,7 +23,7 @@ Samples = slice | NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 MOVEMENTS = 5, 2**25
-"""Play movements that are remembered for a record, and their bytes in all."""
+"""Number of play movements remembered for a record, and their bytes in all."""
 
 DIFFERENCES = 12, 2**25
 """The same for errors before the free offsets are fitted: hypotheses of a round are compared with each other."""
@@ -33,7 +33,7 @@ COMPARISONS = 40, 2**23
 
 
 class Recent:
-    """The arrays used last, by key: at most `most` of them, of `most_bytes` together."""
+    """A cache of the arrays used last, by key: at most `most` of them, of `most_bytes` in all."""
 
     def __init__(self, most: int, most_bytes: int) -> None:
         self._most, self._most_bytes = most, most_bytes
@@ -43,11 +43,11 @@ class Recent:
         """The array under a key, None without one."""
         if by not in self._arrays:
             return None
-        self._arrays[by] = found = self._arrays.pop(by)  # the one used last comes last
+        self._arrays[by] = found = self._arrays.pop(by)  # moved to the end as the one used last
         return found
 
     def remember(self, by: object, found: Array) -> None:
-        """Remember an array; the ones unused for longest give way."""
+        """Remember an array; those unused for the longest time give way."""
         arrays = self._arrays
         while arrays and (len(arrays) >= self._most or found.nbytes * (len(arrays) + 1) > self._most_bytes):
             del arrays[next(iter(arrays))]
@@ -57,13 +57,13 @@ class Recent:
 
 @dataclass(frozen=True)
 class Item:
-    """A record as it is compared: `y` is NaN where it is not; `history` the drive before it, None when unknown.
+    """A record as it is compared: `y` is NaN where it is not; `history`: the drive before it, None if unknown.
 
-    `timed`: whether its times are known. `turns`: drive values that lead virgin plays to the start memory that was
-    found in place of a history, if any.
-    `session`: all records of a session on one time axis, if they are of one, and `part` this record's samples of it.
-    `moved`: the last movements of the plays, which most numbers of a search do not change; `residuals`: the last errors
-    before the free offsets are fitted; `errors`: the same behind that.
+    `timed`: whether its times are known. `turns`: drive values that lead virgin plays to the start memory found in
+    place of a history, if any.
+    `session`: all records of a session on one time axis, if they form one, and `part` this record's samples in it.
+    `moved`: recent movements of the plays, which most numbers of a search do not change; `residuals`: recent errors
+    before the free offsets are fitted; `errors`: recent errors after that.
     """
 
     name: str
@@ -91,7 +91,7 @@ class Item:
 
     @cached_property
     def compared(self) -> Samples:
-        """Their places: a slice if they are evenly spaced, which picks without a copy."""
+        """Their indices, or a slice if they are evenly spaced, which picks them without a copy."""
         found = np.flatnonzero(self.known)
         steps = np.diff(found)
         if not len(steps) or np.any(steps != steps[0]):
@@ -113,13 +113,13 @@ def rms(errors: Sequence[Array]) -> float:
 
 
 def compared(items: Sequence[Item]) -> tuple[int, int]:
-    """Samples that are compared, and samples recorded."""
+    """Numbers of samples compared and recorded."""
     found = [mask for _, mask in masks(items)]
     return sum(int(np.count_nonzero(mask)) for mask in found), sum(map(len, found))
 
 
 def masks(items: Sequence[Item]) -> list[tuple[str, Mask]]:
-    """Name of each record and the samples of it that are compared; the two ends of a record are two items."""
+    """Name of each record, and a mask of its compared samples; the two ends of a record may be two items."""
     found: dict[int, tuple[str, Mask]] = {}
     for item in items:
         _, others = found.get(id(item.run), ("", np.zeros(len(item.known), dtype=bool)))
@@ -128,21 +128,21 @@ def masks(items: Sequence[Item]) -> list[tuple[str, Mask]]:
 
 
 class Model(Protocol):
-    """A fitted model, as far as the records are judged by it."""
+    """A fitted model, as far as the judgement of records needs it."""
 
     @property
     def reach(self) -> float:
         """The largest threshold, input units."""
 
     def errors(self, items: Sequence[Item]) -> list[Array]:
-        """Measured less predicted, (N,) a record, NaN where it is not compared."""
+        """Measured less predicted, (N,) for each record, NaN where it is not compared."""
 
 
 # Fewer samples to search with --------------------------------------------------------------------------------
 
 
 def needed(items: Sequence[Item], errors: Sequence[Array], noise: float) -> list[Mask]:
-    """Samples of each record without which the prediction at the others would change by a part of the noise.
+    """Masks of the samples without which the prediction at the others would change by a part of the noise.
 
     `errors`: errors of a model over the records, NaN where they are not known.
     """
@@ -155,7 +155,7 @@ def _needed(item: Item, residual: Array, noise: float) -> Mask:
         return np.ones(number, dtype=bool)
     residual, predicted = (np.interp(run.t, run.t[known], x[known]) for x in (residual, item.y - residual))
     as_drive = float(np.ptp(run.v)) / max(float(np.ptp(predicted)), 1e-300)
-    bends = [  # signal, how far it may be off a straight line, and whether that is its rms or every sample
+    bends = [  # signal, its largest distance from a straight line, and whether that is an rms or for every sample
         (predicted, acceptance.THIN_STRAIGHT * noise, False),
         (run.v, acceptance.THIN_STRAIGHT * noise * as_drive, False),
         (residual, acceptance.THIN_RESIDUAL * noise, True),
@@ -177,7 +177,7 @@ def _needed(item: Item, residual: Array, noise: float) -> Mask:
         size //= 2
     found |= ~straight
     found[[0, -1]] = True
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(run.v)))) + 1  # the plays remember these
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(run.v)))) + 1  # plays remember turning points
     kept = np.flatnonzero(found)
     beyond = np.abs(run.v[turns] - np.interp(run.t[turns], run.t[kept], run.v[kept]))
     found[turns[beyond > acceptance.THIN_TURNING * noise * as_drive]] = True
@@ -185,14 +185,15 @@ def _needed(item: Item, residual: Array, noise: float) -> Mask:
 
 
 def everything(groups: Sequence[Sequence[Item]]) -> list[list[Mask]]:
-    """Masks under which no sample may be left out."""
+    """Masks with which no sample is left out."""
     return [[np.ones(len(item.run.t), dtype=bool) for item in group] for group in groups]
 
 
 def thinned(groups: Sequence[Sequence[Item]], most: int, masks: Sequence[Sequence[Mask]]) -> list[list[Item]]:
-    """Groups of records with evenly spaced samples, at most `most` of them compared in each group, and the needed ones.
+    """Groups of records with fewer samples: evenly spaced ones, of which each group compares at most `most`, and the
+    needed ones.
 
-    `masks`: the needed samples of each record. Groups that are small enough come back as they are.
+    `masks`: the needed samples of each record. Groups that are small enough are returned unchanged.
     """
     every = [max(1, -(-sum(int(np.count_nonzero(item.known)) for item in group) // most)) for group in groups]
     if max(every) == 1:

@@ -1,4 +1,4 @@
-"""From records to the samples that fits compare: whole records and samples checked, held-out records set aside."""
+"""From records to the samples that fits compare: check whole records and samples, set held-out records aside."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 Kind = TypeVar("Kind", bound=Finding)
 
 
-# Whether records are what they claim: their units, columns, displacement, and the history before them --------
+# Checks of whole records: units, columns, displacement, and the history before them -------------------------
 
 
 Predict = Callable[[Record], Array]
@@ -49,8 +49,8 @@ Predict = Callable[[Record], Array]
 class Against:
     """A record's output as `factor * prediction + offset`, with the correlation of the two.
 
-    `sense`: area of the measured loop over that of the predicted one, negative where the output is ahead of the drive,
-    0 where it is not significant.
+    `sense`: area of the measured loop over that of the predicted one, negative if the output is ahead of the drive, 0
+    if it is not significant.
     """
 
     factor: float
@@ -59,10 +59,10 @@ class Against:
 
 
 def checked(records: Sequence[Record], predict: Predict) -> tuple[list[Record | None], list[Finding]]:
-    """The records that can be used, None in place of the others, and the findings, one a record.
+    """The records that can be used, None in place of the others, and the findings, at most one per record.
 
-    Exchanged columns are put right; a record in other units than the others, or with another's output, is left out.
-    Wrong samples take no part in the judgement.
+    Exchanged columns are put right; a record in other units, or with the output of another record, is left out. Wrong
+    samples take no part in the judgement.
     """
     kept: list[Record | None] = []
     seen: list[Record] = []
@@ -131,7 +131,7 @@ def _against(record: Record, predicted: Array) -> Against:
     y, v = np.asarray(record.y, dtype=np.float64), np.asarray(record.v, dtype=np.float64)
     factor, correlation, scatter = _line(predicted, y)
     own, model = _area(v, y), _area(v, predicted)
-    # white noise of the output gives the area this standard deviation
+    # the standard deviation of the area by white noise of the output
     around = scatter * float(np.sqrt(np.sum((v[2:] - v[:-2]) ** 2))) / 2.0
     expected = abs(factor) * model
     significant = abs(own) > acceptance.LOOP_SIGMAS * around and expected > 0.0
@@ -160,12 +160,12 @@ def _line(x: Array, y: Array) -> tuple[float, float, float]:
 
 
 def _area(v: Array, y: Array) -> float:
-    """Area that (v, y) encloses counterclockwise, the sense of an output that is late."""
+    """Area that (v, y) encloses counterclockwise, as it does if the output is late."""
     return 0.5 * float(np.sum(v[:-1] * y[1:] - v[1:] * y[:-1]) + v[-1] * y[0] - v[0] * y[-1])
 
 
 def _right_way_round(record: Record, predict: Predict) -> tuple[Record, Array, Against]:
-    """A record, with its columns exchanged if they were, its prediction, and how the two compare."""
+    """A record, with its columns exchanged back if they were, its prediction, and how the two compare."""
     predicted = predict(record)
     found = _against(record, predicted)
     if found.sense <= 0.0:
@@ -181,7 +181,8 @@ def _right_way_round(record: Record, predict: Predict) -> tuple[Record, Array, A
 def _better(swapped: Against, found: Against) -> bool:
     """Whether a record's columns are exchanged: with the output as drive, the model predicts the drive.
 
-    Its loop then runs the right way, as wide as expected; where no loop is visible, the sensitivity decides.
+    Its loop then runs in the right direction and is as wide as expected; if no loop is visible, the sensitivity
+    decides.
     """
     if swapped.correlation < acceptance.FOLLOWS:
         return False
@@ -194,7 +195,7 @@ def _better(swapped: Against, found: Against) -> bool:
 
 
 def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found: dict[int, Against]) -> int | None:
-    """The record whose prediction the output of record k follows, where it does not follow its own."""
+    """The record whose prediction the output of record k follows, if it does not follow its own."""
     if abs(found[k].correlation) > acceptance.OWN_CORRELATION:
         return None
     y = np.asarray(records[k].y)
@@ -203,23 +204,23 @@ def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found
     return best[0] if best[1] > acceptance.FOREIGN_CORRELATION else None
 
 
-# Whether the records begin in the memory to which the given history leads ------------------------------------
+# Whether the records begin in the memory that the given history leaves ---------------------------------------
 
 
 def contradicted(items: Sequence[Item], fitted: Model) -> OtherHistory | None:
-    """The finding where the starts, which depend on the history, are off by far more than the rest, else None.
+    """A finding if the starts, which depend on the history, are off by far more than the rest, else None.
 
     `items`: fitted records; held-out ones decide nothing about a fit, and may go where it is a guess. The history
-    precedes every one of them, of a session too.
+    precedes each of them, even in a session.
     """
     return _off(*_parts(items, fitted, False))
 
 
 def bends(items: Sequence[Item], fitted: Model, free: Model) -> OtherHistory | None:
-    """The same where a model fitted with the history can follow it, at the cost of the rest.
+    """The same if a model fitted with the history can follow the starts, but only at the cost of the rest.
 
-    `free`: the model fitted to what does not depend on the history, which predicts what the starts should have been.
-    Starts that are off alone, and cost the rest nothing, may be an effect that fades.
+    `free`: the model fitted to the samples that do not depend on the history, which predicts the right starts. Starts
+    that are off without a cost for the rest may be an effect that fades.
     """
     starts, rest = _parts(items, free, True)
     _, bent = _parts(items, fitted, True)
@@ -227,7 +228,7 @@ def bends(items: Sequence[Item], fitted: Model, free: Model) -> OtherHistory | N
 
 
 def _parts(items: Sequence[Item], fitted: Model, own: bool) -> tuple[list[Array], list[Array]]:
-    """Errors that depend on the history, and errors that do not; `own`: with the offset of the latter."""
+    """Errors that depend on the history, and errors that do not; `own`: both less the mean of the latter."""
     first, later = [], []
     for item, e in zip(items, fitted.errors(items), strict=True):
         if item.history is None:
@@ -248,12 +249,12 @@ def _off(first: Sequence[Array], later: Sequence[Array]) -> OtherHistory | None:
     return OtherHistory("all", samples, start, rest) if start > UNLIKE * rest else None
 
 
-# Records made ready for the fits -----------------------------------------------------------------------------
+# Preparation of the records for the fits ---------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """Records to fit and held-out ones, with notes on every change to them.
+    """Fitted and held-out records, with notes on every change to them.
 
     `repaired`: faults that were left out or bridged; `drive`: range of the fitted drives; `thresholds`: of the plays.
     """
@@ -273,7 +274,7 @@ def prepare(
     rest: float,
     skip: float = 0.0,
 ) -> Prepared:
-    """Items for the fits; without held-out records that can judge one in three is held out, or the end of each.
+    """Items for the fits; if no held-out record can judge, every third record is held out, or the end of each.
 
     `skip`: seconds at the start of every record that are not compared. Raises IdentificationError, also if there are
     too few samples to compare.
@@ -338,7 +339,7 @@ def prepare(
 def _courses(
     records: Sequence[Record], history: tuple[float, ...] | None, skip: float
 ) -> tuple[list[Course], list[Saturated]]:
-    """The records as they take part, and the samples left out at a converter's end."""
+    """The records as they take part, and findings about samples left out at a converter's end."""
     courses, saturated = [], []
     for record in records:
         course, ends = prepared.without_rails(prepared.course_of(record, history, prepared.samples_in(record, skip)))
@@ -349,10 +350,10 @@ def _courses(
 
 
 def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Course], list[Course], list[str]]:
-    """The courses, with a start memory where without one too little could be compared for a name, and notes on the way
-    in which their loops run.
+    """The courses, with a start memory if too little could be compared for a name without one, and notes on the
+    direction of their loops.
 
-    Elsewhere these are left out: what an effect does in its first seconds may look like a start memory.
+    Other courses get none: an effect in its first seconds may look like a start memory.
     """
     begun = start.needed(to_fit, least=acceptance.FEW_COMPARED)
     solution, _ = pi.solve(begun, None, 0.0)
@@ -382,14 +383,14 @@ def _item(course: Course, record: Record, rest: float) -> Item:
 
 
 def _outliers(course: Course) -> NDArray[np.intp]:
-    """Samples whose output was left out as isolated, where it would be compared."""
+    """Samples that would be compared if their output had not been left out as isolated."""
     missing = np.isnan(course.y)
     missing[: course.first] = False
     return np.flatnonzero(missing if course.stretches is None else missing & ~course.stretches)
 
 
 def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[Item]]:
-    """The items with the session around them, where their times follow each other."""
+    """The items with their session, if their times follow each other."""
     items = sorted([*to_fit, *held], key=lambda item: float(item.run.t[0]))
     apart = all(a.run.t[-1] < b.run.t[0] for a, b in itertools.pairwise(items))
     if len(items) < 2 or not apart:
@@ -410,18 +411,18 @@ JUDGE = "judge by"
 
 
 def enough(courses: Sequence[Course], share: float = 1.0) -> bool:
-    """Whether a share of any of them is enough to compare, if a start memory is found for it."""
+    """Whether a share of any course is enough to compare, given a start memory if one can be found."""
     return any(share * _comparable(course) > acceptance.COMPARED_SAMPLES for course in courses)
 
 
 def _comparable(course: Course) -> int:
-    """Number of samples that can be compared once a start memory is found, if it can be."""
+    """Number of samples that can be compared, given a start memory if one can be found."""
     known = np.isfinite(course.y[course.begin : course.last])
     return int(np.count_nonzero(known)) if start.findable(course) else course.used
 
 
 def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
-    """The message where there is not; `what`: the purpose they are too short for."""
+    """The message if there is not enough; `what`: the purpose for which the courses are too short."""
     names = ", ".join(course.name for course in courses)
     most, least = max(course.used for course in courses), acceptance.COMPARED_SAMPLES / share
     if all(start.findable(course) for course in courses) and not enough(courses, share):
@@ -456,9 +457,9 @@ def hardly_compared(items: Sequence[Item]) -> list[str]:
 
 
 def set_aside(records: Sequence[Record]) -> list[int]:
-    """Numbers of the records to hold out: every third one, shifted where that gives both sides fast and wide drives.
+    """Indices of the records to hold out: every third one, shifted if that gives both sides fast and wide drives.
 
-    What a fast edge shows cannot be found where none is fitted, nor judged where none is held out.
+    An effect that only shows at a fast edge cannot be found if none is fitted, nor judged if none is held out.
     """
     rates = np.array([float(np.max(np.abs(np.diff(record.v) / np.diff(record.t)))) for record in records])
     swings = np.array([float(np.ptp(record.v)) for record in records])
@@ -474,7 +475,7 @@ def set_aside(records: Sequence[Record]) -> list[int]:
 
 
 def with_ends(ready: Prepared) -> Prepared | None:
-    """The records with the end of each fitted one held out as well; None where they are, or are too short."""
+    """The records with the end of each fitted one held out as well; None if they already are, or are too short."""
     ends = {id(item.run) for item in ready.to_fit} & {id(item.run) for item in ready.held}
     longest = max(int(np.count_nonzero(item.known)) for item in ready.to_fit)
     if ends or acceptance.SET_ASIDE * longest <= acceptance.COMPARED_SAMPLES:
@@ -535,7 +536,7 @@ def without_faults(items: Sequence[Item], repaired: Sequence[Finding]) -> tuple[
 
 
 def merged(findings: Sequence[Kind]) -> list[Kind]:
-    """One finding a kind and record: a record whose end is held out was examined in two parts."""
+    """One finding per kind and record: a record whose end is held out was examined in two parts."""
     found: dict[object, Kind] = {}
     for each in findings:
         key = type(each), *(getattr(each, name, None) for name in ("record", "channel", "end"))
@@ -547,7 +548,7 @@ def merged(findings: Sequence[Kind]) -> list[Kind]:
 
 
 def not_at_the_end(repaired: Sequence[Finding], items: Sequence[Item]) -> list[Finding]:
-    """The repairs, with samples listed as held, not saturated, if another record goes beyond their level."""
+    """The repairs, with samples listed as held instead of saturated if another record goes beyond their level."""
     highest, lowest = (f([float(f(item.y[item.known])) for item in items if item.known.any()]) for f in (max, min))
     span = highest - lowest
     found: list[Finding] = []
@@ -561,7 +562,7 @@ def not_at_the_end(repaired: Sequence[Finding], items: Sequence[Item]) -> list[F
 
 
 def _levels(y: Array, runs: Runs) -> set[float]:
-    """Levels of runs with one value."""
+    """Levels of the runs that have a single value."""
     return {float(y[a]) for a, b in runs if b - a >= faults.SHORT and np.nanmin(y[a:b]) == np.nanmax(y[a:b])}
 
 

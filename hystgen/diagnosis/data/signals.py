@@ -23,11 +23,11 @@ Places = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Noise rms in output units by each way that the records allow, the one that is used, and its name `ruled`.
+    """Noise rms in output units by each method that the records allow, the one that is used, and its name `ruled`.
 
-    Holds contain all noise that is faster than they last; repeated periods everything that does not repeat; differences
-    only the changes from sample to sample, so they are a lower bound where the noise is coloured. No record has less
-    than the rounding of its numbers, `resolution`, and a share of the range that no sensor resolves.
+    Holds contain all noise that is faster than they last; repeated periods contain everything that does not repeat;
+    differences only contain changes from sample to sample, which gives a lower bound if the noise is coloured. No
+    record has less than `resolution`, the rounding of its numbers or a share of the range that no sensor resolves.
     """
 
     rms: float
@@ -56,19 +56,19 @@ def noise_floor(items: Sequence[Item]) -> NoiseFloor:
 
 
 def converter_step(y: Array) -> float:
-    """The smallest step between two outputs that occur; infinite if only one does."""
+    """The smallest step between two different outputs; infinite if there is only one output."""
     return float(np.min(np.diff(np.unique(y[np.isfinite(y)])), initial=np.inf))
 
 
 def _pooled(parts: Sequence[tuple[float, int]], quantile: float) -> float | None:
-    """Root of a quantile of the variances, so that odd parts do not count; longer parts count more."""
+    """Root of a quantile of the variances, which ignores odd parts; longer parts count more."""
     sample = acceptance.HOLD_SAMPLES
     variances = np.array([v for v, n in parts for _ in range(max(1, min(n // sample, acceptance.HOLD_WEIGHT)))])
     return float(np.sqrt(np.quantile(variances, quantile))) if len(variances) else None
 
 
 def still(v: Array, least: int) -> list[tuple[int, int]]:
-    """Stretches [first, last) of at least `least` samples over which the drive stands still."""
+    """Stretches [first, last) of at least `least` samples in which the drive stands still."""
     tolerance = max(stands_within(v), 1e-300)
     found, first = [], 0
     for k in np.append(np.flatnonzero(np.abs(np.diff(v)) > tolerance), len(v) - 1):
@@ -79,7 +79,7 @@ def still(v: Array, least: int) -> list[tuple[int, int]]:
 
 
 def stands_within(v: Array) -> float:
-    """The change of a drive from sample to sample up to which it stands: noise of its measurement, or a code of it."""
+    """Largest change of a drive from sample to sample while it stands: noise of its measurement, or one code."""
     swing = float(np.ptp(v))
     code = converter_step(v)
     jitter = 1.001 * code if code <= acceptance.COARSE_DRIVE * swing else 0.0
@@ -87,14 +87,14 @@ def stands_within(v: Array) -> float:
 
 
 def _holds(item: Item) -> list[tuple[float, int]]:
-    """Variance and samples of each hold, without what settles in it."""
+    """Variance and number of samples of each hold, without the part in which it settles."""
     parts = []
     for first, last in still(item.run.v, acceptance.HOLD_SAMPLES):
         begin = first + int(acceptance.HOLD_SETTLING * (last - first))
         y, t = item.y[begin:last], item.run.t[begin:last]
         known = np.isfinite(y)
         if np.count_nonzero(known) < acceptance.HOLD_SAMPLES // 2 or np.ptp(y[known]) == 0.0:
-            continue  # too little, or less than a converter's step
+            continue  # too few samples, or less than a converter's step
         y, t = y[known], t[known] - item.run.t[first]
         # creep and drift within a hold are smooth in the logarithm of time
         s = np.log(np.maximum(t, 1e-12))
@@ -108,9 +108,9 @@ def _holds(item: Item) -> list[tuple[float, int]]:
 
 
 def _rings(x: Array) -> bool:
-    """Whether a signal is mostly one oscillation that hardly decays from sample to sample: an actuator, not noise.
+    """Whether a signal is mostly one oscillation that hardly decays from sample to sample: the actuator, not noise.
 
-    Linear prediction from the two samples before; coloured noise is predictable too, but by real or small poles.
+    By linear prediction from two samples; coloured noise is predictable too, but with real or small poles.
     """
     before = np.column_stack([x[1:-1], x[:-2]])
     (a, b), *_ = np.linalg.lstsq(before, x[2:], rcond=None)
@@ -120,7 +120,7 @@ def _rings(x: Array) -> bool:
 
 
 def _differences(item: Item) -> list[tuple[float, int]]:
-    """Variance of white noise with the third differences of a record, and its samples."""
+    """Variance of white noise, from the third differences of a record, and their number."""
     y = _sampled(item.y[item.known])
     if len(y) < acceptance.HOLD_SAMPLES:
         return []
@@ -131,7 +131,7 @@ def _differences(item: Item) -> list[tuple[float, int]]:
 
 
 def _sampled(y: Array) -> Array:
-    """The samples that were measured, without those held or interpolated between them, if these are most."""
+    """The samples that were really measured, if most of the others were held or interpolated between them."""
     for order in (1, 2):
         changes = np.abs(np.diff(y, order))
         at = np.flatnonzero(changes > UNMEASURED * float(np.ptp(y))) if len(y) > order else np.empty(0, dtype=np.intp)
@@ -142,13 +142,13 @@ def _sampled(y: Array) -> Array:
 
 
 UNMEASURED = 1e-9
-"""[share of the range of the output] Smaller changes come from the arithmetic alone. Interpolated samples are found in
-files of 12 digits with offsets up to ten times the range, not in files of 9; second differences of a noise-free sine
-are smaller only from 70 000 samples a period on. Set by: benchmarks/chosen_numbers.py exact."""
+"""[share of the range of the output] Smaller changes are only rounding. Interpolated samples are found in files of 12
+digits with offsets up to ten times the range, but not in files of 9; second differences of a noise-free sine are
+smaller only above 70 000 samples per period. Set by: benchmarks/chosen_numbers.py exact."""
 
 
 def _periods(item: Item) -> list[tuple[float, int]]:
-    """Variance of what does not repeat from one period of the drive to the next."""
+    """Variance of the part of the output that does not repeat from one period of the drive to the next."""
     v = item.run.v
     n = len(v)
     swing = float(np.ptp(v))
@@ -164,7 +164,7 @@ def _periods(item: Item) -> list[tuple[float, int]]:
     for period in range(max(peak - 2, least), peak + 3):
         apart = v[period:] - v[:-period]
         if len(apart) > least and np.sqrt(np.mean(apart**2)) < acceptance.PERIOD_REPEATS * swing:
-            for first in (period, 0):  # behind the first period, or of two alone
+            for first in (period, 0):  # after the first period, or both if there are only two
                 changed = item.y[first + period :] - item.y[first : n - period]
                 changed = changed[np.isfinite(changed)]
                 if len(changed) > least:
@@ -172,19 +172,20 @@ def _periods(item: Item) -> list[tuple[float, int]]:
     return []
 
 
-# Where the drive turns, and whether all records pass one loop ------------------------------------------------
+# Turns of the drive, and whether all records pass one loop ---------------------------------------------------
 
 
 def reversals(v: Array) -> Places:
-    """Samples at which the drive turns, by more than a share of its range."""
+    """Samples at which the drive turns for more than a share of its range."""
     return _moves(v)[1]
 
 
 def unresolved_edges(v: Array) -> NDArray[np.bool_]:
-    """Samples of which nobody knows what the drive did between them: its jumps from one stand to the next.
+    """Samples of jumps of the drive from one level to the next, between which its course is unknown.
 
-    A jump within a sample, or two if the converter averages, may begin anywhere in it, held or straight. So its samples
-    and the one behind them show what is assumed of the edge, where even a small lag makes a difference.
+    A jump within one sample, or two if the converter averages, may begin anywhere in it, held or straight. The errors
+    of its samples and of the one after them therefore depend on what is assumed about the edge, where even a small lag
+    makes a difference.
     """
     swing = float(np.ptp(v))
     step = np.abs(np.diff(v))
@@ -201,7 +202,7 @@ def unresolved_edges(v: Array) -> NDArray[np.bool_]:
 
 
 def one_loop(items: Sequence[Item]) -> bool:
-    """Whether the drive moves between the same two ends in all records without a hold, which would show more."""
+    """Whether the drive moves between the same two ends in all records, without a hold, which would show more."""
     ends = []
     for item in items:
         v, t = item.run.v, item.run.t
@@ -225,7 +226,7 @@ def one_speed(items: Sequence[Item]) -> bool:
 
 
 def _moves(v: Array) -> tuple[Places, Places]:
-    """Samples behind which the drive moves on, and those at which it turns, without its noise: as a play follows it."""
+    """Samples after which the drive moves on, and those at which it turns, as seen by a play that ignores its noise."""
     z = operators.plays(v, np.array([0.5 * acceptance.REVERSAL * float(np.ptp(v))]), np.array([v[0]]))[0]
     steps = np.diff(z)
     moved = np.flatnonzero(steps)
@@ -233,11 +234,11 @@ def _moves(v: Array) -> tuple[Places, Places]:
 
 
 def _between_ends(turns: Places) -> Places:
-    """The turns without the first one: the way to it may begin anywhere."""
+    """The turns without the first one, since the move to it may begin anywhere."""
     return turns[1:] if len(turns) > 1 else turns
 
 
-# Spectra of errors: narrow peaks that the drive does not make, ringing that fades, the period of a drive -----
+# Spectra of errors: narrow peaks that do not come from the drive, ringing that fades, the period of a drive --
 
 
 BESIDE = 2
@@ -287,7 +288,7 @@ def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
 
 
 def ringing(items: Sequence[Item], errors: Sequence[Array], most: int) -> tuple[float, ...]:
-    """Frequencies (Hz) of narrow peaks in any record and of fading ringing, the strongest first, close ones once."""
+    """Frequencies (Hz) of narrow peaks in any record and of fading ringing, the strongest first, without close ones."""
     each = ([*peaks(item, error), *_fading(item, error)] for item, error in zip(items, errors, strict=True))
     found = sorted(itertools.chain(*each), reverse=True)
     kept: list[float] = []
@@ -326,7 +327,7 @@ def _fading(item: Item, error: Array) -> list[tuple[float, float]]:
 
 
 def repetition(v: Array) -> int | None:
-    """Samples after which the drive repeats itself for at least as long again; None where it does not."""
+    """Samples after which the drive repeats itself for at least as long again; None if it does not."""
     n = len(v)
     swing = float(np.ptp(v))
     if n < acceptance.LINE_SAMPLES or swing == 0.0:
@@ -348,7 +349,7 @@ def repetition(v: Array) -> int | None:
 
 
 def _filled(item: Item, error: Array) -> tuple[Array, float] | None:
-    """An error with its gaps bridged, and the time between samples; None where too few of them are compared."""
+    """An error with its gaps bridged, and the time between samples; None if too few samples are compared."""
     known = np.isfinite(error)
     if np.count_nonzero(known) < acceptance.SPECTRUM_SAMPLES:
         return None
@@ -370,7 +371,7 @@ def _around(power: Array, k: int, reach: int) -> float:
 
 
 def _carrier(power: Array) -> float | None:
-    """Place (bins) of the line that holds most of a windowed drive's power; None where none holds enough of it."""
+    """Place (bins) of the line that holds most of a windowed drive's power; None if none holds enough of it."""
     k = int(np.argmax(power))
     near = np.arange(max(k - BESIDE, 0), min(k + BESIDE + 1, len(power)))
     held = float(np.sum(power[near]))

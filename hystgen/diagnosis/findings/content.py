@@ -1,4 +1,4 @@
-"""The result of a search: the effects found and their certainty, the remaining error, and its place in the records."""
+"""From a search to the result: the effects found and their certainty, the remaining error, and where it is large."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ONE_LOOP = (
     "all records pass one loop, which shows little more than one effect: add smaller loops inside it, other speeds and "
     "holds"
 )
-"""Advice about records of one loop alone."""
+"""Advice about records of only one loop."""
 
 ADVICE: dict[frozenset[str], str] = {
     frozenset(("creep", "drift")): "record holds of a minute after moves both ways: creep follows the last move",
@@ -37,7 +37,7 @@ ADVICE: dict[frozenset[str], str] = {
     frozenset(("lag", "rate_dependence")): "record small loops at high rate with reversals: a lag opens them",
     frozenset(("asymmetry", "sensor_nonlinearity")): "record wide and nested loops: a sensor's curve is a line over y",
 }
-"""The experiment that separates two effects."""
+"""Experiments that separate two effects."""
 
 
 def result_of(
@@ -53,7 +53,7 @@ def result_of(
     """The whole result.
 
     `as_given`: errors of the nominal model before it was refitted; `odd`: findings about whole records; `one_loop`:
-    whether all records pass the same one.
+    whether all records pass the same loop.
     """
     before = [found.refitted.errors(group) for group in (ready.to_fit, ready.held)]
     after = [found.fitted.errors(group) for group in (ready.to_fit, ready.held)]
@@ -132,7 +132,7 @@ def _unexplained(
     lines, errors = disturbances.lines(everything, errors)
     known = [each for each in odd if isinstance(each, Line | Ripple)]
     new = [line for line in lines if not disturbances.is_known(line, known)]
-    # a ripple hides jumps as noise does, where the position is not predicted well enough to take it out
+    # like noise, a ripple hides jumps if the position is not predicted well enough to take it out
     jumping = max([noise, *(each.amplitude for each in (*known, *new) if isinstance(each, Ripple))])
     sticking = preparing.merged(disturbances.stick_slip(everything, errors, jumping))
     remaining = [each for each in odd if not isinstance(each, Fault)] + new + sticking
@@ -173,7 +173,7 @@ def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float) -> tuple[N
 
 
 def _twice(times: Sequence[float]) -> bool:
-    """Whether two time constants are one."""
+    """Whether two time constants are practically equal."""
     ordered = sorted(times)
     return any(b <= (1.0 + acceptance.BETTER) * a for a, b in itertools.pairwise(ordered))
 
@@ -188,28 +188,28 @@ def _evidence(each: Found) -> str:
 
 
 def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:
-    """The entry's keys without the name; for a front its stage. `later`: number of that name found after it."""
+    """The entry's keys without the name, or the stage of a front. `later`: number of that name found after it."""
     k = fits.place(fitted, name, later)
     if k is None:
         return fits.stage(fitted, fitted.shape)
     return fits.entry(fitted.structure.effects(fitted.shape)[k])
 
 
-# The remaining error: which variables it goes with -----------------------------------------------------------
+# The remaining error: the variables that it depends on -------------------------------------------------------
 
 
 DESCRIBED_PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
-"""Thresholds of the plays that stand for the memory, as shares of the drive range."""
+"""Thresholds of the plays that represent the memory, as shares of the drive range."""
 
 MEMORIES = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
-"""Time constants of the averages of the drive that stand for rates and creep, in samples."""
+"""Time constants of the averages of the drive that represent rates and creep, in samples."""
 
 
 LENGTHS = (0.02, 0.05, 0.15, 0.5, 1.5, 5.0)
-"""[share of the drive range] Distances of the averages of the drive over its travel: six, as many as of the times, each
-about three times the one before, from the smallest play up to five ranges. They explain 0.55 of what plays leave of a
-Bouc-Wen plant; four explain 0.34, eleven 0.59, and of creep none more than 0.09. Set by: benchmarks/chosen_numbers.py
-lengths."""
+"""[share of the drive range] Distances of the averages of the drive over its travel: six, like the times above, each
+about three times the one before, from the smallest play up to five ranges. They explain 0.55 of the error that plays
+leave for a Bouc-Wen plant; four explain 0.34, eleven 0.59; for creep none explains more than 0.09. Set by:
+benchmarks/chosen_numbers.py lengths."""
 
 
 @dataclass(frozen=True)
@@ -233,7 +233,7 @@ def displacement(item: Item) -> Array:
 
 
 def travel(item: Item) -> Array:
-    """Distance that the drive has gone since the session began, as far as the records show it."""
+    """Distance that the drive has travelled since the session began, as far as the records show it."""
     whole = item.session or item.run
     return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(whole.v)))])[item.part]
 
@@ -291,8 +291,8 @@ def described(items: Sequence[Item], errors: Sequence[Array], noise: float, held
 
 
 def _rate_free(free: float, with_rates: float) -> bool | None:
-    """Whether drive and memory explain the error without rates; None where nothing explains much of it, or rates add to
-    a small share what does not matter either."""
+    """Whether drive and memory explain the error without rates; None if nothing explains much of it, or if rates add
+    little to a small share."""
     if with_rates < acceptance.VARIABLE_SHARE and free < acceptance.VARIABLE_SHARE:
         return None
     if free > acceptance.RATE_FREE_SHARE * with_rates:
@@ -301,9 +301,9 @@ def _rate_free(free: float, with_rates: float) -> bool | None:
 
 
 def shares(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, dict[str, float]]:
-    """Share of the errors' variance that a smooth function of one variable explains on samples it was not fitted to.
+    """Shares of the errors' variance that a smooth function of one variable explains on samples it was not fitted to.
 
-    Returns the largest such share, and that of each variable which matters.
+    Returns the largest share, and those of the variables that matter.
     """
     found = {each.name: _share([each.of(item) for item in items], errors) for each in VARIABLES}
     mattering = {name: round(share, 4) for name, share in found.items() if share > acceptance.VARIABLE_SHARE}
@@ -335,9 +335,10 @@ def _folds(n: int) -> NDArray[np.intp]:
 
 def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, float]:
     """Cross-validated shares explained by rate-free variables (drive, plays, averages of the drive over the distance
-    that it travels), and by these together with averages over several times, which stand for rates and creep.
+    that it travels), and by these together with averages over several times, which represent rates and creep.
 
-    What is left of a hysteresis that plays do not follow goes with both averages: only what the second add is rate.
+    The error of a hysteresis that plays cannot follow depends on both kinds of averages: only the gain by the second
+    kind is due to rates.
     """
     widest = max(float(np.ptp(item.run.v)) for item in items)
     low = min(float(item.run.v.min()) for item in items)
@@ -372,7 +373,7 @@ def _averaged(v: Array, decay: float) -> Array:
 
 
 def _averaged_over_travel(v: Array, length: float) -> Array:
-    """The same over a distance of the drive: it does not depend on the rate, and stands where the drive does."""
+    """The same over a distance of the drive: it does not depend on the rate, and stands still with the drive."""
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(v)))])
     if travelled[-1] == 0.0:
         return v
@@ -396,7 +397,7 @@ def _regressed(x: Array, e: Array) -> float:
 
 
 def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
-    """Share of the error's variance that returns when the drive repeats itself; None where it never does."""
+    """Share of the error's variance that returns when the drive repeats itself; None if it never does."""
     products = powers = 0.0
     count = 0
     for item, error in zip(items, errors, strict=True):
@@ -417,7 +418,7 @@ def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
 def even_share(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
     """Share of the mean error over drive and direction that is even: the same when drive and direction are reversed.
 
-    None where that mean is small against the error.
+    None if that mean is small against the error.
     """
     v = np.concatenate([item.run.v[np.isfinite(e)] for item, e in zip(items, errors, strict=True)])
     up = np.concatenate([rate(item)[np.isfinite(e)] > 0.0 for item, e in zip(items, errors, strict=True)])
@@ -442,14 +443,14 @@ def even_share(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
     return float(even @ even) / power
 
 
-# Where model and measurement disagree, and what the drive does there -----------------------------------------
+# Where model and measurement disagree, and how the drive moves there -----------------------------------------
 
 
 STRETCH_WINDOWS = 24
 """Windows that each record is cut into; neighbours of one kind become one stretch."""
 
 LISTED_STRETCHES = 12
-"""Most stretches that are listed: a reader looks at no more."""
+"""Most stretches that are listed, as many as a reader will look at."""
 
 
 def worst(items: Sequence[Item], errors: Sequence[Array], noise: float) -> tuple[Stretch, ...]:
@@ -459,7 +460,7 @@ def worst(items: Sequence[Item], errors: Sequence[Array], noise: float) -> tuple
 
 
 def _stretches(item: Item, error: Array, noise: float) -> list[Stretch]:
-    """The windows of a record with more than noise, those next to each other joined where their kinds agree."""
+    """The windows of a record with more than noise; neighbours of the same kind are joined."""
     kind_of = _Kinds(item)
     merged: list[tuple[int, int, float, str]] = []
     edges = np.linspace(0, len(error), STRETCH_WINDOWS + 1).astype(int)

@@ -1,4 +1,4 @@
-"""Entries of `unexplained`: a type for each kind of thing that is seen but not named, with its sentence."""
+"""Entries of `unexplained`: a type for each kind of observation that is not named as an effect, with its sentence."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ INTERPOLATION = "the sensor's interpolation error looks like this"
 class Finding(ABC):
     """An entry of `unexplained`.
 
-    `kind`: its name in `diagnosis.json`; `optional`: keys that are left out there where they are None or False.
+    `kind`: its name in `diagnosis.json`; `optional`: keys that are left out there if they are None or False.
     """
 
     kind: ClassVar[str]
     optional: ClassVar[frozenset[str]] = frozenset()
 
     def entry(self) -> dict[str, Any]:
-        """The entry as `diagnosis.json` has it."""
+        """The entry as in `diagnosis.json`."""
         entry: dict[str, Any] = {"kind": self.kind}
         for each in fields(self):
             value = getattr(self, each.name)
@@ -42,9 +42,9 @@ class Finding(ABC):
 
 @dataclass(frozen=True)
 class Fault(Finding):
-    """A fault of the recording that is left out of the comparison or put right: the remaining record is sound.
+    """A fault of the recording that is left out of the comparison or put right; the rest of the record is sound.
 
-    `noun`: for the count in a sentence; `qualifier`: the words behind it.
+    `noun`: counted in a sentence; `qualifier`: the words after it.
     """
 
     noun: ClassVar[str]
@@ -52,7 +52,7 @@ class Fault(Finding):
 
     @property
     def times(self) -> int:
-        """How often it occurred: its `count`, or once."""
+        """How often it occurred: its `count`, or 1."""
         return int(getattr(self, "count", 1))
 
 
@@ -146,7 +146,7 @@ class Saturated(Fault):
 
 @dataclass(frozen=True)
 class DropOuts(Fault):
-    """Stretches over which the output was lost; `level`: where it was all the while, if at one value."""
+    """Stretches in which the output was lost; `level`: its value there, if it was constant."""
 
     kind, noun = "drop_outs", "drop-out"
     optional = frozenset(("level",))
@@ -163,7 +163,7 @@ class DropOuts(Fault):
 
 @dataclass(frozen=True)
 class HeldSamples(Fault):
-    """Stretches over which the output repeats a value while the drive moves."""
+    """Stretches in which the output repeats a value while the drive moves."""
 
     kind, noun, qualifier = "held_samples", "stretch", " of held samples"
     optional = frozenset(("first",))
@@ -211,7 +211,7 @@ class Line(Finding):
 
     @property
     def place(self) -> float:
-        """Where it lies on its axis."""
+        """Its place on its axis, Hz."""
         return self.frequency
 
     def sentence(self, unit: str | None) -> str:
@@ -226,7 +226,7 @@ class Line(Finding):
 
 @dataclass(frozen=True)
 class Ripple(Finding):
-    """A line over the position with a pitch in output units; `converter_step`: which is the step of the converter."""
+    """A line over the position with a pitch in output units; `converter_step`: whether that is the converter's step."""
 
     kind = "ripple"
     optional = frozenset(("repaired",))
@@ -239,7 +239,7 @@ class Ripple(Finding):
 
     @property
     def place(self) -> float:
-        """Where it lies on its axis."""
+        """Its place on its axis, output units."""
         return self.pitch
 
     def sentence(self, unit: str | None) -> str:
@@ -283,10 +283,10 @@ VARIABLE_NAMES = {
 class Structure(Finding):
     """An error that is not noise and that no effect removes.
 
-    `share_by_variable`: of its variance, by smooth functions of one variable on samples that they have not seen, and
-    `main_variable` the one with most, None where none matters; `rate_free`, `repeatable`: None where the records cannot
-    show it; `even_share`: of what goes with drive and direction, the part that is even about the middle of the range;
-    `held_out_alone`: held-out records that have it where the fitted ones do not.
+    `share_by_variable`: shares of its variance that smooth functions of one variable explain on samples that they have
+    not seen, and `main_variable` the one with the largest, None if none matters; `rate_free`, `repeatable`: None if the
+    records cannot show it; `even_share`: the even part, about the middle of the range, of its dependence on drive and
+    direction; `held_out_alone`: held-out records that have it while the fitted ones do not.
     """
 
     kind = "structure"
@@ -325,7 +325,7 @@ class Structure(Finding):
 
     def advice(self) -> list[str]:
         advice = []
-        if self.held_out_alone:  # never fitted, so that an effect they alone show cannot be found
+        if self.held_out_alone:  # they are never fitted, so that an effect that only they show cannot be found
             alone = several(self.held_out_alone)
             advice.append(f"fit {alone} too and hold out others: what is left shows in held-out records alone")
         if self.rate_free is None:
@@ -338,7 +338,7 @@ class Structure(Finding):
 
 
 EVEN = 0.3, 0.7
-"""Even shares of odd and of even errors, in words."""
+"""Even shares below and above which an error is called odd and even."""
 
 
 # Words -------------------------------------------------------------------------------------------------------
@@ -361,13 +361,14 @@ def faults(findings: Sequence[Finding]) -> str:
 
 
 def several(names: Sequence[str]) -> str:
-    """Names of records, in short where there are more than three."""
+    """Names of records, shortened if there are more than three."""
     return ", ".join(names) if len(names) <= 3 else f"{len(names)} records ({names[0]}, {names[1]}, ..)"
 
 
 MANY = 100.0
-"""[times the noise] Larger ratios are not given in figures: two digits end here, and the noise is an estimate of which
-they would claim more. Only wording depends on it. Changed by: report::test_ratios_to_the_noise_have_two_digits."""
+"""[times the noise] Larger ratios are not given in figures: with two digits they end here, and the noise is only an
+estimate, which does not support more. Only wording depends on it. Changed by:
+report::test_ratios_to_the_noise_have_two_digits."""
 
 
 def times_noise(ratio: float) -> str:

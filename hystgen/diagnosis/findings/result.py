@@ -1,4 +1,4 @@
-"""The result of a diagnosis: typed, as `diagnosis.json`, in a sentence, and written into a folder."""
+"""The result of a diagnosis: as types, as `diagnosis.json`, in sentences, and as files in a folder."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Errors:
 
 @dataclass(frozen=True)
 class Gap:
-    """Errors of the model as given, of the same model refitted, and of the one with the effects."""
+    """Errors of the model as given, of the same model refitted, and of the model with the effects."""
 
     as_given: Errors
     refitted: Errors
@@ -45,10 +45,11 @@ class Gap:
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that was found: `parameters` as its entry of a parameter file has them, `intervals` of 95 % for them.
+    """An effect that was found: `parameters` as in its entry of a parameter file, with 95 % `intervals`.
 
     `share_of_gap`: the held-out error that it removes, as a share of the refitted model's; errors in output units;
-    `at_an_end`: whether a number of it is at an end of its range, or two of its parts are one: its shape is open.
+    `at_an_end`: whether one of its numbers is at an end of its range, or two of its parts coincide, so that its shape
+    is not certain.
     """
 
     name: str
@@ -64,7 +65,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of a record where the refitted model does badly: from and to (s), and the rms error there."""
+    """A part of a record in which the refitted model has a large error: from and to (s), and the rms error there."""
 
     record: str
     kind: str
@@ -74,7 +75,7 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Contender:
-    """A shape of an effect that was fitted to the end, with its rms errors; `refused`: why it has no name, or None."""
+    """A shape of an effect that was fully fitted, with its rms errors; `refused`: why it has no name, or None."""
 
     name: str
     shape: str
@@ -95,9 +96,9 @@ class Inverse:
 class Result:
     """Everything in `diagnosis.json`, under the names of its keys; numbers have eight digits.
 
-    `noise_from`: what the noise floor was estimated from, `holds`, `periods`, `differences` or `resolution`;
-    `compared`: samples that took part, and samples recorded; `withdrawn`: effects that were accepted one by one and
-    do not stand in the end, since together they leave most of the gap, or too few samples were compared.
+    `noise_from`: the source of the noise floor, `holds`, `periods`, `differences` or `resolution`; `compared`: numbers
+    of samples that took part and that were recorded; `withdrawn`: effects that were accepted one by one and withdrawn
+    in the end, since together they leave most of the gap, or too few samples were compared.
     """
 
     verdict: str
@@ -119,7 +120,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Signals:
-    """A record with the errors of the refitted model and of the one with the effects; NaN where not compared."""
+    """A record with the errors of the refitted model and of that with the effects; NaN where not compared."""
 
     name: str
     held_out: bool
@@ -134,9 +135,9 @@ class Signals:
 class Diagnosis:
     """A finished diagnosis: its `result`, and `parameters` with the effects added.
 
-    `notes`: what was done to the records, one sentence each; `signals`: the records with their errors; `page`: makes
-    `report.html` of this and the text of the parameter file, None where no report is written; `figures`: what draws
-    each figure of the page, by name.
+    `notes`: changes to the records, one sentence each; `signals`: the records with their errors; `page`: makes
+    `report.html` from this and the text of the parameter file, None if no report is written; `figures`: functions that
+    draw the figures of the page, by name.
     """
 
     result: Result
@@ -175,7 +176,7 @@ class Diagnosis:
 
     @cached_property
     def content(self) -> dict[str, Any]:
-        """The result as `diagnosis.json` has it."""
+        """The result as in `diagnosis.json`."""
         content: dict[str, Any] = plain(self.result)
         return {"hystgen": 1, **content}
 
@@ -190,7 +191,7 @@ class Diagnosis:
         return self.result.verdict
 
     def sentence(self) -> str:
-        """The verdict in a few sentences, what limits it first."""
+        """The verdict in a few sentences, its limits first."""
         parts = [*self._limits(), self._finding()]
         ends = dict.fromkeys(effect.name for effect in self.result.effects if effect.at_an_end)
         if ends:
@@ -247,7 +248,7 @@ class Diagnosis:
         return "Something is missing, and no effect is named"
 
     def _nearest(self) -> str:
-        """The candidate that leaves least, and why it has no name; empty if none removes anything."""
+        """The candidate with the smallest error, and why it has no name; empty if none removes anything."""
         closest = self._closest()
         if closest is None:
             return ""
@@ -269,7 +270,7 @@ class Diagnosis:
         return kinds.times_noise(error / self.result.noise_floor)
 
     def not_emitted(self) -> str:
-        """Why there is no C for the model with the effects yet; empty where `emit` takes it."""
+        """Why the model with the effects cannot be emitted yet; empty if it can."""
         from hystgen.basics.problems import EffectsError, NotInvertibleError
         from hystgen.emission.calls import emit_options
         from hystgen.model import Model
@@ -281,7 +282,7 @@ class Diagnosis:
         return ""
 
     def _name(self, name: str) -> str:
-        """An effect with those that cannot be separated from it."""
+        """The name of an effect, and of those that cannot be separated from it."""
         others = [other for one, other in self.result.not_separable if one == name]
         return f"{name} (or {' or '.join(others)})" if others else name
 
@@ -306,7 +307,7 @@ class Diagnosis:
 
 
 def plain(value: Any) -> Any:
-    """The value as JSON has it: mappings, lists, text and finite numbers, None for others."""
+    """The value for JSON: mappings, lists, text and finite numbers; None for other numbers."""
     if isinstance(value, Finding):
         return plain(value.entry())
     if is_dataclass(value) and not isinstance(value, type):

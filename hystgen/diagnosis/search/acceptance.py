@@ -1,7 +1,7 @@
 """Every number of a diagnosis that decides something: its unit, its reason, and the run that set it or would change it.
 
-The unit stands first, in brackets. `Set by` names the run that a number comes from; where none is recorded the reason
-says what the number is derived from or compared with, and `Changed by` names the run that would show it wrong. Runs:
+The unit comes first, in brackets. `Set by` names the run that a number comes from; if none is recorded, the reason says
+what the number is derived from or compared with, and `Changed by` names the run that would show it wrong. Runs:
 
 - blind: `make blind`, the cases of the report block, seeds from 0 (single 260, pair 80, none 200, foreign 100, poor 65,
   snr 130); `blind none` is that kind alone;
@@ -10,7 +10,7 @@ says what the number is derived from or compared with, and `Changed by` names th
 
 `docs/thresholds.csv` has such tests for every number, each with its case, written by `python -m tests.threshold_mutants
 --write`. Other modules read the numbers as attributes of this one, so that a number can be changed in one place.
-Tolerances of the searches and sizes of caches, which decide nothing, are where they are used.
+Tolerances of searches and sizes of caches, which decide nothing, are in the modules that use them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ NOISE = 1.25
 the samples, which may miss slow noise. Changed by: blind none."""
 
 FAR_ABOVE_NOISE = 2.0
-"""[times the noise floor] An error above this is not noise, whatever it depends on; of records of one loop alone it
+"""[times the noise floor] An error above this is not noise, whatever it depends on; with records of only one loop it
 supports no name, since a right name in a wrong shape leaves as much as a wrong name. Coloured noise stays below it.
 Changed by: blind none, blind poor."""
 
@@ -60,7 +60,7 @@ NAME_SHARE = 0.07
 in a wrong shape leaves to a second name is up to 0.05. Set by: tune single (seeds not recorded)."""
 
 NEARLY_ALL = 0.25
-"""[share of the error before it] Or it leaves at most this: beside a far larger effect `NAME_SHARE` is out of reach.
+"""[share of the error before it] Or it leaves at most this: beside a far larger effect, `NAME_SHARE` is out of reach.
 Changed by: blind pair, selection::test_nearly_all_that_is_left_is_worth_a_name."""
 
 FIRST_REMOVES = 0.6
@@ -96,9 +96,10 @@ BLOCKS = 20
 acceptance::test_blocks_are_longer_than_errors_remember."""
 
 SEEN_IN_BOTH = 0.25
-"""[times the remaining error or the noise] What an effect removes at least from fitted and from held-out records, while
-it removes `FIRST_REMOVES` or `FURTHER_REMOVES` from either; what one kind alone shows may be another one's. With 0.5
-one of ten pairs loses its second name, with 0.25 none does, nor with 0, which gives no false name in 24 further cases.
+"""[times the remaining error or the noise] Least that an effect removes from both fitted and held-out records, while it
+removes `FIRST_REMOVES` or `FURTHER_REMOVES` from one of them; an error that only one of them shows may belong to
+another effect. With 0.5 one of ten pairs loses its second name; with 0.25 none does, nor with 0, without a false name
+in 24 further cases.
 Set by: tune pair 0:10; with 0 also tune single, none and poor 0:8. Changed by: blind pair,
 acceptance::test_an_effect_has_to_show_in_both."""
 
@@ -112,37 +113,38 @@ of an accepted one, or for following a shape further. Changed by: blind single,
 selection::test_all_records_decide_between_equal_numbers."""
 
 FAR_LESS = 0.5
-"""[share of an error] A fitted error at most this of another outweighs a small lead of that on held-out records, which
-yet another effect may rule. Changed by: acceptance::test_equal_effects_come_in_the_order_of_the_catalogue."""
+"""[share of an error] A fitted error of at most this share of another outweighs a small lead of the other on held-out
+records, which yet another effect may dominate. Changed by:
+acceptance::test_equal_effects_come_in_the_order_of_the_catalogue."""
 
 EQUAL = 0.005
 """[share of an error] Errors closer than this are equal, and the order of the catalogue decides: far above what the
 last steps of a search change. Changed by: acceptance::test_equal_effects_come_in_the_order_of_the_catalogue."""
 
 MOST_OF_GAP = 0.5
-"""[share of the gap above the noise] Records of one loop support a name only where at most this is left, and leave open
-all names that leave at most this: two functions, up and down, show little more than whose shape is handier. Set by: 180
+"""[share of the gap above the noise] Records of one loop support a name only if at most this is left, and leave open
+all names that leave at most this: two curves, up and down, hardly show which shape is the right one. Set by: 180
 fresh cases of kind poor, 7 of which had a false second name without it (commit 86e5f08, seeds not recorded)."""
 
 LEAST_EXPLAINED = 0.5
-"""[share of the variance above the noise] Names stand only where together they leave at most this of held-out and of
-fitted records: most is explained. What a disturbance shares with an effect is less: room temperature on the gain and
+"""[share of the variance above the noise] Names stand only if together they leave at most this of held-out and of
+fitted records, so that most is explained. A disturbance has less in common: room temperature on the gain and
 a slow crosstalk line kept 0.74 to 0.79 of the fitted variance under false names, right names at most 0.28. Set by:
 second_plants foreign 0:10, single 0:13. Changed by: acceptance::test_names_near_the_noise_explain_half."""
 
 MOSTLY_EXPLAINED = 1.0 / 3.0
-"""[share of the variance above the noise] The same of names that leave more than `MUCH_LEFT`, as wrong names do: they
+"""[share of the variance above the noise] The same for names that leave more than `MUCH_LEFT`, as wrong names do: they
 have to explain two thirds. Room temperature on the gain kept 0.39 to 0.41 under the names of ageing and self-heating,
 right names at most 0.30, beside a second effect that was not found. Set by: second_plants foreign 300:308, single and
 pair 300:312. Changed by: second_plants foreign 400:410, acceptance::test_names_explain_most."""
 
 MUCH_LEFT = 3.0
-"""[times the noise floor] A verdict that names effects says first what they leave if it is more. Changed by: blind
+"""[times the noise floor] A verdict that names effects begins with what they leave if it is more. Changed by: blind
 single, acceptance::test_what_a_verdict_says_first."""
 
 FEW_COMPARED = 0.25
-"""[share of the samples] If fewer took part a verdict says so first and names nothing: of blind records without a known
-history at least 0.5 do, of a test whose amplitude grows to the end 0.02 to 0.06. Set by: blind of all kinds, first
+"""[share of the samples] If fewer took part, a verdict says so first and names nothing: at least 0.5 of blind records
+without a known history do, and 0.02 to 0.06 of a test whose amplitude grows to the end. Set by: blind, all kinds, first
 71000, and second_plants. Changed by: acceptance::test_what_a_verdict_says_first."""
 
 MOST_EFFECTS = 5
@@ -152,7 +154,7 @@ MOST_RIVALS = 3
 """[effects] Alternatives that are tried in place of the latest effect. Changed by: blind pair."""
 
 MOST_EXCHANGES = 4
-"""[exchanges] Most exchanges of an accepted effect in a round, so that two cannot replace each other for ever. Changed
+"""[exchanges] Most exchanges of an accepted effect in a round, so that two cannot replace each other forever. Changed
 by: run time of blind."""
 
 HELD_OUT_ALONE = 3.0
@@ -169,8 +171,8 @@ SEARCHED = 12_000
 """[samples] Fitted in later searches, and used where many variables are regressed together. Changed by: as before."""
 
 PLAYS = 32
-"""[plays] Thresholds of a fit: with half as many the steps between them leave up to 1.4 times the noise in effect-free
-records, with more no less. Set by: tune none (commit 9f9a31e, seeds not recorded)."""
+"""[plays] Thresholds of a fit: half as many leave up to 1.4 times the noise in effect-free records because of the gaps
+between them; more leave no less. Set by: tune none (commit 9f9a31e, seeds not recorded)."""
 
 FIRST_STEPS = 2
 """[steps] Of a search from each start while shapes are screened. Changed by: blind single."""
@@ -179,15 +181,15 @@ SCREENING_STEPS = 2
 """[steps] Of a search from the best start, repeated while it still falls. Changed by: blind single."""
 
 FALLING = 0.8
-"""[share of the error] A search whose error falls below this within `SCREENING_STEPS` continues: the minimum of a light
-damping is too narrow for the first steps. Set by: tune single with resonance (commit 47d9267, seeds not recorded)."""
+"""[share of the error] A search whose error falls below this within `SCREENING_STEPS` continues: with light damping the
+minimum is too narrow for the first steps. Set by: tune single with resonance (commit 47d9267, seeds not recorded)."""
 
 LONGER = 4
 """[times] `SCREENING_STEPS` are repeated at most this often. Set by: as before."""
 
 TOO_FAR = 5.0
-"""[times the error of the best start] A start with more is not searched from: the best end was reached from up to 3.5
-(a limit of the output does nothing beyond the measured range). Set by: tune single (commit 0f80f02, seeds not
+"""[times the error of the best start] No search begins at a start with more: the best end was reached from up to 3.5 (a
+limit of the output has no effect beyond the measured range). Set by: tune single (commit 0f80f02, seeds not
 recorded)."""
 
 IDLE = 0.01
@@ -204,8 +206,8 @@ SHAPES_OF_ONE = 2
 """[shapes] Most of one effect among those: the others go to other effects. Changed by: blind single."""
 
 TWIN = 0.02
-"""[share of the errors] An effect that leaves as much as one of those, fitted and held out, is followed too: which of a
-lag and a delay is cut off would be chance. Changed by: acceptance::TestScreening::test_a_twin_follows."""
+"""[share of the errors] An effect that leaves as much as one of those, fitted and held out, is followed too; otherwise
+chance would decide whether a lag or a delay is cut off. Changed by: acceptance::TestScreening::test_a_twin_follows."""
 
 PROMISING = 2.0
 """[times the error of the best shape] A shape that leaves more, fitted and held out, is not searched jointly. Changed
@@ -219,7 +221,8 @@ HOPEFUL = 1.3
 blind single."""
 
 RINGING_STARTS = 3
-"""[frequencies] At which the error rings, as starts for a resonance. Changed by: blind single with resonance."""
+"""[frequencies] Frequencies of ringing in the error that are starts for a resonance. Changed by: blind single with
+resonance."""
 
 BREAKS = 4
 """[breaks] Of the dead-zone sum with which an asymmetry is sought. Changed by: blind single with asymmetry."""
@@ -260,7 +263,7 @@ LIMITER_NEAR = 0.1
 acceptance::test_what_a_front_is_called."""
 
 LIMITER_SLOPE = 0.6
-"""[times the middle slope] A smaller slope at an end is a limit's alone. Changed by:
+"""[times the middle slope] Only a limit has a smaller slope at an end. Changed by:
 acceptance::test_what_a_front_is_called."""
 
 ODD_FRONT = 2.0
@@ -303,18 +306,18 @@ THIN_COLUMN = 0.01
 acceptance::TestThinning::test_a_column_that_jitters."""
 
 EDGE = 0.03
-"""[share of the drive range] A jump of the drive is larger: of less the output moves by no more than some tens of times
-the noise, and a sample of it counts little. Changed by: acceptance::TestEdges::test_a_jump."""
+"""[share of the drive range] A jump of the drive is larger than this: a smaller one moves the output by no more than
+some tens of times the noise, and its sample counts little. Changed by: acceptance::TestEdges::test_a_jump."""
 
 EDGE_SAMPLES, EDGE_STANDS = 2, 4
-"""[samples], [samples] Most of a jump that is not resolved, from one sample to the next or over one that averages, and
-fewest over which the drive stands before and behind it. With these samples compared a lag, a delay or a rate dependence
-left 2 to 8 times the noise, without them 1.0 to 1.1. Set by: second_plants single 0:13, pair 0:6."""
+"""[samples], [samples] Longest jump that is not resolved, from one sample to the next or with an averaged one between,
+and fewest samples for which the drive stands before and after it. With these samples compared, a lag, a delay or a rate
+dependence left 2 to 8 times the noise, without them 1.0 to 1.1. Set by: second_plants single 0:13, pair 0:6."""
 
 # Noise floor -------------------------------------------------------------------------------------------------
 
 HOLD_SAMPLES = 40
-"""[samples] Fewest of a hold that measures noise: its trend has four numbers, and 24 samples behind `HOLD_SETTLING`.
+"""[samples] Fewest of a hold that measures noise: its trend has four numbers, and 24 samples after `HOLD_SETTLING`.
 Changed by: acceptance::TestNoiseFloor::test_jitter_of_the_drive."""
 
 HOLD_DRIVE = 2e-4
@@ -326,7 +329,7 @@ COARSE_DRIVE = 1e-3
 ten bits. Coarser values are levels. Changed by: acceptance::TestNoiseFloor::test_a_coarse_drive."""
 
 HOLD_SETTLING = 0.4
-"""[share of a hold] Its beginning, which is left out: what still moves there is no noise. Changed by:
+"""[share of a hold] Its beginning, which is left out, since it still settles there. Changed by:
 acceptance::TestNoiseFloor::test_jitter_of_the_drive."""
 
 HOLD_WEIGHT = 50
@@ -336,7 +339,7 @@ QUIET_HOLDS = 0.25
 """[quantile of the variances] The holds that count: in others something may still ring or creep. Changed by: blind."""
 
 RING_DECAY = 0.9
-"""[1 a sample] A hold rings where its oscillation decays less. Changed by:
+"""[1/sample] A hold rings if its oscillation decays by less. Changed by:
 acceptance::TestNoiseFloor::test_a_hold_that_rings."""
 
 RING_UNPREDICTED = 0.3
@@ -348,13 +351,14 @@ PERIOD_REPEATS = 2e-3
 adds as large a share of the output to it. Changed by: acceptance::TestNoiseFloor::test_periods_of_a_jittering_drive."""
 
 HELD_SHARE = 0.55
-"""[share of the changes] An output with at most this of them other than 0 has samples that were held or interpolated:
-of one of which every other sample was, half are. Changed by: acceptance::TestNoiseFloor::test_samples_between."""
+"""[share of the changes] An output of whose changes at most this share is not 0 has samples that were held or
+interpolated: half of the changes if every other sample was. Changed by:
+acceptance::TestNoiseFloor::test_samples_between."""
 
 LEAST_NOISE = 1e-5
-"""[share of the output range] Noise that every record is taken to have: 17 bits, more than sensors of a stage resolve
-sample by sample. Without it records of a simulation would have a floor of 0, and an error of any size would be far
-above it. Changed by: acceptance::TestNoiseFloor::test_records_without_noise."""
+"""[share of the output range] Noise that every record is assumed to have: 17 bits, more than sensors of a stage resolve
+in a single sample. Without it, records of a simulation would have a floor of 0, and any error would be far above it.
+Changed by: acceptance::TestNoiseFloor::test_records_without_noise."""
 
 # Faults of whole records and samples -------------------------------------------------------------------------
 
@@ -413,8 +417,8 @@ LINE_SHARE = 0.03
 acceptance::TestSpectra::test_share_of_a_line."""
 
 RULING_SHARE = 0.3
-"""[share of the error's variance] Of a line that is taken out before effects are sought, or that is in a few records
-alone: what a missing effect leaves may look like a weaker one. Changed by: blind foreign,
+"""[share of the error's variance] Of a line that is taken out before the search for effects, or that is only in a few
+records: the error of a missing effect may look like a weaker line. Changed by: blind foreign,
 acceptance::TestLines::test_a_line_rules."""
 
 LINE_HEIGHT = 30.0
@@ -434,7 +438,7 @@ CARRIER_SHARE = 0.5
 acceptance::TestSpectra::test_harmonics_of_a_carrier."""
 
 HARMONICS = 10
-"""[harmonics] Of that line which the actuator answers with. Changed by:
+"""[harmonics] Of that line in the actuator's response. Changed by:
 acceptance::TestSpectra::test_harmonics_of_a_carrier."""
 
 LINE_PERIODS = 8
@@ -467,7 +471,7 @@ SAME_LINE = 0.05
 acceptance::TestLines::test_the_rest_of_a_line."""
 
 MOST_LINES = 4
-"""[lines] That are sought: mains, two harmonics and a ripple. Changed by: blind foreign."""
+"""[lines] Most lines that are searched for: mains, two harmonics and a ripple. Changed by: blind foreign."""
 
 CRESTS = 5
 """[bins] The highest of a spectrum that are examined, as many as `MOST_LINES` and one of the drive. Derived."""
@@ -485,14 +489,14 @@ STEADY_SHARE = 0.5
 other half's own fit removes. Changed by: acceptance::TestLines::test_a_line_that_fades."""
 
 AMPLITUDE_SAMPLES = 2.2
-"""[samples a period] Below this the amplitude of a line cannot be seen. Derived: Nyquist's two, and a tenth."""
+"""[samples per period] With fewer, the amplitude of a line cannot be seen. Derived: Nyquist's two, and a tenth."""
 
 MAINS_TOLERANCE = 0.002
 """[share of the frequency] A line within this of the mains is hum: 0.1 Hz, twice the band to which the grid is held.
 Derived."""
 
 RIPPLE_RESOLVED = 0.25
-"""[pitches a sample] A sample shows a ripple if the position moves by less. Derived: four samples a period."""
+"""[pitches per sample] A sample shows a ripple if the position moves by less. Derived: four samples per period."""
 
 CONVERTER_STEP = 0.02
 """[share of the pitch] A pitch within this of the smallest step of the output is the converter's. Changed by:
@@ -510,7 +514,7 @@ PASS_SAMPLES, PASS_PITCHES = 32, 3.0
 acceptance::TestRipple::test_pitches_of_a_pass."""
 
 DRIVE_REPEATS = 0.01
-"""[share of the drive range, rms] A drive repeats itself where it differs by less from itself a period later: the noise
+"""[share of the drive range, rms] A drive repeats itself if it differs by less from itself a period later: the noise
 of a measured drive is less. Changed by: acceptance::TestSpectra::test_a_noisy_drive_repeats."""
 
 DRIVE_AWAY = 0.25
@@ -528,7 +532,7 @@ SLIP_STRETCH = 0.5, 3.0
 acceptance::TestStickSlip::test_how_much_stands."""
 
 SLIP_OFF = 0.6
-"""[share of the predicted motion] The output stands where it misses this of it, and leaps where it exceeds it by this.
+"""[share of the predicted motion] The output stands if it moves less by this share, and leaps if it moves more by it.
 Changed by: acceptance::TestStickSlip::test_how_much_stands."""
 
 SLIP_STANDS, SLIP_LEAPS = 0.15, 0.05
@@ -536,7 +540,7 @@ SLIP_STANDS, SLIP_LEAPS = 0.15, 0.05
 acceptance::TestStickSlip::test_how_much_stands."""
 
 SLIP_CONTINUES = 0.3
-"""[correlation] Largest of neighbouring stretches: a lag continues, a leap makes up for the standing before it. Changed
+"""[correlation] Largest of neighbouring stretches: a lag continues, a leap makes up for the standstill before. Changed
 by: acceptance::TestStickSlip::test_what_goes_on."""
 
 SLIP_MOVING = 0.25
@@ -598,7 +602,7 @@ FOLD_BLOCKS = 16
 acceptance::TestDescription::test_folds."""
 
 DESCRIBED_SAMPLES = 200
-"""[samples] Fewest that describe an error: eight a bin. Derived."""
+"""[samples] Fewest that describe an error: eight per bin. Derived."""
 
 MEMORY_WINS = 1.25
 """[times] Memory is reported in place of one variable if it explains more by this. Changed by:

@@ -1,7 +1,8 @@
-"""Hypotheses fitted to records: weights and all other numbers together, on the free-run error of whole records.
+"""Fits of hypotheses to records: weights and all other numbers together, on the free-run error of whole records.
 
-The output is linear in the weights wherever no output map bends it, so each step solves for the weights and for the
-change of all other numbers at once (`identification.joint`). The system about the fit gives intervals for the numbers.
+The output is linear in the weights unless an output map bends it, so that each step solves for the weights and for the
+change of all other numbers at once (`identification.joint`). The linear system at the fit gives intervals for the
+numbers.
 """
 
 from __future__ import annotations
@@ -27,13 +28,13 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 POLISHED = 1e-5
-"""A search ends with a step that lowers the error by a smaller share: far below any difference that decides."""
+"""A search ends after a step that lowers the error by a smaller share: far below any difference that decides."""
 
 
 class _Block:
-    """A record's part of the system about a shape and weights: plays and measured output, reduced; then derivatives.
+    """A record's part of the system linearised about a shape and weights: plays and measured output, then derivatives.
 
-    The reflections of the reduction are kept, so that the columns of the derivatives are reduced alone.
+    The reflections of the reduction are kept, so that the derivatives can be reduced later by themselves.
     """
 
     def __init__(self, here: Actuator, item: Item, p: Array) -> None:
@@ -96,7 +97,7 @@ class _Block:
 
 
 def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) -> Shaped:
-    """The best weights of a shape, and the linear system about the shape and about weights `p` close to them."""
+    """The best weights of a shape, and the system linearised about the shape and about weights `p` close to them."""
     n1 = len(structure.thresholds)
     here = structure.actuator(shape)
     try:
@@ -112,7 +113,7 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
         return Reduced(structure.thresholds, whole[:, measured_last], (), (samples,))
 
     whole = reduction.triangle(*(block.system() for block in blocks))
-    if not np.isfinite(whole).all():  # the numbers are far out
+    if not np.isfinite(whole).all():  # the numbers are far from reasonable
         return Shaped(shape, p, math.inf, p, samples, derived)
     columns = np.arange(n1)
     best = pi.non_negative(whole, columns)
@@ -153,7 +154,7 @@ class Fitted:
 def at_an_end(fitted: Fitted, name: str, later: int) -> bool:
     """Whether a number of an effect behind the front is at an end of its range; `later` as in `place`.
 
-    No amount of it, the least, is no end: what has several parts may do without one.
+    A least value of 0 does not count as an end: one of several parts may be absent.
     """
     k = place(fitted, name, later)
     if k is None:
@@ -173,7 +174,7 @@ class Search:
     damping: float = joint.DAMPING
 
     def further(self, steps: int = joint.MOST_STEPS, little: float = POLISHED) -> Search:
-        """At most `steps` further, until one lowers the error by a smaller share than `little`."""
+        """The search after at most `steps` more steps, or after one that lowers the error by less than `little`."""
         now, damping = joint.search(
             lambda shape, p: linear(self.structure, self.items, shape, p),
             self.structure,
@@ -185,7 +186,7 @@ class Search:
         return replace(self, now=now, damping=damping)
 
     def found(self, otherwise: Array) -> Fitted:
-        """The fit; `otherwise`: its weights if the numbers are too far out to solve for them."""
+        """The fit; `otherwise`: its weights if no weights can be solved for with these numbers."""
         best = self.now.best if math.isfinite(self.now.rms) else otherwise
         return Fitted(self.structure, self.now.shape, best, self.now.rms)
 
@@ -219,23 +220,23 @@ def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fit
     return replace(fitted, weights=made.p, rms=made.rms), replace(made, free_p0=float(p[0]))
 
 
-# 95 % intervals for the numbers, from the linear system about the fit ----------------------------------------
+# 95 % intervals for the numbers, from the system linearised at the fit ---------------------------------------
 
 
 DRAWS = 400
 
 HALVINGS = 20
-"""Bisections on the way to an inadmissible shape: down to a millionth of an interval's width."""
+"""Bisections between the fitted shape and an inadmissible one, down to a millionth of an interval's width."""
 
 WEAKEST = 1e-9
-"""Singular values below this share of the largest are raised to it: such directions are not determined."""
+"""Singular values below this share of the largest are raised to it, since their directions are not determined."""
 
 Numbers = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
 class Sure:
-    """Low and high of every number under the keys of the entries: of the front's stage, and of each part."""
+    """Low and high end for every number, under the keys of the entries: for the front's stage, and for each part."""
 
     front: dict[str, Any]
     parts: tuple[dict[str, Any], ...]
@@ -255,10 +256,10 @@ def place(fitted: Fitted, name: str, later: int) -> int | None:
 def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
     """95 % intervals of the numbers of the effects and of the front.
 
-    The covariance is `s^2 tau (J^T J)^-1` (Seber and Wild, Nonlinear Regression, 1989, section 2.1), J being that of
-    weights and numbers together on the free-run error, with the weights that are zero held there; `tau`, the
-    correlation time of the residuals in samples, makes of their number the effective one. Numbers of the entries are
-    those of shapes drawn from it and kept within the bounds.
+    The covariance is `s^2 tau (J^T J)^-1` (Seber and Wild, Nonlinear Regression, 1989, section 2.1), with J the
+    Jacobian of the free-run error with respect to weights and numbers together, zero weights kept at zero; `tau`, the
+    correlation time of the residuals in samples, turns their number into the effective one. The intervals come from
+    shapes drawn with this covariance and kept within the bounds.
     """
     shape, p = fitted.shape, fitted.weights
     front = len(fitted.structure.front.straight)
@@ -269,8 +270,8 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
     active = np.flatnonzero(np.append(p > 0.0, np.ones(len(shape), dtype=bool)))
     _, singular, right = np.linalg.svd(system[:, active], full_matrices=False)
     inverse = 1.0 / np.maximum(singular, WEAKEST * singular[0])
-    # Only the numbers' part of the covariance is needed. Its triangular root with a positive diagonal is unique, unlike
-    # singular vectors, whose signs and order depend on the library and would draw other numbers
+    # only the numbers' part of the covariance is needed; its triangular root with a positive diagonal is unique, unlike
+    # singular vectors, whose signs and order depend on the library and would lead to other draws
     root = np.asarray(np.linalg.qr((right.T * inverse)[np.count_nonzero(active < n1) :].T, mode="r"))
     root = root * np.where(np.diag(root) < 0.0, -1.0, 1.0)[:, None]
     errors = fitted.errors(items)
@@ -298,7 +299,7 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
 
 
 def _admissible(fitted: Fitted, drawn: Array) -> Array:
-    """The last admissible shape on the way from the fitted one to a drawn one."""
+    """The last admissible shape on the line from the fitted one to a drawn one."""
     limits, found = fitted.structure, fitted.shape
     least = np.minimum(limits.slack(found), 0.0)
     if np.all(limits.slack(drawn) >= least):
@@ -314,18 +315,18 @@ def _admissible(fitted: Fitted, drawn: Array) -> Array:
 
 
 def stage(fitted: Fitted, shape: Array) -> dict[str, Any]:
-    """The last stage of the front as a parameter file has it; empty without a front."""
+    """The last stage of the front as in a parameter file; empty without a front."""
     stages = fitted.structure.front.stages(fitted.structure.pieces(shape)[0])
     return dict(stage_content(stages[-1])) if stages else {}
 
 
 def entry(effect: Effect) -> dict[str, Any]:
-    """The keys of an effect as a parameter file has them, without the name."""
+    """The keys of an effect as in a parameter file, without the name."""
     return {key: value for key, value in effect.model_dump(exclude_defaults=True).items() if key != "name"}
 
 
 def _spread(made: Sequence[Numbers], at: Numbers) -> dict[str, Any]:
-    """`[low, high]` of each key that varies; for a list or a mapping that of its entries."""
+    """`[low, high]` for each key that varies; for a list or a mapping, the same for its entries."""
     found = {key: _interval([each.get(key) for each in made], value) for key, value in at.items()}
     return {key: sure for key, sure in found.items() if sure}
 

@@ -1,6 +1,6 @@
 """Hypotheses: thresholds, a front and effects whose numbers a fit may change, and their forward model over a record.
 
-The `Structure` of a hypothesis makes an `Actuator` of its numbers; the nominal model is the first structure.
+The `Structure` of a hypothesis turns numbers into an `Actuator`; the nominal model is the first structure.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ Sums = dict[object, Array]
 ALL = slice(None)
 
 _MOVED, _FILTERED, _RINGING, _MAPPED = range(4)
-"""Parts of the chain behind which the compared samples are picked: plays, filters behind them, other filters, maps."""
+"""Parts of the chain after which the compared samples are picked: plays, filters behind them, other filters, maps."""
 
 LEVEL_STEPS = 3
-"""Most Newton steps to the offset in front of a map, whose curvature is a few per cent: each squares the rest."""
+"""Most Newton steps for the offset in front of a map, whose curvature is a few per cent: each squares the error."""
 
 
 class NotFiniteError(ArithmeticError):
@@ -51,7 +51,7 @@ class NotFiniteError(ArithmeticError):
 
 @dataclass(frozen=True)
 class Actuator:
-    """Plays with given thresholds between a front and effects; the weights are given apart."""
+    """Plays with given thresholds between a front and effects; the weights are separate arguments."""
 
     thresholds: Array
     stages: tuple[Stage, ...]
@@ -59,7 +59,7 @@ class Actuator:
     gains: dict[tuple[int, int], tuple[Effect, Run, Array, Array]] = field(
         default_factory=dict, compare=False, repr=False
     )
-    """Gain and offset over a run, with the effect and the run themselves: the `id` of a deleted one may be reused."""
+    """Gain and offset over a run, kept with the effect and the run, since the `id` of a deleted one may be reused."""
 
     def at(self, place: Place) -> Sequence[Effect]:
         """The effects at one place of the chain, in its order."""
@@ -75,8 +75,8 @@ class Actuator:
     def columns(self, item: Item, p: Array | None = None, sums: Sums | None = None) -> tuple[Array, Array]:
         """Rows that the weights multiply, up to the output map, and the constant that is added to them.
 
-        Of the compared samples alone where nothing behind needs the others; `compared` picks them in any case. With `p`
-        a single row, the weighted sum, for which the rest of the chain runs once. `sums`: weighted sums shared by
+        Only the compared samples if nothing after them needs the others; `compared` picks them in any case. With `p`, a
+        single row, the weighted sum, for which the rest of the chain runs once. `sums`: weighted sums shared by
         actuators that have effects in common.
         """
         run = item.run
@@ -105,7 +105,7 @@ class Actuator:
 
     @cached_property
     def _needed(self) -> int:
-        """The last part of the chain that needs every sample; behind it the compared ones are enough."""
+        """The last part of the chain that needs every sample; after it the compared ones are enough."""
         if not all(effect.pointwise for effect in self.at(Place.OUTPUT)):
             return _MAPPED
         if len(self._filters) < len(self.at(Place.LINEAR)):
@@ -113,7 +113,7 @@ class Actuator:
         return _FILTERED if self._filters or not all(effect.pointwise for effect in self._bending) else _MOVED
 
     def _slow(self, item: Item) -> Array:
-        """(n + 1, N) plays behind the filters that follow them, remembered like the plays."""
+        """(n + 1, N) plays after the filters that follow them, cached like the plays."""
         if self._needed == _MOVED:
             return self._plays(item)
         by = (self._moving, self._bending, self._filters, self._needed == _FILTERED)
@@ -128,7 +128,7 @@ class Actuator:
         return rows
 
     def _slow_sum(self, item: Item, p: Array, sums: Sums) -> Array:
-        """(N,) their weighted sum; actuators that differ in one number share the part of the chain before it."""
+        """(N,) weighted sum of the same; actuators that differ in one number share the part of the chain before it."""
         by: object = (self._moving, self._bending)
         if by not in sums:
             sums[by] = self._summed(item, p)
@@ -146,7 +146,7 @@ class Actuator:
         return tuple(effect for effect in self.at(Place.LINEAR) if effect.order == 0)
 
     def _plays(self, item: Item) -> Array:
-        """(n + 1, N) plays behind the effects that bend them; those of the last few hypotheses are remembered."""
+        """(n + 1, N) plays after the effects that bend them; those of the last few hypotheses are cached."""
         if not self._bending:
             return self._moved(item)
         by = (self._moving, self._bending, self._needed == _MOVED)
@@ -157,7 +157,7 @@ class Actuator:
         return rows
 
     def _moved(self, item: Item) -> Array:
-        """(n + 1, N) the plays before they are bent, remembered too."""
+        """(n + 1, N) plays before they are bent, cached too."""
         by = (self._moving, (), self._needed == _MOVED)
         rows = item.moved.recalled(by)
         if rows is None:
@@ -168,9 +168,9 @@ class Actuator:
         return rows
 
     def _summed(self, item: Item, p: Array) -> Array:
-        """(N,) weighted sum of the plays; those without a weight need not move for it.
+        """(N,) weighted sum of the plays; those without a weight need not be computed.
 
-        The sum has the same bits whether the plays are remembered or not: that depends on what a process did before.
+        The sum has the same bits with and without cached plays, since the cache depends on what a process did before.
         """
         if self._bending:
             return chain.bent_sum(self._bending, p, self._moved(item), self.thresholds)
@@ -187,7 +187,7 @@ class Actuator:
 
     @cached_property
     def _moving(self) -> object:
-        """Everything but the record on which the movement of the plays depends."""
+        """A key of everything, except the record, that the movement of the plays depends on."""
         movers = tuple(effect for effect in self.at(Place.PLAYS) if effect.moves_plays())
         return self.thresholds.tobytes(), tuple(self.at(Place.DRIVE)), self.stages, movers
 
@@ -214,10 +214,10 @@ class Actuator:
         return h
 
     def level(self, h: Array, item: Item, largest: Array | None = None) -> tuple[Array, Array]:
-        """The best offset (N,) in front of a sensor and behind a limit, and how the output changes with it (N,).
+        """The best offset (N,) in front of a sensor and behind a limit, and the change of the output with it (N,).
 
-        A sensor sees the responses to an unknown start state as well, so they are included; drift added behind it is
-        not, since a curve about the wrong offset would be a different one. `largest`: limits of the responses' factors.
+        It includes the responses to an unknown start state, which a sensor also sees, but not drift added behind the
+        sensor: about the wrong offset its curve would be a different one. `largest`: limits of the responses' factors.
         """
         y = item.y[item.compared] - self.added(item)
         free = self._free(item) if self._needed == _MAPPED else self.nuisances(item)
@@ -256,16 +256,16 @@ class Actuator:
         return any(effect.place is Place.OUTPUT for effect in self.effects)
 
     def nuisances(self, item: Item, offset: Array | None = None) -> Array:
-        """(k, N) free components of every record at the compared samples: its offset, responses to an unknown start.
+        """(k, N) free components of a record at the compared samples: its offset, and responses to an unknown start.
 
         A history gives the memory of the plays, but not its times, on which slow effects depend. `offset`: the change
-        of the output with the offset, where a map lies between them.
+        of the output with the offset, if there is a map between them.
         """
         free = self._free(item)[:, item.compared]
         return free if offset is None else free * offset
 
     def _free(self, item: Item) -> Array:
-        """The same of all samples."""
+        """The same at all samples."""
         free = [np.ones((1, len(item.run.t)))]
         free += [found for effect in self._starting(item) if len(found := effect.transients(item.run))]
         return np.concatenate(free)
@@ -274,17 +274,17 @@ class Actuator:
         return [effect for effect in self.effects if item.history is None or not effect.fades]
 
     def largest(self, item: Item, p: Array) -> Array:
-        """(k,) largest factors of `nuisances`: an effect of little weight has a small start response."""
+        """(k,) largest factors of `nuisances`: an effect with a small weight has a small start response."""
         span = acceptance.START_SPAN * float(np.sum(p)) * (item.session or item.run).drive_range
         found = np.concatenate([[np.inf], *(effect.largest(item.run) for effect in self._starting(item))])
         limited = np.isfinite(found)
-        return np.where(limited, span * np.where(limited, found, 0.0), np.inf)  # a span of 0 limits no other either
+        return np.where(limited, span * np.where(limited, found, 0.0), np.inf)  # inf even for a span of 0
 
     def error(self, item: Item, p: Array, like: tuple[Actuator, Array] | None = None) -> Array:
         """Measured less predicted with the free components fitted; NaN where the record is not compared.
 
-        `like`: another actuator and its weights, whose `nuisances` are free in place of its own: the two are then
-        compared on equal terms.
+        `like`: another actuator and its weights, whose `nuisances` are free in place of its own, to compare the two on
+        equal terms.
         """
         by = self._mark(p), None if like is None else like[0]._mark(like[1])
         whole = item.errors.recalled(by)
@@ -302,7 +302,7 @@ class Actuator:
         return whole
 
     def _mark(self, p: Array) -> object:
-        """Everything but the record on which a prediction depends."""
+        """A key of everything, except the record, that a prediction depends on."""
         return self._numbers, p.tobytes()
 
     @cached_property
@@ -354,7 +354,7 @@ class Part:
 
 
 def kept(effect: Effect) -> Part:
-    """An effect that stays as it is."""
+    """An effect whose numbers stay."""
     none = np.empty(0)
     return Part(effect.name, Candidate("as it is", none, none, none, lambda _: effect))
 
@@ -369,7 +369,7 @@ class Structure:
 
     @property
     def start(self) -> Array:
-        """Where a search starts."""
+        """The shape at which a search starts."""
         return np.concatenate([self.front.straight, *(part.candidate.start for part in self.parts)])
 
     @property
@@ -399,7 +399,7 @@ class Structure:
         return [part.candidate.build(numbers) for part, numbers in zip(self.parts, self.pieces(shape)[1], strict=True)]
 
     def held(self, shape: Array) -> Structure:
-        """The same without free numbers: front and effects stay as a shape makes them."""
+        """The same without free numbers: front and effects keep the numbers of a shape."""
         front_shape, _ = self.pieces(shape)
         front = Kept(self.front.stages(front_shape), self.front.name)
         return replace(self, front=front, parts=tuple(map(kept, self.effects(shape))))
@@ -459,14 +459,14 @@ def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front
 
 
 def _inside(front: Front, shape: Array) -> bool:
-    """Whether a search may begin at a shape: a neighbour of it would not be the nominal front."""
+    """Whether a search may begin at a shape: within the bounds, since a limited shape is not the nominal front."""
     low, high = front.bounds
     slack = front.slack(np.clip(shape, low, high))
     return bool(np.all((low <= shape) & (shape <= high)) and np.all(slack >= -acceptance.TOUCHING))
 
 
 def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> tuple[Structure, Array]:
-    """The nominal model with free weights, front and numbers of its effects, and the start of a search."""
+    """The nominal model with free weights, front and effect numbers, and the start of a search."""
     front, shape = front_of(cascade.stages, found.drive)
     places = found.thresholds if cascade.stages else _through(found.thresholds, cascade.pi.thresholds)
     parts = tuple(Part(effect.name, _near(effect)) for effect in given)
@@ -474,12 +474,12 @@ def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> 
 
 
 def without_front(base: Structure, start: Array) -> tuple[Structure, Array]:
-    """A structure without its front, and where its search starts."""
+    """A structure without its front, and the start of its search."""
     return replace(base, front=Kept()), start[len(base.front.straight) :]
 
 
 def nominal_weights(cascade: Cascade, structure: Structure) -> Array | None:
-    """The nominal weights at the structure's nearest thresholds; None behind a front, which has a scale of its own."""
+    """The nominal weights at the structure's nearest thresholds; None with a front, whose scale is arbitrary."""
     if cascade.stages:
         return None
     p, places = np.zeros(len(structure.thresholds)), structure.thresholds
@@ -489,7 +489,7 @@ def nominal_weights(cascade: Cascade, structure: Structure) -> Array | None:
 
 
 def _near(effect: Effect) -> Candidate:
-    """The effect with free factors on its numbers: zeros and signs stay."""
+    """The effect with a free factor on each of its numbers, so that zeros and signs stay."""
     sizes = {key: _size(value) for key, value in effect if key not in effect.settled}
     free = {key: size for key, size in sizes.items() if size}
     number = sum(free.values())
@@ -532,7 +532,7 @@ def _times(value: Any, factors: Sequence[float], effect: Effect, key: str) -> An
 
 
 def _through(places: Array, nominal: Sequence[float]) -> Array:
-    """The places, those next to a nominal threshold moved there, so that a right nominal model is met exactly."""
+    """The places, with the nearest one moved to each nominal threshold, so that a right nominal model fits exactly."""
     moved = places.copy()
     for r in nominal:
         near = int(np.argmin(np.abs(places - r)))
@@ -548,7 +548,7 @@ def as_given(cascade: Cascade, given: Sequence[Effect]) -> tuple[Structure, Arra
 
 
 def predicted(record: Record, actuator: Actuator, weights: Array, history: tuple[float, ...] | None) -> Array:
-    """(N,) what an actuator with these weights predicts of a record, up to an offset, output units."""
+    """(N,) prediction of an actuator with these weights for a record, up to an offset, output units."""
     assert record.y is not None
     run = Run(np.ascontiguousarray(record.t, dtype=np.float64), np.ascontiguousarray(record.v, dtype=np.float64),
               dict(record.extra))  # fmt: skip

@@ -1,4 +1,4 @@
-"""Extensions of a hypothesis by one effect: all shapes of the catalogue ranked quickly, the best fitted jointly."""
+"""Extensions of a hypothesis by one effect: rank all shapes of the catalogue quickly, then fit the best jointly."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ SLOPE_PLACES = 201
 
 @dataclass(frozen=True)
 class Option:
-    """One way to extend a hypothesis. `front`: it adds a memoryless part in front, which is named once it is fitted.
+    """One way to extend a hypothesis. `front`: it adds a memoryless part in front, which is named after the fit.
 
-    `structure`: with all numbers to find; `alone`: with those of the extension alone, from `starts`. `beyond`: label of
-    the simpler one that it contains, and without which it is not tried; `grown`: a start from the numbers of that.
+    `structure`: with all numbers free; `alone`: with only those of the extension free, from `starts`. `beyond`: label
+    of the simpler option that it contains and after which it is tried; `grown`: a start from the numbers of that one.
     """
 
     label: str
@@ -50,7 +50,7 @@ class Option:
     grown: Callable[[Array], Array] | None = None
 
     def joined(self, now: Fitted, numbers: Array) -> Array:
-        """The shape of the whole hypothesis with these numbers of the extension; the others stay."""
+        """The shape of the whole hypothesis with these numbers for the extension; the others stay."""
         front_shape, _ = now.structure.pieces(now.shape)
         if self.front:
             return np.concatenate([numbers, now.shape[len(front_shape) :]])
@@ -115,8 +115,8 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
     dead_zones, finer = (DeadZones(drive, even_breaks(drive, n)) for n in (acceptance.BREAKS, acceptance.FINER_BREAKS))
     tanh = Tanh(drive)
     sides = (-acceptance.TANH_SIDE, acceptance.TANH_SIDE)
-    bent = [np.array([acceptance.TANH_BEND, side]) for side in sides]  # one way over the whole range
-    # a limit outside the range does nothing, nor does a small change of it: start inside
+    bent = [np.array([acceptance.TANH_BEND, side]) for side in sides]  # bent one way over the whole range
+    # a limit outside the range has no effect, and a small change of it neither: start inside
     limiters = [np.array([share, share, -2.0]) for share in acceptance.LIMITERS]
     return [
         one("front that bends one way", one_way, [one_way.straight]),
@@ -131,7 +131,7 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
 def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple[str, ...]:
     """`saturation` for a front that is straight between flatter ends, or bends alike at both; else `asymmetry`.
 
-    Both names where one end alone is a little flatter: a soft limit there and a bent actuator give the same front.
+    Both names if only one end is a little flatter: a soft limit there and a bent actuator give the same front.
     """
     v = np.linspace(*drive, SLOPE_PLACES)
     w = v
@@ -152,19 +152,19 @@ def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple
     return ("saturation",) if odd_wins and flat_ends else ("asymmetry",)
 
 
-# Their screening beside a hypothesis -------------------------------------------------------------------------
+# Screening of the options ------------------------------------------------------------------------------------
 
 
 COARSE = 1e-3
-"""A search of the screening ends with a step that lowers the error by a smaller share: ranks differ by per cents."""
+"""A search of the screening ends after a step that lowers the error by a smaller share: ranks differ by per cents."""
 
 WORTH_PROCESSES = 5_000
-"""Samples to fit from which the options are tried in several processes; fewer are not worth starting them."""
+"""Fewest fitted samples with which the options are tried in several processes; fewer are not worth starting them."""
 
 
 @dataclass(frozen=True)
 class Tried:
-    """An option fitted to the end, with its held-out errors."""
+    """A fully fitted option, with its held-out errors."""
 
     option: Option
     fitted: Fitted
@@ -179,21 +179,21 @@ class Tried:
         return self.names[0]
 
     def numbers(self, held: Sequence[Item]) -> int:
-        """Number of its free numbers, with those in a record: free start responses alone may explain a drift."""
+        """Number of its free numbers, with those of a record: free start responses may explain a drift."""
         return free_numbers(self.fitted, held)
 
 
 def free_numbers(fitted: Fitted, held: Sequence[Item]) -> int:
-    """Number of a hypothesis' free numbers, with those in a record."""
+    """Number of a hypothesis' free numbers, with those of a record."""
     return len(fitted.shape) + max(len(fitted.actuator.nuisances(item)) for item in held)
 
 
 @dataclass(frozen=True)
 class Records:
-    """The records of a search: in full, thinned to search with, and thinner still for the screening.
+    """The records of a search: in full, thinned for searches, and thinner still for the screening.
 
-    `full`: fitted records with the most samples that any fit compares; `quick`: with those of a search; `thin`,
-    `thin_held`: with those of the screening.
+    `full`: fitted records with the most samples that any fit compares; `quick`: with those that a search compares;
+    `thin`, `thin_held`: with those that the screening compares.
     """
 
     to_fit: Sequence[Item]
@@ -226,7 +226,7 @@ class Records:
         user: Sequence[type[Effect]] = (),
         tick: Callable[[], None] = lambda: None,
     ) -> Records:
-        """Records thinned by the errors of the refitted model; a user's own effect sees all samples."""
+        """Records thinned according to the errors of the refitted model; a user's own effect sees all samples."""
         groups, structure = (to_fit, held), refitted.structure
         masks = everything(groups)
         if not user and not any(part.name.startswith(USER) for part in structure.parts):
@@ -242,7 +242,7 @@ class Records:
         )  # fmt: skip
 
     def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
-        """The hypothesis with one effect more, the best shapes first; `worth`: selects the options to try."""
+        """The hypothesis with one more effect, the best shapes first; `worth`: selects the options to try."""
         rings = signals.ringing(self.to_fit, now.errors(self.to_fit), acceptance.RINGING_STARTS)
         known = replace(self.known, ringing=rings)
         rough = _rough(now, self.thin)
@@ -259,11 +259,11 @@ class Records:
 
 
 def _rough(now: Fitted, thin: Sequence[Item]) -> Fitted:
-    """The hypothesis with every other threshold, the smallest and the largest among them: enough to rank shapes."""
+    """The hypothesis with every other threshold, including the smallest and the largest: enough to rank shapes."""
     all_of_them = now.structure.thresholds
     places = np.unique([0, *range(len(all_of_them) - 1, -1, -2)])
     p = np.zeros(len(places))
-    np.add.at(p, np.searchsorted(places, np.arange(len(all_of_them))), now.weights)  # a map behind needs near weights
+    np.add.at(p, np.searchsorted(places, np.arange(len(all_of_them))), now.weights)  # an output map needs near weights
     structure = replace(now.structure, thresholds=np.ascontiguousarray(all_of_them[places]))
     return fits.begun(structure, thin, now.shape, p).found(p)
 
@@ -287,7 +287,7 @@ class _Pair(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Screened:
-    """An option, with its number, after the first steps, and its held-out rms."""
+    """An option, its index, its fit after the first steps, and its held-out rms."""
 
     k: int
     option: Option
@@ -296,21 +296,21 @@ class _Screened:
 
 
 _SCREEN, _JOIN, _POLISH = range(3)
-"""Stages of a search: a few steps of the option alone, a few of the whole hypothesis, and the rest to its end."""
+"""Stages of a search: a few steps of only the option, a few of the whole hypothesis, and the rest to its end."""
 
 
 class _Task(NamedTuple):
     what: int
     k: int
-    """number of the option"""
+    """index of the option"""
     shape: Array | None = None
-    """start of the search; for a shape that contains a simpler one the numbers of that"""
+    """start of the search; for a shape that contains a simpler one, the numbers of the simpler one"""
     weights: Array | None = None
     steps: int = 0
 
 
 class _Numbers(NamedTuple):
-    """Numbers that a search found, and its held-out rms: what a process can send, unlike the candidates themselves."""
+    """Numbers found by a search, and its held-out rms, which a process can send, unlike the candidates themselves."""
 
     shape: Array
     weights: Array
@@ -320,7 +320,7 @@ class _Numbers(NamedTuple):
 
 @dataclass(frozen=True)
 class _Searches:
-    """The searches of one round, for every option beside a hypothesis; `rough`: that with fewer thresholds."""
+    """The searches of one round, for every option beside a hypothesis; `rough`: the same with fewer thresholds."""
 
     now: Fitted
     rough: Fitted
@@ -384,8 +384,8 @@ _Pool = parallel.Pool[_Task, _Numbers]
 def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
     """The options after a few steps on thinned records: the best on fitted records, and on held-out ones.
 
-    What was found before keeps its numbers; it is fitted jointly with those that are followed up. A shape that contains
-    a simpler one is tried where that takes something away, and goes on where it takes more.
+    Effects found before keep their numbers here; they are fitted jointly with the options that are followed up. A shape
+    that contains a simpler one is tried if that one helps, and kept if it helps more.
     """
     records, found = searches.records, [pair.rough for pair in searches.found]
     without = [rms(searches.rough.errors(items)) for items in (records.thin, records.thin_held)]
@@ -420,16 +420,16 @@ def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
     tried = [each for each in tried if math.isfinite(each.residual)]
     kept = _kept(tried, [each for each in tried if helps(each, *without)])
     contained = [simpler[each.option.beyond] for each in kept if each.option.beyond]
-    return list(dict.fromkeys([*kept, *contained]))  # whether further numbers help shows in the joint fit
+    return list(dict.fromkeys([*kept, *contained]))  # the joint fit shows whether further numbers help
 
 
 def _cost(structure: Structure, option: Option) -> int:
-    """Rough cost of a search: the longest go first, so that no process ends alone with one."""
+    """Rough cost of a search: the longest go first, so that none runs by itself at the end."""
     return len(structure.start) * (1 + len(option.starts))
 
 
 def _kept(tried: Sequence[_Screened], helpful: Sequence[_Screened]) -> list[_Screened]:
-    """The best on held-out records, others that fit best, and of the helpful ones their twins."""
+    """The best on held-out records, others that fit best, and twins of these among the helpful ones."""
     kept: list[_Screened] = []
     by_held_out, by_fit = sorted(tried, key=lambda one: one.residual), sorted(tried, key=lambda one: one.fitted.rms)
     for order, most in ((by_held_out, acceptance.KEPT), (by_fit, acceptance.KEPT + acceptance.ALSO_KEPT)):

@@ -1,6 +1,6 @@
 """Grey-box forward selection: which effects remove the gap on records that took no part in the fit.
 
-Held-out errors decide first, with fitted ones as a witness. The numbers, and the reasons for them, are in `acceptance`.
+Held-out errors decide, and fitted ones have to confirm. The thresholds, and the reasons for them, are in `acceptance`.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ FRONTS = "asymmetry", "saturation"
 
 @dataclass(frozen=True)
 class Merit:
-    """Merit of an effect: the rms that it removes from held-out and from fitted records, and how sure that is."""
+    """Merit of an effect: the rms that it removes from held-out and from fitted records, and how certain that is."""
 
     removed: float
     fitted: float
@@ -59,7 +59,7 @@ class Merit:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why an effect that was tried has no name: the number that it fell short by, and the limit of that.
+    """Why an effect that was tried has no name: the number that missed a limit, and the limit.
 
     `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
     fitted ones], `small` [share of the gap], `most` [rms left], `given` [rms left], `few` [share of samples], `other`:
@@ -80,12 +80,11 @@ def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = N
 def judged(now: Fitted, best: Tried, records: Records, least: float | None = None) -> Merit | Refusal:
     """Merit of a tried effect, or why it has none.
 
-    It has none where chance explains the difference, where too little is removed to stand out of the noise, where
-    hardly any of it is in the held-out or in the fitted records, and where records of one loop alone do not support a
-    name.
+    It has none if chance explains the difference, if it removes too little to stand out of the noise, if it hardly
+    shows in the held-out or in the fitted records, or if records of only one loop do not support a name.
 
-    `least`: what has to be removed, as a multiple of the remaining error or the noise; by default the number of a first
-    or a further effect.
+    `least`: the rms to be removed, as a multiple of the remaining error or the noise; by default the threshold for a
+    first or a further effect.
     """
     if not _supported(now, best, records):
         gap = apart(records.residual(now), records.noise)
@@ -108,7 +107,7 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
 
 @dataclass(frozen=True)
 class _Removed:
-    """What an effect removes from some records on equal terms: their errors without it and with it."""
+    """Errors of some records without an effect and with it, on equal terms."""
 
     without: list[Array]
     errors: list[Array]
@@ -123,7 +122,7 @@ class _Removed:
 
 
 def _removed(now: Fitted, best: Tried, records: Records) -> tuple[_Removed, _Removed]:
-    """From held-out and from fitted records."""
+    """Errors without and with an effect, for held-out and for fitted records."""
     return (
         _Removed(_without_merit(now, best, records.held), best.errors),
         _Removed(_without_merit(now, best, records.to_fit), best.fitted.errors(records.to_fit)),
@@ -140,7 +139,7 @@ def _enough(held: _Removed, fitted: _Removed, needed: float, noise: float) -> bo
 
 
 def removes(now: Fitted, best: Tried, records: Records, least: float | None = None) -> bool:
-    """Whether enough is removed on equal terms, by chance or not; `least` as in `merit_of`."""
+    """Whether an effect removes enough on equal terms, by chance or not; `least` as in `merit_of`."""
     return _enough(*_removed(now, best, records), _least(now) if least is None else least, records.noise)
 
 
@@ -155,23 +154,23 @@ def leaves_enough(now: Fitted, records: Records) -> bool:
 
 
 def _without_merit(now: Fitted, best: Tried, items: Sequence[Item]) -> list[Array]:
-    """Errors of a hypothesis with the start states and offset that an effect leaves free, which must not be its merit.
+    """Errors of a hypothesis with the start states and offset that an effect leaves free, which are not its merit.
 
-    Or with those that it leaves free itself, if the error is then smaller: leaving less free is no merit either.
+    Or with those that the hypothesis itself leaves free, if the error is then smaller.
     """
     return min(now.errors(items, best.fitted), now.errors(items), key=rms)
 
 
 def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
-    """All candidates tried: first the best and those about as good, in the order of their number of parameters.
+    """All candidates tried: first the best and those about as good, ordered by their number of parameters.
 
-    About as good: with the same start states free, held-out records find them no worse, whatever more the best explains
-    of the fitted ones (between two shapes of one effect each has its own free states, which are part of the effect); or
-    held-out records find them within a few per cent, and fitted ones no worse, or worse by chance, or by less than an
-    effect is worth where a number of the best is at an end of its range.
-    Between equal numbers of numbers all records decide, or the order of the catalogue where these hardly differ: a lag,
-    which every amplifier has, before a delay. What leaves far more of the fitted records than another is not the best
-    because of a small lead on held-out ones, which may consist mostly of what yet another effect leaves there.
+    A candidate is about as good in two cases. With the same start states free, its held-out error is no larger, however
+    much better the best one fits (two shapes of one effect each have their own free states, which are part of the
+    effect). Or its held-out error is within a few per cent, and its fitted error is no larger, or larger by chance, or,
+    if a number of the best is at an end of its range, larger by less than an effect is worth.
+    With equal numbers of parameters all records decide, or the order of the catalogue if they hardly differ: a lag,
+    which every amplifier has, before a delay. A candidate with a far larger fitted error than another is not the best
+    because of a small lead on held-out records, which may consist mostly of yet another effect.
     """
     if not tried:
         return []
@@ -216,25 +215,25 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
 
 
 def place(name: str) -> int:
-    """Place in the catalogue, with the user's own effects behind it."""
+    """Place in the catalogue, with the user's own effects after it."""
     return effects.CATALOGUE.index(name) if name in effects.CATALOGUE else len(effects.CATALOGUE)
 
 
 def _at_an_end(fitted: Fitted) -> bool:
-    """Whether a number is at an end of its range."""
+    """Whether any number is at an end of its range."""
     low, high = fitted.structure.bounds
     return bool(np.any((fitted.shape <= low) | (fitted.shape >= high)))
 
 
 def _everywhere(each: Tried, best: Tried, records: Records) -> float:
-    """rms error over all records, with the start states free that the best leaves free."""
+    """rms error over all records, with the free start states of the best candidate."""
     return rms(each.fitted.errors([*records.to_fit, *records.held], best.fitted))
 
 
 def alike(other: Tried, best: Tried, noise: float) -> bool:
-    """Whether the records leave open which of two effects it is.
+    """Whether the records leave open which of two effects is present.
 
-    What one explains beyond the other has to be enough to deserve a name, and no chance.
+    They do unless the advantage of one over the other is enough to deserve a name and is not due to chance.
     """
     if no_worse(other.held_out, best.held_out, noise):
         return True
@@ -248,7 +247,7 @@ def rivals(best: Tried, tried: Sequence[Tried], records: Records) -> list[Tried]
 
 
 def left_open(now: Fitted, best: Tried, tried: Sequence[Tried], records: Records) -> list[str]:
-    """Names of those that fitted records cannot separate from the accepted one either."""
+    """Names of the effects that fitted records cannot separate from the accepted one either."""
     least = best.fitted.rms
     others = [each for each in rivals(best, tried, records) if no_worse(each.fitted.rms, least, records.noise)]
     if records.one_loop:
@@ -268,21 +267,22 @@ def _explains_most(now: Fitted, tried: Tried, records: Records) -> bool:
 
 
 def takes_most(residual: float, gap: float, noise: float) -> bool:
-    """Whether a residual is a small part of a gap, both without the noise."""
+    """Whether a residual is a small part of a gap, each without the noise."""
     return apart(residual, noise) <= acceptance.MOST_OF_GAP * apart(gap, noise)
 
 
 def bear_two(records: Records) -> bool:
-    """Whether records can support a second name, or one beside an effect that a model has already."""
+    """Whether records can support a second name, or one beside an effect that the model already has."""
     return not (records.one_loop and records.one_speed)
 
 
 def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
-    """Why the names that were found do not stand, or None: together they have to explain most of the gap.
+    """Why the names that were found are withdrawn, or None: together they have to explain most of the gap.
 
-    Of held-out and of fitted records both, with the start states and offsets free that the effects leave free; what is
-    noise is explained. A disturbance lets many an effect remove a part of the error; what it leaves tells it from an
-    effect that is there. Records of one loop support no name above the noise, and a small part of them none at all.
+    Both for held-out and for fitted records, with the start states and offsets free that the effects leave free; noise
+    counts as explained. Many effects can remove a part of a disturbance; the remaining error distinguishes it from a
+    real effect. Records of one loop support no name if more than noise remains, and too few compared samples none at
+    all.
     """
     if records.compared < acceptance.FEW_COMPARED:
         return Refusal("few", records.compared, acceptance.FEW_COMPARED)
@@ -299,19 +299,19 @@ def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
 
 
 def _supported(now: Fitted, best: Tried, records: Records) -> bool:
-    """Whether the records support a name, even if they are of one loop alone."""
+    """Whether the records support a name, even if they are of only one loop."""
     return not records.one_loop or ((now.bare or bear_two(records)) and _explains_most(now, best, records))
 
 
 def no_worse(residual: float, least: float, noise: float) -> bool:
-    """Whether an error is so close above the least one that the difference would not be an effect."""
+    """Whether an error exceeds the least one by so little that the difference would not count as an effect."""
     return apart(residual, least) < acceptance.FIRST_REMOVES * max(noise, least)
 
 
 def difference(before: Sequence[Array], after: Sequence[Array]) -> float:
-    """One-sided p-value of smaller squared errors after than before, over blocks longer than the errors' memory.
+    """One-sided p-value for smaller squared errors after than before, over blocks longer than the errors' memory.
 
-    Wilcoxon's signed-rank test: an effect may show in a few events, so that the mean alone is no measure.
+    Wilcoxon's signed-rank test: an effect may show in a few events, so that the mean by itself is no measure.
     """
     from scipy.stats import wilcoxon
 
@@ -348,7 +348,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Ranked:
-    """An effect that was tried in a round, and why it was not the one that was accepted; None of that one."""
+    """An effect that was tried in a round, and why it was refused; None for the one that was accepted."""
 
     tried: Tried
     refused: Refusal | None
@@ -358,7 +358,7 @@ class Ranked:
 class Outcome:
     """The refitted nominal model, the model with the effects, these effects, and the ranking of each round.
 
-    `withdrawn`: names of effects that had been accepted and do not stand in the end (`borne_out`).
+    `withdrawn`: names of effects that were accepted at first but not in the end (`borne_out`).
     """
 
     refitted: Fitted
@@ -374,7 +374,7 @@ class Outcome:
 
     @property
     def not_separable(self) -> tuple[tuple[str, str], ...]:
-        """Effects that were found, each with one that it may be instead."""
+        """Pairs of an effect that was found and one that it may be instead."""
         return tuple((each.name, rival) for each in self.found for rival in each.rivals)
 
 
@@ -387,8 +387,8 @@ def as_given(cascade: Cascade, given: Sequence[Effect]) -> Fitted:
 def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array | None = None) -> Fitted:
     """The nominal structure with weights, front and numbers of its effects refitted.
 
-    From the shape `start` and linear weights; where an output map bends the output also from the `nominal` weights,
-    since samples beyond a limit do not show how far off others are.
+    From the shape `start` and linear weights; if an output map bends the output, also from the `nominal` weights, since
+    samples beyond a limit hide the error of the weights.
     """
     quick = _quick(to_fit)
     starts = [_first_weights(base, quick, start)]
@@ -399,9 +399,9 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array 
 
 
 def no_worse_than(given: Fitted, outcome: Outcome, records: Records) -> Outcome:
-    """The outcome, or the model as given where that predicts held-out records better.
+    """The outcome, or the model as given if that predicts held-out records better.
 
-    A refit that does worse there is not a better model; where effects were named, by enough to count.
+    A refit that predicts them worse is not a better model; if effects were named, the difference has to count.
     """
     least, found = records.residual(given), outcome.fitted
     if not (better(given, found, records.held) if outcome.found else least < records.residual(found)):
@@ -409,7 +409,7 @@ def no_worse_than(given: Fitted, outcome: Outcome, records: Records) -> Outcome:
     if not outcome.found:
         return replace(outcome, fitted=given)
     refused = Refusal("given", records.residual(found), least)
-    return replace(_withdrawn(outcome, given, refused), withdrawn=())  # they explain something, if not enough
+    return replace(_withdrawn(outcome, given, refused), withdrawn=())  # they explain something, but not enough
 
 
 def _withdrawn(outcome: Outcome, fitted: Fitted, refused: Refusal) -> Outcome:
@@ -430,7 +430,7 @@ def again(fitted: Fitted, ready: Prepared) -> Fitted:
 
 
 def invertible(outcome: Outcome, records: Records, floor: float) -> tuple[Outcome, Weights]:
-    """The outcome with p_0 raised to the floor of `identify`, and the weights; errors are then those of that model."""
+    """The outcome with p_0 raised to the floor of `identify`, and the weights; errors are those of that model."""
     fitted, made = fits.invertible(outcome.fitted, records.full, floor)
     if fitted is outcome.fitted:
         return outcome, made
@@ -446,7 +446,8 @@ def _quick(to_fit: Sequence[Item]) -> Sequence[Item]:
 
 
 def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] = lambda _: False) -> Outcome:
-    """Add effects to the refitted model as long as one qualifies; a model that `until` accepts ends the search."""
+    """Add effects to the refitted model as long as one qualifies; the search also ends with a model that `until`
+    accepts."""
     now = fits.begun(refitted.structure, records.quick, refitted.shape, refitted.weights).found(refitted.weights)
     none = now
     found: list[Found] = []
@@ -491,7 +492,7 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
 
 
 def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
-    """The effects fitted to all samples, without those that are idle then."""
+    """The effects fitted to all samples, without those that then turn out to be needless."""
     now = fits.fit(now.structure, records.full, now.shape, now.weights)
     kept, rest, _ = _without_needless(now, found, records)
     if kept is not now:
@@ -500,7 +501,7 @@ def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted
 
 
 def _ranked(step: _Step, gap: float, records: Records) -> tuple[Ranked, ...]:
-    """All that were tried in a step, the best first, with what speaks against each."""
+    """All options tried in a step, the best first, with the objection to each."""
 
     def refused(tried: Tried) -> Refusal | None:
         if step.merit is not None and tried is step.best:
@@ -517,7 +518,7 @@ def _ranked(step: _Step, gap: float, records: Records) -> tuple[Ranked, ...]:
 
 @dataclass(frozen=True)
 class _Step:
-    """A hypothesis, the extensions that were tried, the best of them, and its merit if it is accepted."""
+    """A hypothesis, the extensions tried, the best of them, and its merit if it is accepted."""
 
     now: Fitted
     tried: list[Tried]
@@ -533,11 +534,11 @@ def _step(
     start: Fitted | None = None,
     least: float | None = None,
 ) -> _Step | None:
-    """The best extension of a hypothesis and those it was chosen from; None without any to try.
+    """The best extension of a hypothesis and those it was chosen from; None if there is none to try.
 
-    `start`: the same hypothesis with other numbers, from which extensions are sought; `least`: as in `merit_of`. An
-    extension may explain most only through its free start states, and be worth nothing on equal terms; then the next
-    one is judged. If another explains far more on equal terms, but in too few places to be sure, none is named.
+    `start`: the same hypothesis with other numbers, from which extensions are searched for; `least`: as in `merit_of`.
+    An extension may explain most only by its free start states and have no merit on equal terms; then the next one is
+    judged. If another one explains far more on equal terms, but in too few places to be certain, none is named.
     """
     tried = records.extensions(start or now, worth)
     if not tried:
@@ -555,15 +556,15 @@ def _step(
 
 
 def _explained(step: _Step, records: Records) -> bool:
-    """Whether only noise is left: no other first effect can do better, and `_exchanged` finds those that do as well."""
+    """Whether only noise is left: no other first effect can do better, and `_exchanged` finds equally good ones."""
     return step.merit is not None and is_noise(step.best.held_out, records.noise)
 
 
 def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
     """The latest step with a rival in place of its best, and the step that this makes possible; None to keep the best.
 
-    Which of several alike effects is present shows beside the next one: if nothing more qualifies behind the accepted
-    one, or it leaves more, or needs more numbers to leave as little, it was the wrong one. Where the next effect is
+    Which of several alike effects is present shows with the next one: if nothing more qualifies after the accepted one,
+    or the remaining error is larger, or the same error takes more numbers, it was the wrong one. If the next effect is
     itself a rival, `_exchanged` examines what else fits beside it.
     """
     alike = rivals(latest.best, latest.tried, records)
@@ -591,7 +592,7 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
 
 
 def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step] | None:
-    """Two effects that hide each other: neither qualifies alone, but each beside the other.
+    """Two effects that hide each other: neither qualifies by itself, but each does beside the other.
 
     Returns the first, and the step from it to both. The search begins with the effect that explains most on held-out
     records, and with each that is certain on fitted ones. Without the first, the other may leave less of the gap than
@@ -628,7 +629,7 @@ def _found(step: _Step, records: Records) -> Found:
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
-    """Weights without the effects, a linear fit, then with them: far from its outputs a sensor's curve leads astray."""
+    """Weights from a linear fit without the effects, then with them: a sensor's curve misleads far from its outputs."""
     alone, front = replace(base, parts=()), base.pieces(start)[0]
     near = fits.begun(alone, to_fit, front, np.ones(len(base.thresholds))).now.best
     return fits.begun(base, to_fit, start, near).now.best
@@ -637,7 +638,7 @@ def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Arr
 def _without_needless(
     now: Fitted, found: list[Found], records: Records
 ) -> tuple[Fitted, list[Found], dict[str, Fitted]]:
-    """Drop effects accepted earlier that later ones have made needless.
+    """Drop earlier effects that later ones have made needless.
 
     Returns the model, the remaining effects, and for each earlier one the model without it.
     """
@@ -656,11 +657,11 @@ def _without_needless(
 def _exchanged(
     now: Fitted, found: list[Found], less: dict[str, Fitted], names: Collection[str], records: Records
 ) -> tuple[Fitted, list[Found]]:
-    """Replace effects accepted earlier by others, or other shapes, that are better beside those accepted later.
+    """Replace earlier effects by others, or other shapes, that are better beside the later ones.
 
     The first of two was chosen while the second was missing, and may have taken part of its place; the second was
     chosen beside a wrong first one. Rivals, too, are judged beside all the others. `less`: the model without an effect,
-    where it is known; `names`: effects that were among the best in some round, the only ones worth another search.
+    if known; `names`: effects that were among the best in some round, the only ones worth another search.
     """
     latest = found[-1].name
     for _ in range(acceptance.MOST_EXCHANGES):
@@ -668,7 +669,7 @@ def _exchanged(
             fitted = None if old.name == latest else less.get(old.name) or _without(now, old.name, records)
             if fitted is None:
                 continue
-            start = _without_refit(now, old.name, records)  # refitted without it, the others' numbers may be far off
+            start = _without_refit(now, old.name, records)  # a refit without it could move the others' numbers far off
             step = _step(fitted, 0.0, records, lambda option: option.name in names, start, acceptance.FIRST_REMOVES)
             if step is None or step.merit is None:
                 continue
@@ -690,9 +691,8 @@ def _exchanged(
 
 
 def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
-    """Whether an effect gives way to a better one.
-
-    By error, by fewer numbers with no larger error on equal terms, or, if equal, by its later place in the catalogue.
+    """Whether an effect gives way to a better one: one with a smaller error, one with fewer numbers and no larger error
+    on equal terms, or an equal one that comes earlier in the catalogue.
     """
     held, residual = records.held, records.residual(now)
     fewer = free_numbers(now, held) - best.numbers(held)
@@ -722,7 +722,7 @@ def _in_place(now: Fitted, found: Sequence[Found], gap: float, records: Records)
 
 
 def _rest(found: Sequence[Found], k: int, without: float) -> list[Found]:
-    """The effects without the k-th; the errors before and after each remain those of existing models."""
+    """The effects without the k-th; the errors before and after each are still those of models in the sequence."""
     later = [replace(found[k + 1], before=found[k].before), *found[k + 2 :]] if k + 1 < len(found) else []
     rest = [*found[:k], *later]
     rest[-1] = replace(rest[-1], after=without)
@@ -744,7 +744,7 @@ def _without_refit(now: Fitted, name: str, records: Records) -> Fitted | None:
 
 
 def _less(now: Fitted, name: str) -> tuple[Structure, Array] | None:
-    """The structure without one effect, and where its search starts."""
+    """The structure without one effect, and the start of its search."""
     front_shape, numbers = now.structure.pieces(now.shape)
     parts = [(part, x) for part, x in zip(now.structure.parts, numbers, strict=True) if part.name != name]
     if len(parts) < len(now.structure.parts):
