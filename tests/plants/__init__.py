@@ -4,21 +4,21 @@
 `make blind` does all three with the report block of seeds. Nothing here imports the package, and only `run` and `track`
 call it.
 
-bench, drives, session    who measures what: ranges, rates, waveforms, what happens between the records
+bench, drives, session    the measurement: ranges, rates, waveforms, and the time between the records
 base, effects, plant      the actuator, on a time grid eight times finer than the records
-measure, foreign          converters and noise; faults that are no effect
-refit, rivals             how much a fine play sum swallows; which names the records leave open
-case, labels              what a seed gives, and its files: `cases/` for the workflow, `labels/` for the score
+measure, foreign          converters and noise; faults that are not effects
+refit, rivals             how much a fine play sum absorbs; which names the records leave open
+case, labels              the case of a seed, and its files: `cases/` for the workflow, `labels/` for the score
 run, score                the package's command line on every case; the figures and their limits
 
-`generate --drives PLAN --holdout FILE ..` drives the plants with records that somebody else has made, such as those
-that `hystgen diagnose --plan` writes; `--kind single --seeds 0:13` then hides every effect once.
+`generate --drives PLAN --holdout FILE ..` drives the plants with records from elsewhere, such as those that
+`hystgen diagnose --plan` writes; `--kind single --seeds 0:13` then hides every effect once.
 
-An effect counts as visible from three times the noise on, by the rms that it alone leaves when a fine play sum and an
-offset a record are refitted to the noise-free records. Held-out records are never fitted, so that what they alone show
-cannot be found: of its strength at least half is wanted in the held-out records and, after a refit to these alone, in
-the records to fit. Where five draws do not make that (a slew limit that is met by the edges of one held-out staircase
-only) the nearest is kept, and an effect that leaves less than half of three times the noise in the records to fit
-counts as not visible. A name that leaves at most 5 % more on the held-out records
-than the plant's true form is indistinguishable there; for a pair this is settled for each effect alone.
+An effect counts as visible from three times the noise, by the rms that it leaves by itself when a fine play sum and an
+offset per record are refitted to the noise-free records. Held-out records are never fitted, so that an effect that only
+they show cannot be found: at least half of its strength is wanted in the held-out records and, after a refit to only
+the records to fit, in those. If five draws do not achieve that (as with a slew limit that only the edges of one
+held-out staircase reach), the nearest is kept, and an effect that leaves less than half of three times the noise in the
+records to fit counts as not visible. A name whose error on the held-out records is at most 5 % larger than that of the
+plant's true form is indistinguishable there; for a pair this is decided for each effect by itself.
 """

@@ -8,7 +8,7 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
-# Small matrices: threads of the linear algebra would only wait for each other
+# the matrices are small: threads of the linear algebra would only wait for each other
 for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(variable, "1")
 
@@ -31,7 +31,7 @@ def main(words: list[str] | None = None) -> int:
     make.add_argument("--seeds", type=_seeds, required=True, metavar="A:B", help="A to B - 1, counted in the block")
     make.add_argument("-o", dest="folder", required=True, metavar="DIR", help="gets cases/ and labels/")
     make.add_argument("--large", action="store_true", help="about 50000 samples a case, not 13000")
-    make.add_argument("--no-rivals", action="store_true", help="do not settle which names are alike (quick)")
+    make.add_argument("--no-rivals", action="store_true", help="do not determine which names are alike (quick)")
     make.add_argument("--drives", type=Path, metavar="DIR", help="take the drives of its CSV files as they are")
     make.add_argument("--holdout", action="append", default=[], metavar="FILE", help="of these, one that is held out")
     make.add_argument("--jobs", type=int, default=1)

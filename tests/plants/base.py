@@ -3,7 +3,7 @@
 Every kind starts from a continuous density p(r) of half widths, scaled to a wanted loop width:
 
 * `everett`: the continuous operator itself, evaluated by its branch function B(d) = p0 d + int p(r) max(d - 2r, 0) dr
-  on a stack of reversals that are wiped out as they are passed;
+  on a stack of reversals that are removed as they are passed;
 * `maxwell`: some hundred parallel spring-slider elements with random yield points and stiffnesses;
 * `relays`: a lattice of two-state relays, in which every half width has its own, shifted row of centres;
 * `bouc_wen`: `maxwell` with a small share of a Bouc-Wen variable, which no play sum represents exactly.
@@ -28,9 +28,9 @@ KINDS = ("everett", "maxwell", "relays", "bouc_wen")
 DENSITY_POINTS = 2000
 LEAST_P0_SHARE = 0.25
 ROWS = 160
-"""Rows of relays, one a half width."""
+"""Rows of relays, one per half width."""
 COLUMNS = 1500
-"""Relays across the drive span in a row."""
+"""Relays in a row over the drive span."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def spread(base: Base, rows: int) -> tuple[Array, Array]:
 class Viscosity:
     """Sliders that slip with a delay. `law` power: excess decays as x' = -(x/unit)^exponent unit/tau_i with
     tau_i = tau (r_i/mean r)^slant; `law` activated: yield points grow by r_i strength asinh(slip rate/rate), thermally
-    activated friction (Prandtl, Eyring), each time step solved for its end."""
+    activated friction (Prandtl, Eyring), solved for the end of each time step."""
 
     law: str
     tau: float = 0.0
@@ -125,7 +125,7 @@ class Viscosity:
 
 @dataclass(frozen=True)
 class Centre:
-    """Density of relays times 1 + strength shape((centre - middle)/width); `bend`: springs that bend instead."""
+    """Density of relays times 1 + strength shape((centre - middle)/width); `bend`: nonlinear springs instead."""
 
     shape: str
     strength: float
@@ -134,7 +134,7 @@ class Centre:
 
 
 def run(base: Base, v: Array, dt: Array, viscosity: Viscosity | None = None, centre: Centre | None = None) -> Array:
-    """Output for a drive `v` at time steps `dt` (dt[0] is ignored), starting as if coming from far below."""
+    """Output for a drive `v` with time steps `dt` (dt[0] is ignored), which starts as if it came from far below."""
     if viscosity is not None:
         return _run_viscous(base, v, dt, viscosity)
     if centre is not None:
@@ -189,7 +189,7 @@ def _everett(v: Array, branch: Array, step: float, far: float) -> Array:
             top += 1
             points[top], values[top] = last, value
             rising = not rising
-        # A pair of reversals that the move passes is wiped out
+        # the move removes a pair of reversals that it passes
         while top >= 2 and ((rising and x >= points[top - 1]) or (not rising and x <= points[top - 1])):
             top -= 2
         side = 1.0 if rising else -1.0
@@ -219,7 +219,7 @@ def _run_relays(base: Base, v: Array, centre: Centre | None) -> Array:
 @njit(cache=True)
 def _relays(v: Array, radii: Array, origin: Array, pitch: float, totals: Array) -> Array:
     rows, most = totals.shape[0], totals.shape[1] - 1
-    # In a row of equal widths the relays that are up are always those of the lowest centres
+    # in a row of equal widths, the relays that are up are always those with the lowest centres
     up = np.zeros(rows, np.int64)
     out = np.empty(len(v))
     for k in range(len(v)):
@@ -237,7 +237,7 @@ def _relays(v: Array, radii: Array, origin: Array, pitch: float, totals: Array) 
 
 @njit(cache=True)
 def _sliders(v: Array, yields: Array, stiffnesses: Array) -> Array:
-    """Springs of `stiffnesses` that are stretched by v less their sliders: the slip of the sliders, weighted."""
+    """Weighted slip of the sliders, on springs of `stiffnesses` that v less the slip stretches."""
     stretch = yields.copy()
     out = np.empty(len(v))
     for k in range(len(v)):
@@ -322,7 +322,7 @@ def _activated(v: Array, dt: Array, yields: Array, stiffnesses: Array, strength:
         for i in range(len(yields)):
             e = stretch[i] + move
             if abs(e) > yields[i]:
-                # y (1 + strength u) + slipped sinh(u) = |e|, which bends upwards: Newton's way down from above
+                # y (1 + strength u) + slipped sinh(u) = |e| is convex: Newton's method descends from above
                 u = math.asinh((abs(e) - yields[i]) / slipped)
                 for _ in range(50):
                     grows = yields[i] * strength + slipped * math.cosh(u)
@@ -355,7 +355,7 @@ def _bent(v: Array, yields: Array, stiffnesses: Array, strength: float, middle: 
             s = min(max(slip[i], v[k] - yields[i]), v[k] + yields[i])
             slip[i] = s
             x = (s - middle) / width
-            # Wide elements bend more, so that no function of the sum does the same
+            # wide elements bend more, so that no function of the sum gives the same
             bend = strength * min(yields[i] / mean, 2.0)
             total += stiffnesses[i] * (s + bend * width * (math.sqrt(1.0 + x * x) - 1.0))
         out[k] = total

@@ -1,4 +1,4 @@
-"""Test benches: drive range, travel, sampling and length of the records that somebody would take on them."""
+"""Test benches: drive range, travel, sampling and length of the records that a user would take on them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ KINDS = ("static", "dynamic", "mixed")
 
 @dataclass(frozen=True)
 class Bench:
-    """`rates` [1/s] of slow and fast records, equal on a bench of one kind; `samples` a record."""
+    """`rates` [1/s] of slow and fast records, equal on a bench of one kind; `samples` per record."""
 
     kind: str
     low: float

@@ -27,19 +27,19 @@ NOISE = (2.0e-4, 2.0e-3)
 """Noise rms as a share of the output range: least, most."""
 
 PURE = 0.25
-"""Most that a fine play sum may leave of an effect-free plant, in units of the noise."""
+"""Largest rms that a fine play sum may leave of an effect-free plant, in units of the noise."""
 
 VISIBLE = 3.0
-"""Least rms that is left of an effect, in units of the noise, for its name to be asked for."""
+"""Least rms left of an effect, in units of the noise, for its name to be required."""
 
 SHOWN = 0.5
-"""Share of the strength that held-out records, and those to fit, have to show each by themselves."""
+"""Share of the strength that the held-out records and the records to fit each have to show."""
 
 CLOSE = 0.25
-"""Largest log of the ratio between the wanted and the made strength."""
+"""Largest log of the ratio between the wanted and the achieved strength."""
 
 SMALL, LARGE = 1300, 5200
-"""Samples a record."""
+"""Samples per record."""
 
 MOST = {
     "creep": 0.035,
@@ -51,16 +51,16 @@ MOST = {
     "sensor_nonlinearity": 0.12,
     "noncongruent": 0.8,
 }
-"""Strength beyond which an effect is no longer one of a real stage; where none is given, 20."""
+"""Largest strength that an effect of a real stage has; 20 for effects not listed."""
 
 LEAST = {"resonance": 0.6, "slew_limit": 0.6, "delay": 0.3, "lag": 0.3}
-"""Strength below which the samples of the bench would no longer resolve an effect."""
+"""Least strength at which the samples of the bench resolve an effect."""
 
 
 @dataclass(frozen=True)
 class Present:
-    """An effect of the plant, and the rms that it alone leaves after a refit of a fine play sum [output], in all
-    records and in the held-out ones; `to_fit`: in the others, after a refit to these alone."""
+    """An effect of the plant, and the rms that it leaves by itself after a refit of a fine play sum [output], in all
+    records and in the held-out ones; `to_fit`: in the others, after a refit to only these."""
 
     effect: Effect
     unabsorbed: float
@@ -72,9 +72,9 @@ class Present:
 class Case:
     """Everything about one case; only `measured`, `nominal` and the session's known history go to the workflow.
 
-    `clean`: noise-free output of the plant a record, before any foreign fault; `twin`: the same of the plant without
-    its effects; `measured`: columns a record by name; `added`: what the converters added to `clean`; `unabsorbed`,
-    `remainder`: rms left by a fine play sum with and without the effects.
+    `clean`: noise-free output of the plant for each record, before any foreign fault; `twin`: the same for the plant
+    without its effects; `measured`: columns of each record by name; `added`: error that the converters added to
+    `clean`; `unabsorbed`, `remainder`: rms left by a fine play sum with and without the effects.
     """
 
     kind: str
@@ -96,18 +96,18 @@ class Case:
 
     @property
     def name(self) -> str:
-        """Tells nothing about what the case holds."""
+        """A name that tells nothing about the content of the case."""
         return "case_" + hashlib.sha256(f"{self.kind}:{self.seed}".encode()).hexdigest()[:10]
 
     def noise(self, held_out: bool | None = None) -> float:
-        """Rms of what the converters added [output], over all records or those held out or not; without any fault."""
+        """Rms of the converters' error [output], over all records or those held out or not; without any fault."""
         rows = [k for k, r in enumerate(self.session.records) if held_out is None or r.held_out == held_out]
         return float(np.sqrt(np.mean(np.concatenate([self.added[k] for k in rows]) ** 2)))
 
 
 @dataclass(frozen=True)
 class Nominal:
-    """Parameters of the model that the workflow is given: about right, from the plant without effects."""
+    """Parameters of the model given to the workflow: about right, from the plant without effects."""
 
     thresholds: tuple[float, ...]
     weights: tuple[float, ...]
@@ -115,7 +115,7 @@ class Nominal:
 
 
 def make(kind: str, seed: int, samples: int = SMALL, given: Sequence[session.Given] = ()) -> Case:
-    """The case of a kind and seed; `samples` a record, about; `given`: drives to take as they are."""
+    """The case of a kind and seed; about `samples` per record; `given`: drives to take as they are."""
     streams = [
         np.random.Generator(np.random.PCG64(s))
         for s in np.random.SeedSequence([KINDS.index(kind), seed, samples]).spawn(6)
@@ -191,7 +191,7 @@ def contents(kind: str, seed: int) -> tuple[list[str], str | None]:
         for k, a in enumerate(names)
         for b in names[k + 1 :]
         if kinds[a].family != kinds[b].family and set(kinds[a].benches) & set(kinds[b].benches)
-        # Viscous and centre-dependent elements are two different kinds of base
+        # viscous and centre-dependent elements need two different kinds of base
     ]
     pairs = [pair for pair in pairs if pair != ["noncongruent", "rate_dependence"]]
     return pairs[(seed * 7) % len(pairs)], None
@@ -247,7 +247,7 @@ def _effects(
     noise: float,
     remainder: float,
 ) -> tuple[list[Present], float]:
-    """Effects of a strength that real stages have, with noise and strength fitted to a wanted ratio of the two."""
+    """Effects with strengths of real stages, with noise and strength adjusted to a wanted ratio of the two."""
     least = max(NOISE[0] * stage.bench.span_out, remainder / PURE)
     most = max(NOISE[1] * stage.bench.span_out, least)
     present: list[Present] = []

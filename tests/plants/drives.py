@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Drive = Callable[[np.random.Generator, Array, float, float], Array]
-"""Generator, time from 0 to 1 of the record, start value, one sample as a share of the record."""
+"""Function of a random generator, the time in the record from 0 to 1, the start value, and one sample's share of it."""
 
 
 def path(t: Array, sample: float, points: list[tuple[float, float]]) -> Array:
     """Piecewise linear through (duration share, value); durations are scaled to fill the record.
 
-    Corners lie on the middle of a sample, as those of a generator that shares the converters' clock.
+    Corners lie in the middle of a sample, as with a generator that shares the converters' clock.
     """
     durations = np.array([d for d, _ in points])
     times = np.concatenate(([0.0], np.cumsum(durations[1:])))
@@ -78,7 +78,7 @@ def staircase(rng: np.random.Generator, t: Array, start: float, sample: float) -
     points = [(0.0, start), (0.02, start)]
     levels = rng.uniform(0.1, 0.9, 5).tolist()
     first = int(rng.integers(3))
-    # One full-scale step down and one up, among smaller ones
+    # one full-scale step down and one up, among smaller ones
     levels[first:first] = [1.0, 0.0, 0.97]
     for k, level in enumerate(levels):
         full = first < k < first + 3
@@ -101,7 +101,7 @@ def reversals(rng: np.random.Generator, t: Array, start: float, sample: float) -
 
 
 def _approach(t: Array, wave: Array, start: float) -> Array:
-    """Go from `start` to the wave within the first 4 % of the record, smoothly."""
+    """Go smoothly from `start` to the wave within the first 4 % of the record."""
     x = np.clip(t / 0.04, 0.0, 1.0)
     ease = x * x * (3.0 - 2.0 * x)
     return start + ease * (wave - start)
@@ -163,7 +163,7 @@ FIT: dict[str, Drive] = {
     "multisine": multisine((11, 30)),
     "repeated": repeated,
 }
-"""Waveforms to fit, the indispensable ones first."""
+"""Waveforms to fit, the most important ones first."""
 
 HELD_OUT: dict[str, Drive] = {
     "staircase": staircase,

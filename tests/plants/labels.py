@@ -1,4 +1,4 @@
-"""Cases on disk: what the workflow may read in one folder, the labels in another."""
+"""Cases on disk: files for the workflow in one folder, the labels in another."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from .session import Given
 
 
 def generate(task: tuple[str, int, int, bool, str, Sequence[Given]]) -> str:
-    """Make and write the case of (kind, seed, samples a record, with rivals, folder, drives); returns its name."""
+    """Make and write the case of (kind, seed, samples per record, with rivals, folder, drives); returns its name."""
     kind, seed, samples, with_rivals, folder, given = task
     return write(make(kind, seed, samples, given), Path(folder), with_rivals).name
 
 
 def write(case: Case, folder: Path, with_rivals: bool = True) -> Path:
-    """Write `cases/NAME/` with records, params.yaml and session.json, and `labels/NAME.json`; returns the former."""
+    """Write `cases/NAME/` with records, params.yaml and session.json, and `labels/NAME.json`. Returns `cases/NAME/`."""
     home = folder / "cases" / case.name
     home.mkdir(parents=True, exist_ok=True)
     names = []
@@ -69,8 +69,8 @@ def parameters(case: Case) -> str:
 def label(case: Case, with_rivals: bool = True) -> dict[str, Any]:
     """The truth about a case. Lengths of displacement are in output units.
 
-    `ratio` is unabsorbed rms over noise rms; `ratio_holdout`, `ratio_fit` are those of the held-out records, and of the
-    others after a refit to these alone.
+    `ratio`: unabsorbed rms over noise rms; `ratio_holdout`, `ratio_fit`: the same for the held-out records, and for the
+    others after a refit to only these.
     """
     noise = case.noise()
     effects = []
@@ -124,12 +124,12 @@ def label(case: Case, with_rivals: bool = True) -> dict[str, Any]:
 
 
 def _visible(effect: dict[str, Any]) -> bool:
-    """Whether an effect of a label is strong enough, and not in the held-out records alone."""
+    """Whether an effect of a label is strong enough, and not only in the held-out records."""
     return bool(effect["ratio"] >= VISIBLE and effect["ratio_fit"] >= SHOWN * VISIBLE)
 
 
 def compared(case: Case, plant: Plant) -> dict[str, float]:
-    """Held-out rms of every name's simple form on a plant with the case's noise, over that of the true form."""
+    """Held-out rms of every name's simple form on a plant with the case's noise, relative to that of the true form."""
     stage = case.session
     fine = plant.respond(stage)
     noise = np.concatenate(case.added)
@@ -150,7 +150,7 @@ def compared(case: Case, plant: Plant) -> dict[str, float]:
 
 
 def _own_times(course: refit.Track) -> np.ndarray[Any, Any]:
-    """Time that begins anew with every record; between records it does not matter."""
+    """Time that restarts with every record; between records it does not matter."""
     first = {number: course.t[np.argmax(course.record == number)] for number in np.unique(course.record).tolist()}
     return course.t - np.array([first[number] for number in course.record.tolist()])
 

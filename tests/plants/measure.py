@@ -1,4 +1,4 @@
-"""What the converters make of a signal: noise, white or coloured, and the steps of both channels."""
+"""The converters: white or coloured noise, and the steps of both channels."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ COLOURS = ("white", "mixed", "pink")
 
 @dataclass(frozen=True)
 class Converters:
-    """`noise` rms before conversion [output]; steps of both converters, and the noise of the drive's in its steps."""
+    """`noise` rms before conversion [output]; steps and bits of both converters."""
 
     noise: float
     colour: str
     correlation: float
-    """Samples over which the coloured part lasts."""
+    """Correlation time of the coloured part in samples."""
     output_step: float
     output_bits: int
     drive_step: float
@@ -40,7 +40,7 @@ def draw(rng: np.random.Generator, noise: float, span_out: float, span: float, c
     bits = [b for b in (12, 14, 16, 18) if wide_out / 2**b <= 0.9 * noise]
     output_bits = bits[int(rng.integers(min(len(bits), 2)))]
     wide = 1.2 * span
-    # The step of the drive, through the slope of the loop, stays well below the noise
+    # through the slope of the loop, the step of the drive stays well below the noise
     drive_bits = next(b for b in (12, 14, 16, 18, 20) if 0.4 * wide / 2**b * span_out / span <= 0.12 * noise)
     return Converters(
         noise,

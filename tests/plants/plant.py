@@ -39,7 +39,7 @@ class Plant:
     def respond(self, session: Session, first: Session | None = None) -> Array:
         """Noise-free output on the session's fine grid; zero drive gives about zero output.
 
-        `first`: the session in which the plant has had its zero and the strengths of its effects, where not this one.
+        `first`: the session that defines the plant's zero and the strengths of its effects, if not this one.
         """
         around = _around(session)
         x, h = self._driven(around)

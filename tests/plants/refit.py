@@ -1,4 +1,4 @@
-"""A fine play sum fitted to records by non-negative least squares: how much of a signal such a sum can swallow."""
+"""A fine play sum fitted to records by non-negative least squares: how much of a signal such a sum can absorb."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 FINE = 48
-"""Plays of the sum that decides what is left unabsorbed."""
+"""Plays of the sum that defines the unabsorbed part."""
 
 RIDGE = 1e-9
 
 STILL = 1e-9
-"""A play that moves by less than this share of the one that moves most gets no weight."""
+"""A play that moves by less than this share of the largest movement gets no weight."""
 
 
 @dataclass(frozen=True)
@@ -31,14 +31,14 @@ class Track:
     v: Array
     record: Ints
     held_out: NDArray[np.bool_]
-    """One a record."""
+    """One flag per record."""
 
     @property
     def seen(self) -> NDArray[np.bool_]:
         return self.record >= 0
 
     def of(self, held_out: bool) -> NDArray[np.bool_]:
-        """Which of the seen samples belong to held-out records, or to the others."""
+        """Mask of the seen samples of held-out records, or of the others."""
         return self.held_out[self.record[self.seen]] == held_out
 
 
@@ -75,7 +75,7 @@ def radii(span: float, number: int) -> Array:
 
 
 def centred(columns: Array, record: Ints) -> Array:
-    """Columns less their mean over each record, whose samples lie together: a free offset a record."""
+    """Columns less their mean over each record, whose samples are contiguous: a free offset per record."""
     starts = np.concatenate(([0], np.flatnonzero(np.diff(record)) + 1))
     counts = np.diff(np.append(starts, len(record)))
     means = np.add.reduceat(columns, starts, axis=0).T / counts
@@ -83,7 +83,7 @@ def centred(columns: Array, record: Ints) -> Array:
 
 
 def fit(columns: Array, y: Array, free: int = 0) -> Array:
-    """Weights that are not negative but for the last `free`; columns (N, n) and y (N,) have no mean."""
+    """Weights, not negative except for the last `free`; columns (N, n) and y (N,) have no mean."""
     rms = np.sqrt(np.mean(columns * columns, axis=0))
     scale = np.where(rms > STILL * np.max(rms), rms, np.inf)
     scaled = columns / scale
@@ -101,7 +101,7 @@ def fit(columns: Array, y: Array, free: int = 0) -> Array:
 @dataclass(frozen=True)
 class Left:
     """Rms that is left of a noise-free output: over all records and over the held-out ones after a joint refit to all,
-    and over the records to fit after a refit to these alone."""
+    and over the records to fit after a refit to only these."""
 
     everywhere: float
     held_out: float
@@ -109,7 +109,7 @@ class Left:
 
 
 def unabsorbed(course: Track, output: Array, span: float) -> Left:
-    """What a fine play sum leaves of an output (seen samples)."""
+    """The part of an output (seen samples) that a fine play sum leaves."""
     record = course.record[course.seen]
     columns = centred(plays(course.v, radii(span, FINE))[course.seen], record)
     y = centred(output, record)

@@ -1,9 +1,9 @@
-"""Which other names a record leaves open: the plant refitted with every catalogue form, judged on held-out records.
+"""The other names that a record leaves open: the plant refitted with every catalogue form, judged on held-out records.
 
-For each effect alone on its base hysteresis, with the noise of the case: a simple form of each catalogue name is
-fitted to the fit records jointly with a play sum and an offset a record; so is the true form, which is the play sum
-on the plant without the effect, all its parameters being known. A name whose held-out rms is within 5 % of the true
-form's cannot be separated on these records.
+For each effect by itself on its base hysteresis, with the noise of the case, a simple form of each catalogue name is
+fitted to the fit records jointly with a play sum and an offset per record. So is the true form: the play sum on the
+plant without the effect, since all parameters of the effect are known. A name whose held-out rms is within 5 % of the
+true form's cannot be separated on these records.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ PLAYS = 24
 
 @dataclass(frozen=True)
 class Data:
-    """A course with a measured output (seen samples); `clock` is the time that the records give, at every sample."""
+    """A course with a measured output (seen samples); `clock`: the time in the records, at every sample."""
 
     course: refit.Track
     clock: Array
@@ -41,7 +41,7 @@ class Data:
     low: float
     high: float
     rate: float
-    """Samples a second of the fastest record."""
+    """Samples per second of the fastest record."""
     temperature: Array | None
 
     @property
@@ -54,14 +54,14 @@ class Data:
 
 
 Columns = tuple[Array, int]
-"""Columns on the seen samples, and how many of them, the last ones, may have either sign."""
+"""Columns on the seen samples, and the number of columns at the end that may have either sign."""
 
 Form = Callable[[Data, Array], Columns]
 
 
 @dataclass(frozen=True)
 class Rival:
-    """A form with nonlinear parameters: start values by rows, each refined if it is the best; logarithmic if so."""
+    """A form with nonlinear parameters: start values in rows, the best of which is refined; in logs if `positive`."""
 
     form: Form
     starts: Callable[[Data], Array]
@@ -69,13 +69,13 @@ class Rival:
 
 
 def compared(data: Data, twin: Array) -> dict[str, float]:
-    """Held-out rms of every name's form over that of the true form, which is a play sum on the output `twin`."""
+    """Held-out rms of every name's form relative to that of the true form, which is a play sum on the output `twin`."""
     true = held_out_rms(data, plain(data, np.empty(0)), twin)
     return {other: min(_best(data, rival) for rival in rivals) / true for other, rivals in RIVALS.items()}
 
 
 def held_out_rms(data: Data, columns: Columns, y: Array) -> float:
-    """Fit on the fit records, rms on the held-out ones with a free offset each."""
+    """Fit to the fit records, rms on the held-out ones with a free offset each."""
     return _judge(data, columns, y)[1]
 
 
@@ -91,13 +91,13 @@ def _judge(data: Data, columns: Columns, y: Array) -> tuple[float, float]:
 
 
 def _best(data: Data, rival: Rival) -> float:
-    """Held-out rms of the parameters that fit best."""
+    """Held-out rms with the parameters that fit best."""
     starts = rival.starts(data)
     begins = np.log(starts) if rival.positive else starts
     reach = 2.0 if rival.positive else 0.5
 
     def point(x: Array) -> Array:
-        # A direction without effect must not lead to infinity
+        # a direction without effect must not lead to infinity
         x = np.clip(x, begins.min(axis=0) - reach, begins.max(axis=0) + reach)
         return np.exp(x) if rival.positive else x
 
@@ -135,9 +135,9 @@ def _lag(data: Data, x: Array) -> Array:
 
 
 def _delayed(straight: bool) -> Form:
-    """Plays delayed, not the drive: they remember corners, which a drive delayed by a part of a sample would miss.
+    """Delays the plays instead of the drive: they remember corners, which a drive delayed by a part of a sample misses.
 
-    Between samples straight lines are right beside steep edges, Akima's curves on sines.
+    Between samples, straight lines are right beside steep edges, and Akima's curves on sines.
     """
 
     def form(data: Data, x: Array) -> Columns:
@@ -184,7 +184,7 @@ def _bent(data: Data, x: Array) -> Array:
 
 
 def _stops(data: Data, x: Array) -> Columns:
-    """A bend of the output at a share of its range, from the top and, on a two-sided bench, from the bottom."""
+    """Bends of the output at a share of its range below the top and, on a two-sided bench, above the bottom."""
     columns = _plays(data, data.course.v)
     h = _predicted(data, columns)
     cut = float(x[0]) * float(np.ptp(h))
@@ -246,7 +246,7 @@ def _resonant(data: Data, x: Array) -> Columns:
     for k in range(len(course.held_out)):
         rows = record == k
         dt = float(np.median(np.diff(t[rows])))
-        # State q, p/w in units of w t, with the input and its slope beside it
+        # state q, p/w in units of w t, extended by the input and its slope
         system = np.zeros((4, 4))
         system[0, 1], system[1, 0], system[1, 1], system[1, 2], system[2, 3] = 1.0, -1.0, -2.0 * damping, 1.0, 1.0
         step = w * dt
@@ -264,7 +264,7 @@ def _predicted(data: Data, columns: Array) -> Array:
     matrix = refit.centred(columns, record)
     weights = refit.fit(matrix[fitted], refit.centred(data.y, record)[fitted])
     h = columns @ weights
-    # Zero drive is about zero output, which is what a gain acts on
+    # zero drive gives about zero output: a gain acts relative to that
     return np.asarray(h - h.mean() + 0.5 * (data.low + data.high) * np.ptp(h) / data.span)
 
 
@@ -342,7 +342,7 @@ def _sensed(data: Data, _: Array) -> Columns:
     """Powers of the measured output beside the plays: y + c_2 y^2 + .. = PI."""
     columns = _plays(data, data.course.v)
     h = _predicted(data, columns)
-    half = 0.5 * float(np.ptp(data.y))  # a sum fitted to a drift alone need not move
+    half = 0.5 * float(np.ptp(data.y))  # a sum fitted to nothing but drift need not move
     z = (data.y - _record_means(data, data.y) + _record_means(data, h) - h.mean()) / half
     return np.column_stack((columns, half * z**2, half * z**3, half * z**4)), 3
 

@@ -1,4 +1,4 @@
-"""Count how often the diagnosis was right, against labels that it has not seen.
+"""Count how often the diagnosis was right, by labels that it has not seen.
 
 A name counts as right when it is the effect's, or one that the label holds indistinguishable on the given records and
 that the diagnosis reports as not separable from the effect's own. A pair of names that are separable by the label is
@@ -55,7 +55,7 @@ class Outcome:
         return name in alike and any({name, effect["name"]} <= group <= alike for group in self.groups)
 
     def left_open(self, effect: dict[str, Any]) -> bool:
-        """Nothing was named, but the effect was reported as not separable from names that it is indeed not."""
+        """Nothing was named, but the effect was reported as not separable from names, and it really is not."""
         alike = {effect["name"], *effect["indistinguishable"]}
         return not self.names and any(effect["name"] in group <= alike and len(group) > 1 for group in self.groups)
 
@@ -88,14 +88,14 @@ class Outcome:
 
     @property
     def confident_wrong(self) -> list[str]:
-        """Wrong names that were not reported as not separable from a right one."""
+        """Wrong names, except those that were reported as not separable from a right one."""
         return [
             name for name in self.wrong if not any(name in group and group & set(self.true) for group in self.groups)
         ]
 
     @property
     def overcautious(self) -> bool:
-        """An effect was reported as not separable from a name that these records do separate from it."""
+        """An effect was reported as not separable from a name although these records separate the two."""
         return any(
             e["name"] in group and not group <= {e["name"], *e["indistinguishable"]}
             for e in self.label["effects"]
@@ -205,7 +205,7 @@ def figures(outcomes: Sequence[Outcome]) -> list[Figure]:
 
 
 def asides(outcomes: Sequence[Outcome]) -> dict[str, float]:
-    """Shares without a limit, which tell whether a limit is kept by saying nothing or by leaving all open."""
+    """Shares without a limit, which show whether limits are kept only by naming nothing or by leaving all open."""
     singles = _of(outcomes, "single", visible=True)
     pairs = _of(outcomes, "pair", visible=True)
     poor = _of(outcomes, "poor")

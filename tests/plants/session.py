@@ -1,4 +1,4 @@
-"""A session of records on a bench: the drive on a fine time grid, including what happens between the records."""
+"""A session of records on a bench: the drive on a fine time grid, including the time between the records."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .bench import Bench
 Array = NDArray[np.float64]
 
 FINER = 8
-"""Fine steps a sample of a record."""
+"""Fine steps per sample of a record."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Planned:
 
 @dataclass(frozen=True)
 class Session:
-    """`t` [s], `v` [input] on the fine grid; `history`, `rest` before each record where they are known."""
+    """`t` [s], `v` [input] on the fine grid; `history`, `rest`: before each record, if they are known."""
 
     bench: Bench
     t: Array
@@ -110,7 +110,7 @@ def plan(rng: np.random.Generator, bench: Bench, known: bool, waveforms: Wavefor
 
 @dataclass(frozen=True)
 class Given:
-    """A drive that somebody else has made: session time [s] and drive [input] of its samples, held out or not."""
+    """A drive from elsewhere: session time [s] and drive [input] of its samples, held out or not."""
 
     name: str
     held_out: bool
@@ -152,7 +152,7 @@ def replayed(rng: np.random.Generator, span_out: float, given: Sequence[Given]) 
 
 
 def rich(rng: np.random.Generator, records: int) -> Waveforms:
-    """Waveforms that can show every effect of the bench; the held-out ones lie anywhere but at the very start."""
+    """Waveforms that can show every effect of the bench; the held-out ones are anywhere but at the very start."""
     names = list(drives.FIT)
     fit = [(name, drives.FIT[name], False) for name in names[: max(records - 3, 5)]]
     fit = [fit[k] for k in rng.permutation(len(fit))]
@@ -165,7 +165,7 @@ def rich(rng: np.random.Generator, records: int) -> Waveforms:
 
 
 def poor(rng: np.random.Generator) -> Waveforms:
-    """One waveform at one speed and size, again and again: one sine, or one slow triangle."""
+    """One waveform at one speed and size, repeated: one sine, or one slow triangle."""
     if rng.uniform() < 0.6:
         waveform = drives.sine(round(rng.uniform(4.0, 9.0)), rng.uniform(0.25, 0.5))
         name = "sine"
@@ -195,5 +195,5 @@ def _room(rng: np.random.Generator, t: Array) -> Array:
 
 
 def _round(x: float) -> float:
-    """Two significant digits: what somebody writes down."""
+    """Two significant digits, as a user would write down."""
     return float(f"{x:.2g}")

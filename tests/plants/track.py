@@ -36,16 +36,16 @@ EFFECTS = (
     "creep", "lag", "rate_dependence", "asymmetry", "saturation", "resonance", "delay", "noncongruent", "slew_limit",
     "ageing", "thermal",
 )  # fmt: skip
-"""Effects that are looked at: drift is one of the clock, and a sensor's nonlinearity no error of the stage."""
+"""Tracked effects; not drift, which needs a clock, nor a sensor's nonlinearity, which is no error of the stage."""
 
 PAIRS = "pairs"
-"""Plants with two of these."""
+"""Plants with two effects."""
 
 FAST = ("lag", "rate_dependence", "resonance", "delay", "slew_limit")
-"""Those that are looked at at the rate of the bench's fast records."""
+"""Effects that are tracked at the rate of the bench's fast records."""
 
 LENGTH, SWEEP = 3000, 400
-"""Samples of a reference, and of one sweep over its range, two of which come first and are not counted."""
+"""Samples of a reference, and of one sweep over its range; the first two sweeps do not count."""
 
 SLOWEST = 60
 """Samples of the fastest half wave of a reference."""
@@ -54,12 +54,12 @@ GOOD = 2.0, 0.05
 """A good compensator leaves at most this multiple of the held-out residual, or this many per cent."""
 
 INSIDE = 0.1
-"""Share of the output over the range of the drive that a reference stays away from its ends."""
+"""Distance of a reference from the ends of the output, as a share of the output over the range of the drive."""
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """What one plant left, rms in per cent of the reference's range; `named`: whether its effects were."""
+    """Errors left on one plant, rms in per cent of the reference's range; `named`: whether its effects were named."""
 
     effect: str
     seed: int
@@ -98,13 +98,13 @@ def reference(rng: np.random.Generator, low: float, high: float) -> Array:
     longer = np.concatenate([np.full(15, steps[0]), steps, np.full(15, steps[-1])])
     steps = np.convolve(longer, edge / edge.sum(), "valid")
     joined = np.zeros(1)
-    for part in (smooth, raster, steps):  # straight ways from one to the next
+    for part in (smooth, raster, steps):  # joined by straight moves
         joined = np.concatenate([joined, np.linspace(joined[-1], part[0], SLOWEST), part])
     return np.concatenate([*parts, low + (high - low) * joined[:rest]])
 
 
 def rooms(case: Case) -> Array:
-    """Temperature along a reference: three waves as far as it went in the records, from where these began."""
+    """Temperature along a reference: three waves over the range of the records, beginning where these began."""
     seen = case.session.temperature
     low, high = float(seen.min()), float(seen.max())
     level = 2.0 * (seen[0] - low) / (high - low) - 1.0 if high > low else 0.0
@@ -113,8 +113,8 @@ def rooms(case: Case) -> Array:
 
 
 def answer(case: Case, drive: Array, room: Array, rate: float) -> Array:
-    """What the plant answers to a drive in a room, a sample each, from rest at its first value."""
-    held = np.full(LENGTH, drive[0])  # whatever rings at the start has died out behind them
+    """Output of the plant for each sample of a drive, at a room temperature, from rest at the first value."""
+    held = np.full(LENGTH, drive[0])  # ringing at the start has decayed after these
     drive, room = np.concatenate([held, drive]), np.concatenate([np.full(LENGTH, room[0]), room])
     n = len(drive)
     before = np.geomspace(1e-4, 1.0, 50) * 5.0 * max(case.session.bench.long, n / rate)
@@ -158,7 +158,7 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
         outputs = np.concatenate([columns["y"] for columns in case.measured])
         drives = np.concatenate([columns["v"] for columns in case.measured])
         stand = case.session.bench
-        # a straight line at the ends of the drive: what rings goes farther, where no drive holds it
+        # a straight line at the ends of the drive: a ringing stage goes further, and no drive can hold it
         low, high = np.polyval(np.polyfit(drives, outputs, 1), [stand.low, stand.high]).tolist()
         low, high = low + INSIDE * (high - low), high - INSIDE * (high - low)
         u = reference(np.random.default_rng(seed), low, high)
@@ -190,7 +190,7 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
 
 
 def _aligned(number: int) -> int:
-    """A seed of the block of reports whose effect is the one counted: cases take effects in turn from 0 on."""
+    """The seed in the report block whose effect is number `number`: cases take effects in turn from seed 0 on."""
     return number - REPORT % len(catalogue())
 
 
@@ -208,7 +208,7 @@ def _tried(task: tuple[str, int]) -> Tracked | tuple[str, int, str]:
 
 
 def table(rows: Sequence[Tracked]) -> Iterator[str]:
-    """Plant by plant, then the medians of those named."""
+    """A row for each plant, then the medians of those whose effects were named."""
     yield f"{'effect':16} {'seed':>4} {'line':>7} {'plays':>7} {'whole':>7} {'ratio':>6} {'held out':>8}  found"
     for row in rows:
         mark = " " if row.named else "*"
@@ -228,7 +228,7 @@ def table(rows: Sequence[Tracked]) -> Iterator[str]:
 
 
 def main(effects: Sequence[str], seeds: range, jobs: int) -> int:
-    """Print the table; 1 where a plant failed."""
+    """Print the table. Returns 1 if a plant failed."""
     tasks = [(effect, seed) for effect in effects or EFFECTS for seed in seeds]
     rows, failed = [], []
     with ProcessPoolExecutor(jobs) as pool:

@@ -32,7 +32,7 @@ class Effect:
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What an effect may look at: fine time and steps [s], drive [input], temperature [degC], the bench.
+    """Inputs of an effect: fine time and steps [s], drive [input], temperature [degC], the bench.
 
     Strengths of what adds up refer to the end of a session: of `first`, where the plant has been in another one before.
     """
@@ -54,8 +54,8 @@ Draw = Callable[[np.random.Generator, Bench], Effect]
 
 @dataclass(frozen=True)
 class Kind:
-    """How an effect is drawn, the `benches` that can show it, and its `family`: a pair takes no two of one family,
-    because they look alike."""
+    """How an effect is drawn, the `benches` that can show it, and its `family`: two of one family look alike and never
+    make a pair."""
 
     draw: Draw
     benches: tuple[str, ...]

@@ -29,7 +29,7 @@ def delay(effect: Effect, x: Array, around: Surroundings) -> Array:
 
 
 def draw_slew(rng: np.random.Generator, bench: Bench) -> Effect:
-    # At strength 1 a full-scale move takes this many samples; edges of steps are made in three to eight
+    # at strength 1 a full-scale move takes this many samples; edges of steps take three to eight
     samples = between(rng, 15.0, 60.0)
     rate = bench.span * bench.rates[1] / samples
     return Effect("slew_limit", "current", 1.0, values(rising=rate, falling=rate * rng.uniform(0.7, 1.4)))
@@ -114,7 +114,7 @@ def draw_saturation(rng: np.random.Generator, bench: Bench) -> Effect:
 
 
 def saturation(effect: Effect, x: Array, around: Surroundings) -> Array:
-    """In front of the hysteresis; `stops` act behind it."""
+    """Rails in front of the hysteresis; `stops` act behind it."""
     if effect.form == "stops" or effect.strength <= 0.0:
         return x
     bench = around.bench

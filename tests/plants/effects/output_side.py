@@ -85,7 +85,7 @@ def stops(effect: Effect, y: Array, around: Surroundings) -> Array:
 
 
 def _taken(beyond: Array, depth: float, give: float) -> Array:
-    """Travel that a stop takes from a stage that would go so far beyond it: of `depth` all but the share `give`.
+    """Travel that a stop takes from a stage that would go `beyond` it: at `depth`, all but the share `give`.
 
     The force on a ball grows like its indentation to the power 3/2 and is that of the stage's stiffness on the travel
     taken; solved by bisection.
