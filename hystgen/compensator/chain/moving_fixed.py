@@ -9,9 +9,6 @@ from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import LARGEST_LEVEL, LEVEL_DROP, ChainTables
 from hystgen.compensator.chain.moving import (
-    DASHPOT,
-    DILATED,
-    RELAXING,
     STRAIGHT,
     YIELD_BEGIN,
     YIELD_C3,
@@ -31,7 +28,8 @@ from hystgen.plays.slots import Reals
 
 @jit
 def yields(t: FixedMovingTables, x: Any) -> Any:
-    """What a play that is stretched by x, not negative, gains of it in a step, with bits below a step of the input."""
+    """The part of a stretch x >= 0 that a play with a nonlinear dashpot gains in a step, with bits below a step of the
+    input."""
     inside = t.stretch if x > t.stretch else x
     low = 0
     high = len(t.yields)
@@ -51,58 +49,27 @@ def yields(t: FixedMovingTables, x: Any) -> Any:
 
 
 @jit
-def change(t: FixedMovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
-    """How far play i with a nonlinear dashpot moves while the input of the plays goes to w, as a yield."""
-    x = s.play[0] + times(w - s.play[0], t.seen[0], t.seen[1]) - s.play[i]
-    gained = x - x
-    if x > r[i]:
-        gained = yields(t, x - r[i])
-    elif x < -r[i]:
-        gained = -yields(t, -x - r[i])
-    return gained + lost[i]
+def seen(t: FixedMovingTables, way: Any) -> Any:
+    """How far into the step `way` the input counts as standing still."""
+    return times(way, t.seen[0], t.seen[1])
 
 
 @jit
-def moved(t: FixedMovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
-    """Play i once the input of the plays has gone to w."""
-    q = s.play[i]
-    if t.moves == DASHPOT:
-        return q + nearest(change(t, r, i, s, lost, w), t.yield_bits)
-    if t.moves == RELAXING:
-        return q + times(stretch(w - q, r[i]), t.first[i, 0], t.first[i, 1])
-    threshold = r[i]
-    if t.moves == DILATED:
-        before = s.play[0]
-        way = w - before if w > before else before - w
-        threshold = r[i] + times(way, t.first[i, 0], t.first[i, 1])
-    low = w - threshold
-    high = w + threshold
-    upper = high if q > high else q
-    return low if upper < low else upper
+def moved_by(t: FixedMovingTables, gained: Any) -> Any:
+    """The move of a play for a yield."""
+    return nearest(gained, t.yield_bits)
 
 
 @jit
-def left(t: FixedMovingTables, r: Reals, i: int, z: Any, w: Any) -> Any:
-    """Where play i comes to rest from z with its input held at w, as far as one more step goes."""
-    if t.moves == RELAXING:
-        return z + times(stretch(w - z, r[i]), t.second[i, 0], t.second[i, 1])
-    return z
+def yield_of(t: FixedMovingTables, moved: Any) -> Any:
+    """The yield that the move of a play stands for."""
+    return moved << t.yield_bits
 
 
 @jit
-def keep(t: FixedMovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any, z: Any) -> None:
-    """Play i has moved, and comes to rest at z, while the input of the plays goes to w."""
-    if t.moves == DASHPOT:
-        lost[i] = change(t, r, i, s, lost, w) - ((z - s.play[i]) << t.yield_bits)
-    s.play[i] = z
-
-
-@jit
-def put(t: FixedMovingTables, r: Reals, i: int, s: State, lost: Reals, z: Any) -> None:
-    """Play i rests at z."""
-    if t.moves == DASHPOT:
-        lost[i] = r[0]
-    s.play[i] = z
+def share_of(factors: Reals, i: int, x: Any) -> Any:
+    """x times the factor of play i."""
+    return times(x, factors[i, 0], factors[i, 1])
 
 
 @jit
@@ -116,8 +83,8 @@ def bent(t: FixedMovingTables, plays: Any, i: int, z: Any) -> Any:  # noqa: ARG0
 
 @jit
 def relaxing_follow(t: FixedMovingTables, plays: Any, s: State, w: Any) -> Any:
-    """Viscous plays of one time constant follow their input w; their sum. They stay as near to each other as they are
-    to be, give or take no rounding."""
+    """Viscous plays with one time constant follow their input w. Returns their sum. Each rests at most as far from the
+    play before as their thresholds are from each other, in spite of rounding."""
     r, p = plays.threshold, plays.weight
     total = p[0] * w
     for i in range(1, len(r)):
@@ -137,19 +104,19 @@ def relaxing_follow(t: FixedMovingTables, plays: Any, s: State, w: Any) -> Any:
 
 @jit
 def relaxing_input(t: FixedMovingTables, plays: Any, s: State, h: Any) -> Any:  # noqa: ARG001  as in floating point
-    """Input of viscous plays at which their sum is h: none is stretched where play 1 rests, and from there on they are
-    solved for like others, with smaller slopes."""
+    """Input of viscous plays at which their sum is h: none is stretched with the input where play 1 rests; beyond it
+    they are solved for like plain ones, with smaller slopes."""
     s.play[0] = s.play[1]
     return loop_solve(t.relaxed, s, h)
 
 
 def search(sum_at: Callable[..., Any]) -> Callable[..., Any]:
-    """`search_fixed.c`, with what the plays give at an input."""
+    """`search_fixed.c`, from the function that gives the sum of the plays at an input."""
 
     @jit
     def searched(t: ChainTables, s: ChainState, h: Any) -> Any:
-        """Input of the plays at which their sum is h, by halves between where it is and the farthest: the nearer of
-        two neighbours."""
+        """Input of the plays at which their sum is h, by bisection between the present input and the farthest one: the
+        nearer of two neighbours."""
         here = s.plays.play[0]
         total = sum_at(t, s, here)
         if total == h:
@@ -169,13 +136,13 @@ def search(sum_at: Callable[..., Any]) -> Callable[..., Any]:
 
 @jit
 def level(t: ChainTables, total: Any) -> Any:
-    """A sum of the plays, which has bits below those of a signal, as one."""
+    """A sum of the plays, which has bits below those of a signal, as a signal."""
     return nearest(total, t.number[LEVEL_DROP])
 
 
 @jit
 def asked(t: ChainTables, h: Any) -> Any:
-    """The sum that a signal asks of the plays, kept to what they can give."""
+    """The sum of the plays that a signal asks for, limited to what they can give."""
     inside = h
     if inside > t.number[LARGEST_LEVEL]:
         inside = t.number[LARGEST_LEVEL]
@@ -185,5 +152,8 @@ def asked(t: ChainTables, h: Any) -> Any:
 
 
 PLAYS = operators(
-    Kind(level, asked, loop_solve, relaxing_follow, relaxing_input, moved, left, keep, put, bent, search)
-)
+    Kind(
+        level, asked, loop_solve, relaxing_follow, relaxing_input, share_of, yields, seen, moved_by, yield_of, bent,
+        search,
+    )
+)  # fmt: skip

@@ -10,8 +10,6 @@ from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.moving import (
     BUMP,
     CENTRE,
-    DASHPOT,
-    DILATED,
     HALF,
     INVERSE_SCALE,
     INVERSE_WIDTH,
@@ -19,7 +17,6 @@ from hystgen.compensator.chain.moving import (
     LEAST_INPUT,
     MIDDLE,
     POLYNOMIAL,
-    RELAXING,
     SCALE,
     SEEN,
     TANH_CENTRE,
@@ -35,7 +32,7 @@ from hystgen.plays.slots import Reals
 
 @jit
 def yields(t: MovingTables, x: Any) -> Any:
-    """What a play that is stretched by x, not negative, gains of it in a step."""
+    """The part of a stretch x >= 0 that a play with a nonlinear dashpot gains in a step."""
     low = 0
     high = len(t.yields)
     while high - low > 1:
@@ -48,59 +45,22 @@ def yields(t: MovingTables, x: Any) -> Any:
     return ((t.yields[low, 4] * on + t.yields[low, 3]) * on + t.yields[low, 2]) * on + t.yields[low, 1]
 
 
-@jit
-def change(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
-    """How far play i with a nonlinear dashpot moves while the input of the plays goes to w."""
-    x = s.play[0] + (w - s.play[0]) * t.number[SEEN] - s.play[i]
-    gained = r[0]
-    if x > r[i]:
-        gained = yields(t, x - r[i])
-    elif x < -r[i]:
-        gained = -yields(t, -x - r[i])
-    return gained + lost[i]
+@jit(inline=True)
+def seen(t: MovingTables, way: Any) -> Any:
+    """How far into the step `way` the input counts as standing still."""
+    return way * t.number[SEEN]
 
 
-@jit
-def moved(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
-    """Play i once the input of the plays has gone to w."""
-    q = s.play[i]
-    if t.moves == DASHPOT:
-        return q + change(t, r, i, s, lost, w)
-    if t.moves == RELAXING:
-        return q + t.first[i] * stretch(w - q, r[i])
-    threshold = r[i]
-    if t.moves == DILATED:
-        before = s.play[0]
-        way = w - before if w > before else before - w
-        threshold = r[i] + t.first[i] * way
-    low = w - threshold
-    high = w + threshold
-    upper = high if q > high else q
-    return low if upper < low else upper
+@jit(inline=True)
+def unchanged(t: MovingTables, x: Any) -> Any:  # noqa: ARG001  as in fixed point
+    """The move of a play for a yield, and the reverse."""
+    return x
 
 
-@jit
-def left(t: MovingTables, r: Reals, i: int, z: Any, w: Any) -> Any:
-    """Where play i comes to rest from z with its input held at w, as far as one more step goes."""
-    if t.moves == RELAXING:
-        return z + t.second[i] * stretch(w - z, r[i])
-    return z
-
-
-@jit
-def keep(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, w: Any, z: Any) -> None:
-    """Play i has moved, and comes to rest at z, while the input of the plays goes to w."""
-    if t.moves == DASHPOT:
-        lost[i] = change(t, r, i, s, lost, w) - (z - s.play[i])
-    s.play[i] = z
-
-
-@jit
-def put(t: MovingTables, r: Reals, i: int, s: State, lost: Reals, z: Any) -> None:
-    """Play i rests at z."""
-    if t.moves == DASHPOT:
-        lost[i] = r[0]
-    s.play[i] = z
+@jit(inline=True)
+def share_of(factors: Reals, i: int, x: Any) -> Any:
+    """x times the factor of play i."""
+    return factors[i] * x
 
 
 @jit
@@ -120,7 +80,7 @@ def bent(t: MovingTables, plays: Any, i: int, z: Any) -> Any:
 
 @jit
 def relaxing_follow(t: MovingTables, plays: Any, s: State, w: Any) -> Any:
-    """Viscous plays of one time constant follow their input w; their sum."""
+    """Viscous plays with one time constant follow their input w. Returns their sum."""
     r, p = plays.threshold, plays.weight
     total = p[0] * w
     for i in range(1, len(r)):
@@ -133,7 +93,8 @@ def relaxing_follow(t: MovingTables, plays: Any, s: State, w: Any) -> Any:
 
 @jit
 def relaxing_input(t: MovingTables, plays: Any, s: State, h: Any) -> Any:
-    """Input of viscous plays at which their sum is h: of none at first, then of those stretched on the way there."""
+    """Input of viscous plays at which their sum is h: first without a stretched play, then with those stretched on the
+    way there."""
     r, p = plays.threshold, plays.weight
     rest = r[0]
     for i in range(1, len(r)):
@@ -153,11 +114,11 @@ def relaxing_input(t: MovingTables, plays: Any, s: State, h: Any) -> Any:
 
 
 def search(sum_at: Callable[..., Any]) -> Callable[..., Any]:
-    """`search_float.c`, with what the plays give at an input."""
+    """`search_float.c`, from the function that gives the sum of the plays at an input."""
 
     @jit
     def searched(t: ChainTables, s: ChainState, h: Any) -> Any:
-        """Input of the plays at which their sum is h, by halves between where it is and the farthest."""
+        """Input of the plays at which their sum is h, by bisection between the present input and the farthest one."""
         number = t.moving.number
         here = s.plays.play[0]
         total = sum_at(t, s, here)
@@ -183,5 +144,8 @@ def same(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in fixed point
 
 
 PLAYS = operators(
-    Kind(same, same, loop_solve, relaxing_follow, relaxing_input, moved, left, keep, put, bent, search)
-)
+    Kind(
+        same, same, loop_solve, relaxing_follow, relaxing_input, share_of, yields, seen, unchanged, unchanged, bent,
+        search,
+    )
+)  # fmt: skip

@@ -1,4 +1,4 @@
-"""Operators of plays in any arithmetic: `c_runtime/chain_plays.c`, `chain_relaxing.c` and `chain_moving.c`."""
+"""Operators of plays in any arithmetic: `chain_plays.c`, `chain_relaxing.c`, `chain_moving.c` and `moved_*.c`."""
 
 from __future__ import annotations
 
@@ -7,37 +7,97 @@ from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import ChainTables
-from hystgen.compensator.chain.moving import PLAIN, STRAIGHT
+from hystgen.compensator.chain.moving import DASHPOT, DILATED, PLAIN, RELAXING, STRAIGHT, stretch
 from hystgen.compensator.chain.step import MOVING, ChainState
 from hystgen.plays.loop import State, loop_absorb, loop_output
-from hystgen.plays.slots import Reals
+from hystgen.plays.slots import Reals, zero
 
 Function = Callable[..., Any]
 
 
 class Kind(NamedTuple):
-    """What plays do in one arithmetic; `m` are the `moving` tables, `plays` those of plain plays."""
+    """The parts in which arithmetics differ; `m` are the `moving` tables, `plays` those of plain plays."""
 
-    level: Function  # of chain tables and a sum: that as a signal
-    asked: Function  # of chain tables and a signal: the sum that it asks of the plays
+    level: Function  # of chain tables and a sum: the sum as a signal
+    asked: Function  # of chain tables and a signal: the sum of the plays that it asks for
     solve: Function  # of plays, state and a sum: as engine loop
     relaxing_follow: Function  # of m, plays, state and w
     relaxing_input: Function  # of m, plays, state and a sum
-    moved: Function  # of m, r, i, state, lost and w
-    left: Function  # of m, r, i, z and w
-    keep: Function  # of m, r, i, state, lost, w and z
-    put: Function  # of m, r, i, state, lost and z
+    share_of: Function  # of factors, i and x: x times factor i
+    yields: Function  # of m and a stretch, not negative: its yield in a step
+    seen: Function  # of m and a way: how far into it the input counts as standing still
+    moved_by: Function  # of m and a yield: the move of a play
+    yield_of: Function  # of m and the move of a play: the yield
     bent: Function  # of m, plays, i and z
     search: Callable[[Function], Function]  # of a function that gives the sum at an input: that finds the input
 
 
+def movement(kind: Kind) -> tuple[Function, Function, Function, Function]:
+    """`moved`, `left`, `keep` and `put` of single plays, as in `c_runtime/moved_*.c`."""
+    share_of, yields, seen, moved_by, yield_of = kind.share_of, kind.yields, kind.seen, kind.moved_by, kind.yield_of
+
+    @jit
+    def change(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
+        """How far play i with a nonlinear dashpot moves while the input of the plays goes to w, as a yield."""
+        x = s.play[0] + seen(m, w - s.play[0]) - s.play[i]
+        gained = zero(x)
+        if x > r[i]:
+            gained = yields(m, x - r[i])
+        elif x < -r[i]:
+            gained = -yields(m, -x - r[i])
+        return gained + lost[i]
+
+    @jit
+    def moved(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
+        """Play i after the input of the plays has gone to w."""
+        q = s.play[i]
+        if m.moves == DASHPOT:
+            return q + moved_by(m, change(m, r, i, s, lost, w))
+        if m.moves == RELAXING:
+            return q + share_of(m.first, i, stretch(w - q, r[i]))
+        threshold = r[i]
+        if m.moves == DILATED:
+            before = s.play[0]
+            way = w - before if w > before else before - w
+            threshold = r[i] + share_of(m.first, i, way)
+        low = w - threshold
+        high = w + threshold
+        upper = high if q > high else q
+        return low if upper < low else upper
+
+    @jit
+    def left(m: Any, r: Reals, i: int, z: Any, w: Any) -> Any:
+        """Where play i, now at z, would come to rest with its input held at w, as seen one step later."""
+        if m.moves == RELAXING:
+            return z + share_of(m.second, i, stretch(w - z, r[i]))
+        return z
+
+    @jit
+    def keep(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any, z: Any) -> None:
+        """Play i moves while the input of the plays goes to w, and comes to rest at z."""
+        if m.moves == DASHPOT:
+            lost[i] = change(m, r, i, s, lost, w) - yield_of(m, z - s.play[i])
+        s.play[i] = z
+
+    @jit
+    def put(m: Any, i: int, s: State, lost: Reals, z: Any) -> None:
+        """Play i rests at z."""
+        if m.moves == DASHPOT:
+            lost[i] = zero(lost[i])
+        s.play[i] = z
+
+    return moved, left, keep, put
+
+
 def operators(kind: Kind) -> tuple[Function, Function, Function]:
-    """`follow`, `started` and `inverse_input` of models with effects, of their tables, their state and a number."""
-    level, asked, solve, relaxing_follow, relaxing_input, moved, left, keep, put, bent, search = kind
+    """`follow`, `started` and `inverse_input` of models with effects, as functions of tables, state and a number."""
+    level, asked, solve, bent = kind.level, kind.asked, kind.solve, kind.bent
+    relaxing_follow, relaxing_input = kind.relaxing_follow, kind.relaxing_input
+    moved, left, keep, put = movement(kind)
 
     @jit
     def moved_sum(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
-        """What the plays give once their input has gone to w."""
+        """The sum of the plays after their input has gone to w."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         for i in range(1, len(r)):
@@ -47,7 +107,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function]:
 
     @jit
     def moved_follow(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
-        """The plays follow their input w; their sum."""
+        """The plays follow their input w. Returns their sum."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         for i in range(1, len(r)):
@@ -70,7 +130,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function]:
 
     @jit
     def resting_sum(m: Any, plays: Any, s: State, w: Any) -> Any:
-        """What rest at an input w gives."""
+        """The sum of the plays if they came to rest with their input at w."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         for i in range(1, len(r)):
@@ -79,11 +139,11 @@ def operators(kind: Kind) -> tuple[Function, Function, Function]:
 
     @jit
     def moved_rest(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
-        """The plays at rest with their input at w; their sum."""
+        """The plays come to rest with their input at w. Returns their sum."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         for i in range(1, len(r)):
-            put(m, r, i, s, lost, resting(r, s, i, w))
+            put(m, i, s, lost, resting(r, s, i, w))
             values[i] = bent(m, plays, i, s.play[i])
             total = total + p[i] * values[i]
         s.play[0] = w
@@ -91,16 +151,16 @@ def operators(kind: Kind) -> tuple[Function, Function, Function]:
 
     @jit
     def sum_at(t: ChainTables, s: ChainState, w: Any) -> Any:
-        """What the plays give with their input at w."""
+        """Sum of the plays with their input at w."""
         if s.flags[MOVING]:
             return moved_sum(t.moving, t.plays, s.plays, s.lost, s.bent, w)
         return resting_sum(t.moving, t.plays, s.plays, w)
 
-    searched = search(sum_at)
+    searched = kind.search(sum_at)
 
     @jit
     def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
-        """The plays follow their input w; their sum."""
+        """The plays follow their input w. Returns their sum."""
         m = t.moving
         if m.moves == PLAIN and m.bends == STRAIGHT:
             loop_absorb(t.plays, s.plays, w)
@@ -116,7 +176,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function]:
 
     @jit
     def started(t: ChainTables, s: ChainState) -> Any:
-        """The sum of the plays as they are set."""
+        """Sum of the plays in the start memory."""
         m = t.moving
         if m.scanned or (m.moves == PLAIN and m.bends == STRAIGHT):
             return level(t, loop_output(t.plays, s.plays))
