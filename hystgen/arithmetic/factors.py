@@ -17,6 +17,11 @@ LARGEST = 2**51
 STATE_BITS = 60
 """Bits of a state without its sign, of which a product takes 50: ten are left out, and no rate outgrows a factor."""
 
+GUARD = 3
+"""Bits of a state below those with which its roundings add up to the last bit of a signal: an eighth of that bit is
+left, and a slow state stalls in a dead band of at most 1/16 of it. Held by `test_slow_states_neither_stall_nor_drift`,
+and for effects of the user's own by `test_fixed_point_stays_within_its_bounds`."""
+
 MANTISSA_BITS, LEAST_SHIFT, MOST_SHIFT = 31, LOW_BITS + 1, LOW_BITS + 62
 """Bits of a mantissa without its sign, and shifts: a product drops at least a bit, to be rounded, and at most 62."""
 

@@ -14,15 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic.factors import LARGEST, STATE_BITS, error, factor, lifted, times
+from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, error, factor, lifted, times
 from hystgen.basics.jit import jit
 from hystgen.compensator.chain.own import Linear, OwnTables
 from hystgen.plays.fixed import nearest
-
-GUARD = 3
-"""Bits of a signal beyond those that keep the roundings of a block's states below the chain's last bit. If there is
-room for them, an eighth of that bit is left, beside the half by rounding the output. Held by
-`test_fixed_point_stays_within_its_bounds`."""
 
 MANTISSA, SHIFT, DROP, LIFT = range(4)
 

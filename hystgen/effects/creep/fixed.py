@@ -14,17 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic.factors import LARGEST, STATE_BITS, factor, lifted, times
+from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.basics.jit import jit
 from hystgen.effects.creep import compensator as floating
 from hystgen.effects.creep.compensator import AHEAD, BEFORE, HIGH, CreepNumbers, CreepState, CreepTables
 from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import zero
-
-GUARD = 3
-"""Bits of a state below the last one in which it stalls: a dead band of at most 1/16 of a signal's last bit."""
-
 
 KIND = Kind(
     "creep", rows=Rows("term", letters="fffb", memory="w"), counts=("n",), letters="fffbb", memory="ww",

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic.factors import LARGEST, STATE_BITS, factor, times
+from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag import compensator as floating
@@ -21,12 +21,8 @@ from hystgen.effects.lag.compensator import LagTables
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
-GUARD = 3
-"""Bits of a state below the last one in which it stalls."""
-
 EXACT_BITS = 8
-"""The same of a lag that is inverted exactly, which no rounding can hold up."""
-
+"""Bits of the state of a lag that is inverted exactly, which no rounding can stall."""
 
 KIND = Kind("lag", own=("rest", "solve", "absorb"), letters="fffbb", memory="wwww")
 EXACT_KIND = Kind("lag_exact", own=("rest", "solve", "absorb"), letters="fffbb", memory="ww")
