@@ -86,7 +86,7 @@ def newton() -> None:
 
 
 def decades() -> None:
-    """The table of a logarithmic gain that loses 5 % a decade: pieces, bytes in float32, the gain at its end."""
+    """The table of a logarithmic gain that loses 5 % per decade: pieces, bytes in float32, the gain at its end."""
     print("decades: decades, pieces, bytes, gain at the end")
     effect = LogarithmicAgeing(name="ageing", loss=0.05, travel=1.0)
     whole = ageing.pieces(effect)

@@ -307,7 +307,7 @@ class Model:
         }
         for name, values in (("v", drive), ("t", times), *columns.items()):
             if values.ndim != 1 or len(values) != len(drive) or not np.all(np.isfinite(values)):
-                raise EffectsError(f"{name} has to be {len(drive)} finite numbers, one a sample of v")
+                raise EffectsError(f"{name} has to be {len(drive)} finite numbers, one per sample of v")
         if np.any(np.diff(times) <= 0.0):
             raise EffectsError("t has to rise from sample to sample")
         return Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)

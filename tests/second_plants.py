@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 LOW, HIGH = 0.0, 100.0
 FINER = 4
-"""Fine steps a sample."""
+"""Fine steps per sample."""
 
 NOISE = 4e-4
 """rms noise as a share of the output range."""
@@ -380,7 +380,7 @@ FOREIGN = {each.__name__: each for each in (other_axis, room, changing_weights, 
 
 
 def unabsorbed(y: Sequence[Array], v: Sequence[Array]) -> float:
-    """rms that plays with weights of any sign and an offset a record leave: a plain linear fit behind the first move.
+    """rms that plays with weights of any sign and an offset per record leave: a plain linear fit behind the first move.
 
     Of all records together; plays over thresholds up to half the range.
     """

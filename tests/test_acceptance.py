@@ -624,7 +624,7 @@ class TestNoiseFloor:
     @pytest.mark.parametrize(
         ("b", "a", "samples", "rings"),
         [
-            (0.49, 2.0 * 0.7 * np.cos(0.32), 4000, False),  # decays by 0.7 a sample
+            (0.49, 2.0 * 0.7 * np.cos(0.32), 4000, False),  # decays by 0.7 per sample
             (0.95**2, 2.0 * 0.95 * np.cos(0.32), 4000, True),
             (0.846, 0.0, 20_000, True),  # 0.28 of the variance is not predicted
             (0.825, 0.0, 20_000, False),  # 0.32

@@ -622,7 +622,7 @@ def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
         emit_options(model("creeping", text))
     with pytest.raises(UnsupportedEffectsError, match=r"of the 62010 codes .* moves the drive by 5.3 % of its range"):
         emit_options(model("straight"), arithmetic="q15")
-    with pytest.raises(FormatError, match=r"slew_limit: 0\.819 drive codes a sample are less than one"):
+    with pytest.raises(FormatError, match=r"slew_limit: 0\.819 drive codes per sample are less than one"):
         compiled(model("slow", chain("slow", "name: slew_limit, rate: 0.1")), "q15")
     with pytest.raises(FormatError, match="creep: states and constants do not fit q31"):
         compiled(model("slow", chain("slow", "name: creep, time_constants: [1.0e+7], weights: [9.0]")), "q31")

@@ -116,7 +116,7 @@ def test_a_lag_leaves_its_share_of_the_second_difference() -> None:
 
 
 def _lagged(v: Array, tau: float) -> Array:
-    """`tau a' + a = v` for straight v, by 200 small steps a sample."""
+    """`tau a' + a = v` for straight v, by 200 small steps per sample."""
     a, out = v[0], [v[0]]
     for before, after in itertools.pairwise(v):
         for k in range(200):

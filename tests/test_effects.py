@@ -260,7 +260,7 @@ def test_candidates_build_effects_over_all_their_bounds(effect: Effect) -> None:
 
 
 def test_what_no_record_shows_ringing_is_no_resonance() -> None:
-    """Less than three samples a period, or no peak: in the records that is a delay or a lag."""
+    """Less than three samples per period, or no peak: in the records that is a delay or a lag."""
     about = About((0.0, 1.0), 10.0, 1e-3, 1.0, 1.0, 5.0, 3.0, (0.0,), ringing=(200.0, 450.0))
     for candidate in effects.shapes("resonance")[0].candidates(about):
         fastest = candidate.build(candidate.high)

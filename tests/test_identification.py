@@ -171,7 +171,7 @@ class TestMeasured:
 
 
 def centred_system(parts: Sequence[tuple[Array, Array]], thresholds: Sequence[float]) -> tuple[Array, Array]:
-    """Plays and outputs of several pieces, the mean of each piece taken out: a free offset a piece."""
+    """Plays and outputs of several pieces, the mean of each piece taken out: a free offset per piece."""
     a = np.concatenate([plays - plays.mean(axis=0) for plays, _ in parts])
     b = np.concatenate([y - y.mean() for _, y in parts])
     assert a.shape == (len(b), len(thresholds))

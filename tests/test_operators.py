@@ -33,7 +33,7 @@ def brute_play(v: list[float], r: float, start: float) -> list[float]:
 
 
 def stop_roundings(v: ArrayLike, r: float) -> NDArray[np.float64]:
-    """Two sums a sample, of a state up to r, the sample and the one before; clipping lets them add up as they are."""
+    """Two sums per sample, of a state up to r, the sample and the one before; clipping lets them add up as they are."""
     size = np.abs(v)
     return np.asarray(U * np.cumsum(2 * r + 2 * size + np.concatenate([[0.0], size[:-1]])))
 

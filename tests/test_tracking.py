@@ -30,7 +30,7 @@ model:
 
 
 def recorded(noise: float = 1e-3) -> Record:
-    """Stops instead of plays, and springs with dampers stepped ten times a sample: none of the package's code."""
+    """Stops instead of plays, and springs with dampers stepped ten times per sample: none of the package's code."""
     rng = np.random.default_rng(4)
     turns = np.concatenate([[0.0, 100.0, 0.0], rng.uniform(0.0, 100.0, 40)])
     v = np.interp(np.linspace(0, len(turns) - 1, 4000), np.arange(len(turns)), turns)

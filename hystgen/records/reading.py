@@ -455,7 +455,7 @@ LARGEST = 1e20
 
 Instruments write 9.9E37 for an overload and 9.91E37 for no number at all (SCPI-99, volume 1, section 7.2.1.4 and 5),
 others the largest float32 or 1e30; counters end at 1.8e19. Parameter files end at 1e30, and the rate of a drive, in
-units a second, may be 1e10 times the drive itself.
+units per second, may be 1e10 times the drive itself.
 """
 
 NINES = 3

@@ -355,7 +355,7 @@ class _Builder:
             return 0, 0
         whole = [math.floor(rate) for rate in self.rates()]
         if min(whole) < 1:
-            code = f"{float(min(self.rates())):.3g} drive codes a sample"
+            code = f"{float(min(self.rates())):.3g} drive codes per sample"
             self._refuse(f"slew_limit: {code} are less than one, too slow")
         return min(whole[0], span + 1), min(whole[1], span + 1)
 

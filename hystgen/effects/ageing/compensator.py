@@ -21,11 +21,11 @@ Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
 DECADES = 6
 """[decades of the longest travel] What the table of a gain covers; beyond it the gain keeps its last value. A travel of
 a few moves over the range is then covered for a million of them, in 65 pieces (1560 bytes in float32) where the gain
-falls by 5 % a decade; each decade costs 11 pieces. Set by: benchmarks/chosen_numbers.py decades."""
+falls by 5 % per decade; each decade costs 11 pieces. Set by: benchmarks/chosen_numbers.py decades."""
 
 TABLE_ERROR = 1e-6
 """[share of the output] A table differs from the gain by at most this, about the rounding of ten operations in float32.
-A piece of a logarithm of 5 % a decade then ends 1.23 times as far along as it begins: `0.05/2.3 * 6/384 * 0.23^4`. Set
+A piece of a logarithm of 5 % per decade then reaches 1.23 times as far as its begin: `0.05/2.3 * 6/384 * 0.23^4`. Set
 by: benchmarks/chosen_numbers.py decades."""
 
 

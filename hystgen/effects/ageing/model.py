@@ -49,8 +49,8 @@ class LogarithmicAgeing(_Ageing):
     The logarithmic law of depolarisation, which data sheets quote per decade, over travel instead of time.
     """
 
-    shape: Literal["logarithmic"] = Field(default="logarithmic", description="loss a decade of travel")
-    loss: Number = Field(description="share lost a decade of travel", examples=[0.01])
+    shape: Literal["logarithmic"] = Field(default="logarithmic", description="loss per decade of travel")
+    loss: Number = Field(description="share lost per decade of travel", examples=[0.01])
     travel: Positive = Field(description="travel from which decades count, input units", examples=[1.0e4])
 
     def gain(self, run: Run) -> Array:

@@ -152,7 +152,7 @@ class LogarithmicCreep(_Creep):
     """
 
     shape: Literal["logarithmic"] = Field(description="a spectrum of states, even over log t")
-    per_decade: NotNegative = Field(description="g, share of the play sum a decade of time", examples=[0.015])
+    per_decade: NotNegative = Field(description="g, share of the play sum per decade of time", examples=[0.015])
     t0: Positive = Field(default=0.1, description="s after a step at which it has its full height")
     t_min: Positive = Field(default=1e-3, description="shortest time constant, s")
     t_max: Positive = Field(default=1e3, description="longest time constant, s")

@@ -115,10 +115,11 @@ class Resonance(Effect):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Frequency from two periods a record to three samples a period, damping 0.3 % to 70 %; starts all over log f.
+        """Frequency from two periods per record to three samples per period, damping from 0.3 % to 70 %.
 
-        What is faster is not seen to ring, nor what is damped more: in the records it is a delay or a lag. A light
-        damping rings long, and is found from the frequency at which the error so far rings alone.
+        Starts are spread evenly over log f. What is faster or damped more is not seen to ring: in the records it is a
+        delay or a lag. A light damping rings long, and is found from the frequency at which the error so far rings
+        alone.
         """
         low, fastest = np.log10(2.0 / about.duration), np.log10(1.0 / about.sample_time)
         high = max(fastest - np.log10(3.0), low)
