@@ -41,7 +41,7 @@ class FixedPlayTables(PlayTables, Protocol):
 
 @jit
 def nearest(x: Any, bits: Any) -> Any:
-    """x / 2^bits to the nearest whole number, ties away from zero."""
+    """x / 2^bits to the nearest integer, ties away from zero."""
     if bits == 0:
         return x
     half = 1 << (bits - 1)
@@ -64,7 +64,7 @@ def code(t: FixedPlayTables, total: Any) -> tuple[Any, int]:
 
 @jit
 def over_slope(t: FixedPlayTables, d: Any, k: int) -> Any:
-    """d / slope[k] to the nearest whole number, d not negative."""
+    """d / slope[k] to the nearest integer, d >= 0."""
     r = t.reciprocal[k]
     shift = t.shift[k]
     quotient = (d >> 32) * r + (((d & 0xFFFFFFFF) * r) >> 32)
@@ -73,7 +73,7 @@ def over_slope(t: FixedPlayTables, d: Any, k: int) -> Any:
 
 @jit
 def going(t: FixedPlayTables, w: Any, d: Any, k: int, rising: int) -> Any:
-    """Input of the plays that is d further on in output than w, kept near the range of the plays' input."""
+    """The input of the plays whose output is d further than that of w, at most a little outside their range."""
     step = over_slope(t, d, k)
     if rising:
         most = t.limits[PLAY_MAX] + t.limits[MARGIN]
@@ -88,7 +88,7 @@ def going(t: FixedPlayTables, w: Any, d: Any, k: int, rising: int) -> Any:
 
 @jit
 def loop_solve(t: FixedPlayTables, s: State, output: Any) -> Any:
-    """Input of the plays that gives `output`, taking along the plays one by one."""
+    """Input of the plays that gives `output`: on the way there, one play after another begins to follow."""
     here = loop_output(t, s)
     w = s.play[0]
     if output == here:

@@ -96,7 +96,8 @@ def loop_output(t: PlayTables, s: State) -> Any:
 
 @jit
 def loop_solve(t: LoopTables, s: State, output: Any) -> Any:
-    """Input of the plays that gives `output`, letting go of the largest thresholds one by one."""
+    """Input of the plays that gives `output`: assumes that every play follows, then drops the largest thresholds one by
+    one until the solution reaches the last play that is left."""
     rising = output >= loop_output(t, s)
     tail = t.limits[ZERO]
     next_follows = t.limits[ZERO]

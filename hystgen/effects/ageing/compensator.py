@@ -30,7 +30,7 @@ by: benchmarks/chosen_numbers.py decades."""
 
 
 def gain(effect: Ageing, travelled: float) -> float:
-    """The gain after that distance, input units."""
+    """The gain after a travel, input units."""
     if isinstance(effect, LogarithmicAgeing):
         return 1.0 - effect.loss * math.log10(1.0 + min(travelled / effect.travel, 1e300))
     if isinstance(effect, ExponentialAgeing):
@@ -102,7 +102,7 @@ def problems(effect: Ageing, span: float) -> Iterator[str]:
 
 
 def turns(effect: Ageing, span: float, roundoff: float) -> int:
-    """Steps of Newton's after which the reciprocal of the gain is as good as its rounding."""
+    """Newton steps after which the reciprocal of the gain is exact up to rounding."""
     left = max(most_at_once(effect, span), 1e-9)
     return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
 
@@ -146,7 +146,7 @@ class AgeingState(NamedTuple):
 
 @jit
 def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
-    """The gain after a travel, from the piece that it lies in."""
+    """The gain at a travel; past the last piece it stays constant."""
     low = t.first[j]
     high = t.first[j + 1]
     while high - low > 1:
@@ -163,7 +163,7 @@ def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
 
 @jit
 def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> bool:
-    """The travel from the next step on; whether it had to be limited."""
+    """Set the travel. Returns whether it had to be limited."""
     inside = travel
     if inside < zero(t.number[j, ONE]):
         inside = zero(t.number[j, ONE])
@@ -179,7 +179,7 @@ def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> b
 
 @jit
 def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
-    """A gain in place of the travel's, from the next step on; whether it had to be limited."""
+    """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
     inside = gain
     if inside < t.number[j, LEAST]:
         inside = t.number[j, LEAST]

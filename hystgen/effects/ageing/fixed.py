@@ -39,8 +39,10 @@ def constants(t: AgeingTables) -> Iterator[Constants]:
 
 
 def tables(rows: list[tuple[Array, int]], lsb: float, bits: int) -> AgeingTables:
-    """Pieces and steps of Newton's of each ageing, for drive codes of `lsb`; `bits`: of a gain below a code that sets
-    it. Raises OverflowError."""
+    """Pieces of the gain and Newton steps of each ageing, for drive codes of `lsb`.
+
+    `bits`: of a gain below a code that sets it. Raises OverflowError.
+    """
     piece: list[list[int]] = []
     number: list[list[int]] = []
     first = [0]
@@ -73,7 +75,7 @@ BITS = 0
 
 @jit
 def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
-    """The gain after a travel, from the piece that it lies in; behind the last one it stays."""
+    """The gain at a travel; past the last piece it stays constant."""
     low = t.first[j]
     high = t.first[j + 1]
     while high - low > 1:
@@ -93,7 +95,7 @@ def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
 
 @jit
 def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> bool:
-    """The travel from the next step on; whether it had to be limited."""
+    """Set the travel. Returns whether it had to be limited."""
     inside = travel
     if inside < 0:
         inside = zero(travel)
@@ -108,7 +110,7 @@ def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> b
 
 @jit
 def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
-    """A gain in place of the travel's, from the next step on; whether it had to be limited."""
+    """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
     given = gain << t.number[j, BITS]
     inside = given
     if inside < LEAST:

@@ -100,7 +100,7 @@ class SeveralAgeing(_Ageing):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """One loss a travel."""
+        """One loss for each travel."""
         yield from not_as_many("losses", self.losses, "travels", self.travels)
 
     def gain(self, run: Run) -> Array:

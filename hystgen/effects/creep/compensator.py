@@ -134,7 +134,7 @@ class CreepState(NamedTuple):
 
 @jit
 def creep_rest(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
-    """Settle at the input x; the output."""
+    """Everything has settled at the input x. Returns the output."""
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
         state = t.term[i, WEIGHT] * x
@@ -160,7 +160,7 @@ def creep_solve(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:
 
 @jit
 def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
-    """The input is x at this sample; the output."""
+    """The input is x at this sample. Returns the output."""
     y = s.block[j, AHEAD] + t.block[j, SLOPE] * x
     before = s.block[j, BEFORE]
     ahead = zero(x)

@@ -73,7 +73,7 @@ RATE, LATE, WEIGHT, LIFT = 0, 2, 4, 6
 
 @jit
 def creep_rest(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
-    """Settle at the input x; the output."""
+    """Everything has settled at the input x. Returns the output."""
     total = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
         state = times(x, t.term[i, WEIGHT], t.term[i, WEIGHT + 1]) << t.block[j, BITS]
@@ -100,7 +100,7 @@ def creep_solve(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:
 
 @jit
 def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
-    """The input is x at this sample; the output."""
+    """The input is x at this sample. Returns the output."""
     change = x - s.block[j, BEFORE]
     direct = times(x, t.block[j, DIRECT], t.block[j, DIRECT + 1])
     total = zero(x)

@@ -97,7 +97,7 @@ class ExponentialCreep(_Creep):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """One weight a time constant."""
+        """One weight for each time constant."""
         yield from not_as_many("weights", self.weights, "time_constants", self.time_constants)
 
     def filtered(self, h: Array, run: Run) -> Array:

@@ -43,7 +43,7 @@ def numbers(seconds: float, step: float) -> tuple[float, int]:
 
 @jit
 def delay_rest(line: Waiting, v: Any) -> None:
-    """Settle at the drive v."""
+    """The drive has always been v."""
     for i in range(len(line.sample)):
         line.sample[i] = v
     line.oldest[0] = 0
@@ -51,7 +51,7 @@ def delay_rest(line: Waiting, v: Any) -> None:
 
 @jit
 def delay_next(line: Waiting) -> Any:
-    """The place behind that of the oldest sample."""
+    """The place after that of the oldest sample."""
     following = line.oldest[0] + 1
     return following if following < len(line.sample) else 0
 

@@ -36,7 +36,7 @@ def constants(t: Reals) -> list[Constants]:
 
 @jit
 def clock_start(s: Reals, j: int) -> None:
-    """The time is that of the drive absorbed last."""
+    """Start the clock at the drive absorbed last."""
     s[j, HIGH] = zero(s[j, HIGH])
     s[j, LOW] = zero(s[j, LOW])
 
@@ -54,7 +54,7 @@ def clock_tick(t: Reals, s: Reals, j: int) -> None:
 
 @jit
 def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
-    """The drift `ahead` samples ahead of the clock."""
+    """The drift `ahead` samples after the present one."""
     time = s[j, HIGH] * t[j, BLOCK] + (s[j, LOW] + ahead) * t[j, SAMPLE]
     drift = (t[j, RATE] + t[j, HALF_CHANGE] * time) * time
     if drift > t[j, FARTHEST]:

@@ -40,7 +40,7 @@ def numbers(
     effect: LinearDrift | CurvedDrift, step: float, signal: Fraction, farthest: float, ahead: int
 ) -> ClockNumbers:
     """The constants for samples `step` seconds apart, signals of `signal` output units, and a drift of `farthest`
-    signals either way. Raises OverflowError where it goes farther than numbers do before it has left that for good."""
+    signals either way. Raises OverflowError if the drift needs larger numbers than there are before it stays beyond."""
     rate, change = (Fraction(x) for x in (effect.rate, getattr(effect, "change", 0.0)))
     own = Fraction(step)
     twice = change * own * own / signal
@@ -87,7 +87,7 @@ def constants(t: Reals) -> list[Constants]:
 
 @jit
 def clock_start(s: Reals, j: int) -> None:
-    """The time is that of the drive absorbed last."""
+    """Start the clock at the drive absorbed last."""
     s[j, WHOLE] = zero(s[j, WHOLE])
     s[j, PART] = s[j, WHOLE]
     s[j, GAINED] = s[j, WHOLE]
@@ -109,7 +109,7 @@ def clock_tick(t: Reals, s: Reals, j: int) -> None:
 
 @jit
 def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
-    """The drift `ahead` samples ahead of the clock."""
+    """The drift `ahead` samples after the present one."""
     more = (t[j, SLOPE] + s[j, GAINED]) * ahead + t[j, CHANGE] * ((ahead * (ahead - 1)) // 2)
     drift = s[j, WHOLE] + ((s[j, PART] + more) >> t[j, BITS])
     if drift > t[j, FARTHEST]:

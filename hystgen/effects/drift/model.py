@@ -33,7 +33,7 @@ class LinearDrift(_Drift):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The rate, in output ranges a session."""
+        """The rate, in output ranges per session."""
         unit = about.output_range / max(about.session, about.sample_time)
         return [
             Candidate(
@@ -55,7 +55,7 @@ class CurvedDrift(_Drift):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Rate and what it changes by, in output ranges a session."""
+        """Rate and what it changes by, in output ranges per session."""
         session = max(about.session, about.sample_time)
         unit = about.output_range / session
 

@@ -124,7 +124,7 @@ def constants(t: LagTables) -> Iterator[Constants]:
 
 @jit
 def lag_rest(t: LagTables, s: Reals, j: int, x: Any) -> Any:
-    """Settle at the input x; the output."""
+    """Everything has settled at the input x. Returns the output."""
     s[j, HIGH] = x
     s[j, LOW] = x if t.exact[j] else zero(x)
     s[j, WANTED] = x
@@ -148,7 +148,7 @@ def lag_solve(t: LagTables, s: Reals, j: int, y: Any) -> Any:
 
 @jit
 def lag_absorb(t: LagTables, s: Reals, j: int, x: Any) -> Any:
-    """The input is x at this sample; the output."""
+    """The input is x at this sample. Returns the output."""
     n = t.block[j]
     state = s[j, HIGH]
     if t.exact[j]:

@@ -85,7 +85,7 @@ def scaled(t: LagTables, j: int, x: Any, which: int) -> Any:
 
 @jit
 def lag_rest(t: LagTables, s: Reals, j: int, x: Any) -> Any:
-    """Settle at the input x; the output."""
+    """Everything has settled at the input x. Returns the output."""
     state = x << t.block[j, BITS]
     s[j, HIGH] = state
     if t.exact[j]:
@@ -110,7 +110,7 @@ def lag_solve(t: LagTables, s: Reals, j: int, y: Any) -> Any:
 
 @jit
 def lag_absorb(t: LagTables, s: Reals, j: int, x: Any) -> Any:
-    """The input is x at this sample; the output."""
+    """The input is x at this sample. Returns the output."""
     given = x << t.block[j, BITS]
     if t.exact[j]:
         late = times(x - s[j, BEFORE], t.block[j, SECOND], t.block[j, SECOND + 1])

@@ -88,7 +88,7 @@ class PlayFunctions(_Noncongruent):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """One list a play."""
+        """One list for each play."""
         yield from super().problems(thresholds)
         yield from not_one_a_play("coefficients", self.coefficients, thresholds, "list")
 

@@ -39,7 +39,7 @@ class Movement:
         return bool(np.all(sliding) and least > 0.0)
 
     def after(self, plays: Array, x: float, w: float, seconds: float) -> Array:
-        """Rows (n + 1)."""
+        """The plays (n + 1) after the step, from where they were."""
         out = np.empty_like(plays)
         out[0] = w
         if self.by_threshold(seconds):
@@ -93,8 +93,10 @@ def yielded(effect: RelaxingPlays, scale: float, seconds: float, x: float) -> tu
 
 
 def seen(effect: RelaxingPlays, scale: float, seconds: float, way: float) -> float:
-    """Share of a step's way, of the input, at which it counts as standing still: exact for a linear dashpot as stiff as
-    this one is where plays lag steadily behind an input that moves by `way` a step.
+    """How far into the step `way` the input counts as standing still, as a share.
+
+    Exact for a linear dashpot as stiff as this one is when plays lag steadily behind an input that moves by `way` in
+    every step.
 
     With `s = T f'(e)`, `E = exp(-s)` and `M = (1 - E)/s`: `(1 - M)/(1 - E)`, 1/2 for s = 0.
     """

@@ -285,7 +285,7 @@ class ThresholdRate(_RateDependence):
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """One beta a play."""
+        """One beta for each play."""
         yield from super().problems(thresholds)
         yield from not_one_a_play("betas", self.betas, thresholds)
 
@@ -335,7 +335,7 @@ class RelaxingPlays(_RateDependence):
 
     A dashpot parallel to the dry friction of every play; for tau = 0 the play itself. With `exponent` m the dashpot is
     nonlinear: `z' = (r_n/tau) sign(d) (|d|/r_n)^m`, `d = dz_r(w - z)`, r_n the largest threshold. Over straight `w` the
-    linear case is exact, contacts within a step included; the nonlinear one is integrated to about 1e-6 of r_n a step.
+    linear case is exact, contacts within a step included; the nonlinear one is within about 1e-6 of r_n per step.
     """
 
     shape: Literal["relaxation"] = Field(description="plays that follow viscously")

@@ -119,7 +119,7 @@ def constants(t: Reals) -> Iterator[Constants]:
 
 @jit
 def mode_rest(s: Reals, j: int, x: Any) -> Any:
-    """Settle at the input x; the output."""
+    """Everything has settled at the input x. Returns the output."""
     s[j, BEFORE] = x
     s[j, OFF] = zero(x)
     s[j, RATE] = zero(x)
@@ -128,7 +128,7 @@ def mode_rest(s: Reals, j: int, x: Any) -> Any:
 
 @jit
 def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
-    """The input is x at this sample; the output."""
+    """The input is x at this sample. Returns the output."""
     change = x - s[j, BEFORE]
     off = s[j, OFF]
     rate = s[j, RATE]

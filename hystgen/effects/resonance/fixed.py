@@ -89,7 +89,7 @@ def scaled(t: Reals, j: int, x: Any, which: int) -> Any:
 
 @jit
 def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
-    """The input is x at this sample; the output."""
+    """The input is x at this sample. Returns the output."""
     change = x - s[j, BEFORE]
     off = s[j, OFF]
     rate = s[j, RATE]

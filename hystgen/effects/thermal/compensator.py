@@ -17,9 +17,9 @@ LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
 by fixed point: with `fixed.GAIN_BITS` fraction bits, 2 is the end of what a gain and its reciprocal can be."""
 
 MOST_CHANGE = 0.25
-"""[share of the gain] The largest change of a gain in one sample that the C follows: five of Newton's iterations from
-the last reciprocal leave `0.25^32`, less than the rounding of double precision. A limit of 0.5 would take six of them
-in every sample, one of 0.9 nine. Set by: benchmarks/chosen_numbers.py newton."""
+"""[share of the gain] The largest change of a gain in one sample that the C follows: five Newton steps from the last
+reciprocal leave `0.25^32`, less than the rounding of double precision. A limit of 0.5 would take six of them in every
+sample, one of 0.9 nine. Set by: benchmarks/chosen_numbers.py newton."""
 
 # ---------------------------------------------------------------- gain.c
 
@@ -63,7 +63,7 @@ def numbers(effect: LoggedThermal, span: float) -> tuple[float, ...]:
 
 @jit
 def gain_reset(t: Reals, s: Reals, j: int) -> None:
-    """The gain of the parameter file: none."""
+    """As in the parameter file: gain 1, offset 0."""
     s[j, GAIN] = t[j, ONE]
     s[j, INVERSE] = t[j, ONE]
     s[j, OFFSET] = zero(t[j, ONE])
@@ -71,7 +71,7 @@ def gain_reset(t: Reals, s: Reals, j: int) -> None:
 
 @jit
 def gain_set(t: Reals, s: Reals, j: int, gain: Any) -> bool:
-    """The gain from the next step on; whether it had to be limited."""
+    """Set the gain. Returns whether it had to be limited."""
     inside = gain
     if inside < t[j, LEAST]:
         inside = t[j, LEAST]
@@ -84,7 +84,7 @@ def gain_set(t: Reals, s: Reals, j: int, gain: Any) -> bool:
 
 @jit
 def gain_heat(t: Reals, s: Reals, j: int, temperature: Any) -> bool:
-    """Gain and offset of a temperature; whether it had to be limited."""
+    """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
     inside = temperature
     if inside < t[j, COLDEST]:
         inside = t[j, COLDEST]
@@ -120,7 +120,7 @@ HIGH, LOW, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET = range(5)
 
 
 class HeatTables(NamedTuple):
-    """Own heat of a model: `number` (k, 7), and steps of Newton's `turns` (k,)."""
+    """Own heat of a model: `number` (k, 7), and the number of Newton steps, `turns` (k,)."""
 
     number: Reals
     turns: Counts
@@ -162,7 +162,7 @@ def heat_problems(effect: SelfHeating, ends: tuple[float, float], seconds: float
 
 
 def heat_turns(effect: SelfHeating, ends: tuple[float, float], seconds: float, roundoff: float) -> int:
-    """Steps of Newton's after which the reciprocal of the gain is as good as its rounding."""
+    """Newton steps after which the reciprocal of the gain is exact up to rounding."""
     change = abs(effect.gain_per_degree) * most_at_once(effect, ends, ends[1] - ends[0], seconds) / LEAST_GAIN
     left = max(change, 1e-9)
     return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)

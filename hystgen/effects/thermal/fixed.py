@@ -43,7 +43,7 @@ def constants(t: Reals) -> Iterator[Constants]:
 
 
 def tables(rows: list[tuple[float, ...]], level: float, bits: int, degrees: float) -> Reals:
-    """All gains of a model, `rows` as `numbers` has them; `level`: signals a unit of the output, `bits`: of a
+    """All gains of a model, `rows` as `numbers` has them; `level`: signals per unit of the output, `bits`: of a
     temperature below a code, of which the largest is `degrees`. Raises OverflowError."""
     found = []
     whole = 2.0**TEMPERATURE_BITS
@@ -68,7 +68,7 @@ def reciprocal(gain: Any) -> Any:
 
 @jit
 def followed(gain: Any, before: Any, turns: Any) -> Any:
-    """The same for a gain that has moved, from what it was before, by Newton's steps."""
+    """The same for a gain that has moved, by Newton steps from the reciprocal before."""
     half = 1 << (GAIN_BITS - 1)
     inverse = before
     for _ in range(turns):
@@ -79,7 +79,7 @@ def followed(gain: Any, before: Any, turns: Any) -> Any:
 
 @jit
 def gain_reset(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  as in floating point
-    """The gain of the parameter file: none."""
+    """As in the parameter file: gain 1, offset 0."""
     s[j, GAIN] = ONE
     s[j, INVERSE] = ONE
     s[j, OFFSET] = zero(s[j, OFFSET])
@@ -87,7 +87,7 @@ def gain_reset(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  as in float
 
 @jit
 def gain_heat(t: Reals, s: Reals, j: int, temperature: Any) -> bool:
-    """Gain and offset of a temperature; whether it had to be limited."""
+    """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
     given = temperature << t[j, BITS]
     inside = given
     if inside < t[j, COLDEST]:

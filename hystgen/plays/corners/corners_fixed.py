@@ -14,7 +14,7 @@ from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN, Counts, Real
 INPUT_MOST = 2**31 - 1  # inputs of the plays, in their least steps, are an int32_t in C
 
 Kink = tuple[Any, Any, int, int]
-"""`hystgen_kink_t`: output and input as the present move sees them, plays that follow from there on, corners that hold
+"""`hystgen_kink_t`: output and input along the present move, plays that follow from there on, corners that hold
 the others."""
 
 FAR = 1 << 62
@@ -46,7 +46,7 @@ def new_fixed_memory(plays: int, dtype: Any = np.int64) -> FixedMemory:
 
 @jit(inline=True)
 def along(m: FixedMemory, x: Any) -> Any:
-    """x as the present move sees it: a falling move is a rising one with all signs changed."""
+    """x as seen along the present move: a falling move is a rising one with all signs changed."""
     return x if m.counts[RISING] else -x
 
 
@@ -63,7 +63,7 @@ def leave_corner(m: FixedMemory) -> None:
 
 @jit
 def begins(t: FixedPlayTables, m: FixedMemory, c: int, k: int, by_output: bool) -> Any:
-    """Where play k of a corner's block begins to follow, as the present move sees it."""
+    """Where play k of a corner's block begins to follow, along the present move."""
     if by_output:
         return along(m, m.output[c]) + (0 if m.rose[c] == m.counts[RISING] else t.reach[k])
     return along(m, m.input[c]) + (0 if m.rose[c] == m.counts[RISING] else t.way[k])
@@ -71,7 +71,7 @@ def begins(t: FixedPlayTables, m: FixedMemory, c: int, k: int, by_output: bool) 
 
 @jit
 def turn_back(m: FixedMemory) -> None:
-    """Turn; a corner stays where plays have followed."""
+    """Turn back: a corner stays where plays have followed."""
     if m.counts[K] > 0:
         leave_corner(m)
         m.counts[K] = 0
@@ -80,8 +80,7 @@ def turn_back(m: FixedMemory) -> None:
 
 @jit
 def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
-    """The last place where another play begins to follow before the output, or the input, `to`, as the present move
-    sees it; or the present place."""
+    """The last kink before `to`, an output or input along the move: where another play begins to follow, or here."""
     c = -1
     low = 0
     left = m.counts[DEPTH]
@@ -114,7 +113,7 @@ def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
 
 @jit
 def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
-    """The same for a move to any input; turns if it has to, but moves nothing."""
+    """The same for any move to an input. May turn back, but moves nothing."""
     if along(m, to - m.real[INPUT]) < 0:
         turn_back(m)
     return find(t, m, along(m, to), False)
@@ -122,7 +121,7 @@ def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
 
 @jit
 def go_on(m: FixedMemory, kink: Kink, to: Any, moved: Any) -> None:
-    """Move the plays on from a kink to an input at which the same ones follow; `moved` is the output between."""
+    """Move the plays to an input short of the next kink; `moved` is the output since the last one."""
     m.real[OUTPUT] = along(m, kink[0] + moved)
     m.real[INPUT] = to
     m.counts[K] = kink[2]
@@ -131,7 +130,7 @@ def go_on(m: FixedMemory, kink: Kink, to: Any, moved: Any) -> None:
 
 @jit
 def gained(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
-    """Output that is gained from a kink on until the input comes to `to`, which may lie before it."""
+    """Output gained between a kink and the input `to`; -1 if `to` lies before the kink."""
     way = along(m, to) - kink[1]
     return -1 if way < 0 else t.slope[kink[2] + 1] * way
 
@@ -145,7 +144,7 @@ def move_to_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> None:
 
 @jit
 def next_input(t: FixedPlayTables, m: FixedMemory) -> Any:
-    """Input at which another play begins to follow the present move, or the last one there is."""
+    """Input at which another play begins to follow the present move, or the largest input."""
     x = INPUT_MOST
     if m.counts[DEPTH] > 0:
         following = begins(t, m, m.counts[DEPTH] - 1, m.counts[K] + 1, False)
@@ -155,7 +154,7 @@ def next_input(t: FixedPlayTables, m: FixedMemory) -> Any:
 
 @jit(inline=True)
 def plays_step(t: FixedPlayTables, m: FixedMemory, to: Any) -> Any:
-    """The sum of the plays for the next input."""
+    """The sum of the plays at the next input."""
     at = m.real[INPUT]
     if at < to < m.real[NEXT] if m.counts[RISING] else m.real[NEXT] < to < at:
         m.real[OUTPUT] += t.slope[m.counts[K] + 1] * (to - at)
@@ -168,7 +167,7 @@ def plays_step(t: FixedPlayTables, m: FixedMemory, to: Any) -> Any:
 
 @jit
 def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
-    """The input, near the range, that gives an output behind a kink, `to` as the present move sees it."""
+    """The input, at most a little outside the range, that gives `to`, an output beyond a kink along the move."""
     x = kink[1] + over_slope(t, to - kink[0], kink[2] + 1)
     most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.counts[RISING] else t.limits[MARGIN] - t.limits[PLAY_MIN]
     return along(m, most if x > most else x)
@@ -176,8 +175,10 @@ def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
 
 @jit
 def solve(t: FixedPlayTables, m: FixedMemory, output: Any, following: Any) -> tuple[Any, Kink]:
-    """The input that gives `output`, kept near the range, and the kink that it was counted from. Turns, moves nothing.
-    Short of `following`, an output as the present move sees it, the same plays are known to follow."""
+    """The input that gives `output`, at most a little outside the range, and the kink it is counted from.
+
+    May turn back, but moves nothing. The same plays are known to follow up to the output `following`, along the move.
+    """
     if along(m, output - m.real[OUTPUT]) < 0:
         turn_back(m)
         following = -FAR
@@ -191,14 +192,14 @@ def solve(t: FixedPlayTables, m: FixedMemory, output: Any, following: Any) -> tu
 
 @jit
 def next_output(t: FixedPlayTables, m: FixedMemory, kink: Kink) -> Any:
-    """Output, as the present move sees it, at which another play begins to follow behind a kink."""
+    """Output, along the present move, at which another play begins to follow after a kink."""
     return begins(t, m, kink[3] - 1, kink[2] + 1, True) if kink[3] > 0 else FAR
 
 
 @jit
 def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
-    """Move the plays to an input near the one that was solved for from a kink. Returns the output, as the move sees it,
-    at which another one begins to follow."""
+    """Move the plays to an input near the one that was solved for from a kink. Returns the output, along the move, at
+    which another play begins to follow."""
     following = next_output(t, m, kink)
     moved = gained(t, m, kink, to)
     if moved < 0 or kink[0] + moved > following:  # by rounding, or it was limited
@@ -211,8 +212,8 @@ def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) ->
 
 @jit
 def start(t: FixedPlayTables, m: FixedMemory, play: Reals) -> None:
-    """Start memory: what each play holds, or all of them. Each is a block of its own, as if left by a move that ended
-    where the play begins to follow."""
+    """Start memory: a value for each play, or one for all. Each play is a block of its own, left by a move to where it
+    begins to follow."""
     aside = t.limits[OFFSET]
     m.counts[DEPTH] = 0
     for k in range(len(t.threshold) - 1, 0, -1):

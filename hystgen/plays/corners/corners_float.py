@@ -79,13 +79,13 @@ def copy_place(m: Any, to: tuple[int, int], source: tuple[int, int]) -> None:
 
 @jit(inline=True)
 def along(m: Memory, x: Any) -> Any:
-    """x as the present move sees it: a falling move is a rising one with all signs changed."""
+    """x as seen along the present move: a falling move is a rising one with all signs changed."""
     return m.real[SIGN] * x
 
 
 @jit(inline=True)
 def forget_line(t: Curve, m: Memory) -> None:
-    """There is no line to go on along: the next sample searches."""
+    """Forget the line of the last outputs: the next sample searches."""
     m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
     m.real[NEXT] = m.real[INPUT]
     m.real[CAP] = m.real[INPUT]
@@ -94,7 +94,7 @@ def forget_line(t: Curve, m: Memory) -> None:
 
 @jit
 def leave_corner(t: Curve, m: Memory) -> None:
-    """Leave a corner here. A block whose last play follows beyond the limit only is never passed."""
+    """Leave a corner here. A block whose last play follows only beyond the limit is never passed."""
     rising = m.counts[RISING]
     k = m.counts[K]
     c = m.counts[DEPTH]
@@ -110,7 +110,7 @@ def leave_corner(t: Curve, m: Memory) -> None:
 
 @jit
 def turn_back(t: Curve, m: Memory) -> None:
-    """Turn; a corner stays where plays have followed."""
+    """Turn back: a corner stays where plays have followed."""
     if m.counts[K] > 0:
         leave_corner(t, m)
         m.counts[K] = 0
@@ -133,7 +133,7 @@ def find_segment(step: Reals, k: int, last: int, way: Any) -> int:
 
 @jit
 def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
-    """Stop the present move inside the top corner's block: where the sum is `output`, or before that at `to`."""
+    """End the move in the top corner's block: where the sum is `output`, or at `to` if that comes first."""
     c = m.counts[DEPTH] - 1
     rising = m.counts[RISING]
     reach = along(m, output - m.output[c])
@@ -152,7 +152,7 @@ def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
 
 @jit
 def move_to_output(t: Curve, m: Memory, output: Any) -> None:
-    """Move the plays to where their sum is `output`, as nearly as floating point resolves it."""
+    """Move the plays to where their sum is `output`, up to rounding."""
     if along(m, output) < along(m, m.real[OUTPUT]):
         turn_back(t, m)
     rising = m.counts[RISING]
@@ -228,7 +228,7 @@ def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
 
 @jit
 def move_in_block(t: Curve, m: Memory, to: Any) -> bool:
-    """Move on to an input short of CAP: more plays of the same block follow. False where a search is faster."""
+    """Move on to an input short of CAP: more plays of the block follow. False if a search would be faster."""
     way = along(m, to - m.real[FROM])
     k = m.counts[K] + 1
     many = m.counts[K] + 8
@@ -250,7 +250,7 @@ def move_in_block(t: Curve, m: Memory, to: Any) -> bool:
 
 @jit(inline=True)
 def plays_step(t: Curve, m: Memory, to: Any) -> Any:
-    """The sum of the plays for the next input; a NaN moves nothing."""
+    """The sum of the plays at the next input; a NaN moves nothing."""
     rising = m.counts[RISING]
     at = m.real[INPUT]
     on = to > at if rising else to < at
