@@ -15,6 +15,7 @@ from hystgen.compensator.fixed_tables import build
 from hystgen.effects.creep import fixed as creep
 from hystgen.effects.lag import fixed as lag
 from hystgen.effects.resonance import fixed as resonance
+from hystgen.effects.thermal import fixed as thermal
 from hystgen.model import Model
 from hystgen.plays.slots import CODE_MAX, PLAY_MAX, PLAY_MIN
 
@@ -96,15 +97,32 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
     return BEFORE + text
 
 
-# In models with effects: what states of filters stay within, by the range analysis that their formats were chosen by,
-# and a drive between two others. Eva's sets of values widen a filter's state until it overflows.
+# In models with effects: what states stay within, and relations between two numbers. Eva's sets of values widen a state
+# until it overflows, and keep no relation. Where each fact comes from:
+# SIGNAL   the range analysis that the formats were chosen by, for what goes from block to block
+# CREEP    a state of creep is its weight times a mean of all inputs with no share below 0; `creep.guard` leaves 49 bits
+#          and those dropped for the sum of all states, and a bit more is for rounding
+# PART, WHOLE, GAINED   the clock of a drift counts a parabola over its samples exactly: `clock`
+# RISE     own heat adds no more in a sample than the warmest temperature loses, which has RISE_BITS; a bit more is for
+#          rounding
+# INVERSE  a step of Newton's from x is `x (2 - g x)`, at most 1/g, and a gain is at least 1/2; 2 are for rounding
+# PLAY     a viscous play goes towards one that its input drags along, so that it stays between the start memory and the
+#          input's ends; one that would come too near to another stops in between
+# INPUT    halves lie between the ends that a search begins with
+# LOST     what rounding to whole numbers leaves
+CLOCK = (
+    r"    GRANTED(self->part >= 0 && self->part < PART);\n"
+    r"    WITHIN(self->whole, WHOLE);\n    WITHIN(self->gained, GAINED);\n"
+)
 STATES = [
     (r"(int64_t NAME_creep_rest\([^{]*\{\n)", r"\1    WITHIN(x, SIGNAL);\n"),
     (r"(    return self->ahead;)", r"    WITHIN(self->ahead, SIGNAL);\n\1"),
     (r"(int64_t NAME_creep_absorb\([^{]*\{\n)", r"\1    WITHIN(x, SIGNAL);\n    WITHIN(self->before, SIGNAL);\n"),
     (r"(int64_t NAME_creep_solve\([^{]*\{\n)",
      r"\1    WITHIN(y, SIGNAL);\n    WITHIN(self->before, SIGNAL);\n    WITHIN(self->ahead, SIGNAL);\n"),
-    (r"(        const NAME_creep_term_t \*term = [^\n]*\n)", r"\1        WITHIN(state[i].next, CREEP);\n"),
+    (r"(        const NAME_creep_term_t \*term = [^;]*;\n)", r"\1        WITHIN(state[i].next, CREEP);\n"),
+    (r"(        const int64_t settled =[^;]*;\n)", r"\1        WITHIN(settled, CREEP);\n"),
+    (r"(        (now|next) \+= state\[i\]\.next;\n)", r"\1        WITHIN(\2, CREEP);\n"),
     (r"    return direct \+ now;",
      r"    const int64_t y = direct + now;\n    WITHIN(self->ahead, SIGNAL);\n    WITHIN(y, SIGNAL);\n    return y;"),
     (r"    return (NAME_nearest\((?:self->high - NAME_lag_scaled[^;]*|reached), t->bits\));",
@@ -117,25 +135,56 @@ STATES = [
     (r"(int64_t NAME_mode_absorb\([^{]*\{\n)",
      r"\1    WITHIN(x, SIGNAL);\n    WITHIN(self->before, SIGNAL);\n    WITHIN(self->off, MODE);\n"
      r"    WITHIN(self->rate, MODE);\n"),
-    (r"(    const int64_t change = \(int64_t\)sample\[[^\n]*\n)    return ([^;]*);",
+    (r"(    const int64_t change = \(int64_t\)sample\[[^;]*;\n)    return ([^;]*);",
      r"\1    const int64_t between = \2;\n    WITHIN(between, CODE);\n    return (NAME_reach_t)between;"),
+    (r"(        const int64_t part = self->part[^;]*;\n)", CLOCK + r"\1"),
+    (r"(    const int64_t more = \(t->slope[^;]*;\n)", CLOCK + r"\1"),
+    (r"(        inverse = \(inverse \* more \+ half\)[^;]*;\n)",
+     r"\1        GRANTED(inverse > 0 && inverse <= INVERSE);\n"),
+    (r"(    const int64_t way = NAME_heat_square[^;]*;\n)", r"    GRANTED(self->rise >= 0 && self->rise < RISE);\n\1"),
+    (r"(NAME_sum_t NAME_\w+_displaced\([^{]*\{\n)", r"\1    WITHIN(y, SIGNAL);\n"),
+    (r"        return \(NAME_play_t\)(\(rest < low[^;]*);",
+     r"        const int64_t beside = \1;\n        WITHIN(beside, PLAY);\n        return (NAME_play_t)beside;"),
+    (r"(    return \(NAME_play_t\)rest;\n)", r"    WITHIN(rest, PLAY);\n\1"),
+    (r"(        const int64_t z = play\[i\] \+ NAME_times[^;]*;\n)", r"\1        WITHIN(z, PLAY);\n"),
+    (r"(void NAME_(?:keep|put)\([^{]*\{\n)", r"\1    WITHIN(z, PLAY);\n"),
+    (r"(    const NAME_sum_t lost = [^;]*;\n)", r"\1    WITHIN(lost, LOST);\n"),
+    (r"(        const NAME_reach_t middle = [^;]*;\n)", r"\1        WITHIN(middle, INPUT);\n"),
+    # no facts, but where Eva is to stop widening, and what it is to look at case by case
+    (r"(    while \(high - low > 1\) \{\n)", r'    /*@ loop widen_hints "all", -INPUT, INPUT; */\n\1'),
+    (r"(        const bool before = inside < ([^;]*);\n)", r"        /*@ split inside < \2; */\n\1"),
 ]  # fmt: skip
 
 
-def granted_states(text: str, compiled: Compiled, name: str) -> str:
-    """The emitted C of a model with effects with the checks in it that its blocks need."""
+def clock(table: list[int]) -> dict[str, int]:
+    """What a clock with this table counts to at most: a parabola over its samples, where it turns and where it ends."""
+    slope, change, samples, _, bits, *_ = table
+    turn = -slope // change if change else 0
+    counts = [samples, *(n for n in range(turn, turn + 3) if 0 <= n <= samples)]
+    farthest = max(abs(slope * n + change * (n * (n - 1) // 2)) for n in counts)
+    return {"PART": 2**bits, "WHOLE": (farthest >> bits) + 1, "GAINED": abs(change) * samples}
+
+
+def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") -> str:
+    """The emitted C of a model with effects with the checks in it that its blocks need; `wrong`: a number of which a
+    64th is taken."""
     t, codes = compiled.tables, compiled.codes
     assert codes is not None
 
     def most(rows: list[list[int]], place: int, bits: int) -> int:
         return 2 ** (bits + max((int(row[place]) for row in rows), default=0))
 
+    ends = [*t.plays.limits[[PLAY_MIN, PLAY_MAX]].tolist(), *t.plays.start.tolist()]
     numbers = {
         "SIGNAL": codes.largest, "CODE": int(t.limits[CODE_MAX]),
         "DRIVE": max(map(abs, t.plays.limits[:2].tolist())) * 2 ** int(t.number[ARRIVING_BITS]),
-        "CREEP": most(t.creep.block.tolist(), creep.DROP, 49), "LAG": most(t.lag.block.tolist(), lag.DROP, 50),
-        "MODE": most(t.mode.tolist(), resonance.DROP, 50),
+        "CREEP": most(t.creep.block.tolist(), creep.DROP, 50) - 1, "LAG": most(t.lag.block.tolist(), lag.DROP, 50),
+        "MODE": most(t.mode.tolist(), resonance.DROP, 50), **(clock(t.clock[0].tolist()) if len(t.clock) else {}),
+        "RISE": 2 ** (thermal.RISE_BITS + 1), "INVERSE": 2 * thermal.ONE + 2, "PLAY": max(map(abs, ends)),
+        "INPUT": int(t.moving.farthest), "LOST": 2 ** int(t.moving.yield_bits) // 2,
     }  # fmt: skip
+    if wrong:
+        numbers[wrong] //= 64
     for pattern, replacement in STATES:
         filled = re.sub(
             r"\b(" + "|".join(numbers) + r")\b", lambda found: f"INT64_C({numbers[found[1]]})",

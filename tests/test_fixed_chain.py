@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 import re
 import subprocess
+from collections.abc import Iterator
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from granted import granted_states
+from granted import clock, granted_states
 from modelfiles import CHAINS, INVERSE_ALONE, chain
 
 from hystgen.arithmetic import ARITHMETICS, factors
@@ -23,6 +24,7 @@ from hystgen.compensator.chain.layout import Codes, Compiled
 from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
 from hystgen.effects import Run
+from hystgen.effects.base import Array
 from hystgen.effects.drift import fixed as drift
 from hystgen.effects.drift.model import CurvedDrift
 from hystgen.effects.rate_dependence import compensator as dashpot
@@ -232,34 +234,54 @@ def wild(rng: np.random.Generator, kinds: list[int], real: np.dtype[Any], n: int
     return op, x.astype(real)
 
 
+def checked(
+    folder: Path, one: Model, arithmetic: str, flags: list[str], wrong: str = ""
+) -> Iterator[tuple[str, Array, Array, subprocess.CompletedProcess[bytes]]]:
+    """Of each operator its name, random calls and what they are given, and the C with the checks of `granted_states`,
+    compiled and run with them; `wrong`: a bound that is a 64th of what it should be."""
+    own, n = one.name, 20_000
+    options = emit_options(one, "inverse" if own in INVERSE_ALONE else "both", arithmetic)
+    written = sources.write(folder, one, options)
+    source = folder / f"{own}.c"
+    source.write_text(granted_states(source.read_text(), compiled(one, arithmetic)[0], own, wrong))
+    calls = module.calls_of(one.parameters, one.cascade, options)
+    for op in written.operators:
+        (folder / f"main_{op}.c").write_text(MAIN.format(name=own, op=op))
+        files = [*written.module, written.harness, folder / f"main_{op}.c"]
+        subprocess.run(["gcc", "-std=c99", "-g", "-O1", *flags, "-I", folder, *files, "-o", folder / op], check=True)
+        kinds = [slots.OP_STEP] * 6 + [slots.OP_RESET] + [OPERATIONS[call] for call in calls[op]]
+        kinds += [slots.OP_COMMIT] * (op == "inverse")
+        call, x = wild(np.random.default_rng(5), kinds, ARITHMETICS[arithmetic].number, n)
+        given = call.tobytes() + x.tobytes()
+        yield op, call, x, subprocess.run([folder / op, str(n)], input=given, capture_output=True, check=False)
+
+
 @pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("name", CHAINS)
 @BOTH
 def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_path: Path) -> None:
     """States stay within what their formats were chosen by, as the proof takes for granted."""
-    one = model(CHAINS[name])
-    own = one.name
-    options = emit_options(one, "inverse" if name in INVERSE_ALONE else "both", arithmetic)
-    written = sources.write(tmp_path, one, options)
-    source = tmp_path / f"{own}.c"
-    source.write_text(granted_states(source.read_text(), compiled(one, arithmetic)[0], own))
-    calls = module.calls_of(one.parameters, one.cascade, options)
-    real, numbers, n = ARITHMETICS[arithmetic].number, one.tables(arithmetic, "loop"), 20_000
-    for op in written.operators:
-        (tmp_path / f"main_{op}.c").write_text(MAIN.format(name=own, op=op))
-        flags = ["-std=c99", "-g", "-O1", "-fsanitize=undefined", "-fno-sanitize-recover=all", "-I", tmp_path]
-        files = [*written.module, written.harness, tmp_path / f"main_{op}.c"]
-        subprocess.run(["gcc", *flags, *files, "-o", tmp_path / op], check=True)
-        kinds = [slots.OP_STEP] * 6 + [slots.OP_RESET] + [OPERATIONS[call] for call in calls[op]]
-        kinds += [slots.OP_COMMIT] * (op == "inverse")
-        call, x = wild(np.random.default_rng(5), kinds, real, n)
-        done = subprocess.run([tmp_path / op, str(n)], input=call.tobytes() + x.tobytes(), capture_output=True)
+    one, real = model(CHAINS[name]), ARITHMETICS[arithmetic].number
+    numbers = one.tables(arithmetic, "loop")
+    flags = ["-fsanitize=undefined", "-fno-sanitize-recover=all"]
+    for op, call, x, done in checked(tmp_path, one, arithmetic, flags):
         assert done.returncode == 0, done.stderr.decode()
-        answer = np.frombuffer(done.stdout, real, n)
-        status = np.frombuffer(done.stdout[n * real.itemsize :], np.uint8)
+        answer = np.frombuffer(done.stdout, real, len(x))
+        status = np.frombuffer(done.stdout[answer.nbytes :], np.uint8)
         wanted, bits = reference.answers(numbers, op == "inverse", call, x)
         assert np.array_equal(answer, wanted.astype(real))
         assert np.array_equal(status, bits)
+
+
+@pytest.mark.slow(one_in=4)
+@pytest.mark.parametrize(
+    ("name", "fact"),
+    [("creeping", "CREEP"), ("creeping", "SIGNAL"), ("drifting", "PART"), ("aged", "INVERSE"),
+     ("heated", "RISE"), ("relaxing", "PLAY"), ("dashpot", "LOST"), ("dashpot", "INPUT"), ("late", "MODE")],
+)  # fmt: skip
+def test_what_proofs_take_for_granted_is_looked_at(name: str, fact: str, tmp_path: Path) -> None:
+    runs = checked(tmp_path, model(CHAINS[name]), "q31", [], fact)
+    assert any("beyond what the range analysis says" in done.stderr.decode() for *_, done in runs)
 
 
 @BOTH
@@ -331,12 +353,17 @@ def test_a_drift_is_counted_without_rounding() -> None:
         far = float(20 / signal)
         one = drift.numbers(effect, T, signal, far, ahead)
         slope, twice, samples, _, bits, *_ = one.table
-        for n in (0, 1, 1000, 10**6, samples, 2 * samples):
+        turn = max(-slope // twice, 0) if twice else 0
+        most, farthest = clock(one.table), 0
+        for n in (0, 1, 1000, 10**6, min(turn, samples), samples, 2 * samples):
             counted = min(n, samples)
             if n > samples == drift.MOST_SAMPLES:
                 continue
             total = slope * counted + twice * (counted * (counted - 1) // 2)
             whole, gained = total >> bits, twice * counted
+            assert abs(whole) <= most["WHOLE"]
+            assert abs(gained) <= most["GAINED"]
+            farthest = max(farthest, abs(whole))
             state = np.array([[whole, total - (whole << bits), 0, gained, counted]])
             for lead in (0, ahead):
                 table = np.array([one.table])
@@ -345,6 +372,7 @@ def test_a_drift_is_counted_without_rounding() -> None:
                 t = (n + lead) * Fraction(T)
                 exact = (Fraction(rate) + Fraction(change) / 2 * t) * t / signal
                 assert abs(found - min(max(exact, -Fraction(far)), Fraction(far))) <= one.error
+        assert farthest >= 0.999 * most["WHOLE"] - 2 or samples == drift.MOST_SAMPLES
         state = np.zeros((1, 5), dtype=np.int64)
         with jit.plain():
             for _ in range(20):
@@ -475,4 +503,8 @@ def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int) -> None:
             rise += round(way * heated * 2**100 - rise * rate)
             worst = max(worst, abs(int(state[0, thermal_fixed.RISE]) * unit - rise / 2**100))
             peak, before = max(peak, rise), each
-    assert worst <= one.error < 0.1 * peak / 2**100
+        assert worst <= one.error < 0.1 * peak / 2**100
+        warmest = 2 ** (thermal_fixed.RISE_BITS + 1) - 1  # what proofs take for granted is kept even from there
+        state[0, thermal_fixed.RISE] = warmest
+        thermal_fixed.heat_move(t, state, 0, np.int64(-largest), np.int64(largest))
+        assert 0 <= state[0, thermal_fixed.RISE] <= warmest

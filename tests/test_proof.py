@@ -20,14 +20,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from granted import granted, granted_states
+from granted import STATES, granted, granted_states
 from mains import c_main
-from modelfiles import FILES, chain, head
+from modelfiles import CREEP, FILES, chain, head
 
 import hystgen
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.compensator.chain import tables as chain_tables
 from hystgen.emission import module
+from hystgen.emission.calls import emitted_files
 from hystgen.emission.options import Options
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
@@ -84,6 +85,8 @@ DRIVER = """
 extern unsigned int any_call(void);
 /*@ assigns \\result \\from \\nothing; */
 extern {name}_real_t any_code(void);
+/*@ assigns \\result \\from \\nothing; */
+extern int64_t any_travel(void);
 int main(void)
 {{
     {storage} {name}_forward_t forward; /* auto: nothing written yet */
@@ -109,6 +112,7 @@ int main(void)
 
 
 EFFECTS = {
+    "crept": (CREEP,),
     "gained": ("name: thermal, gain_per_degree: -0.002, offset_per_degree: 0.01",),
     "limited": ("name: saturation, level: 12",),
     "stopped": ("name: saturation, shape: stops, lower: -5, upper: 4, give: 0.2",),
@@ -117,9 +121,23 @@ EFFECTS = {
     "lagged": ("name: lag, time_constant: 0.01",),
     "prompt": ("name: lag, time_constant: 4.0e-4",),
     "rung": ("name: resonance, frequency: 30, damping: 0.05",),
+    "drifted": ("name: drift, shape: curved, rate: 0.05, change: 0.01",),
+    "aged": ("name: ageing, loss: 0.02, travel: 50",),
+    "heated": ("name: thermal, source: self_heating, time_constant: 0.5, heating: 0.05, gain_per_degree: -0.02",),
+    "viscous": ("name: rate_dependence, shape: relaxation, time_constant: 5.0e-3",),
+    "dilated": ("name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 2.0e-4, 2.0e-4, 2.0e-4]",),
+    "dashpot": ("name: rate_dependence, shape: relaxation, time_constant: 5.0e-3, exponent: 2.5",),
+    "bumpy": ("name: noncongruent, shape: centre, amplitude: -0.3, centre: -1, width: 1.5",),
+    "uneven": ("name: noncongruent, coefficients: [[0.05, -0.01], [0.02], [0.01], [0.05], [0.05], [0.05]]",),
 }
-"""Models with one effect. What `granted_states` lists about delays, lags and modes is looked at in runs of
+"""Models with one effect, every block and every kind of plays. What `granted_states` lists is looked at in runs of
 `test_fixed_chain`; instances are static there."""
+
+COMPENSATED = {"drifted": "drift", "heated": "self_heating"}
+"""What of these is asked for although nothing measures it."""
+
+CODE, ANY = "any_code", {"set_travel": "any_travel"}
+"""What a call is given; all but one are given codes."""
 
 CALL = "        case {}: {}; break;\n"
 
@@ -129,11 +147,11 @@ def chain_driver(one: Model, arithmetic: str) -> str:
     name = one.name
     calls = module.calls_of(one.parameters, one.cascade, Options("both", arithmetic, "loop", "self-contained"))
     cases = [
-        (op, f"{name}_{op}_{call}(&{op}{', any_code()' * given})")
+        (op, f"{name}_{op}_{call}(&{op}{f', {ANY.get(call, CODE)}()' * given})")
         for op in ("forward", "inverse")
         for call, given in (
             ("init", 0), ("reset", 1), ("step", 1), ("status", 0), *([("commit", 1)] if op == "inverse" else []),
-            *((each, {"expected": 0, "correct": 2}.get(each, 1)) for each in calls[op]),
+            *((each, {"expected": 0, "travel": 0, "correct": 2}.get(each, 1)) for each in calls[op]),
         )
     ]  # fmt: skip
     text = "".join(CALL.format(i, f"(void){call}") for i, (_, call) in enumerate(cases))
@@ -150,7 +168,7 @@ def frama_c() -> str:
 
 
 def model(name: str) -> Model:
-    chains = {own: chain(own, *effects) for own, effects in EFFECTS.items()}
+    chains = {own: chain(own, *effects, compensate=COMPENSATED.get(own, "")) for own, effects in EFFECTS.items()}
     return Model(parse_parameters({**FILES, **chains, "many": MANY, "sixteen": SIXTEEN}[name], f"{name}.yaml"))
 
 
@@ -177,8 +195,9 @@ def alarms(source: Path, machine: str) -> list[str]:
     plays = int(re.search(r"_N_PLAYS (\d+)", source.with_suffix(".h").read_text())[1])  # type: ignore[index]
     apart = {  # how many states are kept apart: play by play, coefficient by coefficient, not all in one
         "loop_rest": 2 * plays + 20, "loop_start": 2 * plays + 20, "loop_solve": 2 * plays + 20,
+        **dict.fromkeys(("relaxing_follow", "moved_sum", "moved_follow", "resting_sum", "moved_rest"), 2 * plays + 20),
         "start": 300, "find": 1000, "curve": 300, "delay_rest": 30,
-        "preview_put": 30,
+        "preview_put": 30, "creep_rest": 100, "creep_absorb": 100, "ageing_gain": 1000, "yield": 1000,
     }  # fmt: skip
     visits = [f"{name}_{what}:{states}" for what, states in apart.items() if f"{name}_{what}(" in text]
     # half words are put together, curves measure arguments, the corner engine measures ways
@@ -203,7 +222,9 @@ def alarms(source: Path, machine: str) -> list[str]:
     # every code is a number: a model with effects has calls and branches for what is none that are never taken
     idle = 2 if name in EFFECTS else 0
     assert int(functions[2]) - idle <= int(functions[1]), done.stdout
-    assert int(reached[1]) > (0.92 if name in EFFECTS else 0.96) * int(reached[2]), done.stdout
+    # two statements of a fact are never reached where Eva finds by itself that it holds
+    known = 2 * len(re.findall(r"^ +(?:GRANTED|WITHIN)\(", text, flags=re.MULTILINE)) if name in EFFECTS else 0
+    assert int(reached[1]) > (0.92 if name in EFFECTS else 0.96) * (int(reached[2]) - known), done.stdout
     found = re.findall(r"^\[eva:alarm\] (.*(?:\n  .*)*)", done.stdout, flags=re.MULTILINE)
     assert f"  {len(found)} alarms generated" in done.stdout or len(found) == 1, done.stdout
     return found
@@ -250,6 +271,35 @@ def test_faults_raise_alarms(
     assert places == 1
     source.with_suffix(file).write_text(text)
     assert any(alarm in found for found in alarms(source, "32 bits"))
+
+
+# Faults put into what blocks of effects compute, in q31, and the alarm that has to follow
+EFFECT_FAULTS = [
+    ("crept", r"\(settled - state\[i\]\.next\) >> t->drop", "settled - state[i].next", "signed downcast"),
+    ("crept", r"(crept_creep_1 = \{[^;]*, )\d+(, \d+, 3,)", r"\g<1>25\2", "signed overflow"),
+    ("aged", r"\(travel - piece->begin\) >> piece->drop", "travel - piece->begin", "signed downcast"),
+    ("drifted", r"(\(t->slope \+ self->gained\)) \* ahead", r"\1 * self->part", "signed overflow"),
+    ("heated", r"way >= 0 \? way : -way, t->coarse", "way >= 0 ? way : -way, 0", "signed downcast"),
+    ("viscous", r"(sum \+= t->weight\[i\] \* z);", r"\1 * r;", "signed overflow"),
+    ("dashpot", r"\(k = 4; k > 0; --k\)( \{\s*y = piece)", r"(k = 5; k > 0; --k)\1", "out of bounds"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "pattern", "replacement", "alarm"), EFFECT_FAULTS)
+def test_faults_of_effects_raise_alarms(name: str, pattern: str, replacement: str, alarm: str, tmp_path: Path) -> None:
+    source = write(tmp_path, name, "q31", "loop")
+    text, places = re.subn(pattern, replacement, source.read_text())
+    assert places == 1
+    source.write_text(text)
+    assert any(alarm in found for found in alarms(source, "64 bits"))
+
+
+def test_every_fact_about_effects_has_its_place() -> None:
+    text = "".join(
+        emitted_files(model(name), operator="both", arithmetic="q31", engine="loop")[f"{name}.c"] for name in EFFECTS
+    )
+    for pattern, _ in STATES:
+        assert re.search(pattern.replace("NAME", r"\w+?"), text), pattern
 
 
 NOT_GRANTED = """\
