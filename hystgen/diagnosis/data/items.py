@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Run
+from hystgen.identification.joint import DIFFERENCE
 
 Array = NDArray[np.float64]
 Samples = slice | NDArray[np.intp]
@@ -30,6 +31,10 @@ DIFFERENCES = 12, 2**25
 
 COMPARISONS = 40, 2**23
 """The same for errors with the free offsets and start states fitted."""
+
+
+ROUNDED = float(np.finfo(np.float64).eps) ** 0.5
+"""Least change of a number, as a share of it, by which a slope is found: half of the digits are left for it."""
 
 
 class Recent:
@@ -97,6 +102,15 @@ class Item:
         if not len(steps) or np.any(steps != steps[0]):
             return found
         return slice(int(found[0]), int(found[-1]) + 1, int(steps[0]))
+
+    def step(self, h: Array) -> float:
+        """Change of a predicted output (N,) by which the slope of a map is found, output units.
+
+        As small a part of the measured range as of any other number, but not lost in the rounding of the output: the
+        samples compared may be of a drive that rests, or be a single one.
+        """
+        largest = max(float(np.max(np.abs(x), initial=0.0)) for x in (h, self.y[self.known]))
+        return max(DIFFERENCE * self.output_range, ROUNDED * largest, 1e-300)
 
     def picked(self, rows: Array) -> Array:
         """The compared samples of rows (k, N), contiguous."""

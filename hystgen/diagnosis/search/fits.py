@@ -48,7 +48,7 @@ class _Block:
             self._level, moved = here.level(h, item)
             offset = here.compared(moved, item)
             bent = here.mapped(h, self._level, item)
-            step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
+            step = item.step(h)
             slope = (here.mapped(h + step, self._level, item) - bent) / step
             rows = here.compared(rows * slope, item)
             h = here.compared(bent, item)

@@ -224,7 +224,7 @@ class Actuator:
         limits = np.full(len(free), np.inf) if largest is None else largest
         factors = np.zeros(len(free))
         level = np.full(len(h), float(np.mean(y - self.compared(h, item))))
-        step = DIFFERENCE * max(float(np.ptp(h)), 1e-12)
+        step = item.step(h)
         for _ in range(LEVEL_STEPS):
             bent = self.mapped(h, level, item)
             if not np.isfinite(bent).all():
