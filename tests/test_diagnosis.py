@@ -43,6 +43,7 @@ from hystgen.effects.creep.model import ExponentialCreep
 from hystgen.effects.drift.model import LinearDrift
 from hystgen.effects.noncongruent.model import PlayFunctions
 from hystgen.effects.rate_dependence.model import RelaxingPlays
+from hystgen.effects.saturation.model import TanhSaturation
 from hystgen.effects.sensor_nonlinearity.model import SensorPolynomial
 from hystgen.identification.joint import Bent, DeadZones, Ends, Kept
 from hystgen.records import Record, read_record
@@ -300,6 +301,24 @@ def test_a_record_of_which_most_is_not_compared_is_told() -> None:
     assert preparing.prepare([early, late], [early], (0.0,), 0.0).notes == []
 
 
+def test_start_memories_are_found_where_all_records_together_need_them() -> None:
+    """One found by a model without the effects would be wrong by what they do, and judge them with that error."""
+    growing = 50.0 - np.linspace(10.0, 50.0, 2000) * np.cos(np.linspace(0.0, 10.0 * np.pi, 2000))
+    steady = wander(3)
+
+    def made(v: Array, name: str) -> Record:
+        y = brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0)
+        return record(v, noisy(40.0 * np.tanh((y - 60.0) / 40.0), 0.01), name)
+
+    fitted = [made(wander(1), "fitted")]
+    alone = preparing.prepare(fitted, [made(growing, "growing")], None, 0.0).held
+    assert [item.turns is None for item in alone] == [False]
+    assert alone[0].known.all()
+    both = preparing.prepare(fitted, [made(growing, "growing"), made(steady, "steady")], None, 0.0).held
+    assert [item.turns is None for item in both] == [True, True]
+    assert np.argmax(both[0].known) >= 1900  # the largest drive is at its end
+
+
 class TestNoise:
     def item(self, y: Array, v: Array, name: str = "made") -> Item:
         return Item(name, Run(np.arange(len(v)) * 1e-3, v), y, None, float(np.ptp(y)))
@@ -324,7 +343,6 @@ class TestNoise:
         assert selection.difference(before, less) < 1e-6
         assert selection.difference(before, same) > 1e-3
         assert selection.difference(less, before) > 0.9
-
 
     def test_a_hold_that_rings_tells_nothing(self) -> None:
         """An oscillation that dies away in a hold is no noise, however large; slow noise there is."""
@@ -431,6 +449,25 @@ def test_what_a_curved_sensor_sees(rate: float, start: float) -> None:
     item = Item("made", Run(t, v), y - 50.0, None, float(np.ptp(y)))
     error = Actuator(np.array([0.0, 10.0]), (), made).error(item, np.array([1.0, 0.5]))
     assert np.max(np.abs(error)) < 1e-6
+
+
+@pytest.mark.parametrize("samples", [1, 30])
+@pytest.mark.parametrize(
+    "bent",
+    [
+        SensorPolynomial(name="sensor_nonlinearity", coefficients=(0.3,), scale=100.0),
+        TanhSaturation(name="saturation", level=60.0),
+    ],
+)
+@pytest.mark.parametrize("place", [0.0, 30.0])
+def test_a_drive_at_rest_leaves_the_offset_free(place: float, bent: Effect, samples: int) -> None:
+    """Also where a map bends the output: nothing else of the record's own is known."""
+    v = np.full(200, place)
+    y = noisy(np.full(200, 12.0), 0.02)
+    y[:-samples] = np.nan
+    actuator = Actuator(np.array([0.0, 10.0]), (), (bent,))
+    error = actuator.error(Item("rest", Run(np.arange(200) * 1e-3, v), y, None, 0.0), np.array([1.0, 0.5]))
+    np.testing.assert_allclose(error[-samples:], y[-samples:] - y[-samples:].mean(), atol=1e-6)
 
 
 @pytest.mark.parametrize("curve", [-0.15, 0.15])

@@ -350,15 +350,25 @@ def _courses(
 
 
 def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Course], list[Course], list[str]]:
-    """The courses, with a start memory if too little could be compared for a name without one, and notes on the
-    direction of their loops.
+    """The courses, with start memories if too little of all of them could be compared for a name without, and notes on
+    the direction of their loops.
 
-    Other courses get none: an effect in its first seconds may look like a start memory.
+    Otherwise they get none: an effect in its first seconds may look like a start memory, and a memory found without the
+    effects that are still to be named may be wrong by as much as they do.
     """
-    begun = start.needed(to_fit, least=acceptance.FEW_COMPARED)
+    begun = start.needed(to_fit, least=_least(to_fit))
     solution, _ = pi.solve(begun, None, 0.0)
-    begun_held = start.of_model(held, (), solution.thresholds, solution.weights, acceptance.FEW_COMPARED)
+    begun_held = start.of_model(held, (), solution.thresholds, solution.weights, _least(held))
     return begun, begun_held, solution.sense.sentences(len(solution.thresholds) - 1)
+
+
+def _least(courses: Sequence[Course]) -> float:
+    """Share of the samples of a record below which a start memory is sought for it: none where all records together can
+    be compared without."""
+    known = [int(np.count_nonzero(np.isfinite(course.y[course.begin : course.last]))) for course in courses]
+    used = [start.unknown(course).used for course in courses]
+    able = max(used, default=0) > acceptance.COMPARED_SAMPLES
+    return 0.0 if able and sum(used) >= acceptance.FEW_COMPARED * sum(known) else acceptance.FEW_COMPARED
 
 
 def _without_faults(ready: Prepared) -> Prepared:
