@@ -92,7 +92,7 @@ CHAINS = {
     "straight": chain("straight", "name: resonance, frequency: 20, damping: 0.1", "name: lag, time_constant: 3.0e-3",
                       CREEP).replace(PLAYS, "\n  pi: {thresholds: [0], weights: [2]}\n"),
     "drifting": chain("drifting", "name: drift, shape: curved, rate: 0.05, change: 0.01", CREEP,
-                      "name: saturation, level: 15", compensate="drift"),
+                      "name: saturation, level: 15, centre: 4", compensate="drift"),
     "drifting_late": chain("drifting_late", "name: drift, rate: -0.08", "name: delay, time: 2.6e-3", CREEP,
                            compensate="drift"),
     "heated": chain("heated", "name: thermal, source: self_heating, time_constant: 0.5, heating: 0.05, "

@@ -36,6 +36,7 @@ def effect(name: str, which: int = 0, **numbers: Any) -> Any:
 CREEP = effect("creep", time_constants=(0.01, 0.1, 30.0), weights=(0.02, 0.03, 0.05))
 LOGARITHMIC = effect("creep", 1, shape="logarithmic", per_decade=0.02, t0=0.1, t_min=1e-3, t_max=1e4)
 TANH = effect("saturation", level=60.0)
+OFF_CENTRE = effect("saturation", level=45.0, centre=20.0)
 STOPS = effect("saturation", 2, shape="stops", lower=6.0, upper=12.0, give=0.1)
 THERMAL = effect("thermal", gain_per_degree=-0.002, offset_per_degree=0.01)
 BUMP = effect("noncongruent", 1, shape="centre", amplitude=0.4, centre=30.0, width=15.0)
@@ -52,7 +53,8 @@ SLEW = effect("slew_limit", rate=5000.0, falling_rate=4000.0)
 FAST_LAG = effect("lag", time_constant=0.2 * T)
 
 EXACT = {
-    "creep": [CREEP], "creep, logarithmic": [LOGARITHMIC], "tanh": [TANH], "stops": [STOPS], "thermal": [THERMAL],
+    "creep": [CREEP], "creep, logarithmic": [LOGARITHMIC], "tanh": [TANH], "off centre": [OFF_CENTRE],
+    "stops": [STOPS], "thermal": [THERMAL],
     "loop centre": [BUMP], "play functions": [POLYNOMIALS], "relaxation": [RELAXING], "dashpot": [NONLINEAR],
     "thresholds": [BETAS], "slew": [SLEW], "fast lag": [FAST_LAG],
     **{f"ageing {i}": [each] for i, each in enumerate(AGEING)},

@@ -59,6 +59,7 @@ EVERY = [
     make("delay", time=0.0137),
     make("slew_limit", rate=30.0, falling_rate=20.0),
     make("saturation", level=2.0),
+    make("saturation", level=2.0, centre=-0.7),
     make("saturation", shape="hard", level=2.0),
     make("thermal", gain_per_degree=0.01, offset_per_degree=0.02, reference=21.0),
     make("thermal", source="self_heating", gain_per_degree=0.01, time_constant=2.0, heating=0.2),
@@ -830,6 +831,8 @@ def test_sensor_polynomial_and_saturation_and_their_order() -> None:
     limited = 2.0 * np.tanh(h / 2.0) + 0.3
     expected = limited + 3.0 * (0.05 * (limited / 3) ** 2 - 0.02 * (limited / 3) ** 3) + 0.5 * t
     assert np.max(np.abs(Chain(CASCADE, parts).simulate([Run(t, v)])[0] - expected)) < 1e-12
+    around = 0.7 - 1.5 * np.tanh((0.7 - h) / 1.5) + 0.3
+    assert np.max(np.abs(of(make("saturation", level=1.5, centre=0.7), t, v) - around)) < 1e-12
     hard = make("saturation", shape="hard", level=1.0)
     assert np.max(np.abs(of(hard, t, v) - (np.minimum(np.maximum(h, -1), 1) + 0.3))) < 1e-12
     stops = make("saturation", shape="stops", lower=-0.4, upper=0.9, give=0.25)

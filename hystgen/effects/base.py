@@ -236,6 +236,8 @@ class Effect(BaseModel):
     """whether its start state is at rest behind the pause before a record whose history is known"""
     settled: ClassVar[tuple[str, ...]] = ()
     """keys of conventions, and of numbers that a fit cannot separate from others: a refit leaves them as they are"""
+    later: ClassVar[tuple[str, ...]] = ()
+    """keys that came after files were written without them: at their defaults they leave a file's hash as it was"""
     hint: ClassVar[str] = ""
     """word on what may have been meant, said with a wrong or missing key"""
     compensated: ClassVar[Compensated] = "not known"

@@ -183,8 +183,8 @@ def canonical_json(parameters: Parameters) -> str:
     """The one text of these parameters: JSON with sorted keys, defaults filled in, shortest round-trip numbers.
 
     A density stands as it was given, not as the plays made from it. What came later, `emit.optimize`,
-    `emit.compensation` and `not_separable`, stands there only where it is not the default, so that files without it
-    keep their hash.
+    `emit.compensation`, `not_separable` and keys of effects, stands there only where it is not the default, so that
+    files without it keep their hash.
     """
     data = _data(parameters)
     if parameters.emit.optimize == "auto":
@@ -195,6 +195,10 @@ def canonical_json(parameters: Parameters) -> str:
         del data["emit"]["compensation"]["compensate"]
     if not parameters.not_separable:
         del data["not_separable"]
+    for effect, entry in zip(parameters.model.effects, data["model"]["effects"], strict=True):
+        for key in effect.later:
+            if entry[key] == type(effect).model_fields[key].default:
+                del entry[key]
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 

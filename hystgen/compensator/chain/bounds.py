@@ -67,15 +67,20 @@ def _saturation(compiled: Compiled, u: float, kind: str) -> tuple[float, float, 
     slope, back, there = 1.0, 0.0, 0.0
     limits = compiled.tables.limits
     ends = np.array([float(limits[slots.OUTPUT_MIN]), float(limits[slots.OUTPUT_MAX])]) - compiled.static.output_offset
-    size = float(np.max(np.abs(ends)))
     for effect in reversed(compiled.parts.saturations):
         if isinstance(effect, TanhSaturation):
-            share = min(size / effect.level, 1.0 - 4.0 * u)
+            level, centre = effect.level, abs(effect.centre)
+            shares = np.clip((ends - effect.centre) / level, 4.0 * u - 1.0, 1.0 - 4.0 * u)
+            share = float(np.max(np.abs(shares)))
             slope = slope / (1.0 - share * share)
-            back += u * (4.0 * size + effect.level * (0.9 * kernels.ATANH_MAX_ULP[kind] + 2.0)) * slope
-            there += u * effect.level * (4.0 + 2.0 * kernels.TANH_MAX_ULP[kind])
-            size = effect.level * math.atanh(share)
+            size, off = level * share, 1.0 if centre else 0.0
+            back += u * (4.0 * size + level * (0.9 * kernels.ATANH_MAX_ULP[kind] + 2.0)) * slope
+            back += u * (2.0 * off * size + 5.0 * centre) * slope  # two more sums; a2, a3 and what they are added to
+            there += u * level * (4.0 + 2.0 * kernels.TANH_MAX_ULP[kind])
+            there += u * (off * level + 6.0 * centre)
+            ends = effect.centre + level * np.arctanh(shares)
         else:
+            size = float(np.max(np.abs(ends)))
             give = getattr(effect, "give", 0.0)
             slope = slope / (give if 0.0 < give < 1.0 else 1.0)
             back += 8.0 * u * size * slope

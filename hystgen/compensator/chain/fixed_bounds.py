@@ -60,8 +60,9 @@ class Sizes:
     """Largest sizes of the signals behind the plays, in output codes.
 
     Forwards: the sum of the plays, the input of each creep, mode and saturation, the output without motion of the
-    modes, and the output. Backwards: the reference after the inverse of each saturation, the target of the output side,
-    and the sum asked of the plays. For each block of the user's own: the input, and the output asked for.
+    modes, and the output. Backwards: the reference after the inverse of each saturation, the least and largest input to
+    which each tanh is inverted (`inverted`), the target of the output side, and the sum asked of the plays. For each
+    block of the user's own: the input, and the output asked for.
     """
 
     plays: float
@@ -72,6 +73,7 @@ class Sizes:
     still: float
     output: float
     undone: list[float]
+    inverted: list[tuple[float, float]]
     target: float
     asked: float
 
@@ -235,23 +237,26 @@ class Bounds:
     def _saturation(self) -> tuple[float, float, float]:
         """Saturation: the slope of its inverse at the ends of the output, the error of the inverse, and that of the
         map, in output codes."""
-        size = max(abs(end - self.static.output_offset) for end in self.ends)
+        ends = [end - self.static.output_offset for end in self.ends]
         slope, back, there = 1.0, 0.0, 0.0
         bends = [self.bends[i : i + 2] for i in range(0, len(self.bends), 2)]
         for effect in reversed(self.parts.saturations):
             if isinstance(effect, TanhSaturation):
                 onward, backward = bends.pop()
-                share = min(size / effect.level, 1.0 - 2.0**-50)
+                most = 1.0 - 2.0**-50
+                shares = [min(max((end - effect.centre) / effect.level, -most), most) for end in ends]
+                share = max(map(abs, shares))
                 slope = slope / (1.0 - share * share)
                 back = back / (1.0 - share * share) + backward.error(1.0 / (1.0 - share * share)) * self._signal
                 there += onward.error(1.0) * self._signal
-                size = effect.level * math.atanh(share)
+                ends = [effect.centre + effect.level * math.atanh(each) for each in shares]
             elif isinstance(effect, HardSaturation | Stops):
                 give = getattr(effect, "give", 0.0)
                 over = 1.0 / give if 0.0 < give < 1.0 else 1.0
                 slope, back = slope * over, back * over
                 if give:
-                    back += (0.5 + over) * self._signal + missed(1.0 / give) * size / float(self.inner.output_lsb)
+                    size = max(map(abs, ends)) / float(self.inner.output_lsb)
+                    back += (0.5 + over) * self._signal + missed(1.0 / give) * size
                     there += 1.0 * self._signal + missed(give) * self.sizes.output
         return slope, back, there
 

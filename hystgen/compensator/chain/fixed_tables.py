@@ -214,7 +214,6 @@ class _Builder:
         for one in self.own_outputs:
             owns.append(size)
             size = size * one.forward.largest * slack + 1.0
-        settled = size
         span = self._code(self.high - self.low)
         for _ in self.parts.ageing:
             size *= thermal.LARGEST_GAIN
@@ -225,13 +224,25 @@ class _Builder:
         for mode in self.modes:
             modes.append(size)
             size = size * mode.largest * slack + 1.0
-        saturations = [size] * len(self.parts.saturations)
+        saturations, at_rest = [], []
+        low, high = (self._code(end - static.output_offset) for end in self._unlimited)
+        for effect in self.parts.saturations:
+            saturations.append(size)
+            more = (slack - 1.0) * max(abs(low), abs(high)) + 1.0
+            at_rest.append((low - more, high + more))
+            if isinstance(effect, TanhSaturation):
+                size = max(size, abs(self._code(effect.centre)) + 1.0)
+            low, high = (
+                self._code(float(end))
+                for end in effect.mapped(np.array([low, high]) * float(self.output_lsb), None)
+            )
         away = abs(self._code(static.output_offset)) + span * (1 + len(self.parts.drift))
         back = float(self.about.code_max) + away + 1.0
-        undone = [back]
-        for effect in reversed(self.parts.saturations):
+        undone, inverted = [back], []
+        for effect, ends in zip(reversed(self.parts.saturations), reversed(at_rest), strict=True):
             if isinstance(effect, TanhSaturation):
-                back = self.led_back(effect, settled, still)
+                inverted.append(self._inverted(effect, ends, still))
+                back = max(map(abs, inverted[-1]))
             elif isinstance(effect, HardSaturation):
                 back = min(back, self._code(effect.level) + 1.0)
             elif isinstance(effect, Stops):
@@ -252,11 +263,19 @@ class _Builder:
             moved = inside + (asked + inside * each.rest) / each.slope
             asked = max(moved, asked / each.rest) * slack + 1.0
         pairs = list(zip(owns, reversed(asked_of_own), strict=True))
-        return Sizes(plays, creeps, pairs, modes, saturations, still + away, size + away, undone, target, asked)
+        forwards = still + away, size + away
+        return Sizes(plays, creeps, pairs, modes, saturations, *forwards, undone, inverted[::-1], target, asked)
 
-    def led_back(self, effect: TanhSaturation, settled: float, size: float) -> float:
-        """Largest input to which a displacement is inverted; never less than the model reaches at rest."""
-        return max(settled, min(size, STEEP * self._code(effect.level)))
+    @cached_property
+    def _unlimited(self) -> tuple[float, float]:
+        """Extremes of the settled output in front of the saturations, with the offset."""
+        return output_range(self.static, dataclasses.replace(self.parts, saturations=[]), self.seconds)
+
+    def _inverted(self, effect: TanhSaturation, at_rest: tuple[float, float], size: float) -> tuple[float, float]:
+        """Least and largest input to which a displacement is inverted; never less than the model reaches `at_rest`."""
+        centre = self._code(effect.centre)
+        way = max(*(abs(end - centre) for end in at_rest), min(size + abs(centre), STEEP * self._code(effect.level)))
+        return centre - way, centre + way
 
     def _beyond(self) -> tuple[int, bool]:
         """How far beyond its range the input of the plays has to be asked for, in spans, and whether all of it can be.
@@ -471,12 +490,12 @@ class _Builder:
         domain: list[tuple[int, int]] = []
         scaled: list[tuple[int, int]] = []
         curves: list[FixedCurve | None] = []
-        places = zip(self.parts.saturations, self.sizes.saturations, reversed(self.sizes.undone[1:]), strict=True)
-        for effect, size, back in places:
+        inverted = iter(self.sizes.inverted)
+        for effect, size in zip(self.parts.saturations, self.sizes.saturations, strict=True):
             row = [0, 0, *factor(0), *factor(0)]
             if isinstance(effect, TanhSaturation):
                 kinds.append(slots.TANH)
-                pair = self._bends(self._code(effect.level), size, back)
+                pair = self._bends(effect, size, next(inverted))
                 self.bends += pair
                 curves += [one.curve for one in pair]
                 domain += [one.curve.domain for one in pair]
@@ -501,27 +520,36 @@ class _Builder:
             np.array(kinds, dtype=np.int64), np.array(pieces, dtype=np.int64).reshape(-1, 6), found
         )
 
-    def _bends(self, level: float, size: float, back: float) -> tuple[Bend, Bend]:
-        """The curve of a tanh for inputs up to `size` codes, and its inverse for results up to `back`."""
+    def _bends(self, effect: TanhSaturation, size: float, inverted: tuple[float, float]) -> tuple[Bend, Bend]:
+        """The curve of a tanh for inputs up to `size` codes, and its inverse for results between two.
+
+        Arguments of a curve go equally far to both sides: beyond the nearer end of its range it is constant.
+        """
         scale = 2.0**self.bits
 
-        def curve(function: Callable[[float], float], most: float, value: float) -> Bend:
+        def curve(function: Callable[[float], float], low: float, high: float, value: float) -> Bend:
+            most = max(-low, high)
             drop = max(0, math.ceil(math.log2(most * scale)) - BEND_BITS)
             lift = max(0, math.ceil(math.log2(value * scale)) - BEND_BITS)
             end = math.floor(most * scale / 2.0**drop)
             into, out = 2.0**drop / scale, scale / 2.0**lift
-            allowed = max(0.5, out / 64.0)
+            allowed, corners = max(0.5, out / 64.0), [x / into for x in (low, high) if abs(x) < most]
+
+            def within(x: float) -> float:
+                return function(min(max(x * into, low), high)) * out
+
             try:
-                found = FixedCurve(lambda x: function(x * into) * out, (-end, end), [], self.about.degree, allowed)
+                found = FixedCurve(within, (-end, end), corners, self.about.degree, allowed)
             except FormatError:
                 self._refuse("saturation bends too sharply within the output's range")
             return Bend(found, drop, lift)
 
-        envelope = TanhEnvelope((level, 1.0 / level, 0.0, 0.0))
-        far = float(envelope.forward(back))
+        level, centre = self._code(effect.level), self._code(effect.centre)
+        envelope = TanhEnvelope((level, 1.0 / level, 0.0 - centre / level, centre))
+        least, most = (float(envelope.forward(end)) for end in inverted)
         return (
-            curve(lambda x: float(envelope.forward(x)), size, min(level, size)),
-            curve(lambda y: float(envelope.inverse(y)), far, back),
+            curve(lambda x: float(envelope.forward(x)), -size, size, min(level + abs(centre), max(size, abs(centre)))),
+            curve(lambda y: float(envelope.inverse(y)), least, most, max(map(abs, inverted))),
         )
 
 

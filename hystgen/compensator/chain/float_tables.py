@@ -56,7 +56,7 @@ def _behind(parts: Parts, arithmetic: str) -> Stages:
         if isinstance(effect, TanhSaturation):
             kinds.append(slots.TANH)
             sizes.append(0)
-            one = [effect.level, 1.0 / effect.level, 0.0, 0.0, 1.0 / effect.level, effect.level]
+            one = [*effect.envelope, 1.0 / effect.level, effect.level]
             one.append(float(np.nextafter(dtype(1), dtype(0))))
             data += 2 * one  # both branches
             continue

@@ -110,7 +110,7 @@ class Item:
         samples compared may be of a drive that rests, or be a single one.
         """
         largest = max(float(np.max(np.abs(x), initial=0.0)) for x in (h, self.y[self.known]))
-        return max(DIFFERENCE * self.output_range, ROUNDED * largest, 1e-300)
+        return float(max(DIFFERENCE * self.output_range, ROUNDED * largest, 1e-300))
 
     def picked(self, rows: Array) -> Array:
         """The compared samples of rows (k, N), contiguous."""

@@ -12,7 +12,8 @@ def unsaturated(effect: TanhSaturation | HardSaturation | Stops, y: Array) -> Ar
     """The input (N,) that gives the output `y` (N,); for an output out of reach, that of the nearest one in reach."""
     if isinstance(effect, TanhSaturation):
         most = np.nextafter(1.0, 0.0)
-        return np.asarray(effect.level * np.arctanh(np.clip(y / effect.level, -most, most)))
+        share = np.clip((y - effect.centre) / effect.level, -most, most)
+        return np.asarray(effect.centre + effect.level * np.arctanh(share))
     if isinstance(effect, HardSaturation):
         return np.clip(y, -effect.level, effect.level)
     inside = np.clip(y, effect.lower, effect.upper)

@@ -15,6 +15,9 @@ LEVELS = (np.array([-0.02]), np.array([-0.1]), np.array([-0.3]))
 """Starts within the output: a limit beyond what was measured does nothing, and neither does a small change of it."""
 
 
+MIDDLE = 0.5
+"""Centre from which a search starts, as a share of the output range from its lower end."""
+
 INSIDE, GIVE = (0.03, 0.1), 0.2
 """Stops from which a search starts: shares of the output range inside its ends, and what they give."""
 
@@ -45,19 +48,46 @@ class _Level(_Saturation):
 
 
 class TanhSaturation(_Level):
-    """Smooth limit `y = level tanh(h/level)` of the output in front of the offset."""
+    """Smooth limit `y = centre + level tanh((h - centre)/level)` of the output in front of the offset.
+
+    A stage whose limits are alike in both directions has them around the middle of its travel, which with a drive of
+    one sign is not where the output is 0.
+    """
 
     shape: Literal["tanh"] = Field(default="tanh", description="smooth limit")
-    level: Positive = Field(description="largest output, output units", examples=[50.0])
+    level: Positive = Field(description="largest distance from the centre, output units", examples=[50.0])
+    centre: Number = Field(default=0.0, description="output midway between the limits, output units", examples=[20.0])
+
+    later: ClassVar[tuple[str, ...]] = ("centre",)
+
+    @property
+    def envelope(self) -> tuple[float, float, float, float]:
+        """a0 to a3 of the same curve as `a0 tanh(a1 h + a2) + a3`."""
+        return self.level, 1.0 / self.level, 0.0 - self.centre / self.level, self.centre
 
     def mapped(self, y: Array, run: Run) -> Array:
         """The limited output."""
-        return np.asarray(self.level * np.tanh(y / self.level))
+        return np.asarray(self.centre + self.level * np.tanh((y - self.centre) / self.level))
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The level, from a tenth of the output range to a thousand."""
-        return [cls._candidate("saturation behind, tanh", about, 3.0)]
+        """The level, from a tenth of the output range to a thousand; then also the centre, within the output."""
+        low, high = about.drive
+        bottom = about.output_range * low / (high - low)  # of plays without hysteresis
+
+        def build(x: Array) -> TanhSaturation:
+            level, centre = about.output_range * float(10.0 ** x[0]), bottom + about.output_range * float(x[1])
+            return cls(name="saturation", level=level, centre=centre)
+
+        none = np.array([3.0, MIDDLE])
+        starts = [np.append(level, MIDDLE) for level in LEVELS]
+        return [
+            cls._candidate("saturation behind, tanh", about, 3.0),
+            Candidate(
+                "saturation behind, tanh off centre", np.array([-1.0, -1.0]), np.array([3.0, 2.0]), starts[0], build,
+                none, tuple(starts[1:]),
+            ),
+        ]  # fmt: skip
 
 
 class HardSaturation(_Level):
