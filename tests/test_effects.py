@@ -59,7 +59,6 @@ EVERY = [
     make("delay", time=0.0137),
     make("slew_limit", rate=30.0, falling_rate=20.0),
     make("saturation", level=2.0),
-    make("saturation", level=2.0, centre=-0.7),
     make("saturation", shape="hard", level=2.0),
     make("thermal", gain_per_degree=0.01, offset_per_degree=0.02, reference=21.0),
     make("thermal", source="self_heating", gain_per_degree=0.01, time_constant=2.0, heating=0.2),
@@ -73,6 +72,7 @@ EVERY = [
     make("noncongruent", coefficients=((0.1,), (0.05, 0.02), (-0.1,))),
     make("noncongruent", shape="centre", amplitude=0.4, centre=0.5, width=1.2),
     make("saturation", shape="stops", lower=-0.5, upper=2.0, give=0.2),
+    make("saturation", level=2.0, centre=-0.7),
 ]
 
 
