@@ -73,6 +73,7 @@ EVERY = [
     make("noncongruent", shape="centre", amplitude=0.4, centre=0.5, width=1.2),
     make("saturation", shape="stops", lower=-0.5, upper=2.0, give=0.2),
     make("saturation", level=2.0, centre=-0.7),
+    make("resonance", shape="part", frequency=40.0, damping=0.05, share=0.3),
 ]
 
 
@@ -306,7 +307,9 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
             lambda tau, m: {"shape": "relaxation", "time_constant": tau, "exponent": m}, times, st.floats(0.1, 10.0)
         ),
     ),
-    "resonance": st.builds(lambda f, z: {"frequency": f, "damping": z}, positive, st.floats(0, 10, exclude_min=True)),
+    "resonance": st.builds(lambda f, z: {"frequency": f, "damping": z}, positive, st.floats(0, 10, exclude_min=True))
+    | st.builds(lambda f, x: {"shape": "part", "frequency": f, "damping": x, "share": x}, positive,
+                st.floats(0, 1, exclude_min=True, exclude_max=True)),
     "lag": st.builds(lambda tau: {"time_constant": tau}, times),
     "delay": st.builds(lambda time: {"time": time}, times),
     "slew_limit": st.builds(lambda a, b: {"rate": a, "falling_rate": b}, positive, positive),
@@ -475,6 +478,17 @@ def test_resonance_against_scipy(frequency: float, damping: float) -> None:
     expected = h[0] + signal.lsim(system, h - h[0], t)[1]
     found = make("resonance", frequency=frequency, damping=damping).filtered(h, Run(t, h))
     assert np.max(np.abs(found - expected)) < 1e-8
+
+
+@pytest.mark.parametrize("share", [0.01, 0.4, 0.99])
+def test_a_part_of_a_resonance_against_scipy(share: float) -> None:
+    """As one transfer function, with zeros where the mode and the rest are opposite."""
+    t, h = drive()
+    w, damping = 2 * np.pi * 30.0, 0.02
+    poles = np.array([1.0, 2 * damping * w, w * w])
+    expected = h[0] + signal.lsim((poles - share * np.array([*poles[:2], 0.0]), poles), h - h[0], t)[1]
+    mode = make("resonance", shape="part", frequency=30.0, damping=damping, share=share)
+    assert np.max(np.abs(mode.filtered(h, Run(t, h)) - expected)) < 1e-8
 
 
 @pytest.mark.parametrize("ratio", [0.2, 1.0, 1.7])

@@ -37,6 +37,9 @@ FOLDER = Path(__file__).with_name("follower")
 STAGE, STAGE_C = ((FOLDER / name).read_text() for name in ("model.py", "follower.c"))
 FOLLOWER = "name: user:follower, bandwidth: 700"
 
+# One of the catalogue, whose block is of the same kind
+PART = "name: resonance, shape: part, frequency: 30, damping: 0.1, share: 0.2"
+
 
 def written(folder: Path, *effects: str, name: str = "stage") -> Path:
     """A parameter file with these effects."""
@@ -88,7 +91,7 @@ def test_the_forward_model_is_the_integral_of_its_equation(tmp_path: Path) -> No
 
 @pytest.mark.parametrize("even", [True, False])
 def test_the_inverse_composes_with_the_forward_model(tmp_path: Path, even: bool) -> None:
-    one = both(tmp_path, CREEP)
+    one = both(tmp_path, CREEP, PART)
     t = np.cumsum(np.full(500, T) if even else np.random.default_rng(2).uniform(0.5 * T, 2.0 * T, 500))
     u = 0.5 + 4.0 * np.sin(5.0 * t)
     v = one.inverse().simulate(u, t=t)
@@ -100,7 +103,7 @@ def test_the_inverse_composes_with_the_forward_model(tmp_path: Path, even: bool)
 
 def test_c_gives_the_bits_of_the_reference(tmp_path: Path) -> None:
     """Compiled, which the others are not."""
-    report = hystgen.verify(both(tmp_path, CREEP), "float32", "both", compiler=["gcc"], length=1000)
+    report = hystgen.verify(both(tmp_path, CREEP, PART), "float32", "both", compiler=["gcc"], length=1000)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} >= {"inverse", "forward"}
 
@@ -119,8 +122,11 @@ def test_c_gives_the_same_bits_on_cores_and_beside_a_shared_run_time(tmp_path: P
 
 
 @pytest.mark.parametrize("arithmetic", ["float32", "float64"])
-def test_errors_stay_within_the_bounds_that_follow_from_the_functions(tmp_path: Path, arithmetic: str) -> None:
-    one = both(tmp_path, CREEP)
+@pytest.mark.parametrize("effects", [(DROOP, FOLLOWER, CREEP), (PART, CREEP)], ids=["own", "part of a mode"])
+def test_errors_stay_within_the_bounds_that_follow_from_the_functions(
+    tmp_path: Path, arithmetic: str, effects: tuple[str, ...]
+) -> None:
+    one = hystgen.load(written(tmp_path, *effects), [EXAMPLE, outside(tmp_path)])
     for seed in range(3):
         compiled, run = reference(one, arithmetic, seed)
         bound = bounds.chain_bounds(compiled, arithmetic)
@@ -140,6 +146,7 @@ FIXED = {
     "follower": (FOLLOWER,),
     "slow follower": ("name: user:follower, bandwidth: 30", CREEP),
     "both": (DROOP, FOLLOWER, CREEP, "name: saturation, level: 12"),
+    "part of a mode": (PART, CREEP),
 }
 
 
@@ -170,7 +177,7 @@ def test_fixed_point_stays_within_its_bounds(tmp_path: Path, arithmetic: str, ef
 @pytest.mark.parametrize("arithmetic", ["float64", "q31", "q15"])
 def test_c_gives_the_bits_of_the_reference_in_every_arithmetic(tmp_path: Path, arithmetic: str) -> None:
     with jit.plain():
-        report = hystgen.verify(both(tmp_path, CREEP), arithmetic, "both", compiler=["gcc"], length=100)
+        report = hystgen.verify(both(tmp_path, CREEP, PART), arithmetic, "both", compiler=["gcc"], length=100)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} == {"inverse", "forward"}
 

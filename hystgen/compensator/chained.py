@@ -203,7 +203,7 @@ class Compensator:
         )
         self.blocks: list[Block] = [*drives, Actuator(static, plays), *outputs]
         self.slew = self._called("slew_limit")
-        self.modes = self._called("resonance")
+        self.modes = [effect for effect in self._called("resonance") if effect.block is None]
         self.delay = math.fsum(effect.time for effect in self._called("delay"))
 
     def _called(self, name: str) -> list[Any]:

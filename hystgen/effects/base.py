@@ -237,7 +237,7 @@ class Effect(BaseModel):
     settled: ClassVar[tuple[str, ...]] = ()
     """keys of conventions, and of numbers that a fit cannot separate from others: a refit leaves them as they are"""
     later: ClassVar[tuple[str, ...]] = ()
-    """keys that came after files were written without them: at their defaults they leave a file's hash as it was"""
+    """keys that came after files were written without them: at their defaults they are left out, as from the hash"""
     hint: ClassVar[str] = ""
     """word on what may have been meant, said with a wrong or missing key"""
     compensated: ClassVar[Compensated] = "not known"

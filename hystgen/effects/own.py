@@ -26,7 +26,7 @@ import numpy as np
 
 from hystgen.basics.names import KEYWORDS
 from hystgen.basics.problems import EffectsError
-from hystgen.effects.base import Array, Effect, Place
+from hystgen.effects.base import USER, Array, Effect, Place
 from hystgen.effects.kinds import Kind, OwnBlock, product
 
 ARGUMENTS = {"rest": 3, "resting": 2, "solve": 3, "absorb": 3}
@@ -43,7 +43,9 @@ def kind(effect: type[Effect]) -> Kind:
     """The name of an effect's block in the C."""
     assert effect.block is not None
     table, state = effect.block.table, effect.block.state
-    name = f"user_{_name(effect).partition(':')[2]}"
+    called = _name(effect)
+    shape = str(effect.model_fields["shape"].annotation.__args__[0]) if not called.startswith(USER) else ""  # type: ignore[union-attr]
+    name = f"{called}_{shape}" if shape else f"user_{called.partition(':')[2]}"
     return Kind(name, table, state, letters=len(table) * "n", memory=len(state) * "w")
 
 
@@ -137,7 +139,7 @@ def problem(effect: type[Effect]) -> str:
         return ""
     if not isinstance(block, OwnBlock):
         return f"has block {type(block).__name__}; write block: ClassVar[OwnBlock] = OwnBlock(..)"
-    if not NAME.fullmatch(_name(effect)):
+    if _name(effect).startswith(USER) and not NAME.fullmatch(_name(effect)):
         return f"has a block, and {_name(effect)} cannot name it in C; write user: and lower-case letters, digits and _"
     if effect.place is not Place.DRIVE and (effect.place, effect.order) != (Place.LINEAR, 0):
         return "has a block, which has its place among Place.DRIVE or Place.LINEAR with order 0"

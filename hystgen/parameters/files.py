@@ -171,11 +171,15 @@ def _plain(value: Any) -> Any:
 
 
 def _data(parameters: Parameters) -> dict[str, Any]:
-    """The parameters in the file's form, in its order, with every default filled in."""
+    """The parameters in the file's form, in its order, with every default filled in but those of `Effect.later`."""
     data = parameters.model_dump()
     pi = data["model"]["pi"]
     for key in ("thresholds", "weights") if pi["density"] else ("density",):
         del pi[key]
+    for effect, entry in zip(parameters.model.effects, data["model"]["effects"], strict=True):
+        for key in effect.later:
+            if entry[key] == type(effect).model_fields[key].default:
+                del entry[key]
     return data
 
 
@@ -195,10 +199,6 @@ def canonical_json(parameters: Parameters) -> str:
         del data["emit"]["compensation"]["compensate"]
     if not parameters.not_separable:
         del data["not_separable"]
-    for effect, entry in zip(parameters.model.effects, data["model"]["effects"], strict=True):
-        for key in effect.later:
-            if entry[key] == type(effect).model_fields[key].default:
-                del entry[key]
     return json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 

@@ -140,7 +140,8 @@ class _Builder:
         drive = [end << self.inner.fine for end in self.inner.drive]
         plays.limits[slots.DRIVE_MIN], plays.limits[slots.DRIVE_MAX] = drive
         span = self.static.input_range[1] - self.static.input_range[0]
-        self.behind = self._need(self._own_behind, "effects of your own")
+        names = " and ".join(dict.fromkeys(each.effect.name for each in self.own_outputs))
+        self.behind = self._need(self._own_behind, names)
         tables = ChainTables(
             plays,
             limits,

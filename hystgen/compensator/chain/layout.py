@@ -138,7 +138,8 @@ class Parts:
         return cls(
             [each for each in called("lag") if each.time_constant > 0.0], called("creep"), called("ageing"),
             [each for each in thermal_effects if each.columns], [each for each in thermal_effects if not each.columns],
-            called("drift"), called("resonance"), called("saturation"), called("slew_limit"),
+            called("drift"), [each for each in called("resonance") if each.block is None], called("saturation"),
+            called("slew_limit"),
             [effect for effect in effects if effect.place is Place.PLAYS],
             math.fsum(each.time for each in called("delay")),
             [effect for effect in effects if effect.block and effect.place is Place.DRIVE],

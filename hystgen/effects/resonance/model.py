@@ -10,6 +10,8 @@ from pydantic import Field
 from hystgen.basics.jit import jit
 from hystgen.basics.quantities import Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
+from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.resonance.part import BLOCK
 
 
 @jit
@@ -54,11 +56,11 @@ def ring(u: Array, c: Array, s: Array, ramp: Array, step: Array, damping: float,
             out[i, k + 1] = y
 
 
-class Resonance(Effect):
-    """Mode `y'' + 2 zeta w0 y' + w0^2 y = w0^2 h`, `w0 = 2 pi frequency`, gain 1 at rest; several in series.
+class _Mode(Effect):
+    """`m'' + 2 zeta w0 m' + w0^2 m = w0^2 h`, `w0 = 2 pi frequency`, gain 1 at rest; several in series.
 
     Over a step with straight `h` the solution is exact, for any damping: a free oscillation about `h - 2 zeta h'/w0`.
-    A record starts at rest: `y = h`, `y' = 0`.
+    A record starts at rest: `m = h`, `m' = 0`.
     """
 
     name: Literal["resonance"] = Field(description="name of the effect")
@@ -67,10 +69,7 @@ class Resonance(Effect):
 
     place: ClassVar[Place] = Place.LINEAR
     fades: ClassVar[bool] = True
-    order: ClassVar[int] = 1
     repeatable: ClassVar[bool] = True
-    compensated: ClassVar[Compensated] = "approximate"
-    compensation: ClassVar[str] = "three samples of the reference around the present one: no ringing, no delay"
 
     def factors(self, times: Array) -> tuple[Array, Array, Array]:
         """Times in radians of the undamped oscillation, and the decaying cosine and sine."""
@@ -113,6 +112,17 @@ class Resonance(Effect):
         """The free oscillation from a start that is not at rest: decaying cosine and sine."""
         return np.stack(self.factors(run.t - run.t[0])[1:])
 
+
+class Resonance(_Mode):
+    """Mode `y'' + 2 zeta w0 y' + w0^2 y = w0^2 h`, `w0 = 2 pi frequency`, that carries the whole motion."""
+
+    shape: Literal["whole"] = Field(default="whole", description="a mode that carries the whole motion")
+
+    order: ClassVar[int] = 1
+    later: ClassVar[tuple[str, ...]] = ("shape",)
+    compensated: ClassVar[Compensated] = "approximate"
+    compensation: ClassVar[str] = "three samples of the reference around the present one: no ringing, no delay"
+
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
         """Frequency from two periods per record to three samples per period, damping from 0.3 % to 70 %.
@@ -121,31 +131,96 @@ class Resonance(Effect):
         delay or a lag. A light damping rings long, and is found from the frequency at which the error so far rings
         alone.
         """
-        low, fastest = np.log10(2.0 / about.duration), np.log10(1.0 / about.sample_time)
-        high = max(fastest - np.log10(3.0), low)
+        low, high = _frequencies(about)
 
         def build(x: Array) -> Resonance:
             return cls(name="resonance", frequency=float(10.0 ** x[0]), damping=float(10.0 ** x[1]))
 
-        def start(place: float) -> Array:
-            return np.array([min(fastest - max(fastest - low, 0.0) * place, high), -1.3])
-
-        places = {
-            "high": [start(place) for place in (0.14, 0.2, 0.28)],
-            "middle": [start(place) for place in (0.36, 0.44, 0.52)],
-            "low": [start(place) for place in (0.6, 0.7, 0.8)],
-            "where it rings": [np.array([np.log10(f), -1.8]) for f in about.ringing],
-        }
         return [
             Candidate(
                 f"resonance, {name}", np.array([low, -2.5]), np.array([high, np.log10(0.7)]), starts[0], build,
                 others=tuple(starts[1:]),
             )
-            for name, starts in places.items() if starts
+            for name, starts in _places(about).items() if starts
         ]  # fmt: skip
 
 
-SHAPES = (Resonance,)
+class PartMode(_Mode):
+    """Mode that carries a share of the motion: `y = (1 - share) h + share m`.
+
+    A stage has many modes, and what each adds to the motion at rest is its share of the whole compliance. Those far
+    above what is recorded follow at once (Preumont, Vibration Control of Active Structures, 2011, chapter 2).
+    """
+
+    shape: Literal["part"] = Field(description="a mode that carries a share of the motion")
+    share: Annotated[Positive, Field(lt=1.0)] = Field(description="of the motion at rest, below 1", examples=[0.1])
+
+    compensated: ClassVar[Compensated] = "exact"
+    compensation: ClassVar[str] = "exact: solved for the input with the oscillation known"
+    block: ClassVar[OwnBlock] = BLOCK
+
+    def numbers(self, seconds: float) -> tuple[float, ...]:
+        """Of the block, at steps of `seconds`."""
+        zeta = self.damping
+        c, s, ramp, step = (float(x[0]) for x in self.forced(np.array([seconds])))
+        lead = self.share * (ramp - 1.0)
+        return c - 1.0 + zeta * s, s, c - 1.0 - zeta * s, lead, self.share * step, 1.0 / (1.0 + lead), 0.0
+
+    def filtered(self, h: Array, run: Run) -> Array:
+        """The play sum as the mode passes its share on."""
+        return np.asarray(h + self.share * (super().filtered(h, run) - h))
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """As of a whole mode, with damping that lets it ring, up to 20 %, and up to half of the motion.
+
+        With three samples a period the inverse fades for shares up to 0.6, with more a period for larger ones; what
+        carries most of the motion is a whole mode.
+        """
+        low, high = _frequencies(about)
+
+        def build(x: Array) -> PartMode:
+            frequency, damping = (float(10.0**each) for each in x[:2])
+            return cls(name="resonance", shape="part", frequency=frequency, damping=damping, share=float(x[2]))
+
+        places = _places(about)
+        starts = [*places["where it rings"], *(places[name][1] for name in ("high", "middle", "low"))]
+        first, *others = (np.append(place, FIRST_SHARE) for place in starts)
+        return [
+            Candidate(
+                "resonance of a share", np.array([low, -2.5, 1e-3]), np.array([high, np.log10(0.2), 0.5]), first,
+                build, others=tuple(others), amounts=(2,),
+            )
+        ]  # fmt: skip
+
+
+FIRST_SHARE = 0.1
+"""Share from which a search starts."""
+
+
+def _frequencies(about: About) -> tuple[float, float]:
+    """Decimal logarithms of the least and largest frequency that is sought."""
+    low = np.log10(2.0 / about.duration)
+    return low, max(np.log10(1.0 / about.sample_time) - np.log10(3.0), low)
+
+
+def _places(about: About) -> dict[str, list[Array]]:
+    """Logarithms of frequency and damping from which searches start."""
+    low, high = _frequencies(about)
+    fastest = np.log10(1.0 / about.sample_time)
+
+    def start(place: float) -> Array:
+        return np.array([min(fastest - max(fastest - low, 0.0) * place, high), -1.3])
+
+    return {
+        "high": [start(place) for place in (0.14, 0.2, 0.28)],
+        "middle": [start(place) for place in (0.36, 0.44, 0.52)],
+        "low": [start(place) for place in (0.6, 0.7, 0.8)],
+        "where it rings": [np.array([np.log10(f), -1.8]) for f in about.ringing],
+    }
+
+
+SHAPES = (Resonance, PartMode)
 
 
 def load() -> None:
