@@ -311,7 +311,7 @@ def screened(monkeypatch: pytest.MonkeyPatch, *paths: Path) -> float:
     option: Any = SimpleNamespace(front=True, starts=range(len(paths)), grown=None, name="lag", alone=None)
     rough: Any = SimpleNamespace(errors=lambda _: [np.ones(10)], weights=None)
     searches = screening._Searches(None, rough, [], SimpleNamespace(thin=None))  # type: ignore[arg-type]
-    return searches._screen(option, None)  # type: ignore[return-value]
+    return searches._screen(option, screening._Task(0, 0))  # type: ignore[return-value]
 
 
 class TestScreening:

@@ -470,6 +470,28 @@ def test_a_drive_at_rest_leaves_the_offset_free(place: float, bent: Effect, samp
     np.testing.assert_allclose(error[-samples:], y[-samples:] - y[-samples:].mean(), atol=1e-6)
 
 
+def test_a_shape_that_contains_a_simpler_one_goes_on_from_it(tmp_path: Path) -> None:
+    """With its weights too: about those of a straight sensor a curved one does not do what it did."""
+
+    def made(number: int) -> Record:
+        v = wander(number, turns=40)
+        h = brute_output(v, (0.0, 10.0, 30.0), (1.0, 0.3, 0.3), 0.0) / 160.0
+        return record(v, noisy(160.0 * (h + 0.15 * np.sin(3.0 * h + 0.5)), 0.05, number), f"record {number}")
+
+    ready = preparing.prepare([made(1), made(2)], [made(3)], None, 0.0)
+    base, start = hypothesis.structure_of(hystgen.load(_model(tmp_path)).cascade, [], ready)
+    refitted = selection.refit(base, ready.to_fit, start)
+    records = screening.Records.of(ready.to_fit, ready.held, refitted, 0.05)
+    rough = screening._rough(refitted, records.thin)
+    pairs = zip(screening.options(refitted, records.known), screening.options(rough, records.known), strict=True)
+    found = [screening._Pair(*each) for each in pairs if each[0].name == "sensor_nonlinearity"]
+    searches = screening._Searches(refitted, rough, found, records)
+    simpler = searches(screening._Task(screening._SCREEN, 1))
+    containing = searches(screening._Task(screening._SCREEN, 2, simpler.shape, simpler.weights))
+    assert [pair.option.label for pair in found[1:]] == ["sensor, cubic", "sensor, quartic"]
+    assert containing.rms < simpler.rms
+
+
 @pytest.mark.parametrize("curve", [-0.15, 0.15])
 @pytest.mark.thorough
 def test_a_curved_sensor_beside_a_drift(tmp_path: Path, curve: float) -> None:

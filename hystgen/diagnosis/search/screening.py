@@ -306,6 +306,7 @@ class _Task(NamedTuple):
     shape: Array | None = None
     """start of the search; for a shape that contains a simpler one, the numbers of the simpler one"""
     weights: Array | None = None
+    """weights close to those of the start"""
     steps: int = 0
 
 
@@ -331,13 +332,13 @@ class _Searches:
         """The numbers that one search finds."""
         pair, records = self.found[task.k], self.records
         if task.what == _SCREEN:
-            fitted, held = self._screen(pair.rough, task.shape), records.thin_held
+            fitted, held = self._screen(pair.rough, task), records.thin_held
         else:
             fitted, held = self._join(pair.option, task), records.held
         residual = rms(fitted.errors(held)) if math.isfinite(fitted.rms) else math.inf
         return _Numbers(fitted.shape, fitted.weights, fitted.rms, residual)
 
-    def _screen(self, option: Option, simpler: Array | None) -> Fitted:
+    def _screen(self, option: Option, task: _Task) -> Fitted:
         """A few steps from each start on thinned records, and a few more from the best of them."""
         now, thin = self.rough, self.records.thin
         without = rms(now.errors(thin))
@@ -353,10 +354,9 @@ class _Searches:
             structure = replace(option.alone, parts=(*others, amounts))
             return fits.begun(structure, thin, start, now.weights).further(1, COARSE).now.shape
 
-        starts = list(option.starts)
-        if option.grown is not None and simpler is not None:
-            starts.append(option.grown(simpler))
-        begun = [fits.begun(option.alone, thin, enough_of_it(start), now.weights) for start in starts]
+        begun = [fits.begun(option.alone, thin, enough_of_it(start), now.weights) for start in option.starts]
+        if option.grown is not None and task.shape is not None and task.weights is not None:
+            begun.append(fits.begun(option.alone, thin, option.grown(task.shape), task.weights))
         if option.name.startswith(USER) and not any(math.isfinite(each.now.rms) for each in begun):
             raise EffectsError(f"the effect {option.name} gives no finite output wherever a search for it begins")
         near = acceptance.TOO_FAR * min(each.now.rms for each in acting(begun))
@@ -406,7 +406,7 @@ def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
     def further(task: _Task, numbers: _Numbers) -> list[_Task]:
         if found[task.k].beyond or not helps(screened(task.k, numbers), *without):
             return []
-        return [_Task(_SCREEN, k, numbers.shape) for k in containing(found[task.k])]
+        return [_Task(_SCREEN, k, numbers.shape, numbers.weights) for k in containing(found[task.k])]
 
     first = sorted((k for k, option in enumerate(found) if not option.beyond), key=cost, reverse=True)
     done = {task.k: numbers for task, numbers in pool.each([_Task(_SCREEN, k) for k in first], records.tick, further)}
