@@ -58,9 +58,9 @@ static hystgen_real_t hystgen_braked_over(hystgen_real_t size, hystgen_real_t mo
    answer and is short of it by so much, or less of a lead, by what the drive is short now and was
    before at most. A target that moves on by `way` a step takes a lead of way/(1 - E). */
 HYSTGEN_APART hystgen_real_t hystgen_braked_drive(const hystgen_lag_table_t *t,
-                                                  const hystgen_braked_t *self,
-                                                  hystgen_real_t near, hystgen_real_t beyond,
-                                                  hystgen_real_t falling, hystgen_real_t rising) {
+                                                  const hystgen_braked_t *self, hystgen_real_t near,
+                                                  hystgen_real_t beyond, hystgen_real_t falling,
+                                                  hystgen_real_t rising) {
     const hystgen_lag_t *lag = &self->lag;
     const hystgen_real_t missed = self->earlier - lag->wanted;
     const hystgen_real_t room = beyond + (missed < 0 ? -missed : missed) * t->inverse_rate;
@@ -73,6 +73,6 @@ HYSTGEN_APART hystgen_real_t hystgen_braked_drive(const hystgen_lag_table_t *t,
     const hystgen_real_t ahead = near - (lag->high + way * t->inverse_rate);
     return left < 0 ? near + hystgen_braked_over(-left, -left * t->inverse_rate, -ahead,
                                                  rising - way, room)
-                    : near - hystgen_braked_over(left, left * t->inverse_rate, ahead,
-                                                 falling + way, room);
+                    : near - hystgen_braked_over(left, left * t->inverse_rate, ahead, falling + way,
+                                                 room);
 }

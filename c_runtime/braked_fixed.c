@@ -113,8 +113,7 @@ HYSTGEN_APART int32_t hystgen_braked_over(const hystgen_lag_table_t *t,
    answer and `beyond` short of it, or less of a lead, by what the drive is short now and was before
    at most. */
 static int64_t hystgen_braked_drive(const hystgen_lag_table_t *t, const hystgen_braked_t *self,
-                                    int64_t near, int64_t beyond, int64_t falling,
-                                    int64_t rising) {
+                                    int64_t near, int64_t beyond, int64_t falling, int64_t rising) {
     hystgen_brake_t brake;
     const int64_t room = hystgen_braked_room(t, self, beyond);
     if (room + room < (int64_t)1 << HYSTGEN_DRIVE_BITS) {

@@ -128,7 +128,8 @@ def test_a_lag_behind_a_slew_limit_does_not_overshoot(arithmetic: str) -> None:
     one = model("braked", chain("braked", lag, slew))
     numbers = compiled(one, arithmetic)
     low, high = (float(end) for end in numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
-    u = np.repeat(np.rint([0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high, 0.75 * low + 0.25 * high]), [3, 150, 150])
+    near, far = np.rint(0.75 * low + 0.25 * high), np.rint(0.25 * low + 0.75 * high)
+    u = np.repeat([near, far, near], [3, 150, 150])
     with jit.plain():
         v = answers(numbers, Run(np.arange(len(u)) * T, u, {}), True).astype(float)
     codes = numbers.codes

@@ -105,7 +105,8 @@ def arrived(v: Array, step: float, lag: float) -> tuple[float, int]:
 
 
 @pytest.mark.parametrize(
-    ("lag", "moves", "back"), [(20.0, 25.0, 1.0), (20.0, 5.0, 1.0), (2.0, 8.0, 2.0), (100.0, 12.0, 0.5), (60.0, 4.0, 1.0)]
+    ("lag", "moves", "back"),
+    [(20.0, 25.0, 1.0), (20.0, 5.0, 1.0), (2.0, 8.0, 2.0), (100.0, 12.0, 0.5), (60.0, 4.0, 1.0)],
 )
 def test_a_lag_behind_a_slew_limit_does_not_overshoot(lag: float, moves: float, back: float) -> None:
     """A step of so many moves of the drive; against drives that rise as fast as they can, and then come back so."""

@@ -35,9 +35,9 @@ CHAIN_BLOCKS = (
 )  # fmt: skip
 FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
 FIXED_CHAIN_BLOCKS = (
-    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "braked_fixed.c", "gain_fixed.c", "ageing_fixed.c", "heat_fixed.c",
-    "mode_fixed.c", "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c", "bend.c", "stops.c",
-    "product_fixed.c",
+    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "braked_fixed.c", "gain_fixed.c", "ageing_fixed.c",
+    "heat_fixed.c", "mode_fixed.c", "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c",
+    "bend.c", "stops.c", "product_fixed.c",
 )  # fmt: skip
 """Files that models with effects carry themselves, even with a shared run time."""
 
@@ -177,8 +177,8 @@ class Variant:
     `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
     drive code, or with effects what arrives there has bits below them; `saturates`: output codes are limited;
     `start_list`: each play starts at its own value; `chain`: it has effects, `slew`: one of them keeps the drive within
-    a rate, `braked`: and a lag behind that from overshooting, `waits`: it does not act at once, `ages`: one is a gain that follows the travel, `moves` and `bends`: how
-    plays move and are bent where that is not as in engine loop.
+    a rate, `braked`: and a lag behind that from overshooting, `waits`: it does not act at once, `ages`: one is a gain
+    that follows the travel, `moves` and `bends`: how plays move and are bent where that is not as in engine loop.
     """
 
     engine: str

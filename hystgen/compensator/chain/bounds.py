@@ -39,7 +39,6 @@ from hystgen.effects.thermal.compensator import LEAST_GAIN
 from hystgen.front.tanh import kernels
 from hystgen.plays import slots
 
-
 SAME = "both have seen the same drives"
 
 

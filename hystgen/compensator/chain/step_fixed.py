@@ -178,7 +178,8 @@ def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
 
 BLOCKS = Blocks(
     lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, fixed_delayed,
-    (front_forward, front_inverse), moving_fixed.PLAYS, finer, braked, (own_fixed.product, own_fixed.entered, own_fixed.left),
+    (front_forward, front_inverse), moving_fixed.PLAYS, finer, braked,
+    (own_fixed.product, own_fixed.entered, own_fixed.left),
 )  # fmt: skip
 CODES = Codes(
     step_fixed.finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared
