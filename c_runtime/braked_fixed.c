@@ -61,16 +61,15 @@ HYSTGEN_APART int64_t hystgen_braked_room(const hystgen_lag_table_t *t,
 HYSTGEN_APART int64_t hystgen_braked_along(const hystgen_lag_table_t *t,
                                            const hystgen_braked_t *self, int64_t falling,
                                            int64_t rising, hystgen_brake_t *brake) {
+    const int64_t most = rising * ((int64_t)1 << t->bits);
+    const int64_t least = -falling * ((int64_t)1 << t->bits);
     const int64_t move = self->lag.asked - self->earlier;
-    const int64_t on = hystgen_nearest(move, t->bits);
-    const int64_t way = on > rising     ? rising * ((int64_t)1 << t->bits)
-                        : on < -falling ? -falling * ((int64_t)1 << t->bits)
-                                        : move;
+    const int64_t way = move > most ? most : move < least ? least : move;
     const int64_t left =
         self->lag.asked - self->lag.high + hystgen_lag_scaled(t, way, &t->theta) - way;
-    const int64_t fall = hystgen_nearest(way, t->bits) + falling;
+    const int64_t down = hystgen_nearest(way, t->bits) + falling;
     brake->left = hystgen_braked_coarse(hystgen_nearest(left, t->bits));
-    brake->back = hystgen_braked_coarse(left < 0 ? rising + falling - fall : fall);
+    brake->back = hystgen_braked_coarse(left < 0 ? rising + falling - down : down);
     return hystgen_nearest(self->lag.high, t->bits) + hystgen_braked_led(t, way);
 }
 

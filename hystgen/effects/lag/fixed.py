@@ -144,16 +144,15 @@ def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: 
     if room + room < code:
         return near
     move = s[0, ASKED] - s[0, EARLIER]
-    on = nearest(move, bits)
     way = move
-    if on > rising:
+    if move > rising << bits:
         way = rising << bits
-    elif on < -falling:
+    elif move < -falling << bits:
         way = -falling << bits
     more = s[0, ASKED] - s[0, HIGH] + scaled(t, 0, way, SECOND) - way
-    fall = nearest(way, bits) + falling
+    down = nearest(way, bits) + falling
     left = coarse(nearest(more, bits), drop)
-    back = coarse(rising + falling - fall if more < 0 else fall, drop)
+    back = coarse(rising + falling - down if more < 0 else down, drop)
     ahead = near - (nearest(s[0, HIGH], bits) + scaled(t, 0, way, INVERSE))
     lead = coarse(-ahead if left < 0 else ahead, drop)
     less = braked_over(t, -left if left < 0 else left, lead, back, coarse(room, drop), drop) << drop
