@@ -5,7 +5,8 @@
 Code is that of a module at -O2, of zig and gcc the larger one (RISC-V: zig); instructions are the mean of the inverse,
 or of the forward operator for what that alone has, strict -O2 build of zig, over a slow sine. `any` is what any effect
 at all adds, a gain among it, which is the least of them; the others are more than that, or less. Plays that a search
-finds have that in common, `dilated`, and more than that. `effect_sizes.csv`, which the banner of emitted files is made
+finds have that in common, `dilated`, and more than that; `braked` is what a lag and a slew limit take together beyond
+what each of them does. `effect_sizes.csv`, which the banner of emitted files is made
 from, has the code on both cores that `hystgen.compensator.engines` speaks of; `docs/effects.csv` all cores.
 """
 
@@ -15,7 +16,9 @@ import argparse
 import csv
 import functools
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from engine_costs import CODE_PLAYS, SHIPPED, _program
@@ -43,6 +46,7 @@ EFFECTS = {
     "clock": "name: drift, rate: 1.0e-3",
     "preview": "name: resonance, frequency: 30, damping: 0.05",
     "slew": "name: slew_limit, rate: 1.0e+5",
+    "braked": "name: lag, time_constant: 0.01}\n    - {name: slew_limit, rate: 1.0e+5",
     "tanh": "name: saturation, level: 1000",
     "dead_zone": "name: saturation, shape: stops, lower: -900, upper: 900, give: 0.1",
     "relaxing": "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3",
@@ -68,9 +72,10 @@ def model(effect: str) -> Model:
     return Model(parse_parameters(text, "bench.yaml"))
 
 
-def measured(
-    folder: Path, effect: str, arithmetic: str, cores: list[str], operator: str = "inverse"
-) -> tuple[dict[str, int], dict[str, float]]:
+Measures = tuple[dict[str, int], dict[str, float]]
+
+
+def measured(folder: Path, effect: str, arithmetic: str, cores: list[str], operator: str = "inverse") -> Measures:
     """Bytes of code and mean instructions of a sample of an operator on each core."""
     one = model(effect)
     options = emit_options(one, operator, arithmetic, "loop")
@@ -94,6 +99,16 @@ def measured(
     return code, counts
 
 
+def together(apart: list[Measures], least: Measures) -> Measures:
+    """What a model of several effects would take if each added as much as it does by itself."""
+
+    def added(of: Sequence[dict[str, Any]], base: dict[str, Any]) -> dict[str, Any]:
+        return {core: sum(each[core] for each in of) - (len(of) - 1) * base[core] for core in base}
+
+    code, counts = zip(*apart, strict=True)
+    return added(code, least[0]), added(counts, least[1])
+
+
 def main() -> None:
     """Measure everything and write the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -108,6 +123,7 @@ def main() -> None:
             least = measured(Path(place) / f"least-{arithmetic}", "gain", arithmetic, cores)
             ahead = measured(Path(place) / f"forward-{arithmetic}", "gain", arithmetic, cores, "forward")
             moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
+            apart: dict[str, Measures] = {}
             for effect in ("any", *EFFECTS):
                 folder = Path(place) / f"{effect}-{arithmetic}"
                 operator = OPERATORS.get(effect, "inverse")
@@ -115,6 +131,9 @@ def main() -> None:
                 code, counts = measures
                 before = base if effect == "any" else moved if effect in MOVED else least
                 before = ahead if operator == "forward" else before
+                if effect == "braked":
+                    before = together([apart["lag"], apart["slew"]], least)
+                apart[effect] = measures
                 more = [(core, code[core] - before[0][core], counts[core] - before[1][core]) for core in cores]
                 sizes.append((effect, arithmetic, *(size for _, size, _ in more)))
                 costs += [(effect, arithmetic, core, size, round(count)) for core, size, count in more]

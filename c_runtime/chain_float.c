@@ -10,6 +10,10 @@ static inline hystgen_signal_t hystgen_entered_drive(hystgen_real_t v) {
     return v;
 }
 
+static inline hystgen_signal_t hystgen_reaching(hystgen_reach_t v) {
+    return v;
+}
+
 static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a) {
     return a;
 }

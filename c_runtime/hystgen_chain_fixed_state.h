@@ -19,6 +19,17 @@ typedef struct {
 } hystgen_lag_t;
 
 typedef struct {
+    hystgen_lag_t lag;
+    int64_t earlier; /* asked for a sample before */
+} hystgen_braked_t;
+
+/* How a lead is to shrink, in numbers to search with. */
+typedef struct {
+    int32_t left; /* that the lag is to gain beyond its target's way */
+    int32_t back; /* by which the lead shrinks in a step */
+} hystgen_brake_t;
+
+typedef struct {
     int64_t next;   /* output at the next sample for an unchanged input */
     int64_t before; /* input of the last sample */
 } hystgen_lag_exact_t;

@@ -22,6 +22,11 @@ typedef struct {
 } hystgen_lag_t;
 
 typedef struct {
+    hystgen_lag_t lag;
+    hystgen_real_t earlier; /* asked for a sample before */
+} hystgen_braked_t;
+
+typedef struct {
     hystgen_real_t reached;
     hystgen_real_t before; /* input of the last sample */
 } hystgen_lag_exact_t;

@@ -121,6 +121,27 @@ def test_composes_with_the_forward_model_that_shares_no_code(name: str, seed: in
     assert np.max(np.abs(y - run.v)[free]) <= EXACT[name] * span
 
 
+@pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
+def test_a_lag_behind_a_slew_limit_does_not_overshoot(arithmetic: str) -> None:
+    """A step over half the range, up and down; the model in double precision is what the drive moves."""
+    lag, slew = "name: lag, time_constant: 0.01", "name: slew_limit, rate: 700, falling_rate: 400"
+    one = model("braked", chain("braked", lag, slew))
+    numbers = compiled(one, arithmetic)
+    low, high = (float(end) for end in numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+    near, far = np.rint(0.75 * low + 0.25 * high), np.rint(0.25 * low + 0.75 * high)
+    u = np.repeat([near, far, near], [3, 150, 150])
+    with jit.plain():
+        v = answers(numbers, Run(np.arange(len(u)) * T, u, {}), True).astype(float)
+    codes = numbers.codes
+    drive, output = (1.0, 1.0) if codes is None else (float(codes.drive_lsb), float(codes.output_lsb))
+    y = one.simulate(v * drive, t=np.arange(len(u)) * T) / output
+    step = u[3] - u[0]
+    assert np.max(y) < u[3] + 1e-3 * step
+    assert np.min(y) > u[0] - 1e-3 * step
+    for end in (153, 303):
+        assert np.max(np.abs(y[end - 50 : end] - u[end - 1])) < 1e-3 * step, "it has arrived"
+
+
 @pytest.mark.parametrize("name", ["late", "straight", "everything"])
 def test_the_forward_operator_waits_and_rings_like_the_model(name: str) -> None:
     """Jumps and holds, to which a mode rings longest."""

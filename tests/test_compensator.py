@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import signal
 
 import hystgen
 from hystgen.basics.problems import EffectsError, NotInvertibleError
@@ -94,6 +95,47 @@ def test_what_is_promised_exactly_comes_out_at_every_sample(name: str, front: st
     _, y = both(EXACT[name], FRONTS[front], t, smooth(t))
     wrong = np.abs(y - smooth(t)) > 1e-12 * 9.0
     assert np.mean(wrong) <= 0.05 * (front == "two branches" and name in BLURRED)
+
+
+def arrived(v: Array, step: float, lag: float) -> tuple[float, int]:
+    """Overshoot of a lag of `lag` samples on a straight drive, as a share of the step, and samples until 0.1 % of it
+    are left."""
+    numerator, denominator, _ = signal.cont2discrete(([1.0], [lag, 1.0]), 1.0, "foh")
+    y = signal.lfilter(np.ravel(numerator), denominator, v)
+    left = np.flatnonzero(np.abs(y - step) > 1e-3 * step)
+    return float(np.max(y)) / step - 1.0, int(left[-1]) + 1
+
+
+@pytest.mark.parametrize(
+    ("lag", "moves", "back"),
+    [(20.0, 25.0, 1.0), (20.0, 5.0, 1.0), (2.0, 8.0, 2.0), (100.0, 12.0, 0.5), (60.0, 4.0, 1.0)],
+)
+def test_a_lag_behind_a_slew_limit_does_not_overshoot(lag: float, moves: float, back: float) -> None:
+    """A step of so many moves of the drive; against drives that rise as fast as they can, and then come back so."""
+    step, rate = 50.0, 50.0 / moves
+    slew = effect("slew_limit", rate=rate / T, falling_rate=back * rate / T)
+    chain = Chain(Cascade(PI([0.0], [1.0], [0.0]), (), 0.0, (0.0, 100.0)), [effect("lag", time_constant=lag * T), slew])
+    n = int(8.0 * lag + 6.0 * moves)
+    u = np.where(np.arange(n) < 3, 0.0, step)
+    v = Compensator(chain).drives(Run(T * np.arange(n), u), WIDE)
+    over, settled = arrived(v, step, lag)
+    assert over < 1e-9
+    k = np.arange(n) - 2.0
+    up = [np.maximum(np.minimum(k.clip(0) * rate, a * rate - (k - a) * back * rate), np.minimum(k.clip(0) * rate, step))
+          for a in range(int(moves), n - 3)]  # fmt: skip
+    best = min(found for over, found in (arrived(each, step, lag) for each in up) if over < 1e-3)
+    assert settled <= best + 2
+
+
+def test_only_a_drive_that_a_limit_has_kept_short_is_braked() -> None:
+    """Within its rates the drive is that of a lag alone, whatever the reference asks."""
+    lag = effect("lag", time_constant=20.0 * T)
+    t = times()
+    u = smooth(t) + np.where(t > 0.3, 0.2, 0.0)
+    plain, _ = both([lag], (), t, u)
+    fast = float(np.max(np.abs(np.diff(plain)))) / T
+    limited, _ = both([lag, effect("slew_limit", rate=1.001 * fast)], (), t, u)
+    assert np.array_equal(limited, plain)
 
 
 @pytest.mark.parametrize("name", ["creep", "creep, logarithmic", "relaxation", "loop centre", "tanh"])

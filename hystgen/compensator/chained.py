@@ -203,6 +203,8 @@ class Compensator:
         )
         self.blocks: list[Block] = [*drives, Actuator(static, plays), *outputs]
         self.slew = self._called("slew_limit")
+        lags = [block for block in drives if isinstance(block, lag.LagBlock)]
+        self.braked = lags[0] if self.slew and len(lags) == 1 else None
         self.modes = [effect for effect in self._called("resonance") if effect.block is None]
         self.delay = math.fsum(effect.time for effect in self._called("delay"))
 
@@ -274,10 +276,15 @@ class Compensator:
         return [thermal.risen(effect, rise, before, drive, seconds) for effect, rise in pairs]
 
     def _slewed(self, drive: float, before: float, seconds: float) -> float:
-        """The nearest drive that the amplifier can reach in this time."""
-        for effect in self.slew if seconds > 0.0 else ():
-            drive = min(max(drive, before - effect.falling_rate * seconds), before + effect.rate * seconds)
-        return drive
+        """The nearest drive that the amplifier can reach in this time, or one from which a lag does not overshoot."""
+        if not self.slew or seconds <= 0.0:
+            return drive
+        falling: float = min(effect.falling_rate for effect in self.slew) * seconds
+        rising: float = min(effect.rate for effect in self.slew) * seconds
+        near = min(max(drive, before - falling), before + rising)
+        if self.braked is not None and not self.braked.exact:
+            near = self.braked.braked(near, abs(drive - near), falling, rising)
+        return min(max(near, before - falling), before + rising)
 
     def _gains(self, reference: Run) -> list[tuple[Array, Array]]:
         """Gain and offset (N,) by each logged temperature, at the time when the drive of a sample takes effect."""

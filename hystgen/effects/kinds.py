@@ -41,6 +41,8 @@ class Kind:
     In fixed point numbers are of several types: `letters` are those of the table, `memory` those of its memory, f for a
     factor, which takes two numbers, n for a number of the user's own, which takes four, w for 64 bits, i for 32, c for
     four of these in an array, and b for 8.
+
+    `like`: the kind that it shares the type of its table with.
     """
 
     name: str
@@ -53,6 +55,12 @@ class Kind:
     own: tuple[str, ...] = VERBS
     letters: str = ""
     memory: str = ""
+    like: str = ""
+
+    @property
+    def tabled(self) -> str:
+        """Name of the kind whose type its table has."""
+        return self.like or self.name
 
     @property
     def file(self) -> str:

@@ -13,6 +13,7 @@ from typing import Any
 from hystgen.compensator.chain import blocks, moving
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
+    BRAKED_DROP,
     DRIVE_BITS,
     LARGEST_LEVEL,
     LEAST_CODE,
@@ -96,7 +97,7 @@ class Block:
         numbers = [_entries(constants.table, kind.letters)] * (len(constants.table) > 0)
         numbers += map(str, constants.counts)
         if not kind.rows:
-            return [_table(f"{prefix}_{kind.name}_table_t {own}", numbers)]
+            return [_table(f"{prefix}_{kind.tabled}_table_t {own}", numbers)]
         rows, n = f"{own}_{kind.rows.name}", len(constants.rows)
         lines = ",\n".join(f"    {{{_entries(row, kind.rows.letters)}}}" for row in constants.rows)
         return [
@@ -352,6 +353,7 @@ def _fixed_constants(t: ChainTables) -> list[tuple[str, str, str]]:
         ("LEVEL_DROP", f"{t.number[LEVEL_DROP]}u", "and those that a sum of the plays has beyond that"),
         ("LARGEST_LEVEL", operand(t.number[LARGEST_LEVEL]), "sum that is asked of the plays"),
         ("SHARE_BITS", f"{t.number[SHARE_BITS]}u", "bits of a mantissa below a code"),
+        ("BRAKED_DROP", f"{t.number[BRAKED_DROP]}u", "bits of a signal beyond those of a search for a lead"),
     ]
 
 

@@ -136,7 +136,7 @@ def _block_structs(kinds: Iterable[Kind], real: tuple[int, int], layout: Layout)
     for kind in kinds:
         members = [(layout.pointer, layout.pointer)] * bool(kind.rows) + made_of(kind)
         counts = [(2, 2) if i == 0 else (1, 1) for i, _ in enumerate(kind.counts)]
-        found[f"_{kind.name}_table_t"] = layout.struct(*members, *counts)
+        found[f"_{kind.tabled}_table_t"] = layout.struct(*members, *counts)
         if kind.rows:
             found[f"_{kind.name}_{kind.rows.name}_t"] = layout.struct(*made_of(kind.rows))
     return found

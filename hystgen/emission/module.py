@@ -226,6 +226,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.variant = runtime.Variant(
         options.engine, values.fixed, values.fronts, values.branches, values.finer, values.saturates, values.start_list,
         compiled is not None, compiled is not None and bool(compiled.tables.slew),
+        compiled is not None and bool(compiled.tables.braked),
         compiled is not None and compiled.tables.delay.samples > 0,
         compiled is not None and bool(compiled.parts.ageing), *(chain.plays(compiled.tables) if compiled else ()),
     )  # fmt: skip

@@ -35,9 +35,9 @@ CHAIN_BLOCKS = (
 )  # fmt: skip
 FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
 FIXED_CHAIN_BLOCKS = (
-    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "gain_fixed.c", "ageing_fixed.c", "heat_fixed.c",
-    "mode_fixed.c", "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c", "bend.c", "stops.c",
-    "product_fixed.c",
+    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "braked_fixed.c", "gain_fixed.c", "ageing_fixed.c",
+    "heat_fixed.c", "mode_fixed.c", "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c",
+    "bend.c", "stops.c", "product_fixed.c",
 )  # fmt: skip
 """Files that models with effects carry themselves, even with a shared run time."""
 
@@ -177,8 +177,8 @@ class Variant:
     `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
     drive code, or with effects what arrives there has bits below them; `saturates`: output codes are limited;
     `start_list`: each play starts at its own value; `chain`: it has effects, `slew`: one of them keeps the drive within
-    a rate, `waits`: it does not act at once, `ages`: one is a gain that follows the travel, `moves` and `bends`: how
-    plays move and are bent where that is not as in engine loop.
+    a rate, `braked`: and a lag behind that from overshooting, `waits`: it does not act at once, `ages`: one is a gain
+    that follows the travel, `moves` and `bends`: how plays move and are bent where that is not as in engine loop.
     """
 
     engine: str
@@ -190,6 +190,7 @@ class Variant:
     start_list: bool = False
     chain: bool = False
     slew: bool = False
+    braked: bool = False
     waits: bool = False
     ages: bool = False
     moves: str = ""
@@ -221,7 +222,9 @@ class Variant:
         kind = "fixed" if self.fixed else "float"
         start = "loop_start_list.c" if self.start_list else "loop_start.c"
         if self.chain:
-            slew = "chain_slew.c" if self.slew else "chain_free.c"
+            slew = ("chain_slew.c",) if self.braked else ("chain_slew.c", "chain_unbraked.c")
+            slew = slew if self.slew else ("chain_free.c",)
+            brake = ("chain_braked.c",) * self.braked
             delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
             if not self.moves:
                 plays: tuple[str, ...] = ("chain_plays.c",)
@@ -235,7 +238,7 @@ class Variant:
                 moved = (*before, f"moved_{self.moves}.c", *kept, bent, *known)
                 plays = (*moved, "chain_moving.c", f"search_{kind}.c")
             finer = "chain_finer.c" if self.finer else "chain_whole.c"
-            return (start, f"loop_{front}.c", delay, slew, f"chain_{kind}.c", *plays, finer, "chain.c", *more)
+            return (start, f"loop_{front}.c", delay, *slew, f"chain_{kind}.c", *brake, *plays, finer, "chain.c", *more)
         return (
             start,
             f"loop_{front}.c",

@@ -21,7 +21,8 @@ from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal import fixed as thermal_fixed
 
 KINDS = (
-    creep.KIND, lag.KIND, lag.EXACT_KIND, ageing.KIND, thermal.HEAT_KIND, thermal.KIND, resonance.KIND, drift.KIND,
+    creep.KIND, lag.KIND, lag.EXACT_KIND, lag.BRAKED_KIND, ageing.KIND, thermal.HEAT_KIND, thermal.KIND, resonance.KIND,
+    drift.KIND,
 )  # fmt: skip
 """The kinds of blocks in the catalogue, each with a file of its name in `c_runtime/`."""
 
@@ -34,9 +35,11 @@ def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constant
     if t.fixed:
         heats = thermal_fixed.heat_constants(t.heat)
         gains = [*ageing_fixed.constants(t.ageing), *heats, *thermal_fixed.constants(t.gain)]
-        return [*lag_fixed.constants(t.lag), *ahead], [*creep_fixed.constants(t.creep), *behind, *gains, *modes]
-    gains = [*ageing.constants(t.ageing), *thermal.heat_constants(t.heat), *thermal.constants(t.gain)]
-    return [*lag.constants(t.lag), *ahead], [*creep.constants(t.creep), *behind, *gains, *modes]
+        creeps, lags = creep_fixed.constants(t.creep), lag_fixed.constants(t.lag, bool(t.braked))
+    else:
+        gains = [*ageing.constants(t.ageing), *thermal.heat_constants(t.heat), *thermal.constants(t.gain)]
+        creeps, lags = creep.constants(t.creep), lag.constants(t.lag, bool(t.braked))
+    return [*lags, *ahead], [*creeps, *behind, *gains, *modes]
 
 
 def every(t: ChainTables, operator: str) -> list[Constants]:

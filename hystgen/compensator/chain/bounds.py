@@ -39,6 +39,8 @@ from hystgen.effects.thermal.compensator import LEAST_GAIN
 from hystgen.front.tanh import kernels
 from hystgen.plays import slots
 
+SAME = "both have seen the same drives"
+
 
 @dataclasses.dataclass(frozen=True)
 class _Sizes:
@@ -236,12 +238,15 @@ def condition(compiled: Compiled) -> str:
 
     A led lag misses its target by a second difference, so that plays and creep behind it have not seen what was solved
     for; their memory then differs between two drives, and the lead amplifies that. Thresholds that grow with the rate
-    amplify an earlier difference of the drives.
+    amplify an earlier difference of the drives. A lag that is braked behind a slew limit gives up more of its lead than
+    the limit cuts off.
     """
+    if compiled.tables.braked:
+        return f"{SAME} and no slew limit acts"
     led = not all(compiled.tables.lag.exact)
     remembered = compiled.static.pi.n > 0 or len(compiled.tables.creep.block) > 0
     dilated = compiled.tables.moving.moves == moving.DILATED
-    return "both have seen the same drives" if dilated or (led and remembered) else ""
+    return SAME if dilated or (led and remembered) else ""
 
 
 def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:

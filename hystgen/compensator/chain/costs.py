@@ -13,11 +13,11 @@ from hystgen.compensator.chain.layout import ChainTables
 from hystgen.plays import slots
 
 PARTS = (
-    "any", "creep", "lag", "lag_exact", "ageing", "heat", "gain", "clock", "preview", "slew", "tanh", "dead_zone",
-    "relaxing", "dilated", "dashpot", "polynomial", "centre", "mode", "delay",
+    "any", "creep", "lag", "lag_exact", "ageing", "heat", "gain", "clock", "preview", "slew", "braked", "tanh",
+    "dead_zone", "relaxing", "dilated", "dashpot", "polynomial", "centre", "mode", "delay",
 )  # fmt: skip
 """Parts of the code: `any` once for a model with effects, the others once for each kind of block in it; `dilated` for
-all plays whose input is found by a search."""
+all plays whose input is found by a search, `braked` for a lag and a slew limit together."""
 
 OPERATORS = {"preview": "inverse", "mode": "forward", "delay": "forward"}
 """Parts that only one operator has, and that operator."""
@@ -30,7 +30,7 @@ def parts(t: ChainTables, operator: str) -> list[str]:
     found = Counter({
         "creep": len(t.creep.block), "lag": exact.count(False), "lag_exact": exact.count(True),
         "heat": len(t.heat.turns), "clock": len(t.clock),
-        "ageing": len(t.ageing.turns), "gain": len(t.gain), "preview": len(t.tap), "slew": t.slew,
+        "ageing": len(t.ageing.turns), "gain": len(t.gain), "preview": len(t.tap), "slew": t.slew, "braked": t.braked,
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),
         "relaxing": t.moving.scanned, "dilated": t.moving.used and not t.moving.scanned,
         "dashpot": t.moving.moves == moving.DASHPOT,

@@ -24,6 +24,7 @@ from hystgen.arithmetic.factors import error as missed
 from hystgen.arithmetic.factors import lifted
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER
+from hystgen.compensator.chain.bounds import SAME
 from hystgen.compensator.chain.layout import ChainTables, Parts
 from hystgen.compensator.chain.moving import (
     DASHPOT,
@@ -461,7 +462,9 @@ class Bounds:
         followed = self.lags or self.ahead
         if not (led or dilated or (followed and (not self.reached or self.parts.slew))):
             return ""
-        return "both have seen the same drives" + (", nothing limited" if not self.reached else "")
+        if not self.reached:
+            return f"{SAME}, nothing limited"
+        return f"{SAME} and no slew limit acts" if self.tables.braked else SAME
 
     def rounding(self) -> float:
         """Bound of the inverse on the same branch and under its `condition`, in drive codes."""

@@ -26,6 +26,7 @@ from hystgen.compensator.chain import moving, own, own_fixed
 from hystgen.compensator.chain.fixed_bounds import Bend, Bounds, Sizes
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
+    BRAKED_DROP,
     DRIVE_BITS,
     LARGEST_LEVEL,
     LEAST_CODE,
@@ -40,6 +41,7 @@ from hystgen.compensator.chain.layout import (
     Compiled,
     OwnChainTables,
     Parts,
+    braked,
     fastest,
     output_range,
     taps_of,
@@ -58,6 +60,7 @@ from hystgen.effects.drift import fixed as drift
 from hystgen.effects.drift.fixed import ClockNumbers
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag import fixed as lag_fixed
+from hystgen.effects.lag.fixed import COARSE
 from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.resonance import fixed as resonance_fixed
 from hystgen.effects.saturation.fixed import Saturations
@@ -159,6 +162,7 @@ class _Builder:
             self._need(self._tap, "the preview"),
             np.array(self._numbers(), dtype=np.int64),
             int(bool(self.parts.slew)),
+            braked(self.parts, [exact for exact, _ in self.lags]),
         )
         if self.parts.own_drives or self.parts.own_outputs:
             tables = OwnChainTables(*tables)
@@ -336,7 +340,7 @@ class _Builder:
 
     def _numbers(self) -> list[int]:
         span = self.inner.drive[1] - self.inner.drive[0]
-        found = [0] * 13
+        found = [0] * 14
         found[OFFSET] = self.signal(self.static.output_offset)
         found[1] = self.signal(self.high - self.low)
         found[2], found[3] = self.slew(span)
@@ -348,6 +352,7 @@ class _Builder:
         found[MOST_CODE] = self.inner.drive[1] + 2 * span
         found[SHARE_BITS] = 31 - self.about.code_bits
         found[DRIVE_BITS], found[ARRIVING_BITS] = self.inner.fine + self.finer, self.finer
+        found[BRAKED_DROP] = max((span << found[DRIVE_BITS]).bit_length() + 2 - COARSE.bit_length(), 0)
         return found
 
     def _max_rate(self) -> float:

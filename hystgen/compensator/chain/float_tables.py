@@ -21,6 +21,7 @@ from hystgen.compensator.chain.layout import (
     OwnChainTables,
     Parts,
     Stages,
+    braked,
     fastest,
     output_range,
     taps_of,
@@ -167,6 +168,7 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> C
         reals(taps.weights if taps else [], "weights of the preview"),
         reals([static.output_offset, span, rising, falling, VERIFIED_SHARE], "offset or rates"),
         int(bool(rates)),
+        braked(parts, [exact for exact, _ in lags]),
     )
     if drives or outputs:
         tables = OwnChainTables(*tables)

@@ -34,10 +34,13 @@ OFFSET, FARTHEST, RISING, FALLING, SHARE = range(5)
 """Places in `ChainTables.number`: output offset, the largest offset that may be set, how far the drive may rise and
 fall in a step, and the share with which verification corrects."""
 
-LEVEL_BITS, LEVEL_DROP, LARGEST_LEVEL, LEAST_CODE, MOST_CODE, SHARE_BITS, DRIVE_BITS, ARRIVING_BITS = range(5, 13)
+LEVEL_BITS, LEVEL_DROP, LARGEST_LEVEL, LEAST_CODE, MOST_CODE, SHARE_BITS, DRIVE_BITS, ARRIVING_BITS, BRAKED_DROP = (
+    range(5, 14)
+)
 """Further places in fixed point: bits of a signal behind the plays below an output code, bits of a sum of the plays
 below those of a signal, the largest sum asked of the plays, the least and largest code of a drive before it is limited,
-bits of a mantissa below a code, and bits of a signal in front of the plays below a drive code and below their input."""
+bits of a mantissa below a code, bits of a signal in front of the plays below a drive code and below their input, and
+bits of such a signal below the numbers with which the lead of a braked lag is searched."""
 
 TRAVEL_BITS = 16
 """In fixed point, verification sets travels in multiples of 2^16 drive codes."""
@@ -84,6 +87,7 @@ class ChainTables(NamedTuple):
     tap: Reals  # (L,), in fixed point factors (L, 2); none without a preview
     number: Reals
     slew: int  # 1 if the rate of the drive is limited
+    braked: int  # 1 if a lag behind that limit is kept from overshooting
 
     @property
     def fixed(self) -> bool:
@@ -225,6 +229,11 @@ class Compiled:
         for block in self.own:
             gain = gain * block.backward.response(z) * block.rest
         return float(np.max(np.abs(gain)))
+
+
+def braked(parts: Parts, exact: Sequence[bool]) -> int:
+    """1 where a slew limit has one lag behind it that is led; `exact`: whether each lag is inverted exactly."""
+    return int(bool(parts.slew) and list(exact) == [False])
 
 
 def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> float:

@@ -73,7 +73,7 @@ class ChainState(NamedTuple):
     plays: State
     lost: Reals  # (n + 1,), what rounding took from each play that a nonlinear dashpot moves
     bent: Reals  # (n + 1,), what each play contributes, if an effect moves or bends them
-    lag: Reals  # (k, 5)
+    lag: Reals  # (k, 6), in fixed point (k, 5)
     creep: CreepState
     ageing: AgeingState
     gain: Reals  # (k, 3)
@@ -95,7 +95,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         loop.new_state(t.plays),
         np.zeros(len(t.threshold), dtype),
         np.zeros(len(t.threshold), dtype),
-        np.zeros((len(t.lag.block), 5), dtype),
+        np.zeros((len(t.lag.block), 5 if t.fixed else 6), dtype),
         CreepState(np.zeros((len(t.creep.block), 2), dtype), np.zeros((len(t.creep.term), 2), dtype)),
         AgeingState(np.zeros((len(t.ageing.turns), 4), dtype), np.zeros(len(t.ageing.turns), np.int64)),
         np.zeros((len(t.gain), 3), dtype),
@@ -139,7 +139,7 @@ def made_of(
     preview_target, delayed = blocks.target, blocks.delayed
     front_forward, front_inverse = blocks.front
     follow, started, inverse_input = blocks.plays
-    finer = blocks.finer
+    finer, braked = blocks.finer, blocks.braked
     finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared = codes
     plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
 
@@ -262,6 +262,14 @@ def made_of(
         return v
 
     @jit
+    def inverse_slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
+        """The drive in reach that is nearest to v, or from which a lag does not overshoot."""
+        near = slewed(t, s, s.real[APPLIED], v)
+        if not t.braked or not s.flags[MOVING]:
+            return near
+        return slewed(t, s, s.real[APPLIED], braked(t, s, v, near))
+
+    @jit
     def forward_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
         """The drive is v: it passes the delay, and the amplifier follows."""
         late = v
@@ -359,7 +367,7 @@ def made_of(
         w = inverse_input(t, s, h)
         a = finer(t, s, h, w, inverse_drive(t.plays, s.plays, h, w))
         v = drive_code(t, drive_side_solve(t, s, a) if moving else a)
-        reached = slewed(t, s, s.real[APPLIED], v)
+        reached = inverse_slewed(t, s, v)
         if reached != v:
             s.plays.counts[BITS] |= SLEW_LIMITED
         inside = clamp_drive(t, reached)

@@ -13,12 +13,15 @@ from hystgen.compensator import step_fixed
 from hystgen.compensator.chain import moving_fixed, own_fixed
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
+    BRAKED_DROP,
     DRIVE_BITS,
+    FALLING,
     LARGEST_LEVEL,
     LEAST_CODE,
     LEVEL_BITS,
     LEVEL_DROP,
     MOST_CODE,
+    RISING,
     SHARE_BITS,
     TRAVEL_BITS,
     ChainTables,
@@ -32,6 +35,7 @@ from hystgen.effects.creep import fixed as creep
 from hystgen.effects.delay.compensator import fixed_delayed
 from hystgen.effects.drift import fixed as drift
 from hystgen.effects.lag import fixed as lag
+from hystgen.effects.lag.fixed import braked as lag_braked
 from hystgen.effects.resonance import fixed as resonance
 from hystgen.effects.saturation.fixed import saturated, unsaturated
 from hystgen.effects.thermal import fixed as thermal
@@ -157,9 +161,25 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:
     return times(x, share << t.number[SHARE_BITS], 31)
 
 
+# ---------------------------------------------------------------- chain_braked.c
+
+
+@jit
+def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
+    """The drive from which the lag does not overshoot, where the one in reach is near instead of v."""
+    bits = t.number[DRIVE_BITS]
+    beyond = v - near if v > near else near - v
+    drive = lag_braked(
+        t.lag, s.lag, near << bits, beyond << bits, t.number[FALLING] << bits, t.number[RISING] << bits,
+        1 << bits, t.number[BRAKED_DROP],
+    )  # fmt: skip
+    return drive_code(t, drive)
+
+
 BLOCKS = Blocks(
     lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, fixed_delayed,
-    (front_forward, front_inverse), moving_fixed.PLAYS, finer, (own_fixed.product, own_fixed.entered, own_fixed.left),
+    (front_forward, front_inverse), moving_fixed.PLAYS, finer, braked,
+    (own_fixed.product, own_fixed.entered, own_fixed.left),
 )  # fmt: skip
 CODES = Codes(
     step_fixed.finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared

@@ -7,7 +7,7 @@ from typing import Any
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_float
 from hystgen.compensator.chain import moving_float, own
-from hystgen.compensator.chain.layout import ChainTables, Stages
+from hystgen.compensator.chain.layout import FALLING, RISING, ChainTables, Stages
 from hystgen.compensator.chain.preview import preview_target
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import ChainState, Codes
@@ -16,6 +16,7 @@ from hystgen.effects.creep import compensator as creep
 from hystgen.effects.delay.compensator import delayed
 from hystgen.effects.drift import compensator as drift
 from hystgen.effects.lag import compensator as lag
+from hystgen.effects.lag.compensator import braked as lag_braked
 from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.front.compensator import front_forward, front_inverse
@@ -59,8 +60,18 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:  # noqa: ARG001  as in fi
     return share * x
 
 
+# ---------------------------------------------------------------- chain_braked.c
+
+
+@jit
+def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
+    """The drive from which the lag does not overshoot, where the one in reach is near instead of v."""
+    beyond = v - near if v > near else near - v
+    return lag_braked(t.lag, s.lag, near, beyond, t.number[FALLING], t.number[RISING])
+
+
 BLOCKS = Blocks(
     lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, delayed,
-    (front_forward, front_inverse), moving_float.PLAYS, finer, (own.product, own.passed, own.passed),
+    (front_forward, front_inverse), moving_float.PLAYS, finer, braked, (own.product, own.passed, own.passed),
 )  # fmt: skip
 CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)

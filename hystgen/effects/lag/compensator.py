@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -31,7 +32,7 @@ class LagBlock:
 
     def __init__(self, time_constant: float) -> None:
         self.time_constant = time_constant
-        self.state = self.reached = self.before = self.wanted = self._asked = self.answer = 0.0
+        self.rest(0.0)
         self.advance(0.0)
 
     def advance(self, seconds: float) -> None:
@@ -46,7 +47,7 @@ class LagBlock:
 
     def rest(self, x: float) -> float:
         """Settle."""
-        self.state = self.reached = self.before = self.wanted = self._asked = self.answer = x
+        self.state = self.reached = self.before = self.wanted = self._asked = self._earlier = self.answer = x
         return x
 
     def solve(self, y: float) -> float:
@@ -59,12 +60,36 @@ class LagBlock:
         self._asked = y
         return self.answer
 
+    def braked(self, near: float, short: float, falling: float, rising: float) -> float:
+        """The drive from which the lag does not overshoot, though its drive comes back by `falling` or `rising` a step.
+
+        `near`: the drive in reach that is nearest to the answer, `short` of it. A target that moves on by `way` a step
+        takes a lead of `way/(1 - E)`. With m beyond that, which shrinks by `back` a step, the lag gains at most
+        `(1 - E)(m + back/2)^2/(2 back)` on the target, and is to gain `left`. Up to `left = (1 - E) back/2` it arrives
+        in one step; and a drive no farther than where the lag is to arrive never overshoots. Where nothing limits the
+        drive its lead is right as it is, so that it gives way by what it is short of the answer and was before at most.
+        """
+        rate = 1.0 - self.decay
+        way = min(max(self._asked - self._earlier, -falling), rising)
+        left = self._asked + self.theta * way - self.state - way
+        back = falling + way if left > 0.0 else rising - way
+        room = short + abs(self._earlier - self.wanted) / rate
+        lead = math.copysign(1.0, left) * (near - self.state - way / rate)
+        most = abs(left) / rate
+        if most <= 0.5 * back:
+            room = min(max(lead - most, -room), room)
+        else:
+            most = max(abs(left), math.sqrt(2.0 * back * most) - 0.5 * back)
+            room = min(max(lead - most, 0.0), room)
+        return near - math.copysign(1.0, left) * room
+
     def absorb(self, x: float) -> float:
         """The lag follows. Behind another drive than the one asked for, the next lead starts from where that leads."""
         self.reached = self.decay * self.reached + self.early * self.before + self.late * x
         self.state = self.state + (1.0 - self.decay) * (x - self.state)
         self.wanted = self._asked + self.late * (x - self.answer)
         self.before = x
+        self._earlier = self._asked
         return self.reached
 
 
@@ -95,13 +120,19 @@ def shifted(theta: float) -> float:
 
 RATE, THETA, LATE, INVERSE = 0, 1, 2, 3
 EARLY = THETA
-HIGH, LOW, WANTED, ASKED, ANSWER = 0, 1, 2, 3, 4
+HIGH, LOW, WANTED, ASKED, ANSWER, EARLIER = range(6)
 REACHED, BEFORE = HIGH, LOW
+
+HALVES = 16
+"""Steps of the search for a lead, which end within 2^-16 of it: an overshoot below 2e-5 of the way."""
 
 
 KIND = Kind(
     "lag", ("rate", "theta", "late", "inverse_rate"), ("high", "low", "wanted", "asked", "answer"),
     reading=("solve", "absorb"), own=("rest", "solve", "absorb"),
+)  # fmt: skip
+BRAKED_KIND = Kind(
+    "braked", KIND.table, (*KIND.state, "earlier"), reading=KIND.reading, own=KIND.own, like=KIND.name,
 )  # fmt: skip
 EXACT_KIND = Kind(
     "lag_exact", ("rate", "early", "late", "inverse_late"), ("reached", "before"),
@@ -110,16 +141,16 @@ EXACT_KIND = Kind(
 
 
 class LagTables(NamedTuple):
-    """All lags of a model: `exact` (k,), 1 where it is inverted exactly; `block` (k, 4)."""
+    """All lags of a model: `exact` (k,), 1 where it is inverted exactly; `block` (k, 4), in fixed point (k, 8)."""
 
     exact: Counts
     block: Reals
 
 
-def constants(t: LagTables) -> Iterator[Constants]:
-    """The numbers of each lag."""
+def constants(t: LagTables, braked: bool) -> Iterator[Constants]:
+    """The numbers of each lag; `braked`: of the one that there is, behind a slew limit."""
     for exact, row in zip(t.exact, t.block, strict=True):
-        yield Constants(EXACT_KIND if exact else KIND, row, (3, 2))
+        yield Constants(EXACT_KIND if exact else BRAKED_KIND if braked else KIND, row, (3, 2))
 
 
 @jit
@@ -130,6 +161,7 @@ def lag_rest(t: LagTables, s: Reals, j: int, x: Any) -> Any:
     s[j, WANTED] = x
     s[j, ASKED] = x
     s[j, ANSWER] = x
+    s[j, EARLIER] = x
     return x
 
 
@@ -161,4 +193,53 @@ def lag_absorb(t: LagTables, s: Reals, j: int, x: Any) -> Any:
     s[j, HIGH] = following
     s[j, LOW] = change - (following - state)
     s[j, WANTED] = s[j, ASKED] + n[LATE] * (x - s[j, ANSWER])
+    s[j, EARLIER] = s[j, ASKED]
     return following - n[THETA] * (following - state)
+
+
+# ---------------------------------------------------------------- braked.c
+
+
+@jit
+def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: Any) -> Any:
+    """As `LagBlock.braked`, of the only lag of a model."""
+    n = t.block[0]
+    missed = s[0, EARLIER] - s[0, WANTED]
+    room = short + (-missed if missed < 0 else missed) * n[INVERSE]
+    if not room > 0:
+        return near
+    move = s[0, ASKED] - s[0, EARLIER]
+    way = move
+    if move > rising:
+        way = rising
+    elif move < -falling:
+        way = -falling
+    left = (s[0, ASKED] - s[0, HIGH]) + (n[THETA] * way - way)
+    ahead = near - (s[0, HIGH] + way * n[INVERSE])
+    down = left < 0
+    back = rising - way if down else falling + way
+    size = -left if down else left
+    over = braked_over(size, size * n[INVERSE], -ahead if down else ahead, back, room, n.dtype.type(0.5))
+    return near + over if down else near - over
+
+
+@jit
+def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any) -> Any:
+    """What a lead is too much, within room, where the lag is to gain `size` and arrives at once with `most`."""
+    margin = back * half
+    over = lead - most
+    if most > margin:
+        limit = (most + most) * back
+        if lead <= size or (lead + margin) * (lead + margin) <= limit:
+            return lead - lead
+        low, high = size, lead
+        for _ in range(HALVES):
+            middle = low + (high - low) * half
+            if (middle + margin) * (middle + margin) <= limit:
+                low = middle
+            else:
+                high = middle
+        over = lead - low
+    if over > room:
+        return room
+    return -room if over < -room else over

@@ -17,7 +17,7 @@ from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag import compensator as floating
-from hystgen.effects.lag.compensator import LagTables
+from hystgen.effects.lag.compensator import HALVES, LagTables
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
@@ -25,13 +25,14 @@ EXACT_BITS = 8
 """Bits of the state of a lag that is inverted exactly, which no rounding can stall."""
 
 KIND = Kind("lag", own=("rest", "solve", "absorb"), letters="fffbb", memory="wwww")
+BRAKED_KIND = Kind("braked", own=KIND.own, letters=KIND.letters, memory=KIND.memory + "w", like=KIND.name)
 EXACT_KIND = Kind("lag_exact", own=("rest", "solve", "absorb"), letters="fffbb", memory="ww")
 
 
-def constants(t: LagTables) -> Iterator[Constants]:
-    """The numbers of each lag."""
-    for each, exact in zip(floating.constants(t), t.exact, strict=True):
-        yield replace(each, kind=EXACT_KIND if exact else KIND, products=(8, 4))
+def constants(t: LagTables, braked: bool) -> Iterator[Constants]:
+    """As in floating point."""
+    for each, exact in zip(floating.constants(t, braked), t.exact, strict=True):
+        yield replace(each, kind=EXACT_KIND if exact else BRAKED_KIND if braked else KIND, products=(8, 4))
 
 
 class Sizes:
@@ -73,8 +74,11 @@ def tables(rows: list[tuple[bool, tuple[float, float, float, float], Sizes]]) ->
 # ---------------------------------------------------------------- lag_fixed.c, lag_exact_fixed.c
 
 RATE, SECOND, INVERSE, BITS, DROP = 0, 2, 4, 6, 7
-HIGH, WANTED, ASKED, LEAD = 0, 1, 2, 3
+HIGH, WANTED, ASKED, LEAD, EARLIER = range(5)
 NEXT, BEFORE = 0, 1
+
+COARSE = 2**30 - 1
+"""Largest of the numbers that a lead is searched with, so that the square of a sum of two fits 64 bits."""
 
 
 @jit
@@ -94,6 +98,7 @@ def lag_rest(t: LagTables, s: Reals, j: int, x: Any) -> Any:
         s[j, WANTED] = state
         s[j, ASKED] = state
         s[j, LEAD] = zero(x)
+        s[j, EARLIER] = state
     return x
 
 
@@ -123,4 +128,76 @@ def lag_absorb(t: LagTables, s: Reals, j: int, x: Any) -> Any:
     s[j, HIGH] = s[j, HIGH] + change
     s[j, WANTED] = s[j, ASKED] - (short - scaled(t, j, short, SECOND))
     s[j, LEAD] = s[j, LEAD] - scaled(t, j, change, RATE)
+    s[j, EARLIER] = s[j, ASKED]
     return nearest(s[j, HIGH] - scaled(t, j, change, SECOND), t.block[j, BITS])
+
+
+# ---------------------------------------------------------------- braked_fixed.c
+
+
+@jit
+def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: Any, code: Any, drop: Any) -> Any:
+    """As in floating point; `code`: a drive code, with all as signals; a lead is searched with `drop` bits less."""
+    bits = t.block[0, BITS]
+    missed = s[0, EARLIER] - s[0, WANTED]
+    room = short + scaled(t, 0, -missed if missed < 0 else missed, INVERSE)
+    if room + room < code:
+        return near
+    move = s[0, ASKED] - s[0, EARLIER]
+    way = move
+    if move > rising << bits:
+        way = rising << bits
+    elif move < -falling << bits:
+        way = -falling << bits
+    more = s[0, ASKED] - s[0, HIGH] + scaled(t, 0, way, SECOND) - way
+    down = nearest(way, bits) + falling
+    left = coarse(nearest(more, bits), drop)
+    back = coarse(rising + falling - down if more < 0 else down, drop)
+    ahead = near - (nearest(s[0, HIGH], bits) + scaled(t, 0, way, INVERSE))
+    lead = coarse(-ahead if left < 0 else ahead, drop)
+    less = braked_over(t, -left if left < 0 else left, lead, back, coarse(room, drop), drop) << drop
+    return near + less if left < 0 else near - less
+
+
+@jit
+def braked_over(t: LagTables, size: Any, lead: Any, back: Any, room: Any, drop: Any) -> Any:
+    """What a lead is too much, within room."""
+    margin = back >> 1
+    most = coarsely(t, size, drop) if size <= margin else size
+    if most > margin:
+        most = braked_lead(size, lead, margin, coarsely(t, back, drop))
+    over = lead - most
+    if over > room:
+        return room
+    return -room if over < -room else over
+
+
+@jit
+def braked_lead(size: Any, lead: Any, margin: Any, way: Any) -> Any:
+    """The largest lead, up to `lead`, with which the lag gains no more than `size`, where `way` is back/(1 - E)."""
+    limit = way * (2 * size)
+    if lead <= size or (lead + margin) * (lead + margin) <= limit:
+        return lead
+    low, high = size, lead
+    for _ in range(HALVES):
+        middle = low + ((high - low) >> 1)
+        if (middle + margin) * (middle + margin) <= limit:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@jit
+def coarse(x: Any, drop: Any) -> Any:
+    """A signal as a number to search with."""
+    x = x >> drop
+    if x > COARSE:
+        return zero(x) + COARSE
+    return zero(x) - COARSE if x < -COARSE else x
+
+
+@jit
+def coarsely(t: LagTables, x: Any, drop: Any) -> Any:
+    """`x/(1 - E)` of numbers to search with."""
+    return coarse(scaled(t, 0, x << (t.block[0, BITS] + drop), INVERSE), drop)
