@@ -46,7 +46,7 @@ from hystgen.compensator.chain.layout import (
 )
 from hystgen.compensator.chain.moving import Bumps
 from hystgen.compensator.chain.own_fixed import Formats
-from hystgen.compensator.fixed_tables import Builder, FixedCurve, lsbs, nearest
+from hystgen.compensator.fixed_tables import TABLE_MAX, Builder, FixedCurve, lsbs, nearest
 from hystgen.effects import bend
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing import fixed as ageing_fixed
@@ -275,8 +275,8 @@ class _Builder:
 
     @property
     def _farthest(self) -> int:
-        """Largest input that is asked of the plays."""
-        return int(max(map(abs, self.inner.hull)) + self.inner.margin)
+        """Largest input that is asked of the plays, which are of 32 bits; a search goes one beyond."""
+        return min(int(max(map(abs, self.inner.hull)) + self.inner.margin), TABLE_MAX)
 
     def _moving(self, plays: Any) -> Any:
         step = float(self.inner.step)
