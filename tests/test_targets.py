@@ -177,14 +177,17 @@ def frames_and_calls(compiler: cross.CrossCompiler, source: Path) -> tuple[dict[
             caller = whole(section.name.removeprefix(".rel.text."))
             for entry in section.iter_relocations() if caller in frames else ():
                 kind = {10: "", 30: "jump "}.get(entry["r_info_type"])  # R_ARM_THM_CALL, R_ARM_THM_JUMP24
-                if kind is not None:
-                    calls[caller].add(kind + whole(symbols.get_symbol(entry["r_info_sym"]).name))
+                symbol = symbols.get_symbol(entry["r_info_sym"])
+                if kind is not None:  # two functions with the same code may be one, in the section of either
+                    known = symbol["st_shndx"] != "SHN_UNDEF"
+                    name = elf.get_section(symbol["st_shndx"]).name.removeprefix(".text.") if known else symbol.name
+                    calls[caller].add(kind + whole(name))
     return frames, calls
 
 
 def whole(name: str) -> str:
-    """A function's name without the number of a copy, which gcc leaves out in some places."""
-    return re.sub(r"\.\d+$", "", name)
+    """A function's name without the numbers of copies, which gcc leaves out in some places."""
+    return re.sub(r"\.\d+", "", name)
 
 
 def deepest(name: str, frames: dict[str, int], calls: dict[str, set[str]]) -> int:
