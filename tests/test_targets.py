@@ -124,7 +124,9 @@ def test_every_core_gives_the_bits_of_the_reference(name: str, engine: str) -> N
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["plain", "above", "bent", "curved", "two_branches", "mixed"])
-def test_a_cortex_m4f_needs_at_most_128_bytes_of_stack(name: str, arithmetic: str, engine: str, operator: str) -> None:
+def test_a_cortex_m4f_needs_at_most_128_bytes_of_stack(
+    name: str, arithmetic: str, engine: str, operator: str
+) -> None:
     """Whatever is called, with every compiler and build; float64, without FPU there, needs more.
 
     An operator alone is inlined in other ways than both.

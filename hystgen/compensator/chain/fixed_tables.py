@@ -275,13 +275,14 @@ class _Builder:
 
     @property
     def _farthest(self) -> int:
-        """Largest input that is asked of the plays, which are of 32 bits; a search goes one beyond."""
-        return min(int(max(map(abs, self.inner.hull)) + self.inner.margin), TABLE_MAX)
+        """Largest input that is asked of the plays."""
+        return int(max(map(abs, self.inner.hull)) + self.inner.margin)
 
     def _moving(self, plays: Any) -> Any:
         step = float(self.inner.step)
+        farthest = min(self._farthest, TABLE_MAX)  # that a search looks at; it may answer with the input beyond
         return moving.build_fixed(
-            plays, self.static, self.parts.plays, self.seconds, self._farthest, self.bumps, step, self._largest_step()
+            plays, self.static, self.parts.plays, self.seconds, farthest, self.bumps, step, self._largest_step()
         )
 
     @cached_property
