@@ -1,9 +1,17 @@
 #include "hystgen_runtime.h"
 
-/* What play i contributes at z, in fixed point: z plus the value of a curve, which plays may share.
-   Beyond the range of the plays a curve keeps its end value. */
-HYSTGEN_APART int64_t hystgen_bent(unsigned int i, int64_t z) {
-    bool limited = false; /* not reported: only inputs tried by a search go that far */
-    return z + hystgen_nearest(hystgen_bend(&hystgen_bump[hystgen_bump_of[i]], z, &limited),
-                               HYSTGEN_BUMP_BITS);
+/* What a play bent by curve c contributes at z, in fixed point: z and the value of the curve.
+   Beyond where plays can be a curve stays at its end. */
+HYSTGEN_APART int64_t hystgen_bent_by(const hystgen_bump_t *c, int32_t z) {
+    const int32_t inside = z < -HYSTGEN_BUMP_END  ? -HYSTGEN_BUMP_END
+                           : z > HYSTGEN_BUMP_END ? HYSTGEN_BUMP_END
+                                                  : z;
+    const int64_t value =
+        hystgen_curve(c->knot, c->scale, c->coefficient, c->pieces, HYSTGEN_BUMP_DEGREE, inside);
+    return z + hystgen_nearest(value * ((int64_t)1 << HYSTGEN_BUMP_LIFT), HYSTGEN_BUMP_BITS);
+}
+
+/* What play i contributes at z; several plays may have a curve in common. */
+HYSTGEN_APART int64_t hystgen_bent(unsigned int i, int32_t z) {
+    return hystgen_bent_by(&hystgen_bump[hystgen_bump_of[i]], z);
 }

@@ -29,8 +29,7 @@ static hystgen_signal_t hystgen_inside_offset(hystgen_signal_t d) {
 }
 
 /* Drive v has passed through the drive side and moved the plays. Returns their sum. */
-HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_forward_played(hystgen_forward_t *self,
-                                                               hystgen_real_t v) {
+static hystgen_signal_t hystgen_forward_played(hystgen_forward_t *self, hystgen_real_t v) {
     const hystgen_reach_t late = hystgen_forward_waited(self, v);
     const hystgen_reach_t reached = hystgen_forward_slewed(self, late);
     if (reached < late || reached > late) {
@@ -56,8 +55,7 @@ HYSTGEN_APART_IN_FIXED void hystgen_forward_absorb(hystgen_forward_t *self, hyst
 }
 
 /* Drive v has passed through the drive side and moved the plays. Returns their sum. */
-HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_played(hystgen_inverse_t *self,
-                                                               hystgen_real_t v) {
+static hystgen_signal_t hystgen_inverse_played(hystgen_inverse_t *self, hystgen_real_t v) {
     const hystgen_signal_t x = hystgen_entered_drive(v);
     const hystgen_signal_t a = self->moving ? hystgen_inverse_drive_side_absorb(self, x)
                                             : hystgen_inverse_drive_side_rest(self, x);
@@ -95,7 +93,8 @@ static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_re
 }
 
 /* The part common to init and reset, once the plays are set: they rest at this drive. */
-static void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive, bool ascending) {
+HYSTGEN_APART void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive,
+                                         bool ascending) {
     self->applied = drive;
     self->drive = hystgen_arriving(hystgen_entered_drive(drive));
     self->ascending = ascending;
@@ -110,7 +109,8 @@ static void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive,
 }
 
 /* The part common to init and reset, once the plays are set: they rest at this drive. */
-static void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive, bool ascending) {
+HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive,
+                                         bool ascending) {
     self->pending = drive;
     self->answer = drive;
     self->has_pending = false;
@@ -242,7 +242,7 @@ void hystgen_inverse_set_temperature(hystgen_inverse_t *self, hystgen_real_t tem
     }
 }
 
-hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
+HYSTGEN_ALONE hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
     if (!hystgen_finite(v)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return self->answer;
@@ -282,17 +282,21 @@ void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u) {
     }
 }
 
-/* The drive, within its limits, that makes the output side give y. The memory is up to date. */
+/* The sum of the plays with which the output side gives y; the memory is up to date. */
+HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_wanted(hystgen_inverse_t *self,
+                                                               hystgen_signal_t y) {
+    return self->moving ? hystgen_inverse_output_side_solve(self, y)
+                        : hystgen_inverse_output_side_resting(self, y);
+}
+
+/* The drive that leads to an input w of the plays, at which their sum is h, within its limits. */
 HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_sought(hystgen_inverse_t *self,
-                                                             hystgen_signal_t y) {
-    const bool moving = self->moving;
-    const hystgen_signal_t h = moving ? hystgen_inverse_output_side_solve(self, y)
-                                      : hystgen_inverse_output_side_resting(self, y);
+                                                             hystgen_signal_t h,
+                                                             hystgen_reach_t w) {
     self->bits = 0;
-    const hystgen_reach_t w = hystgen_inverse_input(self, h);
     const hystgen_signal_t a = hystgen_inverse_finer(self, h, w, hystgen_inverse_drive(self, h, w));
     const hystgen_reach_t v =
-        hystgen_drive_code(moving ? hystgen_inverse_drive_side_solve(self, a) : a);
+        hystgen_drive_code(self->moving ? hystgen_inverse_drive_side_solve(self, a) : a);
     const hystgen_reach_t reached = hystgen_inverse_slewed(self, v);
     if (reached < v || reached > v) {
         self->bits |= HYSTGEN_STATUS_SLEW_LIMITED;
@@ -305,15 +309,16 @@ HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_sought(hystgen_inverse_t *
     return inside;
 }
 
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
+HYSTGEN_ALONE hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_inverse_take(self);
     if (!hystgen_finite(u)) {
         self->status |= HYSTGEN_STATUS_HELD;
         hystgen_inverse_repeat(self);
         return hystgen_inverse_answer(self, self->stepped ? self->answer : self->applied);
     }
-    const hystgen_signal_t y = hystgen_inverse_put(self, u);
-    return hystgen_inverse_answer(self, hystgen_inverse_sought(self, y));
+    const hystgen_signal_t h = hystgen_inverse_wanted(self, hystgen_inverse_put(self, u));
+    const hystgen_reach_t w = hystgen_inverse_input(self, h);
+    return hystgen_inverse_answer(self, hystgen_inverse_sought(self, h, w));
 }
 
 void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {

@@ -69,7 +69,16 @@ static inline hystgen_sum_t hystgen_asked(hystgen_signal_t h) {
     return inside * ((hystgen_sum_t)1 << HYSTGEN_LEVEL_DROP);
 }
 
-/* A constant share of x. */
+/* A constant share of a way of the plays' input. */
 static inline hystgen_sum_t hystgen_share_of(hystgen_sum_t x, const hystgen_factor_t *share) {
-    return hystgen_times(x, share);
+    return hystgen_short_times(x, share);
+}
+
+/* A play of threshold r once its input has gone to w. The way between the two fits 32 bits. */
+static inline hystgen_play_t hystgen_drawn(hystgen_play_t play, hystgen_play_t w, hystgen_sum_t r) {
+    const uint32_t way = w > play ? (uint32_t)w - (uint32_t)play : (uint32_t)play - (uint32_t)w;
+    if ((hystgen_sum_t)way <= r) {
+        return play;
+    }
+    return (hystgen_play_t)(w > play ? (hystgen_sum_t)w - r : (hystgen_sum_t)w + r);
 }

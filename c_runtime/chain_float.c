@@ -50,7 +50,15 @@ static inline hystgen_sum_t hystgen_asked(hystgen_signal_t h) {
     return h;
 }
 
-/* A constant share of x. */
+/* A constant share of a way of the plays' input. */
 static inline hystgen_sum_t hystgen_share_of(hystgen_sum_t x, const hystgen_real_t *share) {
     return *share * x;
+}
+
+/* A play of threshold r once its input has gone to w. */
+static inline hystgen_play_t hystgen_drawn(hystgen_play_t play, hystgen_play_t w, hystgen_sum_t r) {
+    const hystgen_play_t low = w - r;
+    const hystgen_play_t high = w + r;
+    const hystgen_play_t upper = play > high ? high : play;
+    return upper < low ? low : upper;
 }

@@ -4,27 +4,15 @@
    of play i is the value at which it would come to rest (`play`) and what it contributes there
    (`bent`). */
 
-/* The sum of the plays after their input has gone to w. It rises with w. */
-HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_moved_sum(const hystgen_play_t *play,
-                                                       const hystgen_sum_t *bent,
-                                                       hystgen_reach_t w) {
-    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
-    unsigned int i;
-    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_sum_t z = hystgen_moved(i, play, w);
-        sum = sum + hystgen_model_tables.weight[i] * hystgen_contributed(i, play, bent, z);
-    }
-    return sum;
-}
-
 /* The plays follow their input w. Returns their sum. */
-static hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
-                                          hystgen_play_t w) {
+HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
+                                                 hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
+    HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_sum_t z = hystgen_moved(i, play, w);
-        const hystgen_sum_t rest = hystgen_left(i, z, w);
+        const hystgen_play_t z = hystgen_moved(i, play, w);
+        const hystgen_play_t rest = hystgen_left(i, z, w);
         const hystgen_sum_t value = hystgen_contributed(i, play, bent, z);
         sum = sum + hystgen_model_tables.weight[i] * value;
         bent[i] = rest >= z && rest <= z ? value : hystgen_bent(i, rest);
@@ -35,30 +23,17 @@ static hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *b
 }
 
 /* Play i at rest with its input at w. */
-static hystgen_sum_t hystgen_resting(unsigned int i, const hystgen_play_t *play,
-                                     hystgen_reach_t w) {
-    const hystgen_sum_t low = (hystgen_sum_t)w - hystgen_model_tables.threshold[i];
-    const hystgen_sum_t high = (hystgen_sum_t)w + hystgen_model_tables.threshold[i];
-    const hystgen_sum_t upper = play[i] > high ? high : play[i];
-    return upper < low ? low : upper;
-}
-
-/* The sum of the plays if they came to rest with their input at w. */
-HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_resting_sum(const hystgen_play_t *play,
-                                                         hystgen_reach_t w) {
-    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
-    unsigned int i;
-    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        sum = sum + hystgen_model_tables.weight[i] * hystgen_bent(i, hystgen_resting(i, play, w));
-    }
-    return sum;
+static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play,
+                                      hystgen_play_t w) {
+    return hystgen_drawn(play[i], w, hystgen_model_tables.threshold[i]);
 }
 
 /* The plays come to rest with their input at w. Returns their sum. */
-static hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum_t *bent,
-                                        hystgen_play_t w) {
+HYSTGEN_APART hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum_t *bent,
+                                               hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
+    HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
         hystgen_put(i, play, hystgen_resting(i, play, w));
         bent[i] = hystgen_bent(i, play[i]);
@@ -90,8 +65,23 @@ static hystgen_signal_t hystgen_inverse_started(hystgen_inverse_t *self) {
     return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
 }
 
-/* Sum of the plays with their input at w. */
-static hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_reach_t w) {
-    return self->moving ? hystgen_moved_sum(self->play, self->bent, w)
-                        : hystgen_resting_sum(self->play, w);
+/* What the plays give once their input has gone to w, or rests there. It rises with w. */
+HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_play_t w) {
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+    unsigned int i;
+    if (self->moving) {
+        for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+            const hystgen_play_t z = hystgen_moved(i, self->play, w);
+            const hystgen_sum_t value = hystgen_contributed(i, self->play, self->bent, z);
+            sum = sum + hystgen_model_tables.weight[i] * value;
+        }
+        return sum;
+    }
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        const hystgen_play_t z = hystgen_resting(i, self->play, w);
+        const hystgen_sum_t value = hystgen_contributed(i, self->play, self->bent, z);
+        sum = sum + hystgen_model_tables.weight[i] * value;
+    }
+    return sum;
 }

@@ -13,18 +13,21 @@ static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
+HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self,
+                                                               hystgen_play_t w) {
     hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
     return hystgen_forward_started(self);
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
+HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self,
+                                                               hystgen_play_t w) {
     hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
     return hystgen_inverse_started(self);
 }
 
 /* Input of the plays at which their sum is h. */
-static hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *self, hystgen_signal_t h) {
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *self,
+                                                             hystgen_signal_t h) {
     return hystgen_loop_solve(&hystgen_model_tables, self->play, hystgen_asked(h));
 }

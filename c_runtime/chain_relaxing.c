@@ -14,7 +14,8 @@ static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
+HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self,
+                                                               hystgen_play_t w) {
     if (self->moving) {
         return hystgen_level(hystgen_relaxing_follow(self->play, w));
     }
@@ -23,7 +24,8 @@ static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
+HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self,
+                                                               hystgen_play_t w) {
     if (self->moving) {
         return hystgen_level(hystgen_relaxing_follow(self->play, w));
     }

@@ -4,9 +4,10 @@
 
 /* The drive has always been v. */
 static void hystgen_delay_rest(hystgen_real_t *sample, unsigned int *oldest, hystgen_real_t v) {
+    volatile hystgen_real_t *entry = sample; /* no call of memset, which a target need not have */
     unsigned int i;
     for (i = 0; i < HYSTGEN_WAITING; ++i) {
-        sample[i] = v;
+        entry[i] = v;
     }
     *oldest = 0;
 }

@@ -132,6 +132,14 @@ typedef struct {
     uint8_t lift; /* and bits that a value leaves out */
 } hystgen_bend_curve_t;
 
+/* What a bent play adds to itself, in pieces of a curve like those. */
+typedef struct {
+    const int32_t *knot;
+    const uint8_t *scale;
+    const int32_t *coefficient;
+    uint_least16_t pieces;
+} hystgen_bump_t;
+
 typedef struct {
     hystgen_bend_curve_t forward;
     hystgen_bend_curve_t inverse;

@@ -68,6 +68,7 @@ typedef hystgen_real_t hystgen_number_t;
 /* Storage classes of functions in emitted files: kernels are static where a model has its own copy;
    some are kept from being inlined there, to need less stack. */
 #include "apart.h"
+#include "apart_chain.h"
 #define HYSTGEN_API
 #define HYSTGEN_KERNEL
 #define HYSTGEN_FIXED_KERNEL

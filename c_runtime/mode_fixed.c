@@ -10,8 +10,8 @@ HYSTGEN_APART int64_t hystgen_mode_scaled(const hystgen_mode_table_t *t, int64_t
 }
 
 /* A change of the input times a factor, in units of the states. */
-static int64_t hystgen_mode_entered(const hystgen_mode_table_t *t, int64_t change,
-                                    const hystgen_factor_t *f) {
+HYSTGEN_APART int64_t hystgen_mode_entered(const hystgen_mode_table_t *t, int64_t change,
+                                           const hystgen_factor_t *f) {
     return hystgen_times(change, f) * ((int64_t)1 << t->lift);
 }
 

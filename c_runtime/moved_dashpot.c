@@ -4,35 +4,48 @@
    a table (hystgen_yield) gives what a play gains of its stretch in that time. A second row behind
    the plays holds what rounding took from each, so that none stops short of where it creeps to. */
 
-/* How far play i moves while the input of the plays goes to w, as a yield. */
-static hystgen_sum_t hystgen_change(unsigned int i, const hystgen_play_t *play, hystgen_sum_t w) {
-    const hystgen_play_t r = hystgen_model_tables.threshold[i];
-    const hystgen_sum_t x = play[0] + hystgen_seen(w - play[0]) - play[i];
-    const hystgen_sum_t gained = x > r ? hystgen_yield(x - r) : x < -r ? -hystgen_yield(-x - r) : 0;
-    return gained + play[HYSTGEN_N_PLAYS + i];
+/* Where the input counts as standing still while it goes to w. */
+static inline hystgen_play_t hystgen_standing(const hystgen_play_t *play, hystgen_play_t w) {
+    return (hystgen_play_t)(play[0] + hystgen_seen((hystgen_sum_t)w - play[0]));
+}
+
+/* How far play i moves, as a yield, while the input of the plays stands still there. */
+HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_change(unsigned int i, const hystgen_play_t *play,
+                                                    hystgen_play_t standing) {
+    const hystgen_sum_t x = (hystgen_sum_t)standing - play[i];
+    const hystgen_sum_t lost = play[HYSTGEN_N_PLAYS + i];
+    const hystgen_sum_t on = (x < 0 ? -x : x) - hystgen_model_tables.threshold[i];
+    if (on > 0) {
+        const hystgen_sum_t gained = hystgen_yield(on);
+        return x < 0 ? lost - gained : lost + gained;
+    }
+    return lost;
 }
 
 /* Play i once the input of the plays has gone to w. */
-static hystgen_sum_t hystgen_moved(unsigned int i, const hystgen_play_t *play, hystgen_sum_t w) {
-    return play[i] + hystgen_moved_by(hystgen_change(i, play, w));
+static inline hystgen_play_t hystgen_moved(unsigned int i, const hystgen_play_t *play,
+                                           hystgen_play_t w) {
+    const hystgen_sum_t yield = hystgen_change(i, play, hystgen_standing(play, w));
+    return (hystgen_play_t)(play[i] + hystgen_moved_by(yield));
 }
 
 /* Where play i, now at z, counts as resting: at z, since it only creeps on in the next steps. */
-static hystgen_sum_t hystgen_left(unsigned int i, hystgen_sum_t z, hystgen_sum_t w) {
+static hystgen_play_t hystgen_left(unsigned int i, hystgen_play_t z, hystgen_play_t w) {
     (void)i;
     (void)w;
     return z;
 }
 
 /* Play i moves to z while the input of the plays goes to w. */
-static void hystgen_keep(unsigned int i, hystgen_play_t *play, hystgen_play_t w, hystgen_sum_t z) {
-    const hystgen_sum_t lost = hystgen_change(i, play, w) - hystgen_yield_of(z - play[i]);
+static void hystgen_keep(unsigned int i, hystgen_play_t *play, hystgen_play_t w, hystgen_play_t z) {
+    const hystgen_sum_t yield = hystgen_change(i, play, hystgen_standing(play, w));
+    const hystgen_sum_t lost = yield - hystgen_yield_of((hystgen_sum_t)z - play[i]);
     play[HYSTGEN_N_PLAYS + i] = (hystgen_play_t)lost;
-    play[i] = (hystgen_play_t)z;
+    play[i] = z;
 }
 
 /* Play i rests at z. */
-static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_sum_t z) {
+static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) {
     play[HYSTGEN_N_PLAYS + i] = 0;
-    play[i] = (hystgen_play_t)z;
+    play[i] = z;
 }

@@ -17,7 +17,7 @@ static hystgen_play_t hystgen_beside(const hystgen_play_t *play, unsigned int i,
 }
 
 /* The plays follow their input w. Returns their sum. */
-static hystgen_sum_t hystgen_relaxing_follow(hystgen_play_t *play, hystgen_play_t w) {
+HYSTGEN_APART hystgen_sum_t hystgen_relaxing_follow(hystgen_play_t *play, hystgen_play_t w) {
     const hystgen_tables_t *t = &hystgen_model_tables;
     hystgen_sum_t sum = (hystgen_sum_t)t->weight[0] * w;
     unsigned int i;

@@ -1,22 +1,38 @@
 #include "hystgen_runtime.h"
 
-/* Input of the plays at which their sum is h, by bisection between the present input and the
-   farthest one: the nearer of two neighbours. */
+/* Which of `low` and the input beside it is nearer to where the sum of the plays is `sum`; one
+   beyond them where they are the farthest and not far enough. */
+HYSTGEN_APART hystgen_reach_t hystgen_inverse_nearer(const hystgen_inverse_t *self,
+                                                     hystgen_play_t low, hystgen_sum_t sum) {
+    const hystgen_sum_t above = sum - hystgen_inverse_sum(self, low);
+    if (low == HYSTGEN_LARGEST_INPUT) {
+        return (hystgen_reach_t)low + (above > 0 ? 1 : 0);
+    }
+    const hystgen_sum_t below = hystgen_inverse_sum(self, low + 1) - sum;
+    if (above < 0) {
+        return (hystgen_reach_t)low - 1;
+    }
+    return (hystgen_reach_t)low + (below < 0 ? 2 : above > below ? 1 : 0);
+}
+
+/* Input of the plays at which their sum is h, by halves between where it is and the farthest: the
+   nearer of two neighbours, the lower one of which is `low` while they are `size` apart. */
 HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *self,
                                                     hystgen_signal_t h) {
     const hystgen_sum_t sum = hystgen_asked(h);
-    const hystgen_sum_t here = hystgen_inverse_sum(self, self->play[0]);
-    hystgen_reach_t low = here < sum ? self->play[0] : -HYSTGEN_LARGEST_INPUT;
-    hystgen_reach_t high = here < sum ? HYSTGEN_LARGEST_INPUT : self->play[0];
-    if (here == sum) {
-        return self->play[0];
+    hystgen_play_t low = self->play[0];
+    const hystgen_sum_t here = hystgen_inverse_sum(self, low);
+    uint32_t size = here < sum ? (uint32_t)HYSTGEN_LARGEST_INPUT - (uint32_t)low : 0u;
+    if (here > sum) {
+        size = (uint32_t)low + (uint32_t)HYSTGEN_LARGEST_INPUT;
+        low = -HYSTGEN_LARGEST_INPUT;
     }
-    while (high - low > 1) {
-        const hystgen_reach_t middle = low + (high - low) / 2;
-        const bool beyond = hystgen_inverse_sum(self, middle) >= sum;
-        low = beyond ? low : middle;
-        high = beyond ? middle : high;
+    while (size > 1u) {
+        const hystgen_play_t middle = low + (hystgen_play_t)(size / 2u);
+        size -= size / 2u;
+        if (hystgen_inverse_sum(self, middle) < sum) {
+            low = middle;
+        }
     }
-    return sum - hystgen_inverse_sum(self, low) < hystgen_inverse_sum(self, high) - sum ? low
-                                                                                        : high;
+    return hystgen_inverse_nearer(self, low, sum);
 }

@@ -2,7 +2,8 @@
 
 /* Input of the plays at which their sum is h, by bisection between the present input and the
    farthest one. */
-static hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self, hystgen_real_t h) {
+HYSTGEN_APART hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self,
+                                                   hystgen_real_t h) {
     const hystgen_real_t here = self->play[0];
     const hystgen_real_t sum = hystgen_inverse_sum(self, here);
     hystgen_real_t low = sum < h ? here : HYSTGEN_LEAST_INPUT;

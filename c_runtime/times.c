@@ -12,3 +12,9 @@ static int64_t hystgen_times(int64_t x, const hystgen_factor_t *f) {
     const unsigned int shift = f->shift - HYSTGEN_LOW_PART;
     return (whole + ((int64_t)1 << (shift - 1u))) >> shift;
 }
+
+/* The same for |x| < 2^32, whose product with a mantissa fits 64 bits. */
+static int64_t hystgen_short_times(int64_t x, const hystgen_factor_t *f) {
+    const unsigned int shift = f->shift - HYSTGEN_LOW_PART;
+    return (((x * f->mantissa) >> HYSTGEN_LOW_PART) + ((int64_t)1 << (shift - 1u))) >> shift;
+}

@@ -12,8 +12,9 @@ static inline int64_t hystgen_yield_of(int64_t moved) {
 /* The part of a stretch x >= 0 that a play with a nonlinear dashpot gains in a step, with
    HYSTGEN_YIELD_BITS bits below a step of the plays' input: a piecewise cubic as in hystgen_curve,
    each piece with the bits that its values leave out; never more than x. */
-HYSTGEN_APART int64_t hystgen_yield(int64_t x) {
-    const uint32_t inside = x > HYSTGEN_STRETCH ? (uint32_t)HYSTGEN_STRETCH : (uint32_t)x;
+static int64_t hystgen_yield(int64_t x) {
+    const uint32_t whole = (uint32_t)x;
+    const uint32_t inside = whole > HYSTGEN_STRETCH ? (uint32_t)HYSTGEN_STRETCH : whole;
     unsigned int low = 0;
     unsigned int high = HYSTGEN_YIELDS;
     int64_t y = 0;
@@ -30,10 +31,10 @@ HYSTGEN_APART int64_t hystgen_yield(int64_t x) {
         y = piece->c[k - 1u] + ((y * (int64_t)h + ((int64_t)1 << 30)) >> 31);
     }
     y = y * ((int64_t)1 << piece->lift);
-    return y > hystgen_yield_of(x) ? hystgen_yield_of(x) : y;
+    return y > hystgen_yield_of(whole) ? hystgen_yield_of(whole) : y;
 }
 
 /* How far into the step `way` the input counts as standing still. */
 static inline int64_t hystgen_seen(int64_t way) {
-    return hystgen_times(way, &hystgen_seen_share);
+    return hystgen_short_times(way, &hystgen_seen_share);
 }

@@ -156,6 +156,13 @@ def saturation(t: ChainTables, j: int, name: str, prefix: str) -> dict[str, Any]
 
 def _curve(t: Bends, which: int, own: str) -> tuple[list[str], str]:
     """The tables of a curve in fixed point, and the initializer of the curve itself."""
+    arrays, pointers = _pieces(t, which, own)
+    counts = (t.domain[which, 1], t.pieces[which], t.coefficient.shape[1] - 1, *t.scaled[which])
+    return arrays, f"{pointers},\n     {_entries(counts)}"
+
+
+def _pieces(t: Bends, which: int, own: str) -> tuple[list[str], str]:
+    """The tables of a curve's pieces, and their names."""
     here = int(t.first[which])
     rows = slice(here, here + int(t.pieces[which]))
     arrays = [
@@ -164,8 +171,7 @@ def _curve(t: Bends, which: int, own: str) -> tuple[list[str], str]:
         table("int32_t", f"{own}_coefficient", list(t.coefficient[rows].ravel())),
     ]
     pointers = ", ".join(f"{own}_{part}" for part in ("knot", "scale", "coefficient"))
-    counts = (t.domain[which, 1], t.pieces[which], t.coefficient.shape[1] - 1, *t.scaled[which])
-    return arrays, f"{pointers},\n     {_entries(counts)}"
+    return arrays, pointers
 
 
 MOVES = ("play", "dilated", "relaxing", "dashpot")
@@ -259,12 +265,17 @@ def _fixed_moving(t: FixedMovingTables, prefix: str, inverse: bool) -> tuple[lis
             ("STRETCH", operand(t.stretch), "of a play, up to which there are any"),
         ]
     if t.bends != moving.STRAIGHT:
-        curves = [_curve(t.bump, k, f"{prefix}_bump_{k + 1}") for k in range(len(t.bump.pieces))]
+        curves = [_pieces(t.bump, k, f"{prefix}_bump_{k + 1}") for k in range(len(t.bump.pieces))]
         arrays += [text for texts, _ in curves for text in texts]
-        rows = ",\n".join(f"    {{{entries}}}" for _, entries in curves)
-        arrays.append(f"static const {prefix}_bend_curve_t {prefix}_bump[{len(curves)}] = {{\n{rows},\n}};\n")
+        rows = ",\n".join(f"    {{{names}, {n}}}" for (_, names), n in zip(curves, t.bump.pieces, strict=True))
+        arrays.append(f"static const {prefix}_bump_t {prefix}_bump[{len(curves)}] = {{\n{rows},\n}};\n")
         arrays.append(table("uint16_t", f"{prefix}_bump_of", list(t.bump_of)))
-        numbers.append(("BUMP_BITS", f"{t.bump_bits}u", "of what a bent play adds below a step of its input"))
+        numbers += [
+            ("BUMP_END", operand(t.bump.domain[0, 1]), "largest input of what a bent play adds"),
+            ("BUMP_DEGREE", f"{t.bump.coefficient.shape[1] - 1}u", ""),
+            ("BUMP_LIFT", f"{t.bump.scaled[0, 1]}u", "bits that its polynomials leave out"),
+            ("BUMP_BITS", f"{t.bump_bits}u", "and those of it below a step of the plays' input"),
+        ]
     return arrays, numbers
 
 
@@ -412,6 +423,7 @@ def _functions(
     """The functions of one operator that name the blocks."""
     inverse, ahead = op == "inverse", len(t.tap) > 0
     self_t = f"hystgen_{op}_t *self"
+    apart = "HYSTGEN_APART" if t.fixed else "static"  # its products of 64 bits stay off the stack of what calls it
 
     def through(blocks: Sequence[Block], verb: str, x: str, side: str, comment: str) -> str:
         lines = [f"{x} = {block.call(verb, x)};" for block in blocks] or ["(void)self;"]
@@ -437,9 +449,10 @@ def _functions(
     def drifts(lead: str) -> str:
         return "".join(f" + hystgen_clock_drift({each.table}, &self->{each.name}, {lead})" for each in clocks)
 
+    own = apart if behind or clocks else "static"
     yield _function(
         "The displacement for an output y of the chain.",
-        f"static hystgen_signal_t hystgen_{op}_displaced(const {self_t}, hystgen_signal_t y)",
+        f"{own} hystgen_signal_t hystgen_{op}_displaced(const {self_t}, hystgen_signal_t y)",
         [*lines, f"return {x} + ({offsets}{drifts('0')});"],
     )
     if inverse:
@@ -492,7 +505,7 @@ def _functions(
     )
     yield _function(
         "The drive moves to v from where it was, in one sample.",
-        f"static void hystgen_{op}_travelled({self_t}, hystgen_real_t v)",
+        f"{apart if clocks or heat or ageing else 'static'} void hystgen_{op}_travelled({self_t}, hystgen_real_t v)",
         [
             *(f"hystgen_clock_tick({each.table}, &self->{each.name});" for each in clocks),
             *(f"hystgen_heat_move({each.table}, &self->{each.name}, self->applied, v);" for each in heat),

@@ -162,6 +162,7 @@ def _constants(
         "factor_t": factor,
         "bend_curve_t": bend,
         "bend_t": layout.struct(bend, bend),
+        "bump_t": layout.struct(table, table, table, count),
         "yield_t": layout.struct((4, 4), (16, 4), (1, 1), (1, 1)),
         "stops_t": layout.struct(*2 * [(8, 8)], factor, factor),
     }

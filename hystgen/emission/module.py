@@ -98,7 +98,7 @@ def _implementation(values: SimpleNamespace) -> str:
         runtime.verbatim(files, values.name, family, values.name)
         for files in (
             (*(family.opening_apart if single else ()), *family.opening),
-            (*family.soft(values.kernels), "apart.h"),
+            (*family.soft(values.kernels), "apart.h", *(("apart_chain.h",) if family.chain else ())),
             family.closing if single else (),
         )
     )

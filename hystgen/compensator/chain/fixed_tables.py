@@ -48,7 +48,7 @@ from hystgen.compensator.chain.layout import (
 )
 from hystgen.compensator.chain.moving import Bumps
 from hystgen.compensator.chain.own_fixed import Formats
-from hystgen.compensator.fixed_tables import Builder, FixedCurve, lsbs, nearest
+from hystgen.compensator.fixed_tables import TABLE_MAX, Builder, FixedCurve, lsbs, nearest
 from hystgen.effects import bend
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing import fixed as ageing_fixed
@@ -304,8 +304,9 @@ class _Builder:
 
     def _moving(self, plays: Any) -> Any:
         step = float(self.inner.step)
+        farthest = min(self._farthest, TABLE_MAX)  # that a search looks at; it may answer with the input beyond
         return moving.build_fixed(
-            plays, self.static, self.parts.plays, self.seconds, self._farthest, self.bumps, step, self._largest_step()
+            plays, self.static, self.parts.plays, self.seconds, farthest, self.bumps, step, self._largest_step()
         )
 
     @cached_property

@@ -116,20 +116,25 @@ def search(sum_at: Callable[..., Any]) -> Callable[..., Any]:
     @jit
     def searched(t: ChainTables, s: ChainState, h: Any) -> Any:
         """Input of the plays at which their sum is h, by bisection between the present input and the farthest one: the
-        nearer of two neighbours."""
+        nearer of two neighbours, or the input beyond the farthest where even that is not enough."""
         here = s.plays.play[0]
         total = sum_at(t, s, here)
-        if total == h:
-            return here
-        low = here if total < h else -t.moving.farthest
-        high = t.moving.farthest if total < h else here
-        while high - low > 1:
-            middle = low + (high - low) // 2
-            if sum_at(t, s, middle) >= h:
-                high = middle
-            else:
+        low = -t.moving.farthest if total > h else here
+        size = (t.moving.farthest if total < h else here) - low
+        while size > 1:
+            middle = low + size // 2
+            size -= size // 2
+            if sum_at(t, s, middle) < h:
                 low = middle
-        return low if h - sum_at(t, s, low) < sum_at(t, s, high) - h else high
+        above = h - sum_at(t, s, low)
+        if low == t.moving.farthest:
+            return low + 1 if above > 0 else low
+        below = sum_at(t, s, low + 1) - h
+        if above < 0:
+            return low - 1
+        if below < 0:
+            return low + 2
+        return low + 1 if above > below else low
 
     return searched
 

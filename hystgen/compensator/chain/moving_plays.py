@@ -129,12 +129,13 @@ def operators(kind: Kind) -> tuple[Function, Function, Function]:
         return low if upper < low else upper
 
     @jit
-    def resting_sum(m: Any, plays: Any, s: State, w: Any) -> Any:
+    def resting_sum(m: Any, plays: Any, s: State, values: Reals, w: Any) -> Any:
         """The sum of the plays if they came to rest with their input at w."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         for i in range(1, len(r)):
-            total = total + p[i] * bent(m, plays, i, resting(r, s, i, w))
+            z = resting(r, s, i, w)
+            total = total + p[i] * (values[i] if z == s.play[i] else bent(m, plays, i, z))
         return total
 
     @jit
@@ -154,7 +155,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function]:
         """Sum of the plays with their input at w."""
         if s.flags[MOVING]:
             return moved_sum(t.moving, t.plays, s.plays, s.lost, s.bent, w)
-        return resting_sum(t.moving, t.plays, s.plays, w)
+        return resting_sum(t.moving, t.plays, s.plays, s.bent, w)
 
     searched = kind.search(sum_at)
 

@@ -1,0 +1,11 @@
+/* A step is no part of a reset, and loops over plays go one by one: both need less of the stack. */
+#if defined(__GNUC__)
+#define HYSTGEN_ALONE __attribute__((noinline))
+#else
+#define HYSTGEN_ALONE
+#endif
+#if defined(__clang__)
+#define HYSTGEN_ROLLED _Pragma("clang loop unroll(disable)")
+#else
+#define HYSTGEN_ROLLED
+#endif
