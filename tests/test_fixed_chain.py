@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 from granted import clock, granted_states
-from modelfiles import CHAINS, INVERSE_ALONE, chain
+from modelfiles import CHAINS, INVERSE_ALONE, TANH, chain
 
 from hystgen.arithmetic import ARITHMETICS, factors
 from hystgen.basics import jit
 from hystgen.compensator import reference
-from hystgen.compensator.chain import moving, moving_fixed, tables
+from hystgen.compensator.chain import bounds, moving, moving_fixed, tables
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 from hystgen.compensator.chain.layout import Codes, Compiled
 from hystgen.compensator.chain.run import answers
@@ -118,6 +118,70 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
         most = int(numbers.tables.limits[slots.CODE_MAX])
         y = np.clip(y, -most - 1, most)  # a mode that rings may leave the codes
         assert np.max(np.abs(forward - y)) <= codes.forward_error
+
+
+def shaken(one: Compiled, n: int, rate: float) -> Array:
+    """Up to the middle as fast as bounds hold for, then to and fro by such a step, creeping up by `rate` of it."""
+    low, high = one.static.input_range
+    step = 0.999 * one.largest_step
+    up = np.arange(low, 0.5 * (low + high), step)
+    k = np.arange(n)
+    return np.clip(np.append(up, up[-1] + step * (rate * k - k % 2)), low, high)
+
+
+def wrong(one: Model, arithmetic: str, numbers: Compiled, v: Array) -> tuple[float, float]:
+    """Largest error of the forward operator for a drive, and its bound, output units."""
+    codes, t = numbers.codes, np.arange(len(v)) * T
+    drive, output = (1.0, 1.0) if codes is None else (float(codes.drive_lsb), float(codes.output_lsb))
+    bound = bounds.chain_bounds(numbers, arithmetic).forward if codes is None else codes.forward_error * output
+    given = np.float32(v).astype(float) if codes is None else np.rint(v / drive)
+    left = answers(numbers, Run(t, given), False).astype(float) * output - one.simulate(given * drive, t=t)
+    return float(np.max(np.abs(left))), bound
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q15"])
+@pytest.mark.parametrize(
+    ("name", "n", "rate"),
+    [("viscous", 2000, 0.025), ("relaxing", 2000, 0.025), ("soft_dashpot", 2000, 0.025), ("dashpot", 100_000, 0.0)],
+)
+def test_bounds_of_viscous_plays_hold_for_a_shaken_drive_and_are_reached(
+    name: str, n: int, rate: float, arithmetic: str
+) -> None:
+    """Plays come into contact and leave it inside each step: what the C takes in place of the law there adds up."""
+    one = model(CHAINS[name])
+    numbers = tables.build(one.chain, arithmetic, T)
+    worst, bound = wrong(one, arithmetic, numbers, shaken(numbers, n, rate))
+    assert worst <= bound < 4.0 * worst
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q15"])
+def test_bounds_of_dashpots_are_those_of_a_step_whatever_the_law(arithmetic: str) -> None:
+    """From laws that give way within a step to those that hardly yield in a record."""
+    rng = np.random.default_rng(17)
+    for _ in range(8):
+        tau, exponent = 10.0 ** rng.uniform(-4.0, 1.0), rng.uniform(0.3, 4.0)
+        law = f"name: rate_dependence, shape: relaxation, time_constant: {tau:.4g}, exponent: {exponent:.3g}"
+        one = model(chain("law", law, front=TANH))
+        numbers = tables.build(one.chain, arithmetic, T)
+        worst, bound = wrong(one, arithmetic, numbers, shaken(numbers, 500, 0.01))
+        assert worst <= bound < 1.5 * sum(one.cascade.pi.weights[1:]) * numbers.largest_way
+
+
+@BOTH
+def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(arithmetic: str) -> None:
+    """The inverse takes the gain before the last move, which counts most where the drive turns at an end."""
+    one = model(CHAINS["heated"])
+    numbers, codes = compiled(one, arithmetic)
+    low, high = one.cascade.input_range
+    way = 0.999 * numbers.largest_step * np.arange(N)
+    v = high - np.abs((way + high - low) % (2.0 * (high - low)) - (high - low))
+    t, output, drive = np.arange(N) * T, float(codes.output_lsb), float(codes.drive_lsb)
+    ends = numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1]
+    u = np.rint(np.clip(one.simulate(v, t=t) / output, *ends))
+    range_of_drive = tuple(float(end) * drive for end in numbers.tables.limits[:2])
+    wanted = Compensator(one.chain, ["self_heating"]).drives(Run(t, u * output), range_of_drive) / drive  # type: ignore[arg-type]
+    worst = float(np.max(np.abs(answers(numbers, Run(t, u), True) - wanted)))
+    assert worst <= codes.inverse_error < 4.0 * worst
 
 
 @pytest.mark.parametrize("name", ["lag", "exact", "lag_and_creep"])

@@ -35,7 +35,7 @@ from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.saturation.model import TanhSaturation
 from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal.compensator import LEAST_GAIN
+from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
 from hystgen.front.tanh import kernels
 from hystgen.plays import slots
 
@@ -117,6 +117,16 @@ def _warmed(compiled: Compiled) -> float:
     )
 
 
+def _gain_ends(compiled: Compiled) -> tuple[float, float]:
+    """Least and largest product of the gains: those that are set, and those of own heat at the fastest rate."""
+    set_ones = len(compiled.tables.gain) + len(compiled.tables.ageing.turns)
+    least, largest = LEAST_GAIN**set_ones, LARGEST_GAIN**set_ones
+    for each in compiled.parts.heat:
+        _, low, high = thermal.reached(each, compiled.static.input_range, compiled.largest_step, compiled.seconds)
+        least, largest = least * low, largest * high
+    return least, largest
+
+
 def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float]:
     """Errors of the sum of plays that an effect moves or bends, and of the same at the input that a search finds.
 
@@ -133,15 +143,16 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float]
         slow = t.first[1:].astype(float)
         play = 8.0 * u * size / float(np.min(slow))
         if emitted:
-            play += compiled.largest_step / 4.0  # contact within a step counts from the first touch
+            play += compiled.largest_way / 4.0  # contact within a step counts from the first touch
     if t.moves == moving.DASHPOT:
-        effect, way = next(filter(dashpot.nonlinear, compiled.parts.plays)), compiled.largest_step
-        rows = t.yields.astype(float)
-        play = 8.0 * u * size + dashpot.stretch_error(effect, float(r[-1]), compiled.seconds, rows, way)
+        effect, way = next(filter(dashpot.nonlinear, compiled.parts.plays)), compiled.largest_way
+        rows, ways = t.yields.astype(float), (way, moving.largest_stretch(static))
+        stretched = dashpot.stretch_error(effect, float(r[-1]), compiled.seconds, rows, ways, np.zeros(len(rows)))
+        play = 8.0 * u * size + stretched
         if emitted:
             play += float(t.number[moving.SEEN]) * way  # where the input counts as standing still
-    each = steep * play + (12.0 + len(static.pi.weights)) * u * size * steep
-    error = float(np.sum(p)) * each
+    summed = (12.0 + len(static.pi.weights)) * u * size * steep
+    error = float(np.sum(p[1:])) * steep * play + float(np.sum(p)) * summed
     width = 3.0 * (high - low) * 2.0 ** -t.halves + u * size
     return error, error + float(np.sum(p)) * steep * width
 
@@ -156,18 +167,18 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
     t, sizes = compiled.tables, _sizes(compiled)
     slope, back, there = _saturation(compiled, u, kind)
     gains = len(t.gain) + len(t.ageing.turns) + 9 * len(t.heat.turns)  # own heat: the temperature's roundings too
-    gain = (1.0 / LEAST_GAIN) ** (len(t.gain) + len(t.ageing.turns) + len(t.heat.turns))
+    least, gain = _gain_ends(compiled)
     taps = float(np.sum(np.abs(compiled.taps.weights))) if compiled.taps else 1.0
     inverse = 4.0 * u * sizes.displacement * slope + back
     if compiled.taps:
         inverse = taps * (inverse + u * (len(compiled.taps.weights) + 1) * sizes.displacement * slope)
-    inverse = gain * (inverse + 3.0 * u * gains * taps * sizes.output)
+    inverse = inverse / least + 3.0 * u * gains * taps * sizes.output / least
     late = 0.0
     if t.ageing.turns.size and emitted:  # the C takes the gain at the travel one sample before, from a table
         late = _late(compiled) * sizes.output
-        inverse += gain * late
+        inverse += late / least
     if t.heat.turns.size and emitted:  # the C leaves out the heat of one sample
-        inverse += gain * _warmed(compiled) * (1.0 / LEAST_GAIN)
+        inverse += _warmed(compiled) / least
     moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.lag.block)
     moved += 4.0 * u * sizes.drive * (t.delay.samples > 0)
     moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own[: t.own.ahead])
@@ -277,8 +288,6 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
         inverse = whole
     rest = math.prod(float(row[creep.REST]) for row in compiled.tables.creep.block)
     rest *= math.prod(each.forward.largest for each in compiled.own[compiled.tables.own.ahead :])
-    most = (1.0 / LEAST_GAIN) ** (
-        len(compiled.tables.gain) + len(compiled.tables.ageing.turns) + len(compiled.tables.heat.turns)
-    ) * rest
+    most = _gain_ends(compiled)[1] * rest
     most *= math.prod(mode.largest for mode in compiled.modes)
     return ErrorBounds(SECOND_ORDER * (forward + most * plays.forward), inverse, rounding)

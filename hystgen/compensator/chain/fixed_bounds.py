@@ -15,7 +15,6 @@ while nothing is limited, since a lag cannot be led beyond the drive's range the
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -25,7 +24,7 @@ from hystgen.arithmetic.factors import lifted
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER
 from hystgen.compensator.chain.bounds import SAME
-from hystgen.compensator.chain.layout import ChainTables, Parts
+from hystgen.compensator.chain.layout import ChainTables, Parts, largest_way
 from hystgen.compensator.chain.moving import (
     DASHPOT,
     DILATED,
@@ -50,18 +49,27 @@ from hystgen.effects.resonance.compensator import ModeNumbers
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
-from hystgen.effects.thermal.fixed import GAIN_BITS
+from hystgen.effects.thermal.fixed import GAIN_BITS, TEMPERATURE_BITS
+from hystgen.effects.thermal.model import SelfHeating
 
 DOUBLE = 2.0**-40
 """Relative error of double precision itself: a thousand roundings."""
+
+CUBIC_ERROR, LINEAR_ERROR, RECIPROCAL_ERROR = (last_bits * 2.0**-GAIN_BITS for last_bits in (8.0, 1.0, 4.0))
+"""[share of what passes] Errors of a gain from a piece of a cubic: four coefficients and products, and a share that is
+rounded to 20 bits, where the gain changes by a hundredth; of one linear in a temperature: a product; and of the
+reciprocal of a gain of at least 1/2: that of a linear one's error twice, and a step of Newton's."""
+
+FACTOR_ERROR, DEGREES = 2.0**-31, 2.0 ** -(TEMPERATURE_BITS + 1)
+"""[share of a product, degrees] Errors of a factor of 31 bits, and of the reference of a temperature."""
 
 
 @dataclass(frozen=True)
 class Sizes:
     """Largest sizes of the signals behind the plays, in output codes.
 
-    Forwards: the sum of the plays, the input of each creep, mode and saturation, the output without motion of the
-    modes, and the output. Backwards: the reference after the inverse of each saturation, the least and largest input to
+    Forwards: the sum of the plays, the input of each creep, mode and saturation, that of the gains, and
+    the output. Backwards: the reference after the inverse of each saturation, the least and largest input to
     which each tanh is inverted (`inverted`), the target of the output side, and the sum asked of the plays. For each
     block of the user's own: the input, and the output asked for.
     """
@@ -71,7 +79,7 @@ class Sizes:
     owns: list[tuple[float, float]]
     modes: list[float]
     saturations: list[float]
-    still: float
+    settled: float
     output: float
     undone: list[float]
     inverted: list[tuple[float, float]]
@@ -84,6 +92,17 @@ class Sizes:
         own = (size for pair in self.owns for size in pair)
         forwards = (self.plays, *self.creeps, *own, *self.modes, *self.saturations, self.output)
         return max(*forwards, *self.undone, self.target, self.asked)
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A gain behind the plays: its ends, and in output codes what it adds to errors of its output and of its input that
+    is solved for, beside the rounding of either."""
+
+    least: float
+    largest: float
+    there: float
+    back: float
 
 
 @dataclass(frozen=True)
@@ -149,6 +168,11 @@ class Bounds:
     def _arriving(self) -> float:
         """The unit of signals in front of the plays, in drive units."""
         return float(self.inner.drive_lsb) / 2.0**self._fine
+
+    @property
+    def _way(self) -> float:
+        """As `Compiled.largest_way`."""
+        return largest_way(self.static, [each.linear for each in self.ahead], self.largest_step)
 
     # ------------------------------------------------------------ blocks
 
@@ -218,22 +242,31 @@ class Bounds:
             return error / abs(each.linear.forward.d) + own
         return each.linear.passed(error, own)
 
-    def _gains(self) -> tuple[int, float]:
-        """The number of gains, and the error of each as a share of the output."""
-        return len(self.parts.ageing) + len(self.parts.heat) + len(self.parts.thermal), 8.0 * 2.0**-GAIN_BITS
-
-    def _warmed(self, degrees: Sequence[float]) -> float:
-        """Change of the output, in codes, by errors of the temperatures of own heat."""
-        lsb = float(self.inner.output_lsb)
-        return math.fsum(
-            wrong * (abs(each.gain_per_degree) * self.sizes.still + abs(each.offset_per_degree) / lsb)
-            for wrong, each in zip(degrees, self.parts.heat, strict=True)
-        )
-
-    def _warmed_at_once(self) -> float:
-        """Change of the output, in codes, by the heat of one sample at the fastest rate."""
-        ends, way = self.static.input_range, self.largest_step
-        return self._warmed([thermal.most_at_once(each, ends, way, self.seconds) for each in self.parts.heat])
+    @cached_property
+    def _gains(self) -> list[Gain]:
+        """The gains behind the plays, from there on."""
+        lsb, step, ends = float(self.inner.output_lsb), self.largest_step, self.static.input_range
+        size, span = self.sizes.settled, (self.ends[1] - self.ends[0]) / lsb
+        found = []
+        for each in self.parts.ageing:
+            begun = 0.5 * float(self.inner.drive_lsb) * abs(ageing.steepness(each, 0.0))  # pieces begin at whole codes
+            wrong = ageing.TABLE_ERROR + begun + CUBIC_ERROR
+            late = ageing.most_at_once(each, step) + wrong / LEAST_GAIN + RECIPROCAL_ERROR
+            found.append(Gain(LEAST_GAIN, LARGEST_GAIN, wrong * size, late * size))
+            size *= LARGEST_GAIN
+        linear = [*zip(self.parts.heat, self.heats, strict=True), *((each, DEGREES) for each in self.parts.thermal)]
+        for each, wrong in linear:
+            least, largest, offset, at_once = LEAST_GAIN, LARGEST_GAIN, span, 0.0
+            if isinstance(each, SelfHeating):
+                at_once = thermal.most_at_once(each, ends, step, self.seconds)
+                warmest, least, largest = thermal.reached(each, ends, step, self.seconds)
+                offset = warmest * abs(each.offset_per_degree) / lsb
+            degree = abs(each.gain_per_degree) * size + abs(each.offset_per_degree) / lsb
+            there = wrong * degree + LINEAR_ERROR * size + FACTOR_ERROR * offset
+            back = (wrong + at_once) * degree / least + RECIPROCAL_ERROR * size + FACTOR_ERROR * offset / least
+            found.append(Gain(least, largest, there, back))
+            size = size * largest + offset
+        return found
 
     def _saturation(self) -> tuple[float, float, float]:
         """Saturation: the slope of its inverse at the ends of the output, the error of the inverse, and that of the
@@ -260,13 +293,6 @@ class Bounds:
                     back += (0.5 + over) * self._signal + missed(1.0 / give) * size
                     there += 1.0 * self._signal + missed(give) * self.sizes.output
         return slope, back, there
-
-    def _late(self) -> float:
-        """Share of the output by which the gain is late, as in floating point."""
-        if not self.parts.ageing:
-            return 0.0
-        moved = max(ageing.most_at_once(each, self.largest_step) for each in self.parts.ageing)
-        return moved + ageing.TABLE_ERROR
 
     # ------------------------------------------------------------ operators
 
@@ -312,7 +338,7 @@ class Bounds:
                 plays.append((1.0 + 2.0**-30 * first * travel) * step)
             elif t.moves != PLAIN and first < 1.0:
                 wrong = 2.0 * travel * (2.0**-30 * (first + second))
-                plays.append((1.0 + wrong) / first * step + 0.25 * self.largest_step)
+                plays.append((1.0 + wrong) / first * step + 0.25 * self._way)
             else:
                 plays.append(step * (t.moves != PLAIN))
         slopes = 0.5 * len(t.relaxed.slope) * 2.0**-self.inner.bits * travel * t.scanned
@@ -324,10 +350,10 @@ class Bounds:
     def _dashpot(self, step: float) -> float:
         """How far plays with a nonlinear dashpot can be from those of the model: by the table, and because the input
         counts as standing still within a step."""
-        t, way = self.tables.moving, self.largest_step
-        effect, scale = next(filter(dashpot.nonlinear, self.parts.plays)), self.static.pi.thresholds[-1]
+        t, way = self.tables.moving, self._way
+        effect = next(filter(dashpot.nonlinear, self.parts.plays))
         seen = float(t.seen[0]) / 2.0 ** int(t.seen[1])
-        return yield_error(t, effect, scale, self.seconds, step, way) + seen * way
+        return yield_error(t, effect, self.static, self.seconds, step, way) + seen * way
 
     @cached_property
     def _steepest(self) -> float:
@@ -356,11 +382,8 @@ class Bounds:
             error = error * numbers.rest + self._creep(j)
         for each in self.behind:
             error = error * each.linear.forward.largest + each.output * self._signal
-        gains, share = self._gains()
-        error = LARGEST_GAIN**gains * (error + gains * (share * self.sizes.still + self._signal))
-        error += LARGEST_GAIN**gains * self._warmed(self.heats)
-        if self.parts.ageing:
-            error += ageing.TABLE_ERROR * self.sizes.still
+        for gain in self._gains:
+            error = gain.largest * error + gain.there + self._signal
         for mode, size, row in zip(self.modes, self.sizes.modes, self.tables.mode, strict=True):
             scale = 2.0**self.bits
             error = error * mode.largest + resonance_fixed.rounding(mode, row, size * scale) / scale
@@ -378,9 +401,8 @@ class Bounds:
             size = max(self.sizes.undone)
             own = sum(missed(weight) * size + 0.5 * self._signal for weight in self.taps)
             error = error * math.fsum(map(abs, self.taps)) + own
-        gains, share = self._gains()
-        late = self._late() * self.sizes.still + self._warmed(self.heats) + self._warmed_at_once() / LEAST_GAIN
-        error = (1.0 / LEAST_GAIN) ** gains * (error + gains * (share * self.sizes.still + self._signal) + late)
+        for gain in reversed(self._gains):
+            error = error / gain.least + gain.back + 0.5 * self._signal * (1.0 + 1.0 / gain.least)
         whole = float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
         apart = self._plays(self.slowed * whole) if self.slowed else 0.0  # states behind a slew limit in whole codes
         seen = apart * math.prod(numbers.rest for numbers in self.creeps)

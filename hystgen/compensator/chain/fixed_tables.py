@@ -268,7 +268,7 @@ class _Builder:
             moved = inside + (asked + inside * each.rest) / each.slope
             asked = max(moved, asked / each.rest) * slack + 1.0
         pairs = list(zip(owns, reversed(asked_of_own), strict=True))
-        forwards = still + away, size + away
+        forwards = settled, size + away
         return Sizes(plays, creeps, pairs, modes, saturations, *forwards, undone, inverted[::-1], target, asked)
 
     @cached_property

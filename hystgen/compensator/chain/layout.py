@@ -189,6 +189,11 @@ class Compiled:
         return min(self.max_rate * self.seconds, high - low)
 
     @property
+    def largest_way(self) -> float:
+        """Largest move of the plays' input in such a step."""
+        return largest_way(self.static, self.own[: self.tables.own.ahead], self.largest_step)
+
+    @property
     def ahead(self) -> int:
         """NAME_PREVIEW: what the model needs, or what was asked for."""
         return self.needed if self.asked is None else self.asked
@@ -243,6 +248,15 @@ def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation
     """
     asked = how.max_rate or (static.input_range[1] - static.input_range[0]) / (SAMPLES_A_SWEEP * seconds)
     return float(min([asked, *(rate for each in parts.slew for rate in (each.rate, each.falling_rate))]))
+
+
+def largest_way(static: StaticModel, ahead: Sequence[Linear], step: float) -> float:
+    """Largest move of the plays' input in a step in which the drive moves by at most `step`, through blocks of the
+    user's own `ahead`, up the steepest slope of the front and from one of its branches to the other. A lag makes it no
+    larger."""
+    grown = math.prod(each.forward.largest for each in ahead)
+    low, high = static.play_range
+    return min(static.front_slopes[1] * grown * step + static.branch_gap, max(grown, 1.0) * (high - low))
 
 
 def taps_of(parts: Parts, seconds: float, how: Compensation) -> Taps | None:

@@ -250,6 +250,12 @@ def largest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
     return float(np.max(np.abs(away)) + np.max(np.abs(np.diff(away, axis=1))))
 
 
+def largest_stretch(static: StaticModel) -> float:
+    """Most by which the plays' input can be ahead of a play: the way between all places where either can be."""
+    ends = *static.play_range, *static.pi.start
+    return max(ends) - min(ends)
+
+
 def _far(static: StaticModel) -> float:
     """Largest distance of plays from 0, and a little more."""
     return 1.001 * max(*map(abs, static.play_range), *map(abs, static.pi.start))
@@ -355,17 +361,17 @@ def _yields(
 
 
 def yield_error(
-    t: FixedMovingTables, effect: RelaxingPlays, scale: float, seconds: float, step: float, way: float
+    t: FixedMovingTables, effect: RelaxingPlays, static: StaticModel, seconds: float, step: float, way: float
 ) -> float:
     """As `dashpot.stretch_error`, for tables in fixed point with steps of `step`, plus the stretch that rounding holds
     back."""
-    rows, held = [], 0.0
+    rows, held = [], []
     for begin, *c, shift, lift in t.yields.tolist():
         unit, run = step * 2.0 ** (lift - t.yield_bits), step * 2.0 ** (31 - shift)
         rows.append((begin * step, *(each * unit / run**k for k, each in enumerate(c))))
-        slope = dashpot.yielded(effect, scale, seconds, max(begin, 1) * step)[1] if begin else c[1] * unit / run
-        held = max(held, 2.5 * unit / slope) if slope > 0.0 else math.inf
-    return held + dashpot.stretch_error(effect, scale, seconds, np.array(rows), way)
+        held.append(2.5 * unit)  # of a coefficient, and of three products
+    ways = way, largest_stretch(static)
+    return dashpot.stretch_error(effect, static.pi.thresholds[-1], seconds, np.array(rows), ways, np.array(held))
 
 
 def _relaxed(plays: FixedTables, late: float) -> FixedTables:

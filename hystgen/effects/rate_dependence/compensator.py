@@ -138,15 +138,23 @@ def _fits(effect: RelaxingPlays, scale: float, seconds: float, row: tuple[float,
     return bool(np.all(np.diff(curve) >= 0.0) and np.all(np.abs(curve - law) <= YIELD_ERROR * law))
 
 
-def stretch_error(effect: RelaxingPlays, scale: float, seconds: float, rows: Array, way: float) -> float:
-    """How much farther plays may be stretched by the table than by the law, with an input that moves by at most `way`
-    a step."""
-    if len(rows) == 1:
-        return LEAST_STRETCH * scale
-    x = np.geomspace(rows[1, BEGIN], LONGEST * rows[-1, BEGIN], 4000)
-    law, slope = np.array([yielded(effect, scale, seconds, each) for each in x.tolist()]).T
+def stretch_error(
+    effect: RelaxingPlays, scale: float, seconds: float, rows: Array, ways: tuple[float, float], held: Array
+) -> float:
+    """How much farther or less far plays may be stretched by the table than by the law.
+
+    `ways`: of their input, the largest in a step and the largest in all; `held` (K,): by how much rounding may change
+    what a piece gives. Of two plays, one by the law and one by the table, neither gains on the other once it is
+    stretched by that much less.
+    """
+    end = LONGEST * rows[-1, BEGIN] if len(rows) > 1 else LEAST_STRETCH * scale
+    x = np.append(0.0, np.geomspace(1e-3 * (rows[1, BEGIN] if len(rows) > 1 else end), end, 6000))
+    law = np.array([0.0, *(yielded(effect, scale, seconds, each)[0] for each in x[1:].tolist())])
     k = np.searchsorted(rows[:, BEGIN], x, side="right") - 1
     on = x - rows[k, BEGIN]
     curve = ((rows[k, C3] * on + rows[k, C2]) * on + rows[k, C1]) * on + rows[k, C0]
-    reached = law <= way
-    return float(np.max(np.abs(curve - law)[reached] / slope[reached], initial=LEAST_STRETCH * scale))
+    least, most = (np.maximum.accumulate(np.append(0.0, (curve + side * held[k])[1:])) for side in (-1.0, 1.0))
+    reached = (law <= min(ways[0], float(least[-1]))) & (x <= ways[1])
+    farther = np.interp(law, least, x) - x
+    nearer = x - np.interp(law, most, x)
+    return float(max(np.max(farther[reached]), np.max(nearer[reached])))

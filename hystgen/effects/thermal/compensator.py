@@ -141,6 +141,14 @@ def most_at_once(effect: SelfHeating, ends: tuple[float, float], move: float, se
     )
 
 
+def reached(effect: SelfHeating, ends: tuple[float, float], move: float, seconds: float) -> tuple[float, float, float]:
+    """The warmest rise that a drive which moves by at most `move` a step within `ends` comes to, and the least and the
+    largest gain on the way."""
+    warmest = most_at_once(effect, ends, move, seconds) / -math.expm1(-seconds / effect.time_constant)
+    gain = min(max(1.0 + effect.gain_per_degree * warmest, LEAST_GAIN), LARGEST_GAIN)
+    return warmest, min(gain, 1.0), max(gain, 1.0)
+
+
 def heat_numbers(effect: SelfHeating, span: float, seconds: float) -> tuple[float, ...]:
     """Constants of a block behind which the output spans `span`, at steps of `seconds`."""
     ends = [1e6]  # degrees; where a temperature does nothing
