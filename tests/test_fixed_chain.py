@@ -167,14 +167,32 @@ def test_bounds_of_dashpots_are_those_of_a_step_whatever_the_law(arithmetic: str
         assert worst <= bound < 1.5 * sum(one.cascade.pi.weights[1:]) * numbers.largest_way
 
 
+def swept(one: Compiled, n: int) -> Array:
+    """To and fro over the whole range as fast as bounds hold for, from its lower end."""
+    low, high = one.static.input_range
+    way = 0.999 * one.largest_step * np.arange(n)
+    return high - np.abs(way % (2.0 * (high - low)) - (high - low))
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q15"])
+def test_bounds_hold_however_much_own_heat_there_is(arithmetic: str) -> None:
+    """The fastest rate is one at which the gain stays within its limits, here after eight time constants."""
+    heat = "name: thermal, source: self_heating, time_constant: 0.5, heating: 0.4, gain_per_degree: -0.02"
+    one = model(chain("hot", heat, compensate="self_heating"))
+    numbers = tables.build(one.chain, arithmetic, T)
+    v = swept(numbers, 4000)
+    worst, bound = wrong(one, arithmetic, numbers, v)
+    assert worst <= bound
+    plain = one.without(one.effects).simulate(v)
+    assert np.max(np.abs(one.simulate(v) - plain)) > 0.1 * np.ptp(plain), "what it is worth"
+
+
 @BOTH
 def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(arithmetic: str) -> None:
     """The inverse takes the gain before the last move, which counts most where the drive turns at an end."""
     one = model(CHAINS["heated"])
     numbers, codes = compiled(one, arithmetic)
-    low, high = one.cascade.input_range
-    way = 0.999 * numbers.largest_step * np.arange(N)
-    v = high - np.abs((way + high - low) % (2.0 * (high - low)) - (high - low))
+    v = swept(numbers, N)
     t, output, drive = np.arange(N) * T, float(codes.output_lsb), float(codes.drive_lsb)
     ends = numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1]
     u = np.rint(np.clip(one.simulate(v, t=t) / output, *ends))

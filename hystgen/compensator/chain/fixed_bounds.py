@@ -68,10 +68,10 @@ FACTOR_ERROR, DEGREES = 2.0**-31, 2.0 ** -(TEMPERATURE_BITS + 1)
 class Sizes:
     """Largest sizes of the signals behind the plays, in output codes.
 
-    Forwards: the sum of the plays, the input of each creep, mode and saturation, that of the gains, and
-    the output. Backwards: the reference after the inverse of each saturation, the least and largest input to
-    which each tanh is inverted (`inverted`), the target of the output side, and the sum asked of the plays. For each
-    block of the user's own: the input, and the output asked for.
+    Forwards: the sum of the plays, the input of each creep, mode and saturation, that of the gains, and the output.
+    Backwards: the reference after the inverse of each saturation, the least and largest input to which each tanh is
+    inverted (`inverted`), the target of the output side, and the sum asked of the plays. For each block of the user's
+    own: the input, and the output asked for.
     """
 
     plays: float

@@ -219,6 +219,7 @@ class _Builder:
         for one in self.own_outputs:
             owns.append(size)
             size = size * one.forward.largest * slack + 1.0
+        settled = size
         span = self._code(self.high - self.low)
         for _ in self.parts.ageing:
             size *= thermal.LARGEST_GAIN

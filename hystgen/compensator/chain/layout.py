@@ -25,6 +25,7 @@ from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag.compensator import LagTables
 from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.resonance.compensator import ModeNumbers
+from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.compensator import HeatTables
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import Compensation
@@ -242,12 +243,17 @@ def braked(parts: Parts, exact: Sequence[bool]) -> int:
 
 
 def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> float:
-    """NAME_MAX_RATE in drive units per second: as asked for, else a slow sweep, and no more than the amplifier can do.
+    """NAME_MAX_RATE in drive units per second: as asked for, else a slow sweep, and no more than the amplifier can do,
+    nor than own heat allows without the gain leaving its limits.
 
     Beyond a slew limit the drive differs from the one given to the C, depending on when in a step it is reached.
     """
-    asked = how.max_rate or (static.input_range[1] - static.input_range[0]) / (SAMPLES_A_SWEEP * seconds)
-    return float(min([asked, *(rate for each in parts.slew for rate in (each.rate, each.falling_rate))]))
+    ends = static.input_range
+    asked = how.max_rate or (ends[1] - ends[0]) / (SAMPLES_A_SWEEP * seconds)
+    low, high = output_range(static, parts, seconds)
+    moves = [thermal.farthest(each, ends, high - low, seconds) for each in parts.heat]
+    slew = (rate for each in parts.slew for rate in (each.rate, each.falling_rate))
+    return float(min([asked, *slew, *(move / seconds for move in moves)]))
 
 
 def largest_way(static: StaticModel, ahead: Sequence[Linear], step: float) -> float:

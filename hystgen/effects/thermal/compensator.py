@@ -141,6 +141,17 @@ def most_at_once(effect: SelfHeating, ends: tuple[float, float], move: float, se
     )
 
 
+def farthest(effect: SelfHeating, ends: tuple[float, float], span: float, seconds: float) -> float:
+    """Largest move of the drive within `ends` that may be repeated in every step without getting hotter than what the C
+    follows: at the most the heat of a step is `heating/(4T)` of the change of `v |v|`. `span`: as of `heat_numbers`."""
+    hottest = heat_numbers(effect, span, seconds)[HOTTEST_RISE]
+    largest = max(map(abs, ends))
+    change = 4.0 * seconds * hottest / effect.heating if effect.heating else math.inf
+    if change < largest * largest:
+        return change / (largest + math.sqrt(largest * largest - change))  # from the end of the range inwards
+    return largest + math.sqrt(change - largest * largest)
+
+
 def reached(effect: SelfHeating, ends: tuple[float, float], move: float, seconds: float) -> tuple[float, float, float]:
     """The warmest rise that a drive which moves by at most `move` a step within `ends` comes to, and the least and the
     largest gain on the way."""
