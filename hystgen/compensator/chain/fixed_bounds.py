@@ -323,9 +323,9 @@ class Bounds:
         """Largest change of a play's contribution per change of the play."""
         return 1.0 + steepest_bend(self.static, self.parts.plays) if self.bumps.curves else 1.0
 
-    def _moved(self) -> float:
-        """Error of the sum of plays that an effect moves or bends, by roundings and by contacts within a step, in
-        codes."""
+    def _moved(self, way: float) -> float:
+        """Error of the sum of plays that an effect moves or bends, by roundings and by contacts within a step in which
+        their input moves by `way`, in codes."""
         t = self.tables.moving
         if not t.used:
             return 0.0
@@ -333,12 +333,12 @@ class Bounds:
         plays = []
         for first, second in self._shares:
             if t.moves == DASHPOT:
-                plays.append(2.0 * step + self._dashpot(step))
+                plays.append(2.0 * step + self._dashpot(step, way))
             elif t.moves == DILATED:
                 plays.append((1.0 + 2.0**-30 * first * travel) * step)
             elif t.moves != PLAIN and first < 1.0:
                 wrong = 2.0 * travel * (2.0**-30 * (first + second))
-                plays.append((1.0 + wrong) / first * step + 0.25 * self._way)
+                plays.append((1.0 + wrong) / first * step + 0.25 * way)
             else:
                 plays.append(step * (t.moves != PLAIN))
         slopes = 0.5 * len(t.relaxed.slope) * 2.0**-self.inner.bits * travel * t.scanned
@@ -347,10 +347,10 @@ class Bounds:
         found = math.fsum(abs(p) * play for p, play in zip(self.static.pi.weights[1:], each, strict=True))
         return float(found / float(self.inner.output_lsb) + slopes)
 
-    def _dashpot(self, step: float) -> float:
+    def _dashpot(self, step: float, way: float) -> float:
         """How far plays with a nonlinear dashpot can be from those of the model: by the table, and because the input
         counts as standing still within a step."""
-        t, way = self.tables.moving, self._way
+        t = self.tables.moving
         effect = next(filter(dashpot.nonlinear, self.parts.plays))
         seen = float(t.seen[0]) / 2.0 ** int(t.seen[1])
         return yield_error(t, effect, self.static, self.seconds, step, way) + seen * way
@@ -365,11 +365,13 @@ class Bounds:
         more = (p * (1.0 + 2.0 * wider * dilated) for p, (wider, _) in zip(others, self._shares, strict=True))
         return float(first + self._bent * math.fsum(more))
 
-    def _plays(self, arriving: float) -> float:
-        """Error of the sum of the plays, in output codes, for an error in front of the memoryless part."""
+    def _plays(self, arriving: float, way: float | None = None) -> float:
+        """Error of the sum of the plays, in output codes, for an error in front of the memoryless part; `way` as
+        `_way` if none is given."""
         steep = self.static.front_slopes[1] * self._steepest / float(self.inner.output_lsb)
         level = 0.5 * self._signal if self.drop else 0.0
-        return self._bent * float(self.inner.sum_error()) + self._moved() + steep * arriving * self._arriving + level
+        moved = self._moved(self._way if way is None else way)
+        return self._bent * float(self.inner.sum_error()) + moved + steep * arriving * self._arriving + level
 
     def forward(self) -> float:
         """Bound of the forward operator, in output codes."""
@@ -415,7 +417,7 @@ class Bounds:
             error = self._creep_gain(numbers) * (error + self._creep(j) + self._creep_back(j) + states)
         return error
 
-    def _arriving_error(self) -> float:
+    def _arriving_error(self, way: float | None = None) -> float:
         """Error of the signal that the inverse asks for in front of the memoryless part, in units of signals."""
         code = self._arrival()
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
@@ -425,7 +427,7 @@ class Bounds:
         solved = solution / self._arriving + steep * float(self.inner.back())
         slowed = self.slowed * float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
         solved += steep * (code[0] if self.condition else sum(code) + short + slowed)  # both have seen it, or not
-        missed_by = self._plays(0.0) * float(self.inner.output_lsb) + self._steepest * solved * self._arriving
+        missed_by = self._plays(0.0, way) * float(self.inner.output_lsb) + self._steepest * solved * self._arriving
         for numbers in self.creeps:  # their states have seen the sum of the plays
             missed_by *= numbers.slope * self._creep_gain(numbers)
         for each in self.behind:
@@ -474,7 +476,7 @@ class Bounds:
         """Steps back of the drive that come only from rounding, at most this long, in units of signals."""
         if not self.static.branches_differ or not self.inner.invertible:
             return 0
-        return math.floor(2.0 * self._arriving_error())
+        return math.floor(2.0 * self._arriving_error(self.largest_step))  # on one branch, which is no way by itself
 
     @property
     def condition(self) -> str:
