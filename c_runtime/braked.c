@@ -59,8 +59,7 @@ static hystgen_real_t hystgen_braked_over(hystgen_real_t size, hystgen_real_t mo
    before at most. A target that moves on by `way` a step takes a lead of way/(1 - E). */
 HYSTGEN_APART hystgen_real_t hystgen_braked_drive(const hystgen_lag_table_t *t,
                                                   const hystgen_braked_t *self, hystgen_real_t near,
-                                                  hystgen_real_t beyond, hystgen_real_t falling,
-                                                  hystgen_real_t rising) {
+                                                  hystgen_real_t beyond) {
     const hystgen_lag_t *lag = &self->lag;
     const hystgen_real_t missed = self->earlier - lag->wanted;
     const hystgen_real_t room = beyond + (missed < 0 ? -missed : missed) * t->inverse_rate;
@@ -68,11 +67,13 @@ HYSTGEN_APART hystgen_real_t hystgen_braked_drive(const hystgen_lag_table_t *t,
         return near;
     }
     const hystgen_real_t move = lag->asked - self->earlier;
-    const hystgen_real_t way = move > rising ? rising : move < -falling ? -falling : move;
+    const hystgen_real_t way = move > HYSTGEN_SLEW_RISING     ? HYSTGEN_SLEW_RISING
+                               : move < -HYSTGEN_SLEW_FALLING ? -HYSTGEN_SLEW_FALLING
+                                                              : move;
     const hystgen_real_t left = (lag->asked - lag->high) + (t->theta * way - way);
     const hystgen_real_t ahead = near - (lag->high + way * t->inverse_rate);
     return left < 0 ? near + hystgen_braked_over(-left, -left * t->inverse_rate, -ahead,
-                                                 rising - way, room)
-                    : near - hystgen_braked_over(left, left * t->inverse_rate, ahead, falling + way,
-                                                 room);
+                                                 HYSTGEN_SLEW_RISING - way, room)
+                    : near - hystgen_braked_over(left, left * t->inverse_rate, ahead,
+                                                 HYSTGEN_SLEW_FALLING + way, room);
 }

@@ -59,8 +59,9 @@ HYSTGEN_APART int64_t hystgen_braked_room(const hystgen_lag_table_t *t,
 /* The drive with which the lag goes on as its target does, by no more in a step than the drive
    reaches; sets what the lag is to gain beyond that, and what its lead may shrink in a step. */
 HYSTGEN_APART int64_t hystgen_braked_along(const hystgen_lag_table_t *t,
-                                           const hystgen_braked_t *self, int64_t falling,
-                                           int64_t rising, hystgen_brake_t *brake) {
+                                           const hystgen_braked_t *self, hystgen_brake_t *brake) {
+    const int64_t rising = (int64_t)HYSTGEN_SLEW_RISING * ((int64_t)1 << HYSTGEN_DRIVE_BITS);
+    const int64_t falling = (int64_t)HYSTGEN_SLEW_FALLING * ((int64_t)1 << HYSTGEN_DRIVE_BITS);
     const int64_t most = rising * ((int64_t)1 << t->bits);
     const int64_t least = -falling * ((int64_t)1 << t->bits);
     const int64_t move = self->lag.asked - self->earlier;
@@ -112,13 +113,13 @@ HYSTGEN_APART int32_t hystgen_braked_over(const hystgen_lag_table_t *t,
    answer and `beyond` short of it, or less of a lead, by what the drive is short now and was before
    at most. */
 static int64_t hystgen_braked_drive(const hystgen_lag_table_t *t, const hystgen_braked_t *self,
-                                    int64_t near, int64_t beyond, int64_t falling, int64_t rising) {
+                                    int64_t near, int64_t beyond) {
     hystgen_brake_t brake;
     const int64_t room = hystgen_braked_room(t, self, beyond);
     if (room + room < (int64_t)1 << HYSTGEN_DRIVE_BITS) {
         return near; /* less than half a code, which no drive has */
     }
-    const int64_t ahead = near - hystgen_braked_along(t, self, falling, rising, &brake);
+    const int64_t ahead = near - hystgen_braked_along(t, self, &brake);
     const int32_t lead = hystgen_braked_coarse(brake.left < 0 ? -ahead : ahead);
     const int32_t over = hystgen_braked_over(t, &brake, lead, hystgen_braked_coarse(room));
     const int64_t less = (int64_t)over * ((int64_t)1 << HYSTGEN_BRAKED_DROP);

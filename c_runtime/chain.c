@@ -289,14 +289,17 @@ HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_wanted(hystgen_inverse_t
                         : hystgen_inverse_output_side_resting(self, y);
 }
 
-/* The drive that leads to an input w of the plays, at which their sum is h, within its limits. */
-HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_sought(hystgen_inverse_t *self,
-                                                             hystgen_signal_t h,
-                                                             hystgen_reach_t w) {
+/* The drive that leads to an input w of the plays, at which their sum is h. */
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_sought(hystgen_inverse_t *self,
+                                                              hystgen_signal_t h,
+                                                              hystgen_reach_t w) {
     self->bits = 0;
     const hystgen_signal_t a = hystgen_inverse_finer(self, h, w, hystgen_inverse_drive(self, h, w));
-    const hystgen_reach_t v =
-        hystgen_drive_code(self->moving ? hystgen_inverse_drive_side_solve(self, a) : a);
+    return hystgen_drive_code(self->moving ? hystgen_inverse_drive_side_solve(self, a) : a);
+}
+
+/* The drive v within its limits. */
+static hystgen_real_t hystgen_inverse_limited(hystgen_inverse_t *self, hystgen_reach_t v) {
     const hystgen_reach_t reached = hystgen_inverse_slewed(self, v);
     if (reached < v || reached > v) {
         self->bits |= HYSTGEN_STATUS_SLEW_LIMITED;
@@ -318,7 +321,8 @@ HYSTGEN_ALONE hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystg
     }
     const hystgen_signal_t h = hystgen_inverse_wanted(self, hystgen_inverse_put(self, u));
     const hystgen_reach_t w = hystgen_inverse_input(self, h);
-    return hystgen_inverse_answer(self, hystgen_inverse_sought(self, h, w));
+    const hystgen_reach_t v = hystgen_inverse_sought(self, h, w);
+    return hystgen_inverse_answer(self, hystgen_inverse_limited(self, v));
 }
 
 void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {

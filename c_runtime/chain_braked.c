@@ -9,14 +9,14 @@ static hystgen_reach_t hystgen_inverse_within(const hystgen_inverse_t *self, hys
 
 /* The drive nearest to v that the amplifier reaches in one step, or from which the lag behind it
    does not overshoot; v itself in the first one. */
-static hystgen_reach_t hystgen_inverse_slewed(const hystgen_inverse_t *self, hystgen_reach_t v) {
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(const hystgen_inverse_t *self,
+                                                              hystgen_reach_t v) {
     const hystgen_reach_t near = hystgen_inverse_within(self, v);
     if (!self->moving) {
         return v;
     }
-    const hystgen_signal_t drive = hystgen_braked_drive(
-        &hystgen_braked_1, &self->braked_1, hystgen_reaching(near),
-        hystgen_reaching(v > near ? v - near : near - v), hystgen_reaching(HYSTGEN_SLEW_FALLING),
-        hystgen_reaching(HYSTGEN_SLEW_RISING));
+    const hystgen_signal_t drive =
+        hystgen_braked_drive(&hystgen_braked_1, &self->braked_1, hystgen_reaching(near),
+                             hystgen_reaching(v > near ? v - near : near - v));
     return hystgen_inverse_within(self, hystgen_drive_code(drive));
 }
