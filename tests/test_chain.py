@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from modelfiles import BRANCHES, CHAINS, CREEP, FILES, INVERSE_ALONE, chain
+from scipy import signal
 from scipy.integrate import solve_ivp
 
 import hystgen
@@ -530,6 +531,34 @@ def test_preview_hold_corner_and_rate_are_options() -> None:
     ramp = preview.taps(0.0, [], T, corner=4)
     middle = math.fsum((ramp.first + k) * w for k, w in enumerate(ramp.weights))
     assert middle == pytest.approx(0.0, abs=1e-12), "rounding corners moves nothing in time"
+
+
+@pytest.mark.parametrize(
+    ("frequency", "damping"), [(20.0, 1e-3), (20.0, 0.02), (77.0, 0.1), (150.0, 0.3), (310.0, 0.05)]
+)
+def test_a_shaped_step_does_not_ring(frequency: float, damping: float) -> None:
+    """The mode by scipy, on a drive that is straight between samples: at rest as soon as the last weight has come."""
+    mode = Resonance(name="resonance", frequency=frequency, damping=damping)
+    found = preview.taps(0.0, [mode], T, shaped=True)
+    assert found.ahead == 0
+    assert np.min(found.weights) >= 0.0, "no step is larger than that of the reference"
+    v = np.append(np.zeros(len(found.weights) - 1), np.cumsum(found.weights[::-1]))
+    v = np.append(v, np.ones(300))
+    w0 = 2.0 * np.pi * frequency
+    y = signal.lsim(([w0**2], [1.0, 2.0 * damping * w0, w0**2]), v, T * np.arange(len(v)))[1]
+    assert np.max(np.abs(y - 1.0)[2 * len(found.weights) :]) < 1e-9
+    assert np.max(y) <= 1.0 + 1e-9
+
+
+def test_a_shaper_is_emitted_with_the_bits_of_the_reference() -> None:
+    one = with_options("late", resonance="shaper")
+    for arithmetic in ("float32", "q15"):
+        report = hystgen.verify(one, arithmetic, compiler=["gcc"], length=800)
+        assert report.ok, report.table()
+    slow = CHAINS["late"].replace("frequency: 30", "frequency: 0.4") + "emit: {compensation: {resonance: shaper}}\n"
+    one = model("slow", slow)
+    with pytest.raises(FormatError, match=r"half a period of 0\.4 Hz is 125. samples, and a shaper keeps 1000 at most"):
+        tables.build(one.chain, "float32", T, one.parameters.emit.compensation)
 
 
 DOUBTFUL = 'not_separable: [[asymmetry, sensor_nonlinearity], [creep, drift]]\n'

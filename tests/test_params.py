@@ -601,7 +601,7 @@ REFUSED = [
         '6:58: emit.compensation.noise_gain: must be above 0, not 0; correct the number',
         '6:67: emit.compensation.taps: must be 3 or 5, not 4; choose one of them',
         '6:78: emit.compensation.corner: must be a whole number, not 1.5; write it like 12',
-        '6:94: emit.compensation.resonance: must be inverse or none, not the text "notch"; choose one of them',
+        '6:94: emit.compensation.resonance: must be inverse, shaper or none, not the text "notch"; choose one of them',
         '6:101: emit.compensation.quiet: unknown key; known here are preview, drive_hold, noise_gain, max_rate, '
         'resonance, taps, corner, compensate',
     ]),
@@ -937,7 +937,7 @@ def parameter_data(draw: st.DrawFn) -> dict[str, Any]:
                 "drive_hold": draw(st.sampled_from(["straight", "held"])),
                 "noise_gain": draw(st.none() | sizes),
                 "max_rate": draw(st.none() | sizes),
-                "resonance": draw(st.sampled_from(["inverse", "none"])),
+                "resonance": draw(st.sampled_from(["inverse", "shaper", "none"])),
                 "taps": draw(st.sampled_from([3, 5])),
                 "corner": draw(st.integers(0, 100)),
             },

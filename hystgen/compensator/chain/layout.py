@@ -268,8 +268,8 @@ def largest_way(static: StaticModel, ahead: Sequence[Linear], step: float) -> fl
 def taps_of(parts: Parts, seconds: float, how: Compensation) -> Taps | None:
     """The weights of the reference in the preview; None if the reference is taken as it comes."""
     delay = parts.delay + (0.5 * seconds if how.drive_hold == "held" else 0.0)
-    modes = parts.modes if how.resonance == "inverse" else []
-    needed = preview.taps(delay, modes, seconds, how.taps, how.corner)
+    modes = [] if how.resonance == "none" else parts.modes
+    needed = preview.taps(delay, modes, seconds, how.taps, how.corner, how.resonance == "shaper")
     led = preview.led(needed, how.preview)
     return led if len(led.weights) > 1 or led.first else None
 

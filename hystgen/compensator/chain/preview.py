@@ -15,9 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
+from hystgen.basics.problems import FormatError
 from hystgen.effects.resonance.compensator import denominator
 from hystgen.effects.resonance.model import Resonance
 from hystgen.plays.slots import Counts, Reals
+
+WELL_DAMPED = 0.7
+"""Damping from which on a mode overshoots a step by less than 5 %, and is inverted rather than shaped."""
+
+MOST_SHAPED = 1000
+"""Samples that a shaper may reach back, as many as a preview may have."""
 
 
 class Taps(NamedTuple):
@@ -32,11 +39,14 @@ class Taps(NamedTuple):
         return self.first + len(self.weights) - 1
 
 
-def taps(delay: float, modes: Sequence[Resonance], seconds: float, number: int = 3, corner: int = 0) -> Taps:
+def taps(
+    delay: float, modes: Sequence[Resonance], seconds: float, number: int = 3, corner: int = 0, shaped: bool = False
+) -> Taps:
     """The weights for a delay in s and modes in series at samples `seconds` apart; only the reference itself for none.
 
     A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`; 5 undo that up to a fourth
-    difference. `corner`: three centred moving averages over this number of samples smooth the reference.
+    difference. `corner`: three centred moving averages over this number of samples smooth the reference. `shaped`: a
+    mode that would ring is kept from it by a second step half a period behind the first.
     """
     samples = delay / seconds
     whole = math.floor(samples)
@@ -44,6 +54,11 @@ def taps(delay: float, modes: Sequence[Resonance], seconds: float, number: int =
     weights = np.array([1.0 - share, share] if share > 0.0 else [1.0])
     first = whole
     for mode in modes:
+        if shaped and mode.damping < WELL_DAMPED:
+            row = shaper(mode, seconds)
+            weights = np.convolve(weights, row)
+            first -= len(row) - 1
+            continue
         a1, a2 = denominator(mode, seconds)
         weights = np.convolve(weights, np.array([a2, a1, 1.0]) / (1.0 + a1 + a2))
         first -= 1
@@ -58,6 +73,29 @@ def taps(delay: float, modes: Sequence[Resonance], seconds: float, number: int =
             weights = np.convolve(weights, np.array([0.5, 0.5]))
             first -= 1
     return Taps(first, weights)
+
+
+def shaper(mode: Resonance, seconds: float) -> NDArray[np.float64]:
+    """The weights (n + 2,) of the reference now and about half a period ago, after which a mode does not ring.
+
+    Now, and n and n + 1 samples ago: a half period is between these. They sum to 1 and are 0 at the mode's poles p, so
+    that nothing is left of it behind a step: `sum w_k p^-k = 0`, zero vibration in samples.
+    """
+    a1, a2 = denominator(mode, seconds)
+    pole = complex(-0.5 * a1, math.sqrt(a2 - 0.25 * a1 * a1))
+    half = math.pi / math.atan2(pole.imag, pole.real)
+    n = max(math.ceil(half) - 1, 1)
+    if n >= MOST_SHAPED:
+        raise FormatError((("emit", "compensation", "resonance"), (
+            f"half a period of {mode.frequency:g} Hz is {half:.0f} samples, and a shaper keeps {MOST_SHAPED} at most; "
+            "sample more slowly, or choose inverse"
+        )))  # fmt: skip
+    early, late = pole**-n, pole ** -(n + 1)
+    rows = [[1.0, 1.0, 1.0], [1.0, early.real, late.real], [0.0, early.imag, late.imag]]
+    now, soon, last = np.linalg.solve(rows, [1.0, 0.0, 0.0])
+    weights = np.zeros(n + 2)
+    weights[[0, 1, -1]] = last, soon, now
+    return weights
 
 
 def led(needed: Taps, samples: int | None) -> Taps:

@@ -30,6 +30,7 @@ class _Ageing(Effect):
 
     @classmethod
     def _candidate(cls, label: str, about: About) -> Candidate:
+        """A loss; a stage that gains over its travel does so for another reason, such as the room's temperature."""
         total = max(about.travel, 1e-12)
 
         def build(x: Array) -> Effect:
@@ -40,7 +41,7 @@ class _Ageing(Effect):
 
         start = np.array([0.1, -0.7])
         none, others = np.array([0.0, -0.7]), (np.array([0.1, -2.0]), np.array([0.1, 0.5]))
-        return Candidate(label, np.array([-5.0, LEAST]), np.array([5.0, MOST]), start, build, none, others)
+        return Candidate(label, np.array([0.0, LEAST]), np.array([5.0, MOST]), start, build, none, others)
 
 
 class LogarithmicAgeing(_Ageing):
@@ -125,7 +126,7 @@ class SeveralAgeing(_Ageing):
             loss, travel = one
             return np.array([0.5 * loss, 0.5 * loss, max(travel - APART, LEAST), min(travel + APART, MOST)])
 
-        low, high = np.array([-5.0, -5.0, LEAST, LEAST]), np.array([5.0, 5.0, MOST, MOST])
+        low, high = np.array([0.0, 0.0, LEAST, LEAST]), np.array([5.0, 5.0, MOST, MOST])
         start = np.array([0.1, 0.1, -2.0, 0.0])
         none = np.array([0.0, 0.0, -2.0, 0.0])
         return [Candidate("ageing, two exponentials", low, high, start, build, none, (), EXPONENTIAL, grown)]
