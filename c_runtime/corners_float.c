@@ -51,8 +51,7 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m,
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x, which is a `way` or a `reach`; `step` points
-   to that field of segment 1. */
+/* The last of segments k .. last that begins before x, a way or a reach; `step`: segment 1's. */
 static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k,
                                          unsigned int last, hystgen_real_t x) {
     while (k < last) {
@@ -65,8 +64,7 @@ static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned in
     return k;
 }
 
-/* Ends the move in the top corner's block: where the sum is `output`, or at `input` if that comes
-   first. */
+/* Ends the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
 HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           const hystgen_corner_t *corner, hystgen_real_t output,
                                           hystgen_real_t input) {

@@ -1,8 +1,7 @@
 #ifndef HYSTGEN_CORNERS_TABLES_H
 #define HYSTGEN_CORNERS_TABLES_H
 
-/* Play k begins to follow this far from a turning point; the curve is straight from there to where
-   the next play does. */
+/* Play k begins to follow this far from a turning point; the curve is straight up to the next. */
 typedef struct {
     hystgen_real_t way;   /* of the input: 2 r_k if that is the drive, 2 z_k if it is the output */
     hystgen_real_t reach; /* of the output: the other of the two */

@@ -109,6 +109,7 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
 # PLAY     a viscous play goes towards one that its input drags along, so that it stays between the start memory and the
 #          input's ends; one that would come too near to another stops in between
 # INPUT    halves lie between the ends that a search begins with
+# DRAWN    a play that its input draws along ends between where it was and that input
 # LOST     what rounding to whole numbers leaves
 CLOCK = (
     r"    GRANTED(self->part >= 0 && self->part < PART);\n"
@@ -149,9 +150,14 @@ STATES = [
     (r"(        const int64_t z = play\[i\] \+ NAME_times[^;]*;\n)", r"\1        WITHIN(z, PLAY);\n"),
     (r"(void NAME_(?:keep|put)\([^{]*\{\n)", r"\1    WITHIN(z, PLAY);\n"),
     (r"(    const NAME_sum_t lost = [^;]*;\n)", r"\1    WITHIN(lost, LOST);\n"),
-    (r"(        const NAME_reach_t middle = [^;]*;\n)", r"\1        WITHIN(middle, INPUT);\n"),
+    (r"        const NAME_play_t middle = low \+ \(NAME_play_t\)\(size / 2u\);\n",
+     r"        const int64_t between = (int64_t)low + (int64_t)(size / 2u);\n        WITHIN(between, INPUT);\n"
+     r"        const NAME_play_t middle = (NAME_play_t)between;\n"),
+    (r"(NAME_inverse_nearer\([^{]*\{\n)", r"\1    WITHIN(low, INPUT);\n"),
+    (r"    return \(NAME_play_t\)\((w > play \? [^;]*)\);\n",
+     r"    const int64_t drawn = \1;\n    WITHIN(drawn, DRAWN);\n    return (NAME_play_t)drawn;\n"),
     # no facts, but where Eva is to stop widening, and what it is to look at case by case
-    (r"(    while \(high - low > 1\) \{\n)", r'    /*@ loop widen_hints "all", -INPUT, INPUT; */\n\1'),
+    (r"(    while \(size > 1u\) \{\n)", r'    /*@ loop widen_hints "all", -INPUT, INPUT; */\n\1'),
     (r"(        const bool before = inside < ([^;]*);\n)", r"        /*@ split inside < \2; */\n\1"),
 ]  # fmt: skip
 
@@ -182,6 +188,7 @@ def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") ->
         "MODE": most(t.mode.tolist(), resonance.DROP, 50), **(clock(t.clock[0].tolist()) if len(t.clock) else {}),
         "RISE": 2 ** (thermal.RISE_BITS + 1), "INVERSE": 2 * thermal.ONE + 2, "PLAY": max(map(abs, ends)),
         "INPUT": int(t.moving.farthest), "LOST": 2 ** int(t.moving.yield_bits) // 2,
+        "DRAWN": max(int(t.moving.farthest), *map(abs, ends)),
     }  # fmt: skip
     if wrong:
         numbers[wrong] //= 64

@@ -1031,7 +1031,7 @@ def test_the_report_says_why_refitting_may_widen_the_gap() -> None:
         return dataclasses.replace(found, gap=Gap(Errors(2.0, 3.0), Errors(0.5, held_out), Errors(0.5, 0.5)))
 
     (said,) = report._refitted(gap(4.0))
-    assert "rms error (um) of the records that are fitted from 2 to 0.5, and that" in said.text
+    assert "rms error (um) of the fitted records from 2 to 0.5, and that of the held-out ones from 3 to 4" in said.text
     assert report._refitted(gap(3.02)) == []
 
 

@@ -553,7 +553,7 @@ class TestInverse:
         assert said.startswith("p_0 is 0: after each reversal the output stands still (series backlash). The mod")
         assert f"warning: {said}" in err.splitlines()
         page = (tmp_path / "out" / "report.html").read_text()
-        assert page.index("Mind the inverse: p_0 is 0") < page.index("How the gap shrinks")
+        assert page.index("About the inverse: p_0 is 0") < page.index("How the gap shrinks")
         with pytest.raises(hystgen.NotInvertibleError):
             hystgen.load(tmp_path / "out" / "params.yaml").inverse()
 

@@ -436,14 +436,17 @@ def test_the_catalogue_s_blocks_are_what_their_c_says(kind: Kind) -> None:
     """Names and order of numbers in the headers of the run time are those that tables are written by."""
     text = {piece.name: piece.text for piece in runtime._pieces(runtime.CHAIN_TYPES)}
 
-    def members(name: str) -> list[str]:
+    def members(name: str) -> list[tuple[str, str]]:
+        """Type and name of each, those of a block inside another one in its place."""
         code = re.sub(r"/\*.*?\*/", "", text[name], flags=re.DOTALL)
-        return re.findall(r"(\w+) \*?(\w+);", code.partition("{")[2].rpartition("}")[0])
+        found = re.findall(r"(\w+) \*?(\w+);", code.partition("{")[2].rpartition("}")[0])
+        inner = {f"hystgen_{each.name}_t" for each in blocks.KINDS}
+        return [one for type_, own in found for one in (members(type_) if type_ in inner else [(type_, own)])]
 
     rows = [(f"hystgen_{kind.name}_{kind.rows.name}_t", kind.rows.name)] if kind.rows else []
     counts = list(zip(("uint_least16_t", "uint_least8_t"), kind.counts, strict=False))
     reals = [("hystgen_real_t", name) for name in kind.table]
-    assert members(f"hystgen_{kind.name}_table_t") == [*rows, *reals, *counts]
+    assert members(f"hystgen_{kind.tabled}_table_t") == [*rows, *reals, *counts]
     memory = [("hystgen_real_t", name) for name in kind.state] + [("bool", name) for name in kind.flags]
     assert members(f"hystgen_{kind.name}_t") == memory
     if kind.rows:

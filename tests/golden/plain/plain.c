@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 8a64078e5c2c19c23fe7e0d205b05fa553c663e6995e8089f54d1d517867f224, without this line
+ * Text: sha256 364a59e4b21d07d7d529f8890bc14aa06218a9fd3b0b40520496e0f421030303, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -27,8 +27,7 @@
 #define PLAIN_APART static
 #endif
 
-/* Play k begins to follow this far from a turning point; the curve is straight from there to where
-   the next play does. */
+/* Play k begins to follow this far from a turning point; the curve is straight up to the next. */
 typedef struct {
     plain_real_t way;   /* of the input: 2 r_k if that is the drive, 2 z_k if it is the output */
     plain_real_t reach; /* of the output: the other of the two */
@@ -101,8 +100,7 @@ static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corn
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x, which is a `way` or a `reach`; `step` points
-   to that field of segment 1. */
+/* The last of segments k .. last that begins before x, a way or a reach; `step`: segment 1's. */
 static unsigned int plain_find_segment(const plain_real_t *step, unsigned int k,
                                        unsigned int last, plain_real_t x) {
     while (k < last) {
@@ -115,8 +113,7 @@ static unsigned int plain_find_segment(const plain_real_t *step, unsigned int k,
     return k;
 }
 
-/* Ends the move in the top corner's block: where the sum is `output`, or at `input` if that comes
-   first. */
+/* Ends the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
 PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
                                      const plain_corner_t *corner, plain_real_t output,
                                      plain_real_t input) {

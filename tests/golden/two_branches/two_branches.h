@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 b0f73f710466228e94ad28d1d5bf6ac35036d3fe5a971a97796dec7d8be36b6b, without this line
+ * Text: sha256 e082e97ae0ea961fd3d2f598d8f7c97a3f0f9d1db26a911b233bb4efb91d4b86, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -188,8 +188,7 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #define TWO_BRANCHES_APART static
 #endif
 
-/* Play k begins to follow this far from a turning point; the curve is straight from there to where
-   the next play does. */
+/* Play k begins to follow this far from a turning point; the curve is straight up to the next. */
 typedef struct {
     /* of the input: 2 r_k if that is the drive, 2 z_k if it is the output */
     two_branches_real_t way;
@@ -441,8 +440,7 @@ static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_p
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x, which is a `way` or a `reach`; `step` points
-   to that field of segment 1. */
+/* The last of segments k .. last that begins before x, a way or a reach; `step`: segment 1's. */
 static unsigned int two_branches_find_segment(const two_branches_real_t *step, unsigned int k,
                                               unsigned int last, two_branches_real_t x) {
     while (k < last) {
@@ -455,8 +453,7 @@ static unsigned int two_branches_find_segment(const two_branches_real_t *step, u
     return k;
 }
 
-/* Ends the move in the top corner's block: where the sum is `output`, or at `input` if that comes
-   first. */
+/* Ends the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
 TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t,
                                                    two_branches_plays_t *m,
                                                    const two_branches_corner_t *corner,
