@@ -76,7 +76,7 @@ static inline hystgen_sum_t hystgen_share_of(hystgen_sum_t x, const hystgen_fact
 
 /* A play of threshold r once its input has gone to w. The way between the two fits 32 bits. */
 static inline hystgen_play_t hystgen_drawn(hystgen_play_t play, hystgen_play_t w, hystgen_sum_t r) {
-    const uint32_t way = w > play ? (uint32_t)w - (uint32_t)play : (uint32_t)play - (uint32_t)w;
+    const uint32_t way = (uint32_t)(w > play ? (hystgen_sum_t)w - play : (hystgen_sum_t)play - w);
     if ((hystgen_sum_t)way <= r) {
         return play;
     }

@@ -22,14 +22,14 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *sel
     const hystgen_sum_t sum = hystgen_asked(h);
     hystgen_play_t low = self->play[0];
     const hystgen_sum_t here = hystgen_inverse_sum(self, low);
-    uint32_t size = here < sum ? (uint32_t)HYSTGEN_LARGEST_INPUT - (uint32_t)low : 0u;
+    uint32_t size = here < sum ? (uint32_t)((hystgen_sum_t)HYSTGEN_LARGEST_INPUT - low) : 0u;
     if (here > sum) {
-        size = (uint32_t)low + (uint32_t)HYSTGEN_LARGEST_INPUT;
+        size = (uint32_t)((hystgen_sum_t)low + HYSTGEN_LARGEST_INPUT);
         low = -HYSTGEN_LARGEST_INPUT;
     }
     while (size > 1u) {
         const hystgen_play_t middle = low + (hystgen_play_t)(size / 2u);
-        size -= size / 2u;
+        size = size / 2u + size % 2u;
         if (hystgen_inverse_sum(self, middle) < sum) {
             low = middle;
         }

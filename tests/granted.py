@@ -109,7 +109,8 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
 # PLAY     a viscous play goes towards one that its input drags along, so that it stays between the start memory and the
 #          input's ends; one that would come too near to another stops in between
 # INPUT    halves lie between the ends that a search begins with
-# DRAWN    a play that its input draws along ends between where it was and that input
+# DRAWN    a play that its input draws along, at once or by a dashpot, ends between where it was and that input, and so
+#          does an input that counts as standing still on its way
 # LOST     what rounding to whole numbers leaves
 CLOCK = (
     r"    GRANTED(self->part >= 0 && self->part < PART);\n"
@@ -153,8 +154,8 @@ STATES = [
     (r"        const NAME_play_t middle = low \+ \(NAME_play_t\)\(size / 2u\);\n",
      r"        const int64_t between = (int64_t)low + (int64_t)(size / 2u);\n        WITHIN(between, INPUT);\n"
      r"        const NAME_play_t middle = (NAME_play_t)between;\n"),
-    (r"(NAME_inverse_nearer\([^{]*\{\n)", r"\1    WITHIN(low, INPUT);\n"),
-    (r"    return \(NAME_play_t\)\((w > play \? [^;]*)\);\n",
+    (r"(NAME_inverse_nearer\(const [^{]*\{\n)", r"\1    WITHIN(low, INPUT);\n"),
+    (r"    return \(NAME_play_t\)\((w > play \? [^;]*|play\[(?:0\] \+ NAME_seen|i\] \+ NAME_moved_by)[^;]*)\);\n",
      r"    const int64_t drawn = \1;\n    WITHIN(drawn, DRAWN);\n    return (NAME_play_t)drawn;\n"),
     # no facts, but where Eva is to stop widening, and what it is to look at case by case
     (r"(    while \(size > 1u\) \{\n)", r'    /*@ loop widen_hints "all", -INPUT, INPUT; */\n\1'),
