@@ -301,8 +301,9 @@ def test_a_record_of_which_most_is_not_compared_is_told() -> None:
     assert preparing.prepare([early, late], [early], (0.0,), 0.0).notes == []
 
 
-def test_start_memories_are_found_where_all_records_together_need_them() -> None:
-    """One found by a model without the effects would be wrong by what they do, and judge them with that error."""
+def test_start_memories_of_held_out_records_are_found_where_all_together_need_them() -> None:
+    """One found by a model without the effects would be wrong by what they do, and judge them with that error. A fit
+    needs each of its records."""
     growing = 50.0 - np.linspace(10.0, 50.0, 2000) * np.cos(np.linspace(0.0, 10.0 * np.pi, 2000))
     steady = wander(3)
 
@@ -317,6 +318,9 @@ def test_start_memories_are_found_where_all_records_together_need_them() -> None
     both = preparing.prepare(fitted, [made(growing, "growing"), made(steady, "steady")], None, 0.0).held
     assert [item.turns is None for item in both] == [True, True]
     assert np.argmax(both[0].known) >= 1900  # the largest drive is at its end
+    fit = preparing.prepare([*fitted, made(growing, "growing")], [made(steady, "steady")], None, 0.0).to_fit
+    assert [item.turns is None for item in fit] == [True, False]
+    assert fit[1].known.all()
 
 
 class TestNoise:

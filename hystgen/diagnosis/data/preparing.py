@@ -350,21 +350,22 @@ def _courses(
 
 
 def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Course], list[Course], list[str]]:
-    """The courses, with start memories if too little of all of them could be compared for a name without, and notes on
-    the direction of their loops.
+    """The courses, with start memories if too little of them could be compared for a name without, and notes on the
+    direction of their loops.
 
-    Otherwise they get none: an effect in its first seconds may look like a start memory, and a memory found without the
-    effects that are still to be named may be wrong by as much as they do.
+    Otherwise they get none: an effect in its first seconds may look like a start memory. Each fitted record counts by
+    itself, since a fit needs it. Held-out ones count together: a memory found without the effects that are still to be
+    named may be wrong by as much as they do, and then stands for an error that no name removes.
     """
-    begun = start.needed(to_fit, least=_least(to_fit))
+    begun = start.needed(to_fit, least=acceptance.FEW_COMPARED)
     solution, _ = pi.solve(begun, None, 0.0)
     begun_held = start.of_model(held, (), solution.thresholds, solution.weights, _least(held))
     return begun, begun_held, solution.sense.sentences(len(solution.thresholds) - 1)
 
 
 def _least(courses: Sequence[Course]) -> float:
-    """Share of the samples of a record below which a start memory is sought for it: none where all records together can
-    be compared without."""
+    """Share of the samples of a held-out record below which a start memory is sought for it: none where all of them
+    together can be compared without."""
     known = [int(np.count_nonzero(np.isfinite(course.y[course.begin : course.last]))) for course in courses]
     used = [start.unknown(course).used for course in courses]
     able = max(used, default=0) > acceptance.COMPARED_SAMPLES
