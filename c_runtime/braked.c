@@ -25,9 +25,9 @@ static hystgen_real_t hystgen_braked_absorb(const hystgen_lag_table_t *t, hystge
     return hystgen_lag_absorb(t, &self->lag, v);
 }
 
-/* What a lead is too much, within room, where the lag is to gain `size`, arrives at once with
-   `most`, and the drive comes back by `back` in a step: with a lead m it gains no more than
-   (m + back/2)^2 / (2 back most) of size until it is there. */
+/* By how much `lead` exceeds the largest lead that still comes back in time, limited to `room`. The
+   lag is to gain `size`; `most` would gain it in this step. With a lead m, which shrinks by `back`
+   in a step, it gains at most (m + back/2)^2 / (2 back most) of `size` until the lead is gone. */
 static hystgen_real_t hystgen_braked_over(hystgen_real_t size, hystgen_real_t most,
                                           hystgen_real_t lead, hystgen_real_t back,
                                           hystgen_real_t room) {
@@ -54,9 +54,10 @@ static hystgen_real_t hystgen_braked_over(hystgen_real_t size, hystgen_real_t mo
     return over > room ? room : over < -room ? -room : over;
 }
 
-/* The drive from which the lag does not overshoot: near, the one in reach that is nearest to the
-   answer and is short of it by so much, or less of a lead, by what the drive is short now and was
-   before at most. A target that moves on by `way` a step takes a lead of way/(1 - E). */
+/* The drive from which the lag does not overshoot. `near` is the reachable drive nearest to the
+   answer, `beyond` the distance between the two. The lead is cut by no more than the drive falls
+   short of the answer now and fell short before. A target that moves by `way` in a step needs a
+   lead of way/(1 - E). */
 HYSTGEN_APART hystgen_real_t hystgen_braked_drive(const hystgen_lag_table_t *t,
                                                   const hystgen_braked_t *self, hystgen_real_t near,
                                                   hystgen_real_t beyond) {

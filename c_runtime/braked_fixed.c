@@ -49,7 +49,7 @@ static int32_t hystgen_braked_coarsely(const hystgen_lag_table_t *t, int32_t x) 
     return hystgen_braked_coarse(hystgen_braked_led(t, state));
 }
 
-/* By how much the drive may give way: what it is short of the answer now, and was before. */
+/* The most by which the lead is cut: what the drive falls short of the answer now, and before. */
 HYSTGEN_APART int64_t hystgen_braked_room(const hystgen_lag_table_t *t,
                                           const hystgen_braked_t *self, int64_t beyond) {
     const int64_t missed = self->earlier - self->lag.wanted;
@@ -95,7 +95,7 @@ static int32_t hystgen_braked_lead(int32_t size, int32_t lead, int32_t margin, i
     return low;
 }
 
-/* What a lead is too much, within room. */
+/* By how much `lead` exceeds the largest lead that still comes back in time, limited to `room`. */
 HYSTGEN_APART int32_t hystgen_braked_over(const hystgen_lag_table_t *t,
                                           const hystgen_brake_t *brake, int32_t lead,
                                           int32_t room) {
@@ -109,9 +109,9 @@ HYSTGEN_APART int32_t hystgen_braked_over(const hystgen_lag_table_t *t,
     return over > room ? room : over < -room ? -room : over;
 }
 
-/* The drive from which the lag does not overshoot: near, the one in reach that is nearest to the
-   answer and `beyond` short of it, or less of a lead, by what the drive is short now and was before
-   at most. */
+/* The drive from which the lag does not overshoot. `near` is the reachable drive nearest to the
+   answer, `beyond` the distance between the two. The lead is cut by no more than the drive falls
+   short of the answer now and fell short before. */
 static int64_t hystgen_braked_drive(const hystgen_lag_table_t *t, const hystgen_braked_t *self,
                                     int64_t near, int64_t beyond) {
     hystgen_brake_t brake;

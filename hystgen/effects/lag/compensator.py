@@ -225,7 +225,7 @@ def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: 
 
 @jit
 def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any) -> Any:
-    """What a lead is too much, within room, where the lag is to gain `size` and arrives at once with `most`."""
+    """By how much a lead exceeds the largest that comes back in time, within `room`; `most` gains `size` at once."""
     margin = back * half
     over = lead - most
     if most > margin:

@@ -161,7 +161,7 @@ def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: 
 
 @jit
 def braked_over(t: LagTables, size: Any, lead: Any, back: Any, room: Any, drop: Any) -> Any:
-    """What a lead is too much, within room."""
+    """As in floating point, in numbers to search with."""
     margin = back >> 1
     most = coarsely(t, size, drop) if size <= margin else size
     if most > margin:
