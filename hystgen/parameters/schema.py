@@ -218,10 +218,15 @@ def _auto(value: Any) -> Any:
     return None if value == "auto" else value
 
 
+MOST_REFERENCES = 1000
+"""[samples] References that a compensator keeps, ahead of the motion or behind it: 4000 bytes in float32, and as many
+products in a step; a preview of 1 s at 1 kHz."""
+
+
 class Compensation(_Part):
     """How the C compensates effects."""
 
-    preview: Annotated[int, Field(ge=0, le=1000)] | None = Field(
+    preview: Annotated[int, Field(ge=0, le=MOST_REFERENCES)] | None = Field(
         default=None,
         description="samples that the reference is ahead: auto, what the model needs, or fewer, and the motion is late",
     )

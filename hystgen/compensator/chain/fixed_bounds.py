@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
+from hystgen.arithmetic.factors import MANTISSA_BITS, lifted
 from hystgen.arithmetic.factors import error as missed
-from hystgen.arithmetic.factors import lifted
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER
 from hystgen.compensator.chain.bounds import SAME
@@ -60,8 +60,8 @@ CUBIC_ERROR, LINEAR_ERROR, RECIPROCAL_ERROR = (last_bits * 2.0**-GAIN_BITS for l
 rounded to 20 bits, where the gain changes by a hundredth; of one linear in a temperature: a product; and of the
 reciprocal of a gain of at least 1/2: that of a linear one's error twice, and a step of Newton's."""
 
-FACTOR_ERROR, DEGREES = 2.0**-31, 2.0 ** -(TEMPERATURE_BITS + 1)
-"""[share of a product, degrees] Errors of a factor of 31 bits, and of the reference of a temperature."""
+FACTOR_ERROR, DEGREES = 2.0**-MANTISSA_BITS, 2.0 ** -(TEMPERATURE_BITS + 1)
+"""[share of a product, degrees] Errors of a factor and of the reference of a temperature: half of their last bits."""
 
 
 @dataclass(frozen=True)

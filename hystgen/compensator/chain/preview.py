@@ -18,13 +18,13 @@ from hystgen.basics.jit import jit
 from hystgen.basics.problems import FormatError
 from hystgen.effects.resonance.compensator import denominator
 from hystgen.effects.resonance.model import Resonance
+from hystgen.parameters.schema import MOST_REFERENCES
 from hystgen.plays.slots import Counts, Reals
 
 WELL_DAMPED = 0.7
-"""Damping from which on a mode overshoots a step by less than 5 %, and is inverted rather than shaped."""
-
-MOST_SHAPED = 1000
-"""Samples that a shaper may reach back, as many as a preview may have."""
+"""[damping ratio] From here on a mode is inverted and not shaped. It overshoots a step by `exp(-pi z/sqrt(1 - z^2))`, at
+most 4.6 %, while the half period that a shaper waits for is 1.4 times that without damping and grows without a bound
+towards 1. Both are closed forms; no run set it."""
 
 
 class Taps(NamedTuple):
@@ -85,10 +85,10 @@ def shaper(mode: Resonance, seconds: float) -> NDArray[np.float64]:
     pole = complex(-0.5 * a1, math.sqrt(a2 - 0.25 * a1 * a1))
     half = math.pi / math.atan2(pole.imag, pole.real)
     n = max(math.ceil(half) - 1, 1)
-    if n >= MOST_SHAPED:
+    if n >= MOST_REFERENCES:
         raise FormatError((("emit", "compensation", "resonance"), (
-            f"half a period of {mode.frequency:g} Hz is {half:.0f} samples, and a shaper keeps {MOST_SHAPED} at most; "
-            "sample more slowly, or choose inverse"
+            f"half a period of {mode.frequency:g} Hz is {half:.0f} samples, and a shaper keeps {MOST_REFERENCES} at "
+            "most; sample more slowly, or choose inverse"
         )))  # fmt: skip
     early, late = pole**-n, pole ** -(n + 1)
     rows = [[1.0, 1.0, 1.0], [1.0, early.real, late.real], [0.0, early.imag, late.imag]]

@@ -124,7 +124,8 @@ HIGH, LOW, WANTED, ASKED, ANSWER, EARLIER = range(6)
 REACHED, BEFORE = HIGH, LOW
 
 HALVES = 16
-"""Steps of the search for a lead, which end within 2^-16 of it: an overshoot below 2e-5 of the way."""
+"""[steps] Halvings of the search for a lead. They end at most 2^-16 of it below, which costs less than 2e-5 of the way
+and never overshoots; the tests of overshoot hold it."""
 
 
 KIND = Kind(
