@@ -22,8 +22,8 @@ from hystgen.parameters.schema import MOST_REFERENCES
 from hystgen.plays.slots import Counts, Reals
 
 WELL_DAMPED = 0.7
-"""[damping ratio] From here on a mode is inverted and not shaped. It overshoots a step by `exp(-pi z/sqrt(1 - z^2))`, at
-most 4.6 %, while the half period that a shaper waits for is 1.4 times that without damping and grows without a bound
+"""[damping ratio] From here on a mode is inverted and not shaped. It overshoots a step by `exp(-pi z/sqrt(1 - z^2))`,
+at most 4.6 %, while the half period that a shaper waits for is 1.4 times that without damping and grows without a bound
 towards 1. Both are closed forms; no run set it."""
 
 
