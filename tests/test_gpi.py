@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import platform
+import subprocess
+import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -187,9 +191,7 @@ class TestTanh:
 
 @pytest.mark.parametrize(("volts", "metres"), [(436.9, 1e-6), (1e6, 1e-9), (1e-6, 1e6)])
 @pytest.mark.parametrize(("front", "kind"), [(bent, "gpi-deadzone"), (branched, "gpi-tanh")])
-def test_units_do_not_matter(
-    front: Callable[[Array], Array], kind: str, volts: float, metres: float
-) -> None:
+def test_units_do_not_matter(front: Callable[[Array], Array], kind: str, volts: float, metres: float) -> None:
     """A drive in codes of a converter and an output in metres are as good as V and um.
 
     The sum of squares is flat about its minimum, so that an error tells whether it was found: a search ends where the
@@ -199,6 +201,33 @@ def test_units_do_not_matter(
     plain, other = (hystgen.identify(r, model=kind) for r in (record(v, y), record(v * volts, y * metres)))
     assert len(other.parameters.model.pi.thresholds) == len(plain.parameters.model.pi.thresholds)
     assert [x.rms_percent for x in other.rows] == pytest.approx([x.rms_percent for x in plain.rows], rel=5e-3)
+
+
+KERNELS = (
+    {"OPENBLAS_CORETYPE": "Haswell"},
+    {"OPENBLAS_CORETYPE": "Nehalem", "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4"},
+)
+"""Processors of different years, as the linear algebra library and numpy choose their loops by."""
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="the kernels are those of x86 processors")
+def test_the_same_bytes_on_another_processor(tmp_path: Path) -> None:
+    """Searches with a front, and for effects, end in the same numbers although the last bits of sums differ."""
+    v, y = plant(branched, 3)
+    write_csv(tmp_path / "loops.csv", v, y)
+    found = []
+    for kernels in KERNELS:
+        here = tmp_path / kernels["OPENBLAS_CORETYPE"]
+        here.mkdir()
+        for command in (
+            ["identify", "../loops.csv", "--model", "auto", "--name", "stage", "-o", "stage.yaml"],
+            ["diagnose", "stage.yaml", "../loops.csv", "-o", "found"],
+        ):
+            subprocess.run([sys.executable, "-m", "hystgen", *command], cwd=here, env=os.environ | kernels, check=True)
+        found.append(
+            [(here / name).read_text() for name in ("stage.yaml", "found/params.yaml", "found/diagnosis.json")]
+        )
+    assert found[0] == found[1]
 
 
 class TestAuto:

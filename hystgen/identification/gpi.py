@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hystgen.front.stage import Stage
 from hystgen.identification import faults, joint, pi, reduction, start
 from hystgen.identification.joint import DeadZones, Front, Kept, Tanh, even_breaks
-from hystgen.identification.pi import IdentificationError, Solution
+from hystgen.identification.pi import DIGITS, IdentificationError, Solution
 from hystgen.identification.reduction import Course, Source
 from hystgen.plays import operators
 
@@ -50,7 +50,7 @@ class Fitted:
     @property
     def stages(self) -> tuple[Stage, ...]:
         """The stages of the model."""
-        return self.front.stages(self.shape)
+        return self.front.stages(self.shape, DIGITS)
 
     def inner(self, item: Course) -> Course:
         """A course as the plays see it."""
@@ -93,7 +93,7 @@ def solve(
             best = error, front, shaped.shape
     assert best is not None
     _, front, shape = best
-    courses = start.needed(courses, front.stages(shape), wanted)
+    courses = start.needed(courses, front.stages(shape, DIGITS), wanted)
     fitted = _solve_behind(courses, front, shape, wanted, floor, tick)
     # the plays may have moved: find the best shape for them again
     r = fitted.solution.thresholds
@@ -115,7 +115,7 @@ def _solve_behind(
     floor: float,
     tick: Tick,
 ) -> Fitted:
-    stages = front.stages(shape)
+    stages = front.stages(shape, DIGITS)
     solution, _ = pi.solve([joint.through_front(item, stages) for item in courses], wanted, floor, tick)
     return Fitted(front, shape, solution)
 

@@ -21,7 +21,7 @@ from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.identification import pi, reduction
-from hystgen.identification.pi import DIGITS, InfeasibleError, root_mean_square, rounded
+from hystgen.identification.pi import InfeasibleError, root_mean_square, rounded
 from hystgen.identification.reduction import Course, Reduced, Source
 from hystgen.plays import operators
 
@@ -70,8 +70,11 @@ class Front(Protocol):
     def slack(self, shape: Array) -> Array:
         """Values that must not be negative for the front to be invertible, in addition to the bounds; may be empty."""
 
-    def stages(self, shape: Array) -> tuple[Stage, ...]:
-        """The stages of the model."""
+    def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
+        """The stages of the model, their numbers rounded to `digits` if those are given.
+
+        A search takes them as they are: in a difference of two, each rounded to ten digits, six are gone.
+        """
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ class Kept:
         """No constraints."""
         return np.empty(0)
 
-    def stages(self, shape: Array) -> tuple[Stage, ...]:
+    def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
         """The given stages."""
         return self.given
 
@@ -140,7 +143,7 @@ class DeadZones:
         logs = np.log(np.maximum(slopes, least))
         return np.asarray(np.clip(logs[1:] - logs[0], -STEEPEST, STEEPEST))
 
-    def stages(self, shape: Array) -> tuple[Stage, ...]:
+    def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
         """The dead-zone sum; its weight at 0 is the slope of the piece that contains 0."""
         slopes = self.slopes(shape)
         middle = int(np.searchsorted(self.breaks, 0.0, side="right"))
@@ -149,7 +152,7 @@ class DeadZones:
             outer, inner = (slopes[j], slopes[j + 1]) if j < middle else (slopes[j + 1], slopes[j])
             terms[place] = float(outer - inner)
         places = sorted(terms)
-        return (DeadZone(places, [rounded(terms[place], DIGITS) for place in places]),)
+        return (DeadZone(places, _numbers([terms[place] for place in places], digits)),)
 
 
 @dataclass(frozen=True)
@@ -177,12 +180,12 @@ class Ends:
         """Every piece rises."""
         return np.empty(0)
 
-    def stages(self, shape: Array) -> tuple[Stage, ...]:
+    def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
         """The dead-zone sum."""
         low, high = self.drive
         ends = low + shape[0] * (high - low), high - shape[1] * (high - low)
         breaks = aside([float(x) for x in ends], 1e-3 * (high - low))
-        return DeadZones(self.drive, breaks).stages(np.array([-shape[2], 0.0]))
+        return DeadZones(self.drive, breaks).stages(np.array([-shape[2], 0.0]), digits)
 
 
 @dataclass(frozen=True)
@@ -215,11 +218,11 @@ class Bent:
     def _pieces(self) -> DeadZones:
         return DeadZones(self.drive, even_breaks(self.drive, SMOOTH - 1))
 
-    def stages(self, shape: Array) -> tuple[Stage, ...]:
+    def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
         """The dead-zone sum."""
         u = np.linspace(-1.0, 1.0, 2 * SMOOTH + 1)[1::2]
         logs = u * np.polynomial.polynomial.polyval(u, shape)
-        return self._pieces.stages(logs[1:] - logs[0])
+        return self._pieces.stages(logs[1:] - logs[0], digits)
 
 
 @dataclass(frozen=True)
@@ -271,9 +274,9 @@ class Tanh:
     def _places(self) -> Array:
         return np.linspace(*self.drive, 61)
 
-    def stages(self, shape: Array) -> tuple[Stage, ...]:
-        """The envelope with rounded numbers; the descending branch is lifted if rounding would put it too low."""
-        return (self._stage(shape, DIGITS),)
+    def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
+        """The envelope; the descending branch is lifted if rounding would put it too low."""
+        return (self._stage(shape, digits),)
 
     def _stage(self, shape: Array, digits: int | None) -> TanhEnvelope:
         low, high = self.drive
@@ -292,21 +295,25 @@ class Tanh:
         up = branch(shape[0], shape[1], 1.0)
         up_all = (*up, -value(up, 0.0))
         if self.branches == 1:
-            return TanhEnvelope(_numbers(up_all, digits))
+            return TanhEnvelope(_branch(up_all, digits))
         down = branch(shape[2], shape[3], math.exp(shape[4]))
         lift = value(up, middle) + up_all[3] - value(down, middle) + shape[5] * 2.0 * half
-        stage = TanhEnvelope(_numbers(up_all, digits), _numbers((*down, lift), digits))
+        stage = TanhEnvelope(_branch(up_all, digits), _branch((*down, lift), digits))
         if digits is not None:
             places = np.linspace(low, high, 20001)
             short = float(np.max(stage.forward(places, True) - stage.forward(places, False)))
             if short > 0.0:
-                stage = TanhEnvelope(stage.ascending, _numbers((*down, lift + 1.01 * short + 1e-9 * half), digits))
+                stage = TanhEnvelope(stage.ascending, _branch((*down, lift + 1.01 * short + 1e-9 * half), digits))
         return stage
 
 
-def _numbers(values: tuple[float, ...], digits: int | None) -> tuple[float, float, float, float]:
-    a0, a1, a2, a3 = (float(x) if digits is None else rounded(float(x), digits) for x in values)
+def _branch(values: tuple[float, ...], digits: int | None) -> tuple[float, float, float, float]:
+    a0, a1, a2, a3 = _numbers(values, digits)
     return a0, a1, a2, a3
+
+
+def _numbers(values: Sequence[float], digits: int | None) -> list[float]:
+    return [float(x) if digits is None else rounded(float(x), digits) for x in values]
 
 
 def even_breaks(drive: tuple[float, float], count: int) -> tuple[float, ...]:
@@ -324,8 +331,9 @@ def aside(places: Sequence[float], least: float) -> tuple[float, ...]:
 # The search for a shape --------------------------------------------------------------------------------------
 
 
-DIFFERENCE = 1e-6
-"""Change of a shape number for a derivative; shape numbers are of the order of one."""
+DIFFERENCE = 2.0**-16
+"""Change of a shape number for a derivative; shape numbers are of the order of one. A search needs a few digits of a
+derivative: this leaves five before its curve shows, and eleven of the output behind the rounding of doubles."""
 
 MOST_STEPS = 25
 
@@ -340,6 +348,16 @@ A step of one standard deviation of an estimate changes it by one such share.
 
 LEAST_CHANGE = 1e-8
 """The search also ends when no shape number changes by more than this."""
+
+GRAIN = 1.0 / 32.0
+"""[of the rms error] A number of a step is rounded by at most half of what moves the output by this much.
+
+As the rounding of each of m numbers is independent, all of them raise the sum of squares by m GRAIN^2 / 12 times its
+share of one sample: half of `ENOUGH` for 32 numbers.
+"""
+
+COARSEST = 2.0**-10
+"""Largest unit of a shape number, of the order of one: those that hardly show yet must not be moved by rounding."""
 
 COMPARED = 200_000
 """Samples compared in the search for the shape: an even selection from longer records, although all samples run through
@@ -391,9 +409,7 @@ def _session(item: Course, stages: Sequence[Stage]) -> tuple[NDArray[np.bool_] |
     return (None if whole is None else whole[len(before) :]), tuple(visited.tolist())
 
 
-def refine(
-    courses: Sequence[Course], front: Front, shape: Array, thresholds: Array, tick: Tick = None
-) -> Shaped:
+def refine(courses: Sequence[Course], front: Front, shape: Array, thresholds: Array, tick: Tick = None) -> Shaped:
     """The best shape near `shape`, with non-negative weights for the plays of `thresholds`."""
     stages = front.stages(shape)
     plain = reduction.reduce([through_front(item, stages) for item in courses], thresholds, tick)
@@ -442,11 +458,13 @@ def search(
             change, p = solve_linear(system, now.weights, now.shape, limits, damping)
         except InfeasibleError:
             break
-        moved = np.clip(now.shape + change, low, high)
+        sizes = np.linalg.norm(system, axis=0)
+        p = _grained(p, sizes[: len(p)], now.rms)
+        moved = np.clip(_grained(now.shape + change, sizes[len(p) : -1], now.rms, COARSEST), low, high)
         if np.max(np.abs(moved - now.shape)) < LEAST_CHANGE:
             break
         least = 0.5 * ENOUGH / now.samples
-        residual = system[:, -1] - system[:, :-1] @ np.concatenate([p, change])
+        residual = system[:, -1] - system[:, :-1] @ np.concatenate([p, moved - now.shape])
         promised = root_mean_square(float(residual @ residual), now.samples)
         if now.rms - promised < least * now.rms:  # most such steps fail, at full cost
             break
@@ -461,14 +479,26 @@ def search(
     return now, damping
 
 
+def _grained(found: Array, sizes: Array, rms: float, most: float = math.inf) -> Array:
+    """Solutions of a linear system, rounded to what the records tell of them; `sizes`: lengths of its columns.
+
+    The units are powers of two, `most` the largest. Linear algebra libraries differ in the last bits, from processor to
+    processor, and a search that carried these on from step to step could end in another minimum; rounded, its steps
+    are the same everywhere.
+    """
+    rounded = found.copy()
+    known = (sizes > 0.0) & (rms > 0.0)
+    unit = np.minimum(np.exp2(np.floor(np.log2(GRAIN * rms / sizes[known]))), most)
+    rounded[known] = np.round(found[known] / unit) * unit
+    return rounded
+
+
 def _allowed(limits: Limits, shape: Array) -> bool:
     slack = limits.slack(shape)
     return not len(slack) or float(np.min(slack)) > -1e-6
 
 
-def _linear(
-    courses: Sequence[Course], front: Front, shape: Array, p: Array, thresholds: Array, tick: Tick
-) -> Shaped:
+def _linear(courses: Sequence[Course], front: Front, shape: Array, p: Array, thresholds: Array, tick: Tick) -> Shaped:
     """The best weights for a shape, and the system linearised about the shape and weights `p` close to them."""
     every = max(1, sum(item.used for item in courses) // COMPARED)
     source = linear_source(front, shape, p, every)
@@ -514,7 +544,7 @@ def _rows_with_derivatives(
             carried[k] = (stages, rising, np.ascontiguousarray(moved[:, -1]))
             if k == 0:
                 found[:, 1 : n1 + 1] = moved.T
-            sums.append(p @ moved)
+            sums.append(operators.weighted_sum(p, moved))
         for k, total in enumerate(sums[1:]):
             found[:, n1 + 1 + k] = (total - sums[0]) / DIFFERENCE
         found[:, 0] = 1.0
@@ -526,9 +556,7 @@ def _rows_with_derivatives(
     return rows
 
 
-def solve_linear(
-    system: Array, p: Array, shape: Array, limits: Limits, damping: float
-) -> tuple[Array, Array]:
+def solve_linear(system: Array, p: Array, shape: Array, limits: Limits, damping: float) -> tuple[Array, Array]:
     """Change of the shape, and new weights, that fit a linear system best under the constraints."""
     k, m = len(p), len(shape)
     matrix, target = system[:, :-1], system[:, -1]
@@ -548,7 +576,5 @@ def solve_linear(
             slope[:, j] = (limits.slack(one) - slack) / DIFFERENCE
         bounds = np.concatenate([bounds, np.concatenate([np.zeros((len(slack), k)), slope], axis=1)])
         least = np.concatenate([least, np.minimum(-slack, 0.0)])
-    solution = pi.least_squares(
-        np.concatenate([matrix, tied]), np.concatenate([target, np.zeros(m)]), bounds, least, k
-    )
+    solution = pi.least_squares(np.concatenate([matrix, tied]), np.concatenate([target, np.zeros(m)]), bounds, least, k)
     return solution[k:], solution[:k]

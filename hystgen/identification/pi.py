@@ -21,8 +21,11 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 DIGITS = 10
-"""Significant digits of fitted numbers: more than a record determines, and few enough not to depend on the linear
-algebra library."""
+"""Significant digits of offsets and of the numbers of a front: more than a record determines."""
+
+WEIGHT_DIGITS = 8
+"""Significant digits of weights. With the tie break below, a millionth remains of a direction in which plays move
+alike: the last bits of the linear algebra library reach the tenth digit, and two more are left out."""
 
 DUST = 1e-9
 """A weight below this share of their sum is rounding, not a play."""
@@ -107,8 +110,7 @@ def solve(
     reduced = reduction.reduce(compared, union(lists), tick)
     chosen = choose(reduced, lists)
     fitted = fit_weights(reduced, columns(reduced, chosen), floor)
-    p = np.array([rounded(float(x), DIGITS) for x in fitted.p])
-    p[p < DUST * float(np.sum(p))] = 0.0
+    p = written(fitted.p)
     r = np.array(chosen.thresholds)
     if not np.any(p > 0.0):
         raise IdentificationError(FALLS)
@@ -273,6 +275,13 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
 def dense(reach: float, samples: int, most: int = DENSE) -> Candidate:
     """One list of `most` plays, fine enough to show the other effects in a record."""
     return candidates(reach, samples, min(most, max(1, samples // SAMPLES_A_PLAY)))[:2][-1]
+
+
+def written(weights: Array) -> Array:
+    """Weights as a parameter file has them: rounded, and 0 where only rounding is left."""
+    p = np.array([rounded(float(x), WEIGHT_DIGITS) for x in weights])
+    p[p < DUST * float(np.sum(p))] = 0.0
+    return p
 
 
 def rounded(x: float, digits: int) -> float:

@@ -131,6 +131,10 @@ MEMORY = 4.0
 
 SEED = 1
 
+UNKNOWN = 1e-9
+"""Singular values below this share of the largest belong to directions that the records do not determine, in which
+nothing is redrawn: seven digits are then the same with every linear algebra library, of which four are shown."""
+
 
 @dataclass(frozen=True)
 class Intervals:
@@ -179,15 +183,16 @@ def intervals(fitted: Fitted, courses: Sequence[Course], errors: Sequence[Errors
     lost = min(unknowns / len(scores), 0.5)  # a fit takes away some of the scatter of the residuals
     moved = signs @ scores / np.sqrt(1.0 - lost)
     target = triangle[:, : len(p)] @ p
-    back, *_ = np.linalg.lstsq(triangle.T, moved.T, rcond=1e-12)
+    back, *_ = np.linalg.lstsq(triangle.T, moved.T, rcond=UNKNOWN)
     if len(p) > MANY_WEIGHTS:
         active = np.flatnonzero(np.append(p > 0.0, np.ones(len(fitted.shape), dtype=bool)))
-        found, *_ = np.linalg.lstsq(triangle[:, active], target[:, None] + back, rcond=1e-12)
+        found, *_ = np.linalg.lstsq(triangle[:, active], target[:, None] + back, rcond=UNKNOWN)
         redrawn = np.zeros((REDRAWS, unknowns))
         redrawn[:, active] = found.T
         redrawn = np.maximum(redrawn[:, : len(p)], 0.0)
     else:
         redrawn = np.array([_weights(fitted, triangle, target + change) for change in back.T])
+    redrawn[redrawn < pi.DUST * redrawn.sum(axis=1, keepdims=True)] = 0.0
     low, high = np.quantile(redrawn, TAILS, axis=0)
     total = redrawn.sum(axis=1)
     width = np.quantile(2.0 * (redrawn @ r)[total > 0.0] / total[total > 0.0], TAILS)
