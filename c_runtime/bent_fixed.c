@@ -13,5 +13,6 @@ HYSTGEN_APART int64_t hystgen_bent_by(const hystgen_bump_t *c, int32_t z) {
 
 /* What play i contributes at z; several plays may have a curve in common. */
 HYSTGEN_APART int64_t hystgen_bent(unsigned int i, int32_t z) {
-    return hystgen_bent_by(&hystgen_bump[hystgen_bump_of[i]], z);
+    const uint16_t curve = hystgen_bump_of[i];
+    return hystgen_bent_by(&hystgen_bump[curve], z);
 }

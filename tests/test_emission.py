@@ -8,13 +8,14 @@ import itertools
 import os
 import re
 import subprocess
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from elftools.elf.elffile import ELFFile
 from mains import c_main
-from modelfiles import FILES
+from modelfiles import CHAINS, FILES
 
 import hystgen
 from hystgen.arithmetic import ARITHMETICS
@@ -490,7 +491,7 @@ def test_nothing_forbidden_in_the_text(name: str) -> None:
 
 def renamed(name: str, to: str) -> Model:
     """A model under another name, with a description of many words."""
-    text = FILES[name].replace(f"name: {name}\n", f"name: {to}\ndescription: {'piezo ' * 40}\n")
+    text = {**FILES, **CHAINS}[name].replace(f"name: {name}\n", f"name: {to}\ndescription: {'piezo ' * 40}\n")
     return Model(parse_parameters(text, f"{name}.yaml"))
 
 
@@ -511,6 +512,28 @@ def test_no_line_is_longer_than_100_columns(kind: str, name: str, tmp_path: Path
                     command = ["gcc", "-std=c99", "-fsyntax-only", *compilers.C_WARNINGS, file]
                     done = subprocess.run(command, capture_output=True, text=True, check=False)
                     assert done.returncode == 0, done.stderr
+
+
+EVERY_EFFECT = (
+    "everything", "worn", "dashpot", "viscous", "relaxing", "dilated", "drifting", "heated", "quick", "straight",
+)  # fmt: skip
+"""Chains that have each effect, and each kind of table, between them."""
+
+
+def test_every_effect_is_among_them() -> None:
+    def effects(names: Iterable[str]) -> set[str]:
+        return set(re.findall(r"\{name: (\w+)", "".join(CHAINS[name] for name in names)))
+
+    assert effects(EVERY_EFFECT) == effects(CHAINS)
+
+
+@pytest.mark.parametrize("arithmetic", ["float64", "q31"])
+@pytest.mark.parametrize("chain", EVERY_EFFECT)
+def test_no_line_of_an_effect_is_longer_than_100_columns(chain: str, arithmetic: str) -> None:
+    """float64 and q31 have the longest numbers."""
+    for file, text in emitted_files(renamed(chain, "n" * MAX_NAME), operator="inverse", arithmetic=arithmetic).items():
+        for line in text.splitlines():
+            assert len(line) <= 100, f"{file}: {line}"
 
 
 def test_a_banner_of_two_lines_is_read(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """C text: exact literals, tables, comments, and lines of at most WIDTH characters, however long the model's name is.
 
 The files of `c_runtime/` are formatted for the prefix `hystgen_`; with another name in them statements are broken
-anew. Tables, whose lines are made to fit, stay as they are. clang-format formats `c_runtime/` but not what is emitted:
+anew. Rows of tables are broken only if they are too long. clang-format formats `c_runtime/` but not what is emitted:
 its lines depend on its version, and the same parameters have to give the same bytes anywhere.
 """
 
@@ -181,8 +181,8 @@ def _fitted(lines: list[str]) -> Iterator[str]:
             at = end + 1
         elif re.search(r"= \{$", line):  # a table
             end = next(i for i in range(at, len(lines)) if lines[i].endswith("};"))
-            yield from _broken(line, indent)
-            yield from lines[at + 1 : end + 1]
+            for row in lines[at : end + 1]:
+                yield from _broken(row, row[: len(row) - len(row.lstrip())])
             at = end + 1
         else:
             end = at
@@ -251,6 +251,8 @@ def _broken(code: str, indent: str) -> list[str]:
         found = _place(text, opened, inside)
         if found is None:  # too far to the right
             text, opened = " " * inside + text.lstrip(), [inside] * len(opened)
+            if len(text) <= WIDTH:
+                break
             found = _place(text, opened, inside)
         assert found, text
         place, opened = found
