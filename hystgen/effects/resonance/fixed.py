@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic.factors import LARGEST, STATE_BITS, factor, lifted, times
+from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
@@ -20,9 +20,6 @@ from hystgen.effects.resonance import compensator
 from hystgen.effects.resonance.compensator import BEFORE, OFF, RATE, ModeNumbers
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals
-
-GUARD = 4
-"""Bits of the states below the last one that all roundings of a state together can reach."""
 
 KIND = Kind("mode", own=("rest", "absorb"), reading=("absorb",), letters="fffffbbb", memory="www")
 
