@@ -1,11 +1,11 @@
 """Runs that set numbers which no test of a model can set: what each would cost or spoil with another value.
 
-    python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths]
+    python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths] [visits]
 
 lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.thermal.compensator.MOST_CHANGE`; decades:
 `effects.ageing.compensator.DECADES`; sweeps: `emission.worth.SWEEPS`; unknown: `tracking.MOST_UNKNOWN`; exact:
-`diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`. All of them take some seconds; what
-is random has fixed seeds.
+`diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`; visits:
+`chain.chain.VISIT_SAMPLES`. All of them take some seconds; what is random has fixed seeds.
 """
 
 from __future__ import annotations
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 import hystgen
 from hystgen import plants
+from hystgen.chain import chain
 from hystgen.compensator.chain.layout import SAMPLES_A_SWEEP
 from hystgen.diagnosis.data import signals
 from hystgen.diagnosis.data.items import Item
@@ -168,8 +169,30 @@ def lengths() -> None:
         print(f"  {name:15}", *(f"{free:5.2f}/{rates:4.2f}" for free, rates in shares))
 
 
+def visits() -> None:
+    """How much the answer after a history changes with the samples of its moves."""
+    samples = (25, 100, chain.VISIT_SAMPLES, 800)
+    print(f"visits: effect, largest change, share of the answer's range: {samples} samples a move against 3200")
+    v = np.concatenate([np.linspace(1.0, 3.0, 500), np.linspace(3.0, -2.0, 800)])
+    run = Run(1e-3 * np.arange(len(v)), v)
+    for effect in (
+        "name: creep, shape: logarithmic, per_decade: 0.02, t_min: 1.0e-3, t_max: 1.0e4",
+        "name: lag, time_constant: 2.0",
+        "name: resonance, frequency: 0.5, damping: 0.05",
+        "name: thermal, source: self_heating, time_constant: 5, heating: 0.05, gain_per_degree: -0.02",
+        "name: rate_dependence, shape: relaxation, time_constant: 0.5, exponent: 0.5",
+    ):
+        one = hystgen.Model(parse_parameters(WITH_EFFECT.format(effect=effect), "stage_x.yaml"))
+        answers = []
+        for number in (*samples, 3200):
+            with mock.patch.object(chain, "VISIT_SAMPLES", number):
+                answers.append(one.chain.simulate([run], [3.5, -3.5, 1.0])[0])
+        changes = [np.max(np.abs(each - answers[-1])) / np.ptp(answers[-1]) for each in answers[:-1]]
+        print(f"  {effect.partition(',')[0].removeprefix('name: '):15}", *(f"{x:8.1e}" for x in changes))
+
+
 RUNS: dict[str, Callable[[], None]] = {
-    each.__name__: each for each in (lag, newton, decades, sweeps, unknown, exact, lengths)
+    each.__name__: each for each in (lag, newton, decades, sweeps, unknown, exact, lengths, visits)
 }
 
 

@@ -20,11 +20,14 @@ VISIT = 10.0
 """Seconds of the straight move to each value of a history."""
 
 VISIT_SAMPLES = 200
+"""Samples of that move. More change the answer after a history by at most 4e-6 of its range, which a mode of 0.5 Hz
+takes; 25 would by 2e-4. Set by: benchmarks/chosen_numbers.py visits."""
 
 SESSION_GAP = 10.0
 """Gap between two records of a session, in median steps, above which the drive holds in it; below, it is straight."""
 
 _BEHIND_OFFSET = 6
+"""Rank of the effects that act on the output with its offset, of the order from the drive (0) to the sensor."""
 
 
 def _rank(effect: Effect) -> int:

@@ -43,9 +43,16 @@ from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.plays import slots
 
 SUM_BITS = 62
+"""Bits of a sum of products without its sign: 64 bits then hold the difference of two."""
+
 TABLE_MAX = 2**31 - 1
+"""Largest number of a table, an int32_t in C."""
+
 MOST_PIECES = 2000
+"""[pieces] Most of a curve: cubic ones of this many take 42 kB of flash, more than the smallest cores have."""
+
 FAR = 2.0**40
+"""[steps of the plays' input] Stands for infinity: inputs of plays have 31 bits."""
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from hystgen.emission.runtime import Piece
 from hystgen.emission.text import WIDTH
 
 MOST_BYTES = 1 << 16
+"""Of a C file of the user's; the largest block of the package itself has 6 kB."""
 
 INCLUDE = '#include "hystgen_runtime.h"'
 """The one preprocessor line that a file has, so that it compiles by itself."""

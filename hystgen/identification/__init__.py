@@ -48,8 +48,10 @@ PASSES = 60.0
 """Approximate number of passes of the search for a front through all samples, for the progress bar."""
 
 MOST_PLAYS = 1000
+"""Most plays that are fitted; the memory and time of a fit grow with the square and the cube of their number."""
 
 MOST_BREAKS = 64
+"""Most breaks of a dead-zone sum that are fitted, eight times as many as are tried by default."""
 
 BEYOND = 0.1
 """Largest excursion of a held-out part of a record beyond the fitted drive range, as a share of it; further out every

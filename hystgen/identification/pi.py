@@ -415,6 +415,8 @@ RIDGE = 1e-7
 """Weight of the tie break between solutions that fit equally well, with columns scaled to length one."""
 
 INFEASIBLE = 1e-10
+"""Distance of the dual problem's solution from a target of length 1, below which it is rounding: the target is then
+reached, and no point satisfies all inequalities (Farkas)."""
 
 
 class InfeasibleError(ValueError):

@@ -116,6 +116,8 @@ def table(rows: Sequence[Row], unit: str, remarks: Sequence[str]) -> str:
 
 
 REDRAWS = 1000
+"""Fits with random signs of the residuals' blocks: an end of a 95 % interval then scatters by 0.08 standard deviations,
+sqrt(0.025 * 0.975/1000) over the normal density there."""
 
 TAILS = (0.025, 0.975)
 """Quantiles of 95 % intervals."""
@@ -130,6 +132,7 @@ MEMORY = 4.0
 """Length of a block in correlation times of the residuals."""
 
 SEED = 1
+"""Of the random numbers, so that the same records give the same intervals."""
 
 UNKNOWN = 1e-9
 """Singular values below this share of the largest belong to directions that the records do not determine, in which

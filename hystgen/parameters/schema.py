@@ -27,6 +27,7 @@ from hystgen.basics.quantities import MAX_PLAYS, NotNegative, Number, Positive
 MAX_STAGES = 16
 MAX_EFFECTS = 64
 MAX_DESCRIPTION = 500
+"""Stages, effects, and characters of a description: no model needs as many, and checks stay quick."""
 
 STAGE_KINDS = ("dead_zone", "tanh")
 

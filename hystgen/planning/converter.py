@@ -15,6 +15,8 @@ CODINGS = ("straight", "twos-complement")
 """How codes are written: straight (offset) binary from 0 up, or two's complement with 0 in the middle of the range."""
 
 FEWEST_BITS, MOST_BITS = 8, 32
+"""Of a converter: with fewer than eight, a code is more than the margin that drives keep; more than 32 do not fit the
+C header."""
 
 FEWEST_CODES = 100
 """Codes between the lowest and the highest drive: at fewer a code is more than the margin that drives keep."""

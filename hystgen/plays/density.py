@@ -36,13 +36,19 @@ from hystgen.basics.arguments import finite, positive, whole_from
 from hystgen.basics.quantities import MAX_PLAYS
 
 MAX_FORMULA = 1000
+"""[characters] A longer formula is refused before it is parsed."""
 FUNCTIONS = ("exp", "log", "sqrt", "sin", "cos", "tanh")
 
 _DIGITS = 40
+"""Decimal digits of the arithmetic: the powers of a panel's polynomial lose six of them, and 34 remain."""
 _DEGREE = 16
+"""Of the polynomials; 33 values of the formula in each panel."""
 _FIRST_PANELS = 64
+"""Panels to begin with, so that a narrow peak is seen."""
 _MAX_PANELS = 600
+"""Most panels: a formula that takes more has a pole, or oscillates too fast."""
 _MAX_HALVINGS = 60
+"""Most halvings of the range down to a panel, beyond which doubles do not tell its ends apart."""
 _PRECISION = 1e-20
 """Error of the polynomials allowed to a panel, relative to the whole mass."""
 _LARGEST_EXPONENT = 1000

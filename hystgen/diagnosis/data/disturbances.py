@@ -29,6 +29,7 @@ MAINS = (50.0, 60.0)
 """Hz: the world's mains frequencies."""
 
 MAINS_HARMONICS = (1, 2, 3, 5)
+"""Those that are found in supplies: 2 comes from rectifiers, 3 and 5 from the cores of transformers."""
 
 
 @dataclass(frozen=True)

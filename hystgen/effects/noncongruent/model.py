@@ -25,10 +25,12 @@ from hystgen.effects.base import (
 )
 
 MAX_TERMS = 8
+"""Most coefficients of a play: records determine two (`CUBIC`), and powers beyond the ninth hardly differ."""
 
 CUBIC = "noncongruent, cubic"
 
 PLACES = 101
+"""Places at which a bump is looked for as a start: hundredths of the range."""
 
 LOWEST, HIGHEST = -0.8, 2.5
 """Amplitudes of a bump from which a search starts."""

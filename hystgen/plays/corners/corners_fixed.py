@@ -18,6 +18,7 @@ Kink = tuple[Any, Any, int, int]
 the others."""
 
 FAR = 1 << 62
+"""Beyond every sum of plays: those have fewer than 62 bits."""
 
 
 class FixedMemory(NamedTuple):
