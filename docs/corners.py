@@ -58,8 +58,8 @@ def main() -> None:
             axes.annotate(f"{j + 1}", (x, y), (0, 6 if up else -14), textcoords="offset points", ha="center")
     time.axhline(drive[corners[2]], color=GREY, linewidth=0.8, linestyle=":")
     time.annotate("passes 4 and 3", (len(drive), NEXT), (-4, 8), textcoords="offset points", ha="right", color=ORANGE)
-    time.set(xlabel="sample", ylabel="drive, V", ylim=(-1, 11), title="Corners 1 to 4 hold plays")
-    loop.set(xlabel="drive, V", ylabel="output", title="The same moves in the loop")
+    time.set(xlabel="sample", ylabel="drive (V)", ylim=(-1, 11), title="Corners 1 to 4 hold plays")
+    loop.set(xlabel="drive (V)", ylabel="output", title="The same moves in the loop")
 
     way = np.append(2 * r, 2 * r[-1] + 2)
     reach = np.append(2 * z, 2 * z[-1] + 2 * c[-1])

@@ -216,6 +216,12 @@ REFUSED = [
         '5:1: sampletime: unknown key; did you mean sample_time?',
         '6:1: foo: unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',
     ]),
+    case('keys_that_belong_elsewhere', H + M + "effects: []\nweights: [1]\npreview: 1\nemit: {sample_time: 1}\n", [
+        '5:1: effects: unknown key; it belongs in model',
+        '6:1: weights: unknown key; it belongs in model.pi',
+        '7:1: preview: unknown key; it belongs in emit.compensation',
+        '8:8: emit.sample_time: unknown key; it belongs in the top level',
+    ]),
     case('odd_unknown_keys', H + M + '"a b\\n": 1\n' + "k" * 70 + ": 2\n", [
         '5:1: "a b\\n": unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',
         '6:1: "kkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkk...": unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',
@@ -587,7 +593,7 @@ REFUSED = [
     ]),
     case('emit', H + M + "emit: {operator: inv, arithmetic: float, engine: 5, drive_lsb: 0, output_lsb: -1, x: 1}\n", [
         '5:18: emit.operator: must be inverse, forward or both, not the text "inv"; did you mean inverse?',
-        '5:35: emit.arithmetic: must be float32, float64, q31 or q15, not the text "float"; did you mean float64?',
+        '5:35: emit.arithmetic: must be float32, float64, q31 or q15, not the text "float"; did you mean float32 or float64?',
         '5:50: emit.engine: must be auto, corners or loop, not 5; choose one of them',
         '5:64: emit.drive_lsb: must be above 0, not 0; correct the number',
         '5:79: emit.output_lsb: must be above 0, not -1; correct the number',

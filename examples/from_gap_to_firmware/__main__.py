@@ -92,7 +92,7 @@ def main() -> None:
         figure = drawing.figure(9.0, 6.0)
         motion, error = figure.subplots(2, 1, sharex=True)
         motion.plot(t, wanted, color=drawing.MEASURED, linewidth=1.0)
-        motion.set(title="Motion wanted", ylabel="um")
+        motion.set(title="Motion wanted", ylabel="displacement (um)")
         colours = (drawing.OTHER, drawing.GAP, drawing.MODEL)
         for (name, step), colour in zip(runs.items(), colours, strict=True):
             left = tracked(step, wanted) - wanted
@@ -100,7 +100,7 @@ def main() -> None:
             rms = 100.0 * float(np.std(left[inside])) / (high - low)
             print(f"{name:24} {rms:6.3f} % of the motion, rms")
             error.plot(t, 100.0 * left / (high - low), color=colour, linewidth=1.0, label=f"{name}: {rms:.2f} % rms")
-        error.set(xlabel="time, s", ylabel="tracking error, %", ylim=(-9.0, 9.0))
+        error.set(xlabel="time (s)", ylabel="tracking error (%)", ylim=(-9.0, 9.0))
         drawing.legend_above(error, 3)
         (folder / "tracking.png").write_bytes(drawing.content(figure, "png"))
 

@@ -35,10 +35,10 @@ R = TypeVar("R")
 # Python because there is no numba
 announce: Callable[[str], None] | None = None
 
-ONCE = "compiling for this machine, once for each part in use: up to 20 s, for C of models with effects 40 s"
+ONCE = "compiling Python functions for this machine, once: up to 20 s, with effects in the C up to 40 s"
 EVERY_TIME = (
-    "compiling for this machine: up to 20 s, for C of models with effects 40 s, every time, since no folder for "
-    "the result can be written to; set NUMBA_CACHE_DIR to one that can"
+    "compiling Python functions for this machine: up to 20 s, with effects in the C up to 40 s, and again every time, "
+    "since no folder for the result can be written to; set NUMBA_CACHE_DIR to one that can"
 )
 
 

@@ -157,10 +157,11 @@ class Fit:
 
     def _interval_sentence(self) -> str:
         """Loop width and held-out error with their intervals."""
-        sure = self.intervals
-        said = f"widest loop (input of the plays) {sure.width[0]:.4g} to {sure.width[1]:.4g}"
+        sure, units = self.intervals, self.parameters.units
+        drive, output = (f" {unit}" if unit else "" for unit in (units and units.input, self.unit))
+        said = f"widest loop (input of the plays) {sure.width[0]:.4g} to {sure.width[1]:.4g}{drive}"
         if sure.held_out is not None:
-            said += f", held-out rms error {sure.held_out[0]:.4g} to {sure.held_out[1]:.4g}"
+            said += f", held-out rms error {sure.held_out[0]:.4g} to {sure.held_out[1]:.4g}{output}"
         return said
 
     @property
@@ -185,9 +186,7 @@ class Fit:
         elif any(row.part == "held out" for row in self.rows):
             reported.append("written: fitted to the records of row fit only.")
         if any(row.ignored for row in self.rows):
-            reported.append(
-                "ignored: samples at the start, before the drive had wiped an unknown start memory; none explains them."
-            )
+            reported.append("ignored: samples at the start, where the memory from before the record is not known.")
         if len(self.parameters.model.pi.thresholds) > 1:
             reported += [each.start_sentence(self.unit) for each in self.used if any(each.starts)]
         reported.append(f"95 % confidence: {self._interval_sentence()}.")

@@ -44,6 +44,15 @@ _PARTS: dict[str, type[BaseModel]] = {
     "compensation": schema.Compensation,
 }
 
+_PLACES: dict[str, type[BaseModel]] = {
+    "the top level": schema.Parameters,
+    "model": schema.ModelParameters,
+    "model.pi": schema.PIParameters,
+    "emit": schema.EmitDefaults,
+    "emit.compensation": schema.Compensation,
+}
+"""Where a key belongs that stands at another place."""
+
 # How a key is written, where it is missing.
 _WRITTEN = {
     "hystgen": "hystgen: 1",
@@ -186,8 +195,9 @@ class _Checker:
             self.add(path[:-1], _TWO_NAMES if path[0] == "not_separable" else _TWO_NUMBERS)
         elif kind == "extra_forbidden":
             known = self._keys(path[:-1])
-            near = _nearest(key, known)
-            self.add(path, f"unknown key; {near or 'known here are ' + ', '.join(known)}{hint}", at_key=True)
+            place = next((place for place, part in _PLACES.items() if key in part.model_fields), None)
+            advice = f"it belongs in {place}" if place else _nearest(key, known)
+            self.add(path, f"unknown key; {advice or 'known here are ' + ', '.join(known)}{hint}", at_key=True)
         elif value is None:
             self.add(path, _NO_VALUE, at_key=isinstance(path[-1], str))
         elif path[0] == "not_separable" and kind == "too_long":
@@ -483,9 +493,11 @@ def _entries(count: int) -> str:
 
 
 def _nearest(word: str, known: Sequence[str]) -> str:
-    """`did you mean ..?` if one of the known words is near, else nothing."""
-    near = difflib.get_close_matches(word.lower(), known, 1, 0.6) if len(word) <= 60 else []
-    return f"did you mean {near[0]}?" if near else ""
+    """`did you mean ..?` if one of the known words is near, or several are equally near; else nothing."""
+    near = difflib.get_close_matches(word.lower(), known, len(known), 0.6) if len(word) <= 60 and known else []
+    shares = [difflib.SequenceMatcher(None, each, word.lower()).ratio() for each in near]
+    nearest = [each for each, share in zip(near, shares, strict=True) if share == shares[0]]
+    return f"did you mean {' or '.join(sorted(nearest))}?" if nearest else ""
 
 
 def _choice(value: Any, known: Sequence[Any]) -> str:

@@ -36,7 +36,7 @@ def _tracking_figure(tracking: Tracking) -> Any:
         for (which, values), colour in zip(each.errors.items(), colours, strict=True):
             words = f"{which}: {each.rms(which):.3g} % rms"
             error.plot(each.t, 100.0 * values / each.span, color=colour, linewidth=1.0, label=words)
-        error.set(xlabel="time, s", ylabel="tracking error, % of span")
+        error.set(xlabel="time (s)", ylabel="tracking error (% of span)")
         drawing.legend_above(error, 3)
     return figure
 
