@@ -103,7 +103,7 @@ def _creep(compiled: Compiled, j: int, size: float, u: float) -> tuple[float, fl
 
 
 def _late(compiled: Compiled) -> float:
-    """Largest share of the output by which the gain changes in one step at the fastest rate, plus its table's error."""
+    """Largest change of the ageing gain in a step at the fastest rate, share of the output, plus its table's error."""
     return max(ageing.most_at_once(each, compiled.largest_step) for each in compiled.parts.ageing) + TABLE_ERROR
 
 

@@ -377,7 +377,7 @@ class _Builder:
         return tuple(Fraction(x * self.seconds) / self.drive_lsb for x in (rising, falling))
 
     def slew(self, span: int) -> tuple[int, int]:
-        """The same in whole codes."""
+        """`rates` in whole codes."""
         if not self.parts.slew:
             return 0, 0
         whole = [math.floor(rate) for rate in self.rates()]

@@ -42,7 +42,7 @@ class Taps(NamedTuple):
 def taps(
     delay: float, modes: Sequence[Resonance], seconds: float, number: int = 3, corner: int = 0, shaped: bool = False
 ) -> Taps:
-    """The weights for a delay in s and modes in series at samples `seconds` apart; only the reference itself for none.
+    """The weights for a delay in s and modes in series at samples `seconds` apart; the reference itself without either.
 
     A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`; 5 undo that up to a fourth
     difference. `corner`: three centred moving averages over this number of samples smooth the reference. `shaped`: a

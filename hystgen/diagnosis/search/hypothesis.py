@@ -128,7 +128,7 @@ class Actuator:
         return rows
 
     def _slow_sum(self, item: Item, p: Array, sums: Sums) -> Array:
-        """(N,) weighted sum of the same; actuators that differ in one number share the part of the chain before it."""
+        """(N,) weighted sum of `_slow`; actuators that differ in one number share the part of the chain before it."""
         by: object = (self._moving, self._bending)
         if by not in sums:
             sums[by] = self._summed(item, p)
@@ -157,7 +157,7 @@ class Actuator:
         return rows
 
     def _moved(self, item: Item) -> Array:
-        """(n + 1, N) plays before they are bent, cached too."""
+        """(n + 1, N) plays before they are bent, also cached."""
         by = (self._moving, (), self._needed == _MOVED)
         rows = item.moved.recalled(by)
         if rows is None:
@@ -265,7 +265,7 @@ class Actuator:
         return free if offset is None else free * offset
 
     def _free(self, item: Item) -> Array:
-        """The same at all samples."""
+        """The free components at all samples."""
         free = [np.ones((1, len(item.run.t)))]
         free += [found for effect in self._starting(item) if len(found := effect.transients(item.run))]
         return np.concatenate(free)
@@ -399,7 +399,7 @@ class Structure:
         return [part.candidate.build(numbers) for part, numbers in zip(self.parts, self.pieces(shape)[1], strict=True)]
 
     def held(self, shape: Array) -> Structure:
-        """The same without free numbers: front and effects keep the numbers of a shape."""
+        """The structure without free numbers: front and effects keep the numbers of a shape."""
         front_shape, _ = self.pieces(shape)
         front = Kept(self.front.stages(front_shape), self.front.name)
         return replace(self, front=front, parts=tuple(map(kept, self.effects(shape))))
@@ -459,7 +459,7 @@ def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front
 
 
 def _inside(front: Front, shape: Array) -> bool:
-    """Whether a search may begin at a shape: within the bounds, since a limited shape is not the nominal front."""
+    """Whether a search may begin at a shape: if it is within the bounds. A clipped shape is not the nominal front."""
     low, high = front.bounds
     slack = front.slack(np.clip(shape, low, high))
     return bool(np.all((low <= shape) & (shape <= high)) and np.all(slack >= -acceptance.TOUCHING))

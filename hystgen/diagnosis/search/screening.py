@@ -1,4 +1,4 @@
-"""Extensions of a hypothesis by one effect: rank all shapes of the catalogue quickly, then fit the best jointly."""
+"""Extend a hypothesis by one effect: rank all shapes of the catalogue quickly, then fit the best of them jointly."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
     tanh = Tanh(drive)
     sides = (-acceptance.TANH_SIDE, acceptance.TANH_SIDE)
     bent = [np.array([acceptance.TANH_BEND, side]) for side in sides]  # bent one way over the whole range
-    # a limit outside the range has no effect, and a small change of it neither: start inside
+    # outside the range a limit has no effect, and neither has a small change of it: start inside
     limiters = [np.array([share, share, -2.0]) for share in acceptance.LIMITERS]
     return [
         one("front that bends one way", one_way, [one_way.straight]),
@@ -269,7 +269,7 @@ def _rough(now: Fitted, thin: Sequence[Item]) -> Fitted:
 
 
 def _jobs(to_fit: Sequence[Item]) -> int:
-    """Number of processes; the compiled functions of effects are loaded before they fork."""
+    """Number of processes; loads the compiled functions of effects, so that processes need not do so after the fork."""
     if sum(len(item.run.t) for item in to_fit) < WORTH_PROCESSES:
         return 1
     jobs = parallel.cores()
@@ -424,12 +424,12 @@ def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
 
 
 def _cost(structure: Structure, option: Option) -> int:
-    """Rough cost of a search: the longest go first, so that none runs by itself at the end."""
+    """Rough cost of a search: the longest ones go first, so that the pool is not left waiting for one at the end."""
     return len(structure.start) * (1 + len(option.starts))
 
 
 def _kept(tried: Sequence[_Screened], helpful: Sequence[_Screened]) -> list[_Screened]:
-    """The best on held-out records, others that fit best, and twins of these among the helpful ones."""
+    """The best on held-out records, the best of the others on fitted ones, and helpful ones that are twins of these."""
     kept: list[_Screened] = []
     by_held_out, by_fit = sorted(tried, key=lambda one: one.residual), sorted(tried, key=lambda one: one.fitted.rms)
     for order, most in ((by_held_out, acceptance.KEPT), (by_fit, acceptance.KEPT + acceptance.ALSO_KEPT)):
@@ -447,7 +447,7 @@ def _kept(tried: Sequence[_Screened], helpful: Sequence[_Screened]) -> list[_Scr
 
 
 def _twins(one: _Screened, other: _Screened) -> bool:
-    """Whether two have nearly the same errors, fitted and held out."""
+    """Whether two options leave nearly the same errors, fitted and held out."""
     both = (one.fitted.rms, other.fitted.rms), (one.residual, other.residual)
     return all(abs(a - b) <= acceptance.TWIN * b for a, b in both)
 

@@ -1,4 +1,4 @@
-"""Grey-box forward selection: which effects remove the gap on records that took no part in the fit.
+"""Grey-box forward selection: the effects that remove the gap on records that took no part in the fit.
 
 Held-out errors decide, and fitted ones have to confirm. The thresholds, and the reasons for them, are in `acceptance`.
 """
@@ -59,7 +59,7 @@ class Merit:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why an effect that was tried has no name: the number that missed a limit, and the limit.
+    """Why an effect that was tried has no name: a number, and the limit that it missed.
 
     `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
     fitted ones], `small` [share of the gap], `most` [rms left], `given` [rms left], `few` [share of samples], `other`:
