@@ -16,13 +16,13 @@ from hystgen.effects.base import Effect, Place, Run
 Array = NDArray[np.float64]
 
 EDGE = 1e-9
-"""s of the step itself, far below what any amplifier or converter does."""
+"""[s] Duration of the step itself, far below that of any amplifier or converter."""
 
 HORIZON = 3600.0
-"""s for which the response to the step is computed: a drive that waits for longer is no faster than creep."""
+"""[s] The response to the step is computed for this time: whoever waits for longer waits for creep."""
 
 FOREVER = 1e15
-"""s after which everything has come to rest; the filters take steps of any length."""
+"""[s] Time after which everything has come to rest; the filters take steps of any length."""
 
 A_DECADE = 8
 """Samples per decade of time at which the refinement starts."""

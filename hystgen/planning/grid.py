@@ -10,37 +10,37 @@ from decimal import Decimal
 from hystgen.basics.problems import PlanError
 
 MARGIN = 0.01
-"""Share of the input range, at each end, that no record enters."""
+"""[share of the input range] No record enters this part at either end."""
 
 OF_RATE = 0.98
-"""Share of the rate limit that is used, so that rounding stays below the limit."""
+"""[share of the rate limit] Fastest rate of a plan: rounding then stays below the limit."""
 
 FULL_SCALE = 8
-"""Sample times of a move over the whole range, where no rate limit is given."""
+"""[sample times] Duration of a move over the whole range if no rate limit is given."""
 
 LONGEST_EDGE = 32
-"""Most samples of a full-scale move at the rate limit; a longer one is sampled less often."""
+"""[samples] Longest full-scale move at the rate limit; if it would be longer, it is sampled less often."""
 
 MOVE = 12
-"""Fewest samples of a full-scale move of a triangle."""
+"""[samples] Shortest full-scale move of a triangle."""
 
 SLOW = 24.0
-"""s of a slow record, at least."""
+"""[s] Least duration of a slow record."""
 
 SLOWER = 1.5
-"""Least ratio of the lengths of a slow and a fast record."""
+"""[times] A slow record takes at least this many times as long as a fast one."""
 
 FAST_SAMPLES = 1000
-"""Samples of a fast record, about."""
+"""[samples] Approximate length of a fast record."""
 
 REST = 0.125
-"""Pause between records, in slow records."""
+"""[durations of a slow record] Pause between records."""
 
 LONGEST_MOVE = 60.0
-"""s of a move over the range: a plan of slower ones, which would take a day, is refused."""
+"""[s] Longest move over the range; a plan with slower ones would take a day, and is refused."""
 
 SLOW_SAMPLES = 480
-"""Samples of a slow record."""
+"""[samples] Length of a slow record."""
 
 
 @dataclass(frozen=True)
