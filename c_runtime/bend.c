@@ -5,7 +5,7 @@
 /* The value of a curve at x; sets `limited` if x lies beyond its ends. */
 static int64_t hystgen_bend(const hystgen_bend_curve_t *c, int64_t x, bool *limited) {
     const int64_t argument = hystgen_nearest(x, c->drop);
-    const int64_t inside = argument < -c->end ? -c->end : argument > c->end ? c->end : argument;
+    const int64_t inside = argument < c->least ? c->least : argument > c->most ? c->most : argument;
     if (inside != argument) {
         *limited = true;
     }

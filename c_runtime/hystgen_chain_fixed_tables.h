@@ -125,7 +125,8 @@ typedef struct {
     const int32_t *knot;
     const uint8_t *scale;
     const int32_t *coefficient;
-    int32_t end; /* largest argument of either sign */
+    int32_t least; /* argument */
+    int32_t most;
     uint_least16_t pieces;
     uint8_t degree;
     uint8_t drop; /* bits of a signal that an argument leaves out, */

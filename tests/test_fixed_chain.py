@@ -590,3 +590,24 @@ def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int) -> None:
         state[0, thermal_fixed.RISE] = warmest
         thermal_fixed.heat_move(t, state, 0, np.int64(-largest), np.int64(largest))
         assert 0 <= state[0, thermal_fixed.RISE] <= warmest
+
+
+@pytest.mark.parametrize(("level", "centre"), [(15.0, 4.0), (6.0, -8.0)])
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
+def test_status_tells_at_either_end_that_a_saturation_has_no_input(
+    arithmetic: str, level: float, centre: float
+) -> None:
+    """The limits may lie around any output, and on one side of 0; an offset moves a reference there."""
+    one = model(chain("limited", f"name: saturation, level: {level:g}, centre: {centre:g}"))
+    numbers = tables.build(one.chain, arithmetic, T)
+    scale = 1.0 if numbers.codes is None else 1.0 / float(numbers.codes.output_lsb)
+    limits = numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1].astype(float)
+    for way, u in zip((-level, level), limits.tolist(), strict=True):
+        to_limit = u - (centre + way + 0.5) * scale
+        for share, seen in ((0.0, False), (1.001, True)):
+            x = np.array([share * to_limit, u])
+            op = np.array([slots.OP_OFFSET, slots.OP_STEP], dtype=np.uint8)
+            given = x if numbers.codes is None else np.rint(x)
+            _, status = reference.answers(numbers.tables, True, op, given, compiled=False)
+            assert not status[0], "the offset may be set"
+            assert bool(status[1] & slots.DOMAIN) == seen

@@ -157,7 +157,7 @@ def saturation(t: ChainTables, j: int, name: str, prefix: str) -> dict[str, Any]
 def _curve(t: Bends, which: int, own: str) -> tuple[list[str], str]:
     """The tables of a curve in fixed point, and the initializer of the curve itself."""
     arrays, pointers = _pieces(t, which, own)
-    counts = (t.domain[which, 1], t.pieces[which], t.coefficient.shape[1] - 1, *t.scaled[which])
+    counts = (*t.domain[which], t.pieces[which], t.coefficient.shape[1] - 1, *t.scaled[which])
     return arrays, f"{pointers},\n     {_entries(counts)}"
 
 

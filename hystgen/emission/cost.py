@@ -157,7 +157,7 @@ def _constants(
     reach = (real, real)
     count = (2, 2)
     factor, table = layout.struct((4, 4), (1, 1)), (layout.pointer, layout.pointer)
-    bend = layout.struct(table, table, table, (4, 4), count, *3 * [(1, 1)])
+    bend = layout.struct(table, table, table, (4, 4), (4, 4), count, *3 * [(1, 1)])
     behind = {
         "factor_t": factor,
         "bend_curve_t": bend,

@@ -529,25 +529,16 @@ class _Builder:
         )
 
     def _bends(self, effect: TanhSaturation, size: float, inverted: tuple[float, float]) -> tuple[Bend, Bend]:
-        """The curve of a tanh for inputs up to `size` codes, and its inverse for results between two.
-
-        Arguments of a curve go equally far to both sides: beyond the nearer end of its range it is constant.
-        """
+        """The curve of a tanh for inputs up to `size` codes, and its inverse for results between two."""
         scale = 2.0**self.bits
 
         def curve(function: Callable[[float], float], low: float, high: float, value: float) -> Bend:
-            most = max(-low, high)
-            drop = max(0, math.ceil(math.log2(most * scale)) - BEND_BITS)
+            drop = max(0, math.ceil(math.log2(max(-low, high) * scale)) - BEND_BITS)
             lift = max(0, math.ceil(math.log2(value * scale)) - BEND_BITS)
-            end = math.floor(most * scale / 2.0**drop)
             into, out = 2.0**drop / scale, scale / 2.0**lift
-            allowed, corners = max(0.5, out / 64.0), [x / into for x in (low, high) if abs(x) < most]
-
-            def within(x: float) -> float:
-                return function(min(max(x * into, low), high)) * out
-
+            ends, allowed = (math.ceil(low / into), math.floor(high / into)), max(0.5, out / 64.0)
             try:
-                found = FixedCurve(within, (-end, end), corners, self.about.degree, allowed)
+                found = FixedCurve(lambda x: function(x * into) * out, ends, [], self.about.degree, allowed)
             except FormatError:
                 self._refuse("saturation bends too sharply within the output's range")
             return Bend(found, drop, lift)
