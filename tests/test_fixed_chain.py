@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 import subprocess
@@ -152,6 +153,63 @@ def test_bounds_of_viscous_plays_hold_for_a_shaken_drive_and_are_reached(
     numbers = tables.build(one.chain, arithmetic, T)
     worst, bound = wrong(one, arithmetic, numbers, shaken(numbers, n, rate))
     assert worst <= bound < 4.0 * worst
+
+
+LINEAR = "name: rate_dependence, shape: relaxation, time_constant: 0.02"
+SOFT = "name: rate_dependence, shape: relaxation, time_constant: 2.0e-3, exponent: 0.5"
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q15"])
+@pytest.mark.parametrize(
+    "text", [CHAINS["viscous"], chain("linear", LINEAR), chain("soft", SOFT)], ids=["viscous", "linear", "soft"]
+)
+def test_bounds_of_inverses_of_viscous_plays_hold_for_such_drives_and_are_reached(text: str, arithmetic: str) -> None:
+    """Asked for where the model has been, the inverse undoes part of what its plays do otherwise than the model's."""
+    one = model(text)
+    numbers = tables.build(one.chain, arithmetic, T)
+    codes = numbers.codes
+    drive, output = (1.0, 1.0) if codes is None else (float(codes.drive_lsb), float(codes.output_lsb))
+    bound = bounds.chain_bounds(numbers, arithmetic).rounding if codes is None else codes.inverse_rounding * drive
+    worst = 0.0
+    for rate in (0.01, 0.015, 0.06):
+        v = shaken(numbers, 2000, rate)
+        v = np.float32(v).astype(float) if codes is None else np.rint(v / drive) * drive
+        u = one.simulate(v, t=np.arange(len(v)) * T)
+        asked = np.float32(u).astype(float) if codes is None else np.rint(u / output)
+        left = answers(numbers, Run(np.arange(len(v)) * T, asked), True).astype(float) * drive - v
+        worst = max(worst, float(np.max(np.abs(left))))
+    assert worst <= bound < 4.0 * worst
+
+
+def found_input(p: Array, d: Array, shift: Array, rate: Array) -> tuple[float, Array]:
+    """e with `p_0 e + sum p_i d_i = 0` after each play has gone a share of its way to e and its shift."""
+    kept = (1.0 - rate) * d + rate * shift
+    e = -float(p[1:] @ kept) / float(p[0] + p[1:] @ rate)
+    return e, kept + rate * e
+
+
+def test_the_inverse_undoes_shifts_of_the_plays_input() -> None:
+    """All ways in which up to three plays can be shifted, one after the other; then plays that follow in part."""
+    rng = np.random.default_rng(8)
+    for _ in range(6):
+        p = 10.0 ** rng.uniform(-1.0, 0.5, 4)
+        slopes = np.cumsum(p)
+        ones, reached = np.ones(3), 0.0
+        signs = [np.array(each) for each in itertools.product((-1.0, 1.0), repeat=3)]
+        for first, second, third in itertools.product(signs, repeat=3):
+            e, d = 0.0, np.zeros(3)
+            for level, sign in ((3, first), (2, second), (1, third)):
+                e, d = found_input(p, d, sign, (np.arange(3) < level).astype(float))
+            reached = max(reached, abs(e))
+        assert reached == pytest.approx(float(np.sum(p[1:] * (2.0 / slopes[1:] - 1.0 / slopes[-1]))))
+        bound = moving.found_shifted(p, p, ones, True)
+        assert reached < bound < 2.0 * reached
+        assert bound <= moving.found_shifted(p, p, ones, False)
+        d = np.zeros(3)
+        for _ in range(3000):
+            rate = 10.0 ** rng.uniform(-2.0, 0.0) * (np.arange(3) < rng.integers(0, 4))
+            e, d = found_input(p, d, rng.choice(signs), rate)
+            assert abs(e) <= bound
 
 
 @pytest.mark.parametrize("arithmetic", ["float32", "q15"])

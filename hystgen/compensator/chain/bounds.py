@@ -127,8 +127,9 @@ def _gain_ends(compiled: Compiled) -> tuple[float, float]:
     return least, largest
 
 
-def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float]:
-    """Errors of the sum of plays that an effect moves or bends, and of the same at the input that a search finds.
+def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float, float]:
+    """Of plays that an effect moves or bends: the shift of their input that errors of a play are worth, the roundings
+    of their sum, and its error because a search ends at some width.
 
     `emitted`: include the approximations of the C, which double precision does not make.
     """
@@ -152,9 +153,8 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float]
         if emitted:
             play += float(t.number[moving.SEEN]) * way  # where the input counts as standing still
     summed = (12.0 + len(static.pi.weights)) * u * size * steep
-    error = float(np.sum(p[1:])) * steep * play + float(np.sum(p)) * summed
     width = 3.0 * (high - low) * 2.0 ** -t.halves + u * size
-    return error, error + float(np.sum(p)) * steep * width
+    return play, float(np.sum(p)) * summed, float(np.sum(p)) * steep * width
 
 
 def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[float, float]:
@@ -266,14 +266,19 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     plays = error_bounds(static, arithmetic, "loop")
     pi = static.pi
     gain = (2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]) / static.front_slopes[0] if pi.weights[0] > 0.0 else math.inf
+    only_seen = 0.0  # by creep behind plays whose drive is limited: errors of the sum that the inverse undoes
     if compiled.tables.moving.used:
         least = moving.least_slope(static, compiled.parts.plays) / 2.0
         if compiled.tables.moving.moves == moving.DILATED:
             least = min(least, moving.least_dilated(static, compiled.parts.plays, compiled.seconds))
         gain = 1.0 / least / static.front_slopes[0]
         pairs = zip(_moving(compiled, arithmetic, True), _moving(compiled, "float64", False), strict=True)
-        there, back = (sum(each) for each in pairs)
-        plays = ErrorBounds(plays.forward + there, plays.inverse + gain * back, plays.rounding + gain * back)
+        shift, rounding, search = (sum(each) for each in pairs)
+        shifts = np.full(pi.n, shift)
+        there, back = moving.of_shifts(static, compiled.parts.plays, compiled.tables.moving.moves, shifts)
+        only_seen = gain * (there - back)
+        own = gain * (back + rounding + search)
+        plays = ErrorBounds(plays.forward + there + rounding, plays.inverse + own, plays.rounding + own)
     u = float(np.finfo(arithmetic).eps) / 2 + float(np.finfo("float64").eps) / 2
     same = bool(condition(compiled))
     ways = _one(compiled, arithmetic, True, same), _one(compiled, "float64", False, same)
@@ -281,7 +286,7 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     whole = static.input_range[1] - static.input_range[0]
     seen = 1.0 if same else _seen(compiled)
     inverse, rounding = (
-        min(SECOND_ORDER * _lags(compiled, seen * own + gain * asked, u, same), whole)
+        min(SECOND_ORDER * _lags(compiled, seen * own + (seen - 1.0) * only_seen + gain * asked, u, same), whole)
         for own in (plays.inverse, plays.rounding)
     )
     if same or (compiled.tables.slew and (len(compiled.tables.lag.exact) or compiled.tables.own.ahead)):

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
+import numpy as np
+
 from hystgen.arithmetic.factors import MANTISSA_BITS, lifted
 from hystgen.arithmetic.factors import error as missed
 from hystgen.chain.static import StaticModel
@@ -32,6 +34,7 @@ from hystgen.compensator.chain.moving import (
     Bumps,
     least_dilated,
     least_slope,
+    of_shifts,
     steepest_bend,
     yield_error,
 )
@@ -323,12 +326,12 @@ class Bounds:
         """Largest change of a play's contribution per change of the play."""
         return 1.0 + steepest_bend(self.static, self.parts.plays) if self.bumps.curves else 1.0
 
-    def _moved(self, way: float) -> float:
+    def _moved(self, way: float) -> tuple[float, float]:
         """Error of the sum of plays that an effect moves or bends, by roundings and by contacts within a step in which
-        their input moves by `way`, in codes."""
+        their input moves by `way`, in codes; and the part of it that the inverse undoes."""
         t = self.tables.moving
         if not t.used:
-            return 0.0
+            return 0.0, 0.0
         travel, step = float(self.inner.hull[1] - self.inner.hull[0]), float(self.inner.step)
         plays = []
         for first, second in self._shares:
@@ -343,9 +346,10 @@ class Bounds:
                 plays.append(step * (t.moves != PLAIN))
         slopes = 0.5 * len(t.relaxed.slope) * 2.0**-self.inner.bits * travel * t.scanned
         slopes += len(plays) * 2.0**-self.inner.bits * self.bumps.largest  # rounded weights of the bends
-        each = (self._bent * play + self.bumps.error * step for play in plays)
-        found = math.fsum(abs(p) * play for p, play in zip(self.static.pi.weights[1:], each, strict=True))
-        return float(found / float(self.inner.output_lsb) + slopes)
+        shifted, counting = of_shifts(self.static, self.parts.plays, t.moves, np.array(plays))
+        bumps = math.fsum(map(abs, self.static.pi.weights[1:])) * self.bumps.error * step
+        lsb = float(self.inner.output_lsb)
+        return (shifted + bumps) / lsb + slopes, (shifted - counting) / lsb
 
     def _dashpot(self, step: float, way: float) -> float:
         """How far plays with a nonlinear dashpot can be from those of the model: by the table, and because the input
@@ -370,7 +374,7 @@ class Bounds:
         `_way` if none is given."""
         steep = self.static.front_slopes[1] * self._steepest / float(self.inner.output_lsb)
         level = 0.5 * self._signal if self.drop else 0.0
-        moved = self._moved(self._way if way is None else way)
+        moved, _ = self._moved(self._way if way is None else way)
         return self._bent * float(self.inner.sum_error()) + moved + steep * arriving * self._arriving + level
 
     def forward(self) -> float:
@@ -428,11 +432,12 @@ class Bounds:
         slowed = self.slowed * float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
         solved += steep * (code[0] if self.condition else sum(code) + short + slowed)  # both have seen it, or not
         missed_by = self._plays(0.0, way) * float(self.inner.output_lsb) + self._steepest * solved * self._arriving
+        undone = self._moved(self._way if way is None else way)[1] * float(self.inner.output_lsb)
         for numbers in self.creeps:  # their states have seen the sum of the plays
             missed_by *= numbers.slope * self._creep_gain(numbers)
         for each in self.behind:
             missed_by = self._passed(each, 0.0, missed_by)
-        residual = self._asked() * float(self.inner.output_lsb) + missed_by
+        residual = self._asked() * float(self.inner.output_lsb) + missed_by - undone
         return self._gain() * residual / self._arriving
 
     def _gain(self) -> float:
