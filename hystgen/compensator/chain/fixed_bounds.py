@@ -310,7 +310,8 @@ class Bounds:
             exact, (rate, theta, _, _) = self.lags[0]
             return here, code * (1.0 if exact else rate * (1.0 + 2.0 * theta))
         rounded = bool(self.static.stages or self.ahead) or self._fine > 0
-        return here, code * rounded
+        now = math.prod(abs(each.linear.forward.d) for each in self.ahead)  # what was rounded before has been seen
+        return here, code * rounded * now
 
     @cached_property
     def _shares(self) -> list[tuple[float, float]]:

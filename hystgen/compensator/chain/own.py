@@ -160,15 +160,16 @@ class Linear:
 
         A limit may pass an error of the input on in part or not at all. A single state then lies between its values for
         the two cases. If earlier inputs count less in an output than the present one does, errors of the input
-        contract.
+        contract. If solve gives the input for which absorb returns the output, an error of the input has the effect of
+        one of the output that it is asked for, by what the present input counts.
         """
-        before, now, back = self.forward.before(), abs(self.forward.d), self.backward
-        bounds = []
-        if self.exact and len(self.settled) == 1:
-            bounds.append(back.largest * error + own * (1.0 + back.before() * now))
-        if self.exact and before < now:
-            bounds.append((error / now + own) / (1.0 - before / now))
-        return min(bounds, default=back.largest * error + own * (1.0 + back.largest * self.forward.largest))
+        forward, back = self.forward, self.backward
+        before, now = forward.before(), abs(forward.d)
+        if not self.exact:
+            return back.largest * error + own * (1.0 + back.largest * forward.largest)
+        error += now * own
+        contracting = error / (now - before) if before < now else math.inf
+        return min(back.largest * error, contracting)
 
     def _shares(self, u: float) -> NDArray[Any]:
         return np.array([Rounded(abs(each), u * abs(each), u) for each in self.numbers.tolist()], dtype=object)
