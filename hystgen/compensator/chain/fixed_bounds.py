@@ -310,8 +310,7 @@ class Bounds:
             exact, (rate, theta, _, _) = self.lags[0]
             return here, code * (1.0 if exact else rate * (1.0 + 2.0 * theta))
         rounded = bool(self.static.stages or self.ahead) or self._fine > 0
-        now = math.prod(abs(each.linear.forward.d) for each in self.ahead)  # what was rounded before has been seen
-        return here, code * rounded * now
+        return here, code * rounded
 
     @cached_property
     def _shares(self) -> list[tuple[float, float]]:
