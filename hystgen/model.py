@@ -23,6 +23,7 @@ from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters, load_parameters
+from hystgen.parameters.schema import MOST_REFERENCES
 from hystgen.plays import slots
 
 if TYPE_CHECKING:
@@ -165,10 +166,10 @@ class Model:
                     f"{ARITHMETICS[arithmetic].finer}, or allow it with emit.compensation.noise_gain"
                 )
             return
-        if gain > how.noise_gain:
+        if compiled.noisy(how.noise_gain):
             raise UnsupportedEffectsError(
-                f"the inverse has a noise gain of {gain:.4g}, more than emit.compensation.noise_gain = "
-                f"{how.noise_gain:g}; round corners of the reference (corner), or allow more"
+                f"averages over {MOST_REFERENCES} samples of the reference, the most that the C keeps, leave a noise "
+                f"gain of {gain:.4g}, more than emit.compensation.noise_gain = {how.noise_gain:g}; allow that much"
             )
 
     def refusals(self, operator: str, arithmetic: str) -> list[tuple[Effect, str]]:

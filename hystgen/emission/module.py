@@ -29,6 +29,13 @@ from hystgen.emission.text import WIDTH, comment_text, define, fit, literal
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters, parameters_sha256
 
+LEAST_LATE = 1e-6
+"""[samples] Motion that is less late is in time: the means of ages are sums with rounding."""
+
+PERIODS = (50, 200)
+"""[samples] Periods for which the header states what averages take: that of the fastest sweep for which bounds are
+stated is twice the first."""
+
 
 @functools.cache
 def _environment() -> jinja2.Environment:
@@ -232,6 +239,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     )  # fmt: skip
     glue: chain.Glue | None = getattr(values, "glue", None)
     values.timing = _timing(parameters, compiled) if compiled else []
+    values.smoothed = _smoothed(compiled) if compiled and options.inverse else []
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
     values.corners = (max(n, 1) if values.fixed else n + 1) if corners else 0
     front = render("front.c.j2", values) if values.stages else ""
@@ -316,16 +324,29 @@ def _limits(values: SimpleNamespace) -> list[str]:
 def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, str]]:
     """Macros of a model with effects about time."""
     kind = np.float64 if compiled.tables.fixed else compiled.tables.threshold.dtype.type
-    late = compiled.needed - compiled.ahead
     ahead = "samples that the argument of step is ahead of the motion"
-    if late > 0:
-        ahead += f", which is {late} late"
+    if compiled.late > LEAST_LATE:
+        ahead += f", which is {compiled.late:.4g} late"
     return [
         ("SAMPLE_TIME", literal(kind(parameters.sample_time)), "s, from step to step"),
         ("PREVIEW", str(compiled.ahead), ahead),
         ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest gain from reference to drive over that at rest"),
         ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, a second, for which the errors below hold"),
         *_settings(compiled),
+    ]
+
+
+def _smoothed(compiled: Compiled) -> list[str]:
+    """What holds the noise gain, and what it costs."""
+    one = compiled.smoothing
+    if one is None:
+        return []
+    twice = {1: "once", 2: "twice"}.get(one.times, f"{one.times} times")
+    losses = " and ".join(f"{100.0 * one.loss(period):.2g} % with {period} samples a period" for period in PERIODS)
+    late = f", and the motion is {one.late:.3g} samples later" if one.late > LEAST_LATE else ""
+    return [
+        f"Noise: references are averaged {twice} over {one.width:.4g} samples, so that the noise gain is "
+        f"{compiled.noise_gain:.4g} instead of {one.without:.4g}; a sine loses {losses}{late}"
     ]
 
 
@@ -443,6 +464,7 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         f"Model: {model}; arithmetic {options.arithmetic}; engine {options.engine}; operator {options.operator}; "
         f"layout {options.layout}",
         *(f"Not compensated: {words}" for words in options.left_out),
+        *values.smoothed,
         *([""] if values.precision else []),
         *values.precision,
         "",

@@ -44,7 +44,7 @@ from hystgen.compensator.chain.layout import (
     braked,
     fastest,
     output_range,
-    taps_of,
+    read,
 )
 from hystgen.compensator.chain.moving import Bumps
 from hystgen.compensator.chain.own_fixed import Formats
@@ -113,7 +113,8 @@ class _Builder:
         self.static, self.parts = chain.cascade, Parts.of(chain.effects)
         self.low, self.high = output_range(self.static, self.parts, seconds)
         self.drive_lsb, self.output_lsb = lsbs(self.static, arithmetic, *lsb, (self.low, self.high))
-        self.taps = taps_of(self.parts, seconds, how)
+        self.reading = read(self.static, self.parts, seconds, how)
+        self.taps = self.reading.taps
         self.creeps = [creep.numbers(each, seconds) for each in self.parts.creeps]
         self.modes = [resonance.numbers(each, seconds) for each in self.parts.modes]
         self.lags = [lag.numbers(each, seconds) for each in self.parts.lags]
@@ -181,7 +182,8 @@ class _Builder:
             self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
             bounds.condition, math.ceil(self.sizes.largest * 2**self.bits),
         )  # fmt: skip
-        return Compiled(tables, self.taps, self.parts, self.seconds, static, max_rate, self.how.preview, codes)
+        how, smoothing = self.how.preview, self.reading.smoothing
+        return Compiled(tables, self.taps, self.parts, self.seconds, static, max_rate, how, codes, smoothing)
 
     # ------------------------------------------------------------ refusals
 
@@ -440,7 +442,7 @@ class _Builder:
     @cached_property
     def clocks(self) -> list[ClockNumbers]:
         """The clocks of the drifts, for references as far ahead as they may come."""
-        ahead = self.how.preview if self.how.preview is not None else max(self.taps.ahead, 0) if self.taps else 0
+        ahead = self.reading.ahead(self.how.preview)
         signal = self.output_lsb / 2**self.bits
         farthest = float(self.signal(self.high - self.low))
         return [drift.numbers(each, self.seconds, signal, farthest, ahead) for each in self.parts.drift]

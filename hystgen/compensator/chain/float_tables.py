@@ -24,7 +24,7 @@ from hystgen.compensator.chain.layout import (
     braked,
     fastest,
     output_range,
-    taps_of,
+    read,
 )
 from hystgen.compensator.float_tables import build_float, inward
 from hystgen.effects.ageing import compensator as ageing
@@ -130,8 +130,8 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> C
     rows = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in creeps]
     lags = [lag.numbers(each, seconds) for each in parts.lags]
     span, drive_span = float(high) - float(low), static.input_range[1] - static.input_range[0]
-    taps = taps_of(parts, seconds, how)
-    ahead = how.preview if how.preview is not None else max(taps.ahead, 0) if taps else 0
+    reading = read(static, parts, seconds, how)
+    taps, ahead = reading.taps, reading.ahead(how.preview)
     rates = [(each.rate * seconds, each.falling_rate * seconds) for each in parts.slew]
     rising, falling = (min(each) for each in zip(*rates, strict=True)) if rates else (0.0, 0.0)
     lead = math.prod((2.0 / row[lag.LATE if exact else lag.RATE] for exact, row in lags), start=8.0)
@@ -173,4 +173,4 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> C
     if drives or outputs:
         tables = OwnChainTables(*tables)
         tables.own_effects = tuple(type(one.effect) for one in (*drives, *outputs))
-    return Compiled(tables, taps, parts, seconds, static, max_rate, how.preview)
+    return Compiled(tables, taps, parts, seconds, static, max_rate, how.preview, smoothing=reading.smoothing)

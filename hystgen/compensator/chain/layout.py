@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.chain import own, preview
+from hystgen.compensator.chain import noise, own, preview
+from hystgen.compensator.chain.noise import Smoothing
 from hystgen.compensator.chain.own import Linear, OwnTables
 from hystgen.compensator.chain.preview import Taps
 from hystgen.effects.ageing.compensator import AgeingTables
@@ -21,14 +22,13 @@ from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep.compensator import CreepTables
 from hystgen.effects.delay.compensator import DelayTables
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag.compensator import LagTables
 from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.resonance.compensator import ModeNumbers
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.compensator import HeatTables
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
-from hystgen.parameters.schema import Compensation
+from hystgen.parameters.schema import MOST_REFERENCES, Compensation
 from hystgen.plays.slots import Counts, Reals
 
 OFFSET, FARTHEST, RISING, FALLING, SHARE = range(5)
@@ -182,6 +182,8 @@ class Compiled:
     asked: int | None = None
     codes: Codes | None = None
     """of fixed point"""
+    smoothing: Smoothing | None = None
+    """in the taps"""
 
     @property
     def largest_step(self) -> float:
@@ -197,12 +199,13 @@ class Compiled:
     @property
     def ahead(self) -> int:
         """NAME_PREVIEW: what the model needs, or what was asked for."""
-        return self.needed if self.asked is None else self.asked
+        return Read(self.taps, self.smoothing).ahead(self.asked)
 
     @property
-    def needed(self) -> int:
-        """Samples by which the reference has to be ahead for the motion to be in time."""
-        return max(self.taps.ahead, 0) if self.taps else 0
+    def late(self) -> float:
+        """Samples by which the motion is late, since the reference is not as far ahead as it would have to be."""
+        missing = max(Read(self.taps, None).ahead(None) - self.ahead, 0)
+        return missing + (self.smoothing.late if self.smoothing else 0.0)
 
     @cached_property
     def own(self) -> list[Linear]:
@@ -217,24 +220,11 @@ class Compiled:
     @cached_property
     def noise_gain(self) -> float:
         """Largest gain from reference to drive over all frequencies, divided by the gain at rest."""
-        z = np.exp(-1j * np.linspace(0.0, np.pi, 2001))
-        gain = np.ones_like(z)
-        if self.taps:
-            gain = np.polynomial.polynomial.polyval(z, self.taps.weights[::-1].astype(complex))
-        for each in self.parts.creeps:
-            one = creep.numbers(each, self.seconds)
-            rate, early, late, _ = one.terms.T[:, :, None]
-            states = np.sum((early * z + late) / (1.0 - (1.0 - rate) * z), axis=0)
-            gain = gain * one.rest / (one.slope - float(np.sum(late)) + states)
-        for each in self.parts.lags:
-            exact, (rate, second, late, _) = lag.numbers(each, self.seconds)
-            if exact:
-                gain = gain * (1.0 - (1.0 - rate) * z) / (late + second * z)
-            else:
-                gain = gain * (1.0 + second - second * z) * (1.0 - (1.0 - rate) * z) / rate
-        for block in self.own:
-            gain = gain * block.backward.response(z) * block.rest
-        return float(np.max(np.abs(gain)))
+        return noise.largest(noise.Gain(self.static, self.parts, self.seconds, self.taps or preview.PLAIN))
+
+    def noisy(self, limit: float) -> bool:
+        """Whether the noise gain exceeds a limit, by more than its own rounding."""
+        return self.noise_gain > limit * (1.0 + noise.SAME)
 
 
 def braked(parts: Parts, exact: Sequence[bool]) -> int:
@@ -265,13 +255,31 @@ def largest_way(static: StaticModel, ahead: Sequence[Linear], step: float) -> fl
     return min(static.front_slopes[1] * grown * step + static.branch_gap, max(grown, 1.0) * (high - low))
 
 
-def taps_of(parts: Parts, seconds: float, how: Compensation) -> Taps | None:
-    """The weights of the reference in the preview; None if the reference is taken as it comes."""
+class Read(NamedTuple):
+    """How the reference is read: its weights in the preview, None if it is taken as it comes, and the averages in them
+    that hold the noise gain."""
+
+    taps: Taps | None
+    smoothing: Smoothing | None
+
+    def ahead(self, asked: int | None) -> int:
+        """`Compiled.ahead`."""
+        return asked if asked is not None else max(self.taps.ahead, 0) if self.taps else 0
+
+
+def read(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> Read:
+    """The reading of the reference that a model takes."""
     delay = parts.delay + (0.5 * seconds if how.drive_hold == "held" else 0.0)
     modes = [] if how.resonance == "none" else parts.modes
     needed = preview.taps(delay, modes, seconds, how.taps, how.corner, how.resonance == "shaper")
+    smoothing = None
+    if how.noise_gain is not None:
+        gain = noise.Gain(static, parts, seconds, needed)
+        smoothing = noise.smoothing(gain, how.noise_gain, MOST_REFERENCES, how.preview)
+    if smoothing is not None:
+        needed = smoothing.before(needed)
     led = preview.led(needed, how.preview)
-    return led if len(led.weights) > 1 or led.first else None
+    return Read(led if len(led.weights) > 1 or led.first else None, smoothing)
 
 
 def settled(static: StaticModel, effects: Sequence[Effect], w: float) -> float:

@@ -114,8 +114,8 @@ class System:
 
     def response(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Response (N,) at `z` (N,), the factor z^-1 of a delay by one sample."""
-        eye = np.eye(len(self.b))
-        return np.array([self.d + x * self.c @ np.linalg.solve(eye - x * self.a, self.b) for x in z])
+        states = np.linalg.solve(np.eye(len(self.b)) - z[:, None, None] * self.a, self.b[:, None])[:, :, 0]
+        return np.asarray(self.d + z * (states @ self.c))
 
 
 @dataclass(frozen=True)

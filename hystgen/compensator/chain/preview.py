@@ -39,6 +39,10 @@ class Taps(NamedTuple):
         return self.first + len(self.weights) - 1
 
 
+PLAIN = Taps(0, np.ones(1))
+"""The reference as it comes."""
+
+
 def taps(
     delay: float, modes: Sequence[Resonance], seconds: float, number: int = 3, corner: int = 0, shaped: bool = False
 ) -> Taps:

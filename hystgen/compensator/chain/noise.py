@@ -1,0 +1,257 @@
+"""The gain from the reference to the drive over all frequencies, and the averages that hold it below a limit.
+
+What leads, leads by differences, whose gain grows with the frequency. A moving average over w samples divides a
+difference by w at most: `(1 - z)(1 + z + .. + z^(n-1) + e z^n) = 1 - (1 - e) z^n - e z^(n+1)` has no gain above 2, as
+`1 - z` itself. Averages are weights of the preview like all others: no state, no recursion, hence no limit cycles, and
+centred ones shift nothing in time. For the same limit, poles in front of the lead have the same delay and three times
+the variance.
+
+One average stands in front of all leads. Blocks in series are linear about an operating point, so that only the product
+of their gains counts, and no rule has to share the limit among them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.chain.static import StaticModel
+from hystgen.compensator.chain import moving, own
+from hystgen.compensator.chain.own import Linear
+from hystgen.compensator.chain.preview import Taps
+from hystgen.effects.base import decays
+from hystgen.effects.creep import compensator as creep
+from hystgen.effects.lag import compensator as lag
+from hystgen.effects.rate_dependence import compensator as dashpot
+from hystgen.effects.rate_dependence.compensator import Movement
+from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate
+
+if TYPE_CHECKING:
+    from hystgen.compensator.chain.layout import Parts
+
+Array = NDArray[np.float64]
+
+FREQUENCIES = np.append(np.geomspace(1e-10, 1e-3, 281)[:-1], np.linspace(1e-3, np.pi, 4096))
+"""[rad a sample] Where a gain is looked at first: 8 places in each lobe of an average over 1000 samples, 40 in each
+decade below, where creep of up to 2^28 samples makes a step of the gain."""
+
+PEAK = 0.9
+"""[largest value] Local maxima that are looked at closely: between two places of `FREQUENCIES` a lobe hides 8 % at most,
+`1 - cos(pi/8)`."""
+
+HALVINGS = 60
+"""[steps] Of a search for a frequency or a width: to the last bits of a double."""
+
+SAME = 1e-9
+"""[relative] Excess of a limit that is rounding: responses of a thousand weights have some 1e-13 of it."""
+
+MOST_TIMES = 4
+"""[averages] Most that stand one behind the other. Two lose least for a lag or a mode, three for both, four for three
+leads, and a fifth would save less than 1 % of the loss. Set by: benchmarks/chosen_numbers.py averages."""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """The largest gain (N,) of a model's inverse at frequencies (N,) in rad a sample, over that at rest.
+
+    Of small changes of the reference, over all numbers of plays that follow them: plays that relax, or grow with the
+    rate, follow more slowly than those of the static inverse. `taps`: of the preview.
+    """
+
+    static: StaticModel
+    parts: Parts
+    seconds: float
+    taps: Taps
+
+    @cached_property
+    def own(self) -> list[Linear]:
+        """Blocks of the user's own."""
+        return [own.linear(each, self.seconds) for each in (*self.parts.own_drives, *self.parts.own_outputs)]
+
+    def __call__(self, at: Array) -> Array:
+        z = np.exp(-1j * at)
+        found = np.polynomial.polynomial.polyval(z, self.taps.weights[::-1].astype(complex))
+        for each in self.parts.creeps:
+            one = creep.numbers(each, self.seconds)
+            rate, early, late, _ = one.terms.T[:, :, None]
+            states = np.sum((early * z + late) / (1.0 - (1.0 - rate) * z), axis=0)
+            found = found * one.rest / (one.slope - float(np.sum(late)) + states)
+        for each in self.parts.lags:
+            exact, (rate, second, late, _) = lag.numbers(each, self.seconds)
+            if exact:
+                found = found * (1.0 - (1.0 - rate) * z) / (late + second * z)
+            else:
+                found = found * (1.0 + second - second * z) * (1.0 - (1.0 - rate) * z) / rate
+        for block in self.own:
+            found = found * block.backward.response(z) * block.rest
+        return np.asarray(np.abs(found) * self._plays(z))
+
+    def _plays(self, z: NDArray[np.complex128]) -> Array:
+        """Of the plays: `C_k/|p_0 + sum F_i p_i|`, the largest over k, for plays that follow by `F_i`."""
+        p = np.array(self.static.pi.weights)
+        for effect in self.parts.plays:
+            if isinstance(effect, RelaxingPlays | ThresholdRate):
+                p[1:] *= 1.0 + moving.steepest_bend(self.static, self.parts.plays)
+                if dashpot.nonlinear(effect):  # some stretch is so slow that its play does not follow
+                    return np.full(len(z), float(np.sum(p)) / p[0])
+                movement = Movement(effect, np.array(self.static.pi.thresholds), p)
+                followed = np.ones((len(p), len(z)), dtype=complex)
+                for i, tau in enumerate(movement.taus, 1):
+                    if movement.by_threshold(self.seconds):
+                        followed[i] = 1.0 - tau / self.seconds * (1.0 - z)
+                    elif tau > 0.0:
+                        decay, early, late = (float(x[0]) for x in decays(np.array([self.seconds]), tau))
+                        followed[i] = (late + early * z) / (1.0 - decay * z)
+                sums = np.abs(np.cumsum(p[:, None] * followed, axis=0))
+                return np.asarray(np.max(np.cumsum(p)[:, None] / sums, axis=0))
+        return np.ones(len(z))
+
+    @cached_property
+    def near(self) -> Array:
+        """Frequencies between which it does not rise and fall unseen: blocks of the user's own may ring."""
+        ringing = [np.abs(np.angle(np.linalg.eigvals(block.backward.a))) for block in self.own]
+        return np.unique(np.concatenate([FREQUENCIES, *ringing]))
+
+
+def peaks(gain: Callable[[Array], Array], near: Array) -> tuple[Array, Array]:
+    """The local maxima (M,) close to the largest one, and their frequencies; `near` rises, with one maximum at most
+    between three of them."""
+    found = gain(near)
+    before, behind = (np.append(-np.inf, found[:-1]), np.append(found[1:], -np.inf))
+    places = np.flatnonzero((found >= before) & (found >= behind) & (found >= PEAK * np.max(found)))
+    low, high = near[np.maximum(places - 1, 0)], near[np.minimum(places + 1, len(near) - 1)]
+    for _ in range(HALVINGS):
+        third = (high - low) / 3.0
+        rises = gain(low + third) < gain(high - third)
+        low, high = np.where(rises, low + third, low), np.where(rises, high, high - third)
+    at = np.append(near[places], 0.5 * (low + high))
+    return gain(at), at
+
+
+def largest(gain: Gain) -> float:
+    """The largest gain over all frequencies."""
+    return float(np.max(peaks(gain, gain.near)[0]))
+
+
+@dataclass(frozen=True)
+class Smoothing:
+    """`times` moving averages over `width` samples, one behind the other.
+
+    `centred`: the same to both sides of a sample; else the newest samples count whole. `ahead`: samples by which the
+    newest one of the last average is ahead of the motion. `without`: the noise gain without them.
+    """
+
+    times: int
+    width: float
+    centred: bool
+    ahead: int = 0
+    without: float = 1.0
+
+    @property
+    def whole(self) -> int:
+        """Samples of one average that count whole."""
+        return 2 * int((self.width - 1.0) // 2.0) + 1 if self.centred else int(self.width)
+
+    @property
+    def row(self) -> Array:
+        """Weights of all together, from the oldest sample to the newest."""
+        rest = self.width - self.whole
+        ends = [0.5 * rest] if self.centred else []
+        one = np.array([*(ends or [rest]), *[1.0] * self.whole, *ends]) / self.width
+        row = np.ones(1)
+        for _ in range(self.times):
+            row = np.convolve(row, one[int(rest == 0.0) : len(one) - int(rest == 0.0 and self.centred)])
+        return row
+
+    @property
+    def age(self) -> float:
+        """Mean age of the samples, counted from the newest one."""
+        return float(self.row @ np.arange(len(self.row))[::-1])
+
+    @property
+    def late(self) -> float:
+        """Samples by which the motion is later for them."""
+        return self.age - self.ahead
+
+    @property
+    def variance(self) -> float:
+        """Of the samples' age: the loss of a slow sine is `variance frequency^2/2`, with the frequency in rad."""
+        return float(self.row @ (np.arange(len(self.row))[::-1] - self.age) ** 2)
+
+    def gain(self, at: Array) -> Array:
+        """The gain at frequencies (N,) above 0."""
+        n, rest = self.whole, self.width - self.whole
+        if self.centred:
+            one = np.sin(0.5 * n * at) / np.sin(0.5 * at) + rest * np.cos(0.5 * (n + 1) * at)
+        else:
+            z = np.exp(-1j * at)
+            one = (1.0 - z**n) / (1.0 - z) + rest * z**n
+        return np.asarray((np.abs(one) / self.width) ** self.times)
+
+    def loss(self, period: float) -> float:
+        """Share that a sine with a period in samples loses of its size."""
+        return 1.0 - float(self.gain(np.array([2.0 * np.pi / period]))[0])
+
+    def before(self, row: Taps) -> Taps:
+        """The weights of a preview `row` and of the averages in series."""
+        return Taps(row.first + self.ahead - (len(self.row) - 1), np.convolve(row.weights, self.row))
+
+
+def smoothing(gain: Gain, limit: float, references: int, asked: int | None) -> Smoothing | None:
+    """The averages of at most `references` weights with the preview that hold a noise gain, or else come closest to it.
+
+    None where nothing exceeds the limit. They are centred if the reference may be `asked` samples ahead, for None as
+    far as it takes; else they look back, and are as little late as they can. The number of averages is the one that
+    loses least of a slow reference.
+    """
+    without = largest(gain)
+    if without <= limit * (1.0 + SAME):
+        return None
+    room = references - len(gain.taps.weights)
+    ahead = max(gain.taps.ahead, 0)
+    found = _least(gain, limit, room, centred=True)
+    half = (len(found.row) - 1) // 2
+    if asked is None or asked >= ahead + half:
+        return Smoothing(found.times, found.width, True, half, without)
+    found = _least(gain, limit, room, centred=False)
+    return Smoothing(found.times, found.width, False, min(max(asked - ahead, 0), int(found.age)), without)
+
+
+def _least(gain: Gain, limit: float, room: int, centred: bool) -> Smoothing:
+    """The averages with the least variance that hold the limit with `room` further weights; if none do, those with the
+    least gain."""
+    holding, failing = [], []
+    for times in range(1, MOST_TIMES + 1):
+        one, most = _narrowest(gain, limit, times, room // times - 1.0, centred)
+        if most <= limit * (1.0 + SAME):
+            holding.append((one.variance, one))
+        else:
+            failing.append((most, one))
+    return min(holding or failing, key=lambda each: each[0])[1]
+
+
+def _narrowest(gain: Gain, limit: float, times: int, widest: float, centred: bool) -> tuple[Smoothing, float]:
+    """The least width of so many averages that holds the limit, and its gain; the widest one if none does."""
+    near, sizes = gain.near, gain(gain.near)
+
+    def holds(width: float) -> bool:
+        return bool(np.max(sizes * Smoothing(times, width, centred).gain(near)) <= limit)
+
+    while True:
+        low, high = 1.0, max(widest, 1.0)
+        for _ in range(HALVINGS if holds(high) else 0):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if holds(middle) else (middle, high)
+        one = Smoothing(times, high, centred)
+        found, at = peaks(lambda at, one=one: gain(at) * one.gain(at), gain.near)  # type: ignore[misc]
+        most = float(np.max(found))
+        fresh = np.setdiff1d(at, near)
+        if most <= limit * (1.0 + SAME) or high >= widest or not fresh.size:
+            return one, most
+        order = np.argsort(np.append(near, fresh))
+        near, sizes = np.append(near, fresh)[order], np.append(sizes, gain(fresh))[order]
