@@ -1,11 +1,13 @@
 """Runs that set numbers which no test of a model can set: what each would cost or spoil with another value.
 
     python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths] [visits]
+        [averages]
 
 lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.thermal.compensator.MOST_CHANGE`; decades:
 `effects.ageing.compensator.DECADES`; sweeps: `emission.worth.SWEEPS`; unknown: `tracking.MOST_UNKNOWN`; exact:
 `diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`; visits:
-`chain.chain.VISIT_SAMPLES`. All of them take some seconds; what is random has fixed seeds.
+`chain.chain.VISIT_SAMPLES`; averages: `compensator.chain.noise.MOST_TIMES`. All of them take some seconds; what is
+random has fixed seeds.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from numpy.typing import NDArray
 import hystgen
 from hystgen import plants
 from hystgen.chain import chain
+from hystgen.compensator.chain import noise, preview, tables
 from hystgen.compensator.chain.layout import SAMPLES_A_SWEEP
 from hystgen.diagnosis.data import signals
 from hystgen.diagnosis.data.items import Item
@@ -191,8 +194,52 @@ def visits() -> None:
         print(f"  {effect.partition(',')[0].removeprefix('name: '):15}", *(f"{x:8.1e}" for x in changes))
 
 
+def averages() -> None:
+    """What averages lose of smooth references, and poles in front of the lead that hold the same noise gain.
+
+    References of 60 to 480 samples a period with the same size each; rms error, % of the reference. With a preview
+    poles come as many samples earlier as suits them best; without one averages look back.
+    """
+    at = 2.0 * np.pi / np.geomspace(60.0, 480.0, 40)
+    leads = {
+        "lag, 10 samples": (EFFECTS[1].replace("2.0e-3", "0.01"), 1),
+        "mode, 50 samples": (EFFECTS[2].replace("120", "20"), 2),
+        "lag and mode": ("name: lag, time_constant: 0.01}\n    - {name: resonance, frequency: 20, damping: 0.02", 3),
+    }
+    print("averages: lead, limit / noise gain; error of 1 .. 5 averages, of poles; without preview both")
+    for name, (effects, order) in leads.items():
+        model = hystgen.Model(parse_parameters(WITH_EFFECT.format(effect=effects), "stage_x.yaml"))
+        one = tables.build(model.chain, "float64", 1e-3)
+        gain = noise.Gain(one.static, one.parts, 1e-3, one.taps or preview.PLAIN)
+        for share in (0.5, 0.2, 0.05):
+            limit = share * noise.largest(gain)
+            errors, variances = [], []
+            for times in range(1, 6):
+                found, _ = noise.narrowest(gain, limit, times, 300.0, True)
+                row, ages = found.row, np.arange(len(found.row)) - found.age
+                errors.append(_lost(np.exp(1j * np.outer(at, ages)) @ row))
+                variances.append(found.variance)
+            z, near = np.exp(-1j * at), np.exp(-1j * gain.near)
+            low, high = 0.0, 1.0
+            for _ in range(60):
+                f = 0.5 * (low + high)
+                holds = np.max(gain(gain.near) * np.abs((1.0 - f) / (1.0 - f * near)) ** order) <= limit
+                low, high = (low, f) if holds else (f, high)
+            poles = ((1.0 - high) / (1.0 - high * z)) ** order
+            early = min(_lost(poles * np.exp(1j * at * n)) for n in range(100))
+            late = noise.least(gain, limit, 900, False)
+            row, ages = late.row, np.arange(len(late.row))[::-1]
+            errors += [early, _lost(np.exp(-1j * np.outer(at, ages)) @ row), _lost(poles)]
+            print(f"  {name:18} {share:5.2f}", *(f"{each:7.3f}" for each in errors), int(np.argmin(variances)) + 1)
+
+
+def _lost(response: NDArray[np.complex128]) -> float:
+    """Rms of what a response changes, %."""
+    return 100.0 * math.sqrt(float(np.mean(np.abs(response - 1.0) ** 2)))
+
+
 RUNS: dict[str, Callable[[], None]] = {
-    each.__name__: each for each in (lag, newton, decades, sweeps, unknown, exact, lengths, visits)
+    each.__name__: each for each in (lag, newton, decades, sweeps, unknown, exact, lengths, visits, averages)
 }
 
 

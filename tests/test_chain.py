@@ -490,15 +490,9 @@ def test_noise_gain_is_that_of_an_impulse() -> None:
     x = answers(numbers, Run(np.arange(n) * T, u, {}), True)
     gain = np.abs(np.fft.rfft(x - x[0])) / 1e-3
     rest = 1.0 / (2.0 * 1.1)  # weight 2, and creep of 10 % in the end
-    assert numbers.noise_gain == pytest.approx(float(np.max(gain)) / rest, rel=1e-2)
+    assert numbers.noise_gain == pytest.approx(float(np.max(gain)) / rest, rel=1e-4)
     assert numbers.noise_gain > 50.0
     assert float(header(one, "NOISE_GAIN").rstrip("f")) == pytest.approx(numbers.noise_gain, rel=1e-6)
-    allowed = with_options("straight", noise_gain=2.0 * numbers.noise_gain)
-    assert emit_options(allowed).engine == "loop"
-    with pytest.raises(UnsupportedEffectsError, match="noise gain of"):
-        emit_options(with_options("straight", noise_gain=0.5 * numbers.noise_gain))
-    rounded = with_options("straight", corner=9, noise_gain=0.5 * numbers.noise_gain)
-    assert emit_options(rounded).engine == "loop", "rounded corners hold less noise"
 
 
 def test_five_references_leave_less_of_a_mode_than_three() -> None:

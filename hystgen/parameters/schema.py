@@ -235,7 +235,8 @@ class Compensation(_Part):
         default="straight", description="held: the converter holds each drive, half a sample later than a straight one"
     )
     noise_gain: Positive | None = Field(
-        default=None, description="largest gain from reference to drive over that at rest; averages of the reference hold it"
+        default=None,
+        description="largest gain from reference to drive over that at rest; averages of the reference hold it",
     )
     max_rate: Positive | None = Field(
         default=None, description="fastest drive that error bounds are stated for, input units per s"

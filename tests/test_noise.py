@@ -1,0 +1,193 @@
+"""The noise gain of the emitted inverse, and the averages that hold it: measured on the bit reference itself."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from modelfiles import BRANCHES, CREEP, chain
+
+import hystgen
+from hystgen.basics import jit
+from hystgen.basics.problems import UnsupportedEffectsError
+from hystgen.compensator.chain import noise, tables
+from hystgen.compensator.chain.layout import Compiled
+from hystgen.compensator.chain.run import answers
+from hystgen.compensator.chained import Compensator
+from hystgen.effects import Run
+from hystgen.emission.calls import emit_options, emitted_files
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.parameters.schema import Compensation
+from hystgen.plays import slots
+
+T = 1e-3
+LAG = "name: lag, time_constant: 0.01"
+MODE, DELAY = "name: resonance, frequency: 30, damping: 0.05", "name: delay, time: 2.6e-3"
+RELAXING = "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3"
+DILATED = "name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 3.0e-4, 3.0e-4, 3.0e-4]"
+
+
+def model(*effects: str, front: str = "", **options: Any) -> Model:
+    one = parse_parameters(chain("noisy", *effects, front=front), "noisy.yaml")
+    how = one.emit.compensation.model_copy(update=Compensation(**options).model_dump(exclude_unset=True))
+    return Model(one.model_copy(update={"emit": one.emit.model_copy(update={"compensation": how})}))
+
+
+def compiled(one: Model, arithmetic: str = "float64") -> Compiled:
+    return tables.build(one.chain, arithmetic, T, one.parameters.emit.compensation)
+
+
+def measured(one: Model) -> float:
+    """The largest gain from a small impulse on a ramp to the drive, over that of the plays, which all follow there."""
+    numbers = compiled(one)
+    n = 400
+    u = np.linspace(-7.0, 7.5, n)
+    moved = u.copy()
+    moved[330] += 1e-6
+    with jit.plain():
+        plain, other = (answers(numbers, Run(np.arange(n) * T, each, {}), True) for each in (u, moved))
+    end = n - 8  # then the reference stops and repeats its last sample
+    assert np.max(np.abs(plain[:end])) < 4.0, "nothing is limited"
+    gain = np.abs(np.fft.rfft((other - plain)[:end], 1 << 15)) / 1e-6
+    return float(np.max(gain)) * one.cascade.pi.slopes[-1]
+
+
+@pytest.mark.parametrize(
+    ("effects", "options"),
+    [
+        ((LAG,), {}), ((RELAXING,), {}), ((DILATED,), {}), ((LAG, MODE, DELAY, RELAXING), {}),
+        ((LAG,), {"noise_gain": 5.0}), ((RELAXING,), {"noise_gain": 2.0}), ((DILATED,), {"noise_gain": 1.2}),
+        ((LAG, MODE, DELAY, RELAXING), {"noise_gain": 9.0}), ((LAG, MODE), {"noise_gain": 30.0, "preview": 0}),
+        ((LAG, MODE), {"noise_gain": 30.0, "preview": 2, "corner": 2, "taps": 5}),
+    ],
+)  # fmt: skip
+def test_the_printed_gain_is_the_largest_of_the_bit_reference(effects: tuple[str, ...], options: Any) -> None:
+    one = model(*effects, **options)
+    text = emitted_files(one)["noisy.h"]
+    found = re.search(r"NOISY_NOISE_GAIN ([0-9.e+]+)f", text)
+    assert found
+    printed = float(found[1])
+    assert measured(one) == pytest.approx(printed, rel=2e-4)
+    assert printed <= options.get("noise_gain", math.inf) * (1.0 + 1e-6)
+    assert ("Noise: references are averaged" in text) == ("noise_gain" in options)
+
+
+def rows(times: int, width: float, centred: bool) -> np.ndarray[Any, Any]:
+    """Averages of a unit box of `width`, by their definition: how much of it falls into each sample."""
+    low = -0.5 * width if centred else -0.5
+    cells = np.arange(-30, 31)
+    one = np.clip(np.minimum(low + width, cells + 0.5) - np.maximum(low, cells - 0.5), 0.0, None) / width
+    one = one[np.flatnonzero(one)[0] : np.flatnonzero(one)[-1] + 1]
+    row = np.ones(1)
+    for _ in range(times):
+        row = np.convolve(row, one)
+    return row[::-1]
+
+
+@pytest.mark.parametrize(
+    ("effects", "limit", "preview"),
+    [
+        ((LAG,), 12.0, None), ((LAG,), 3.0, 0), ((MODE,), 4.0, None), ((MODE, LAG), 100.0, 1),
+        ((LAG, MODE, RELAXING), 25.0, None),
+    ],
+)  # fmt: skip
+def test_no_narrower_averages_hold_the_gain(effects: tuple[str, ...], limit: float, preview: int | None) -> None:
+    """Against all widths in steps of 0.05, with responses by the spectrum of their weights."""
+    one = compiled(model(*effects, noise_gain=limit, preview=preview))
+    plain = compiled(model(*effects))
+    found = one.smoothing
+    assert found is not None
+    n = 1 << 10
+    alone = noise.Gain(plain.static, plain.parts, T, plain.taps or noise.Taps(0, np.ones(1)))
+    base = alone(np.maximum(np.linspace(0.0, np.pi, n // 2 + 1), 1e-9))
+    least = math.inf
+    for times in (1, 2, 3, 4):
+        for width in np.arange(1.0, 20.0, 0.05):
+            row = rows(times, float(width), found.centred)
+            if np.max(base * np.abs(np.fft.rfft(row, n))) <= limit:
+                at = np.arange(len(row))
+                least = min(least, float(row @ (at - row @ at) ** 2))
+                break
+    assert 0.9 * least <= found.variance <= 1.001 * least
+    np.testing.assert_allclose(found.row, rows(found.times, found.width, found.centred), atol=1e-12)
+
+
+@pytest.mark.parametrize("preview", [None, 0, 1, 4, 30])
+def test_the_motion_is_as_late_as_printed(preview: int | None) -> None:
+    """On a ramp, against the motion without averages."""
+    effects = LAG, MODE.replace("0.05", "0.5")
+    one = model(*effects, noise_gain=40.0, preview=preview)
+    numbers = compiled(one)
+    n = 240
+    u = np.concatenate([np.full(60, -3.0), np.linspace(-3.0, 6.0, n - 60)])
+    t = np.arange(n) * T
+    with jit.plain():
+        y = one.simulate(answers(numbers, Run(t, u, {}), True), t=t)
+        plain = one.simulate(answers(compiled(model(*effects)), Run(t, u, {}), True), t=t)
+    late = (plain - y)[180:200] / (u[-1] - u[-2])
+    assert numbers.smoothing is not None
+    assert (numbers.late > 0.5) == (preview in (0, 1, 4))
+    np.testing.assert_allclose(late, numbers.late, atol=5e-3)  # the mode rings where plays turn, and fades
+    text = emitted_files(one)["noisy.h"]
+    assert (f"which is {numbers.late:.4g} late" in text) == (numbers.late > 0.0)
+
+
+@pytest.mark.parametrize(("period", "loss"), [(50, "1.5"), (200, "0.093")])
+def test_a_sine_loses_what_is_printed(period: int, loss: str) -> None:
+    one = model(LAG, noise_gain=5.0)
+    assert re.search(rf"{re.escape(loss)} % with {period} samples", emitted_files(one)["noisy.h"].replace("\n * ", " "))
+    numbers = compiled(one)
+    t = np.arange(8 * period) * T
+    u = 1.5 + 3.0 * np.sin(2.0 * np.pi * np.arange(len(t)) / period)
+    with jit.plain():
+        y, plain = (one.simulate(answers(each, Run(t, u, {}), True), t=t) for each in (numbers, compiled(model(LAG))))
+    tone = np.exp(-2j * np.pi * np.arange(4 * period) / period)
+    passed = np.abs(np.sum(tone * y[3 * period : 7 * period]) / np.sum(tone * plain[3 * period : 7 * period]))
+    assert 100.0 * (1.0 - passed) == pytest.approx(float(loss), abs=0.06 if period == 50 else 0.006)
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
+def test_averages_have_the_bits_and_the_bounds_of_the_rest(arithmetic: str) -> None:
+    """Against the compensator in double precision, to which the averaged reference is given."""
+    one = model(DELAY, MODE, CREEP, noise_gain=7.3)
+    with jit.plain():
+        report = hystgen.verify(one, arithmetic, compiler=["gcc"], length=150)
+    assert report.ok, report.table()
+    numbers = compiled(one, arithmetic)
+    codes = numbers.codes
+    drive, output = (1.0, 1.0) if codes is None else (float(codes.drive_lsb), float(codes.output_lsb))
+    rng = np.random.default_rng(3)
+    u = np.rint((1.0 + 6.0 * np.sin(np.cumsum(rng.uniform(0.0, 0.03, 900)))) / output * 64.0) / 64.0
+    u = np.rint(u) if codes else u
+    t = np.arange(len(u)) * T
+    v = answers(numbers, Run(t, u, {}), True).astype(float)
+    assert numbers.smoothing is not None
+    half = (len(numbers.smoothing.row) - 1) // 2
+    averaged = np.convolve(np.pad(u * output, half, mode="edge"), numbers.smoothing.row, mode="valid")
+    wanted = Compensator(one.chain).drives(Run(t, averaged, {}), one.cascade.input_range) / drive
+    left = np.max(np.abs(v - wanted)[: len(u) - numbers.ahead])
+    assert left <= (codes.inverse_error if codes else float(header(one, "INVERSE_MAX_ERROR")))
+
+
+def header(one: Model, macro: str) -> str:
+    found = re.search(rf"#define NOISY_{macro} ([^ f]+)", emitted_files(one)["noisy.h"])
+    assert found
+    return found[1]
+
+
+def test_what_no_average_holds_is_refused_with_the_least_gain() -> None:
+    with pytest.raises(UnsupportedEffectsError, match=r"over 1000 samples .* leave a noise gain of 1\.0\d+, more than"):
+        emit_options(model(CREEP, LAG, noise_gain=1.0))
+    emit_options(model(CREEP, LAG, noise_gain=1.06))
+
+
+def test_what_needs_no_average_has_none() -> None:
+    plain = emitted_files(model(LAG, CREEP, front=BRANCHES))
+    allowed = emitted_files(model(LAG, CREEP, front=BRANCHES, noise_gain=1e3))
+    bare = [re.sub(r"sha256 \w+|SHA256 .*", "", text) for text in (plain["noisy.c"], allowed["noisy.c"])]
+    assert bare[0] == bare[1]
+    assert compiled(model(CREEP)).tables.limits[slots.OUTPUT_MIN] < 0.0
