@@ -527,32 +527,86 @@ def test_preview_hold_corner_and_rate_are_options() -> None:
     assert middle == pytest.approx(0.0, abs=1e-12), "rounding corners moves nothing in time"
 
 
-@pytest.mark.parametrize(
-    ("frequency", "damping"), [(20.0, 1e-3), (20.0, 0.02), (77.0, 0.1), (150.0, 0.3), (310.0, 0.05)]
-)
-def test_a_shaped_step_does_not_ring(frequency: float, damping: float) -> None:
+MODES = [(20.0, 1e-3), (20.0, 0.02), (77.0, 0.1), (150.0, 0.3), (310.0, 0.05), (3.0, 0.69)]
+
+
+@pytest.mark.parametrize("by", ["shaper", "notch"])
+@pytest.mark.parametrize(("frequency", "damping"), MODES)
+def test_a_shaped_step_does_not_ring(frequency: float, damping: float, by: preview.By) -> None:
     """The mode by scipy, on a drive that is straight between samples: at rest as soon as the last weight has come."""
     mode = Resonance(name="resonance", frequency=frequency, damping=damping)
-    found = preview.taps(0.0, [mode], T, shaped=True)
+    found = preview.taps(0.0, [mode], T, by=by)
+    w0 = 2.0 * np.pi * frequency
     assert found.ahead == 0
-    assert np.min(found.weights) >= 0.0, "no step is larger than that of the reference"
+    assert math.fsum(found.weights) == pytest.approx(1.0, abs=1e-12)
+    if by == "shaper":
+        assert np.min(found.weights) >= 0.0, "no step is larger than that of the reference"
+    else:
+        assert len(found.weights) <= 4.0 / (w0 * T) + 6.0, "over in four of the mode's 1/w0"
     v = np.append(np.zeros(len(found.weights) - 1), np.cumsum(found.weights[::-1]))
     v = np.append(v, np.ones(300))
-    w0 = 2.0 * np.pi * frequency
     y = signal.lsim(([w0**2], [1.0, 2.0 * damping * w0, w0**2]), v, T * np.arange(len(v)))[1]
     assert np.max(np.abs(y - 1.0)[2 * len(found.weights) :]) < 1e-9
     assert np.max(y) <= 1.0 + 1e-9
 
 
-def test_a_shaper_is_emitted_with_the_bits_of_the_reference() -> None:
-    one = with_options("late", resonance="shaper")
-    for arithmetic in ("float32", "q15"):
-        report = hystgen.verify(one, arithmetic, compiler=["gcc"], length=800)
-        assert report.ok, report.table()
-    slow = CHAINS["late"].replace("frequency: 30", "frequency: 0.4") + "emit: {compensation: {resonance: shaper}}\n"
-    one = model("slow", slow)
-    with pytest.raises(FormatError, match=r"half a period of 0\.4 Hz is 125. samples, and a shaper keeps 1000 at most"):
+@pytest.mark.parametrize(("frequency", "damping"), MODES[:3])
+def test_a_notch_is_two_poles_that_come_to_an_end(frequency: float, damping: float) -> None:
+    """Against the recursion with `exp(-w0 T)` twice: the same mean delay but for the part of a sample, no more gain at
+    half the sample rate, and 5 % of a step are left of the poles where the averages have ended."""
+    mode = Resonance(name="resonance", frequency=frequency, damping=damping)
+    found = preview.taps(0.0, [mode], T, by="notch")
+    pole = math.exp(-2.0 * math.pi * frequency * T)
+    a1, a2 = resonance.denominator(mode, T)
+    zeros = np.array([1.0, a1, a2]) / (1.0 + a1 + a2)
+    both = signal.lfilter(zeros * (1.0 - pole) ** 2, np.convolve([1.0, -pole], [1.0, -pole]), np.eye(1, 4000)[0])
+    ages = np.arange(len(found.weights))
+    part = 0.25 / (1.0 + 2.0 * pole / (1.0 - pole))
+    assert 0.0 <= found.weights[::-1] @ ages - both @ np.arange(4000) <= part
+    assert 1.0 - np.sum(both[: len(ages)]) > 0.05
+    gains = [np.abs(np.fft.rfft(each, 8192))[-1] for each in (found.weights, both)]
+    assert gains[0] <= gains[1] * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("by", ["shaper", "notch"])
+def test_what_shapes_is_emitted_with_the_bits_of_the_reference(by: str) -> None:
+    one = with_options("late", resonance=by)
+    with jit.plain():
+        for arithmetic in ("float32", "float64", "q31", "q15"):
+            report = hystgen.verify(one, arithmetic, compiler=["gcc"], length=200)
+            assert report.ok, report.table()
+    slow = CHAINS["late"].replace("frequency: 30", "frequency: 0.4")
+    one = model("slow", slow + f"emit: {{compensation: {{resonance: {by}}}}}\n")
+    what = {
+        "shaper": r"half a period of 0\.4 Hz is 125. samples, and a shaper keeps 1000 at most",
+        "notch": r"a notch for 0\.4 Hz takes 1594 samples, and keeps 1000 at most",
+    }[by]
+    with pytest.raises(FormatError, match=what):
         tables.build(one.chain, "float32", T, one.parameters.emit.compensation)
+
+
+@pytest.mark.parametrize("by", ["shaper", "notch"])
+def test_what_shapes_says_how_late_it_is(by: str) -> None:
+    """By the motion of the stage on a ramp and on a sine."""
+    one = with_options("straight", resonance=by)
+    how = one.parameters.emit.compensation
+    numbers, plain = tables.build(one.chain, "float64", T, how), compiled(model("straight"), "float64")
+    text = module.files(one.parameters, one.cascade, emit_options(one))["straight.h"].replace("\n * ", " ")
+    found = re.search(r"is ([0-9.]+) samples late for it, and off a sine with 200 samples .* by ([0-9.]+) %", text)
+    assert found
+    assert "which is" in text
+    k = np.arange(900)
+    for u in (np.interp(k, [200, 900], [0.0, 3.0]), np.sin(2.0 * np.pi * k / 200.0)):
+        with jit.plain():
+            y, exact = (one.simulate(answers(each, Run(k * T, u, {}), True), t=k * T) for each in (numbers, plain))
+        if u[-1] > 2.0:
+            late = np.mean((exact - y)[700:890]) / (u[-1] - u[-2])
+            assert late == pytest.approx(float(found[1]), rel=5e-3)
+            assert numbers.late == pytest.approx(late, rel=2e-3)
+        else:
+            tone = np.exp(-2j * np.pi * k[400:800] / 200.0)
+            missed = np.abs(np.sum(tone * (y - exact)[400:800]) / np.sum(tone * exact[400:800]))
+            assert 100.0 * missed == pytest.approx(float(found[2]), rel=2e-2)
 
 
 DOUBTFUL = 'not_separable: [[asymmetry, sensor_nonlinearity], [creep, drift]]\n'

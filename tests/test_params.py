@@ -378,7 +378,7 @@ REFUSED = [
         '4:66: model.pi.initial_state: has 0 values, at least 1 needed; add to the list',
     ]),
     case('state_text', pi("thresholds: [0, 1], weights: [1, 1], initial_state: zero"), [
-        '4:66: model.pi.initial_state: must be a number or a list of numbers, not the text "zero"; write it like 0.0',
+        '4:66: model.pi.initial_state: must be a number or a list of numbers, not the text "tuned"; write it like 0.0',
     ]),
     case('state_mapping', pi("thresholds: [0, 1], weights: [1, 1], initial_state: {}"), [
         '4:66: model.pi.initial_state: must be a number or a list of numbers, not a mapping; write it like 0.0',
@@ -601,13 +601,13 @@ REFUSED = [
         'compensation',
     ]),
     case('compensation', H + M + "emit:\n  compensation: {preview: -1, drive_hold: x, noise_gain: 0, taps: 4, corner: 1.5,"
-         " resonance: notch, quiet: true}\n", [
+         " resonance: tuned, quiet: true}\n", [
         '6:27: emit.compensation.preview: must be at least 0, not -1; correct the number',
         '6:43: emit.compensation.drive_hold: must be straight or held, not the text "x"; choose one of them',
         '6:58: emit.compensation.noise_gain: must be above 0, not 0; correct the number',
         '6:67: emit.compensation.taps: must be 3 or 5, not 4; choose one of them',
         '6:78: emit.compensation.corner: must be a whole number, not 1.5; write it like 12',
-        '6:94: emit.compensation.resonance: must be inverse, shaper or none, not the text "notch"; choose one of them',
+        '6:94: emit.compensation.resonance: must be inverse, notch, shaper or none, not the text "tuned"; choose one of them',
         '6:101: emit.compensation.quiet: unknown key; known here are preview, drive_hold, noise_gain, max_rate, '
         'resonance, taps, corner, compensate',
     ]),
@@ -943,7 +943,7 @@ def parameter_data(draw: st.DrawFn) -> dict[str, Any]:
                 "drive_hold": draw(st.sampled_from(["straight", "held"])),
                 "noise_gain": draw(st.none() | sizes),
                 "max_rate": draw(st.none() | sizes),
-                "resonance": draw(st.sampled_from(["inverse", "shaper", "none"])),
+                "resonance": draw(st.sampled_from(["inverse", "notch", "shaper", "none"])),
                 "taps": draw(st.sampled_from([3, 5])),
                 "corner": draw(st.integers(0, 100)),
             },

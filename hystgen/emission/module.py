@@ -33,8 +33,8 @@ LEAST_LATE = 1e-6
 """[samples] Motion that is less late is in time: the means of ages are sums with rounding."""
 
 PERIODS = (50, 200)
-"""[samples] Periods for which the header states what averages take: that of the fastest sweep for which bounds are
-stated is twice the first."""
+"""[samples] Periods for which the header states what is lost of a sine: a fast one, as long as the fastest sweep for
+which bounds are stated, and a slow one."""
 
 
 @functools.cache
@@ -239,7 +239,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     )  # fmt: skip
     glue: chain.Glue | None = getattr(values, "glue", None)
     values.timing = _timing(parameters, compiled) if compiled else []
-    values.smoothed = _smoothed(compiled) if compiled and options.inverse else []
+    values.reading = _reading(compiled) if compiled and options.inverse else []
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
     values.corners = (max(n, 1) if values.fixed else n + 1) if corners else 0
     front = render("front.c.j2", values) if values.stages else ""
@@ -336,18 +336,25 @@ def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, 
     ]
 
 
-def _smoothed(compiled: Compiled) -> list[str]:
-    """What holds the noise gain, and what it costs."""
-    one = compiled.smoothing
-    if one is None:
-        return []
-    twice = {1: "once", 2: "twice"}.get(one.times, f"{one.times} times")
-    losses = " and ".join(f"{100.0 * one.loss(period):.2g} % with {period} samples a period" for period in PERIODS)
-    late = f", and the motion is {one.late:.3g} samples later" if one.late > LEAST_LATE else ""
-    return [
-        f"Noise: references are averaged {twice} over {one.width:.4g} samples, so that the noise gain is "
-        f"{compiled.noise_gain:.4g} instead of {one.without:.4g}; a sine loses {losses}{late}"
-    ]
+def _reading(compiled: Compiled) -> list[str]:
+    """What holds the noise gain, what keeps modes from ringing, and what both cost."""
+    found = []
+    if (one := compiled.smoothing) is not None:
+        often = {1: "once", 2: "twice"}.get(one.times, f"{one.times} times")
+        losses = " and ".join(f"{100.0 * one.loss(period):.2g} % with {period} samples a period" for period in PERIODS)
+        late = f", and the motion is {one.late:.3g} samples later" if one.late > LEAST_LATE else ""
+        found.append(
+            f"Noise: references are averaged {often} over {one.width:.4g} samples, so that the noise gain is "
+            f"{compiled.noise_gain:.4g} instead of {one.without:.4g}; a sine loses {losses}{late}"
+        )
+    if (kept := compiled.shaped) is not None:
+        missed = 100.0 * kept.missed(PERIODS[-1])
+        found.append(
+            f"Resonance: behind a step of the reference the stage does not ring ({kept.by}). Not for tracking: the "
+            f"motion is {kept.late:.3g} samples late for it, and off a sine with {PERIODS[-1]} samples a period by "
+            f"{missed:.2g} % of its size"
+        )
+    return found
 
 
 def _settings(compiled: Compiled) -> list[tuple[str, str, str]]:
@@ -464,7 +471,7 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         f"Model: {model}; arithmetic {options.arithmetic}; engine {options.engine}; operator {options.operator}; "
         f"layout {options.layout}",
         *(f"Not compensated: {words}" for words in options.left_out),
-        *values.smoothed,
+        *values.reading,
         *([""] if values.precision else []),
         *values.precision,
         "",

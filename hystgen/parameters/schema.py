@@ -241,9 +241,9 @@ class Compensation(_Part):
     max_rate: Positive | None = Field(
         default=None, description="fastest drive that error bounds are stated for, input units per s"
     )
-    resonance: Literal["inverse", "shaper", "none"] = Field(
+    resonance: Literal["inverse", "notch", "shaper", "none"] = Field(
         default="inverse",
-        description="how modes are compensated; shaper: steps from point to point do not ring, without a preview",
+        description="how modes are compensated; notch, shaper: steps from point to point do not ring, with no preview",
     )
     taps: Literal[3, 5] = Field(default=3, description="references that a mode takes, 5 with an error of fourth order")
     corner: Annotated[int, Field(ge=0, le=100)] = Field(

@@ -182,8 +182,8 @@ class _Builder:
             self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
             bounds.condition, math.ceil(self.sizes.largest * 2**self.bits),
         )  # fmt: skip
-        how, smoothing = self.how.preview, self.reading.smoothing
-        return Compiled(tables, self.taps, self.parts, self.seconds, static, max_rate, how, codes, smoothing)
+        about = (self.parts, self.seconds, static, max_rate, self.how.preview, *self.reading[1:])
+        return Compiled(tables, self.taps, *about, codes)
 
     # ------------------------------------------------------------ refusals
 

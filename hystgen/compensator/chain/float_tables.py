@@ -173,4 +173,4 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> C
     if drives or outputs:
         tables = OwnChainTables(*tables)
         tables.own_effects = tuple(type(one.effect) for one in (*drives, *outputs))
-    return Compiled(tables, taps, parts, seconds, static, max_rate, how.preview, smoothing=reading.smoothing)
+    return Compiled(tables, taps, parts, seconds, static, max_rate, how.preview, *reading[1:])

@@ -15,7 +15,7 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import noise, own, preview
 from hystgen.compensator.chain.noise import Smoothing
 from hystgen.compensator.chain.own import Linear, OwnTables
-from hystgen.compensator.chain.preview import Taps
+from hystgen.compensator.chain.preview import Shaped, Taps
 from hystgen.effects.ageing.compensator import AgeingTables
 from hystgen.effects.base import Effect, Place
 from hystgen.effects.creep import compensator as creep
@@ -180,10 +180,11 @@ class Compiled:
     static: StaticModel
     max_rate: float
     asked: int | None = None
+    smoothing: Smoothing | None = None
+    shaped: Shaped | None = None
+    """like the smoothing in the taps"""
     codes: Codes | None = None
     """of fixed point"""
-    smoothing: Smoothing | None = None
-    """in the taps"""
 
     @property
     def largest_step(self) -> float:
@@ -199,13 +200,18 @@ class Compiled:
     @property
     def ahead(self) -> int:
         """NAME_PREVIEW: what the model needs, or what was asked for."""
-        return Read(self.taps, self.smoothing).ahead(self.asked)
+        return self.needed if self.asked is None else self.asked
+
+    @property
+    def needed(self) -> int:
+        """Samples by which the taps read ahead."""
+        return max(self.taps.ahead, 0) if self.taps else 0
 
     @property
     def late(self) -> float:
-        """Samples by which the motion is late, since the reference is not as far ahead as it would have to be."""
-        missing = max(Read(self.taps, None).ahead(None) - self.ahead, 0)
-        return missing + (self.smoothing.late if self.smoothing else 0.0)
+        """Samples by which the motion is late on a ramp."""
+        missing = max(self.needed - self.ahead, 0)
+        return missing + sum(each.late for each in (self.smoothing, self.shaped) if each)
 
     @cached_property
     def own(self) -> list[Linear]:
@@ -256,11 +262,12 @@ def largest_way(static: StaticModel, ahead: Sequence[Linear], step: float) -> fl
 
 
 class Read(NamedTuple):
-    """How the reference is read: its weights in the preview, None if it is taken as it comes, and the averages in them
-    that hold the noise gain."""
+    """How the reference is read: its weights in the preview, None if it is taken as it comes, and in them the averages
+    that hold the noise gain and what keeps modes from ringing."""
 
     taps: Taps | None
     smoothing: Smoothing | None
+    shaped: Shaped | None
 
     def ahead(self, asked: int | None) -> int:
         """`Compiled.ahead`."""
@@ -270,8 +277,8 @@ class Read(NamedTuple):
 def read(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> Read:
     """The reading of the reference that a model takes."""
     delay = parts.delay + (0.5 * seconds if how.drive_hold == "held" else 0.0)
-    modes = [] if how.resonance == "none" else parts.modes
-    needed = preview.taps(delay, modes, seconds, how.taps, how.corner, how.resonance == "shaper")
+    modes, by = ([], "inverse") if how.resonance == "none" else (parts.modes, how.resonance)
+    needed = preview.taps(delay, modes, seconds, how.taps, how.corner, by)
     smoothing = None
     if how.noise_gain is not None:
         gain = noise.Gain(static, parts, seconds, needed)
@@ -279,7 +286,7 @@ def read(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -
     if smoothing is not None:
         needed = smoothing.before(needed)
     led = preview.led(needed, how.preview)
-    return Read(led if len(led.weights) > 1 or led.first else None, smoothing)
+    return Read(led if len(led.weights) > 1 or led.first else None, smoothing, preview.shaped(modes, seconds, by))
 
 
 def settled(static: StaticModel, effects: Sequence[Effect], w: float) -> float:

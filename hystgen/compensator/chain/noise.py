@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import moving, own
 from hystgen.compensator.chain.own import Linear
-from hystgen.compensator.chain.preview import Taps
+from hystgen.compensator.chain.preview import Taps, averages, whole
 from hystgen.effects.base import decays
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.lag import compensator as lag
@@ -102,8 +102,8 @@ class Gain:
             direct, rest = direct / block.backward.d, rest * block.rest
         found = np.zeros(len(z))
         for slope, plays, at_once in self._plays(z):
-            whole, first = plays * passed, at_once * direct
-            found = np.maximum(found, np.abs(slope * rest / (first + (whole - first) * arriving)))
+            later, first = plays * passed, at_once * direct
+            found = np.maximum(found, np.abs(slope * rest / (first + (later - first) * arriving)))
         return np.asarray(np.abs(led) * found)
 
     def _plays(self, z: NDArray[np.complex128]) -> Iterator[tuple[float, NDArray[np.complex128], float]]:
@@ -157,10 +157,10 @@ def largest(gain: Gain) -> float:
 
 @dataclass(frozen=True)
 class Smoothing:
-    """`times` moving averages over `width` samples, one behind the other.
+    """`times` moving averages over `width` samples in series, `centred` or not, as `preview.averages`.
 
-    `centred`: the same to both sides of a sample; else the newest samples count whole. `ahead`: samples by which the
-    newest one of the last average is ahead of the motion. `without`: the noise gain without them.
+    `ahead`: samples by which the newest one of the last average is ahead of the motion. `without`: the noise gain
+    without them.
     """
 
     times: int
@@ -170,20 +170,9 @@ class Smoothing:
     without: float = 1.0
 
     @property
-    def whole(self) -> int:
-        """Samples of one average that count whole."""
-        return 2 * int((self.width - 1.0) // 2.0) + 1 if self.centred else int(self.width)
-
-    @property
     def row(self) -> Array:
         """Weights of all together, from the oldest sample to the newest."""
-        rest = self.width - self.whole
-        ends = [0.5 * rest] if self.centred else []
-        one = np.array([*(ends or [rest]), *[1.0] * self.whole, *ends]) / self.width
-        row = np.ones(1)
-        for _ in range(self.times):
-            row = np.convolve(row, one[int(rest == 0.0) : len(one) - int(rest == 0.0 and self.centred)])
-        return row
+        return averages(self.times, self.width, self.centred)
 
     @property
     def age(self) -> float:
@@ -202,7 +191,8 @@ class Smoothing:
 
     def gain(self, at: Array) -> Array:
         """The gain at frequencies (N,) above 0."""
-        n, rest = self.whole, self.width - self.whole
+        n = whole(self.width, self.centred)
+        rest = self.width - n
         if self.centred:
             one = np.sin(0.5 * n * at) / np.sin(0.5 * at) + rest * np.cos(0.5 * (n + 1) * at)
         else:

@@ -1,15 +1,15 @@
 """The preview: a weighted sum of the reference's samples around the present one.
 
 A delay takes straight interpolation between two samples, a mode three samples
-(`hystgen.effects.resonance.compensator`). In series they are one row of weights, which sum to 1: without a recursion it
-is stable for all numbers.
+(`hystgen.effects.resonance.compensator`), or, for steps from point to point, a shaper or a notch. In series they are
+one row of weights, which sum to 1: without a recursion it is stable for all numbers.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,9 @@ from hystgen.parameters.schema import MOST_REFERENCES
 from hystgen.plays.slots import Counts, Reals
 
 WELL_DAMPED = 0.7
-"""[damping ratio] From here on a mode is inverted and not shaped. It overshoots a step by `exp(-pi z/sqrt(1 - z^2))`,
-at most 4.6 %, while the half period that a shaper waits for is 1.4 times that without damping and grows without a bound
-towards 1. Both are closed forms; no run set it."""
+"""[damping ratio] From here on a mode is inverted, and neither shaped nor notched. It overshoots a step by
+`exp(-pi z/sqrt(1 - z^2))`, at most 4.6 %, while the half period that a shaper waits for is 1.4 times that without
+damping and grows without a bound towards 1. Both are closed forms; no run set it."""
 
 
 class Taps(NamedTuple):
@@ -43,14 +43,23 @@ PLAIN = Taps(0, np.ones(1))
 """The reference as it comes."""
 
 
+By = Literal["inverse", "shaper", "notch"]
+"""How modes are compensated."""
+
+
+def rings(mode: Resonance, by: By) -> bool:
+    """Whether a mode takes a shaper or a notch."""
+    return by != "inverse" and mode.damping < WELL_DAMPED
+
+
 def taps(
-    delay: float, modes: Sequence[Resonance], seconds: float, number: int = 3, corner: int = 0, shaped: bool = False
+    delay: float, modes: Sequence[Resonance], seconds: float, number: int = 3, corner: int = 0, by: By = "inverse"
 ) -> Taps:
     """The weights for a delay in s and modes in series at samples `seconds` apart; the reference itself without either.
 
     A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`; 5 undo that up to a fourth
-    difference. `corner`: three centred moving averages over this number of samples smooth the reference. `shaped`: a
-    mode that would ring is kept from it by a second step half a period behind the first.
+    difference. `corner`: three centred moving averages over this number of samples smooth the reference. `by`: how a
+    mode that would ring behind a step is kept from it.
     """
     samples = delay / seconds
     whole = math.floor(samples)
@@ -58,8 +67,8 @@ def taps(
     weights = np.array([1.0 - share, share] if share > 0.0 else [1.0])
     first = whole
     for mode in modes:
-        if shaped and mode.damping < WELL_DAMPED:
-            row = shaper(mode, seconds)
+        if rings(mode, by):
+            row = shaper(mode, seconds) if by == "shaper" else notch(mode, seconds)
             weights = np.convolve(weights, row)
             first -= len(row) - 1
             continue
@@ -90,16 +99,86 @@ def shaper(mode: Resonance, seconds: float) -> NDArray[np.float64]:
     half = math.pi / math.atan2(pole.imag, pole.real)
     n = max(math.ceil(half) - 1, 1)
     if n >= MOST_REFERENCES:
-        raise FormatError((("emit", "compensation", "resonance"), (
-            f"half a period of {mode.frequency:g} Hz is {half:.0f} samples, and a shaper keeps {MOST_REFERENCES} at "
-            "most; sample more slowly, or choose inverse"
-        )))  # fmt: skip
+        raise _too_long(f"half a period of {mode.frequency:g} Hz is {half:.0f} samples, and a shaper")
     early, late = pole**-n, pole ** -(n + 1)
     rows = [[1.0, 1.0, 1.0], [1.0, early.real, late.real], [0.0, early.imag, late.imag]]
     now, soon, last = np.linalg.solve(rows, [1.0, 0.0, 0.0])
     weights = np.zeros(n + 2)
     weights[[0, 1, -1]] = last, soon, now
     return weights
+
+
+def notch(mode: Resonance, seconds: float) -> NDArray[np.float64]:
+    """The weights of the reference now and before, after which a mode does not ring: its poles as zeros, `A(z)/A(1)`,
+    behind two averages over `coth(w0 T/2)` samples.
+
+    Two poles at `p = exp(-w0 T)` in place of the averages have the same mean delay, `2 p/(1 - p)`, but for a part of a
+    sample, and the same bound of the gain of two differences, `((1 - p)/(1 + p))^2`; but they creep up to a step,
+    within 0.1 % in 9.2 times `1/w0`, where the averages end after 4 of these, and keep a state that rounding may hold
+    back.
+    """
+    a1, a2 = denominator(mode, seconds)
+    width = 1.0 / math.tanh(math.pi * mode.frequency * seconds)
+    if 2.0 * width + 2.0 > MOST_REFERENCES:
+        raise _too_long(f"a notch for {mode.frequency:g} Hz takes {2.0 * width + 2.0:.0f} samples, and")
+    return np.convolve(np.array([a2, a1, 1.0]) / (1.0 + a1 + a2), averages(2, width, centred=False))
+
+
+def _too_long(what: str) -> FormatError:
+    message = f"{what} keeps {MOST_REFERENCES} at most; sample more slowly, or choose inverse"
+    return FormatError((("emit", "compensation", "resonance"), message))
+
+
+def averages(times: int, width: float, centred: bool) -> NDArray[np.float64]:
+    """The weights of so many moving averages over `width` samples in series, from the oldest sample to the newest.
+
+    `centred`: the same to both sides of a sample; else the newest samples count whole.
+    """
+    n = whole(width, centred)
+    rest = width - n
+    ends = ([0.5 * rest] if centred else [rest]) if rest > 0.0 else []
+    one = np.array([*ends, *[1.0] * n, *(ends if centred else [])]) / width
+    row = np.ones(1)
+    for _ in range(times):
+        row = np.convolve(row, one)
+    return row
+
+
+def whole(width: float, centred: bool) -> int:
+    """Samples of an average that count whole."""
+    return 2 * int((width - 1.0) // 2.0) + 1 if centred else int(width)
+
+
+class Shaped(NamedTuple):
+    """The modes that a shaper or a notch keeps from ringing at steps `seconds` apart, and their weights."""
+
+    by: By
+    modes: tuple[Resonance, ...]
+    seconds: float
+    taps: Taps
+
+    @property
+    def late(self) -> float:
+        """Samples by which the motion is late on a ramp: the weights' mean age, and `2 zeta/w0` of each mode."""
+        ages = -(self.taps.first + np.arange(len(self.taps.weights)))
+        own = math.fsum(each.damping / (math.pi * each.frequency) for each in self.modes)
+        return float(ages @ self.taps.weights) + own / self.seconds
+
+    def missed(self, period: float) -> float:
+        """How far the motion is off a sine with a period in samples, as a share of its size."""
+        turn = 2j * math.pi / period
+        ages = -(self.taps.first + np.arange(len(self.taps.weights)))
+        found = complex(np.exp(-turn * ages) @ self.taps.weights)
+        for each in self.modes:
+            s = turn / (2.0 * math.pi * each.frequency * self.seconds)
+            found /= s * s + 2.0 * each.damping * s + 1.0
+        return abs(1.0 - found)
+
+
+def shaped(modes: Sequence[Resonance], seconds: float, by: By) -> Shaped | None:
+    """The modes that `by` keeps from ringing; None if there are none."""
+    found = tuple(mode for mode in modes if rings(mode, by))
+    return Shaped(by, found, seconds, taps(0.0, found, seconds, by=by)) if found else None
 
 
 def led(needed: Taps, samples: int | None) -> Taps:
