@@ -37,6 +37,7 @@ from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
+from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 from hystgen.verification import sources
 
@@ -669,3 +670,23 @@ def test_status_tells_at_either_end_that_a_saturation_has_no_input(
             _, status = reference.answers(numbers.tables, True, op, given, compiled=False)
             assert not status[0], "the offset may be set"
             assert bool(status[1] & slots.DOMAIN) == seen
+
+
+@BOTH
+@pytest.mark.parametrize("options", [{"resonance": "notch"}, {"resonance": "shaper"}, {"noise_gain": 4.0}])
+def test_weights_of_the_reference_stay_within_bounds_and_come_to_rest(arithmetic: str, options: dict[str, Any]) -> None:
+    """Against float64 with the same weights, which answers the same codes; behind a step nothing moves any more."""
+    one = model(chain("weighed", "name: resonance, frequency: 30, damping: 0.05"))
+    how = Compensation(**options)
+    numbers, double = (tables.build(one.chain, each, T, how) for each in (arithmetic, "float64"))
+    codes = numbers.codes
+    assert codes is not None
+    assert numbers.taps is not None
+    given, exact = record(numbers, codes, 5, 0.9)
+    v = answers(numbers, given, True) * float(codes.drive_lsb)
+    wanted = answers(double, exact, True)
+    assert np.max(np.abs(v - wanted)) <= codes.inverse_error * float(codes.drive_lsb)
+    low, high = numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1].tolist()
+    step = np.repeat([0.2 * low, 0.7 * high], [5, 200]).round()
+    v = answers(numbers, Run(np.arange(205) * T, step, {}), True)
+    assert len(set(v[5 + len(numbers.taps.weights) :].tolist())) == 1
