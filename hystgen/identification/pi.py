@@ -237,8 +237,10 @@ class Candidate:
         return len(self.thresholds) - 1
 
 
-def largest(courses: Sequence[Course]) -> float:
+def largest(courses: Sequence[Course], least: float = LEAST_TRAVEL) -> float:
     """The largest threshold whose play moves far enough in the record that moves it most.
+
+    `least`: the distance that is far enough, as a share of the drive's range.
 
     The movement of a play decreases with its threshold, so bisection finds the place; nothing is assumed about the
     waveform, and a first loading from a known start counts as such.
@@ -248,7 +250,7 @@ def largest(courses: Sequence[Course]) -> float:
         low_end, high_end = course.drive_range
         if high_end == low_end:
             continue
-        wanted = np.array([LEAST_TRAVEL, LEAST_RETURN]) * (high_end - low_end)
+        wanted = np.array([least, LEAST_RETURN]) * (high_end - low_end)
         low, high = 0.0, float(np.ptp(course.v))
         for _ in range(40):
             middle = 0.5 * (low + high)

@@ -94,16 +94,20 @@ def needed(
     stages: Sequence[Stage] = (),
     wanted: int | tuple[float, ...] | None = None,
     least: float = LEAST_KNOWN,
+    largest: float = math.inf,
 ) -> list[Course]:
     """The courses, with a start memory (`estimated`) for those of which too little could be compared without one.
 
-    `least`: share of the samples of a course that is enough.
+    `least`: share of the samples of a course that is enough; `largest`: threshold above which no play is of interest.
     """
-    short = [lacking(item, least) for item in courses]
+    short = [lacking(item, least, largest) for item in courses]
     if not any(short):
-        return [unknown(item) for item in courses]
+        return [unknown(item, largest) for item in courses]
     found = estimated(courses, stages, wanted)
-    return [item if lacks else unknown(item) for item, lacks in zip(found, short, strict=True)]
+    return [
+        unknown(item, largest) if not lacks or item.start is None else item
+        for item, lacks in zip(found, short, strict=True)
+    ]
 
 
 def of_model(
@@ -112,21 +116,29 @@ def of_model(
     thresholds: Array,
     weights: Array,
     least: float = LEAST_KNOWN,
+    largest: float = math.inf,
 ) -> list[Course]:
-    """Courses by which a model is judged: its weights stay, and the starts of courses not `lacking` are ignored."""
+    """Courses by which a model is judged: its weights stay, and the starts of courses not `lacking` are ignored.
+
+    `least`, `largest`: as in `needed`.
+    """
     if len(thresholds) == 1:  # without plays there is nothing to know
         return [replace(item, start=Start((), 0.0), first=item.begin) for item in courses]
-    begun = [unknown(item) for item in courses]
-    places = [k for k, item in enumerate(begun) if lacking(item, least)]
+    begun = [unknown(item, largest) for item in courses]
+    places = [k for k, item in enumerate(begun) if lacking(item, least, largest)]
     if places:
-        for k, item in zip(places, _started([begun[k] for k in places], stages, thresholds, weights), strict=True):
-            begun[k] = item
+        some = [unknown(begun[k]) for k in places]
+        for k, before, item in zip(places, some, _started(some, stages, thresholds, weights), strict=True):
+            begun[k] = begun[k] if item is before else item
     return begun
 
 
-def unknown(item: Course) -> Course:
-    """The course without an estimated start memory, and without its start if no history is known either."""
-    return replace(item, start=None).resettled(math.inf)
+def unknown(item: Course, largest: float = math.inf) -> Course:
+    """The course without an estimated start memory, and without its start if no history is known either.
+
+    `largest`: threshold up to which the memory of plays matters.
+    """
+    return replace(item, start=None).resettled(largest)
 
 
 def findable(item: Course) -> bool:
@@ -137,9 +149,12 @@ def findable(item: Course) -> bool:
     return bool(min(reduction.ways(v)) >= pi.LEAST_TRAVEL * np.ptp(v) > 0.0)
 
 
-def lacking(item: Course, least: float) -> bool:
-    """Whether less than the share `least` of a course can be compared without a start memory, and one can be found."""
-    return findable(item) and unknown(item).used < least * _whole(item).used
+def lacking(item: Course, least: float, largest: float = math.inf) -> bool:
+    """Whether less than the share `least` of a course can be compared without a start memory, and one can be found.
+
+    `largest`: as in `unknown`.
+    """
+    return findable(item) and unknown(item, largest).used < least * _whole(item).used
 
 
 def _started(
@@ -155,7 +170,7 @@ def _started(
             turns = turns_of(r, float(seen.v[0]) + memory_of(slopes, r))
             whole = replace(seen, start=Start(turns, uncertainty), first=item.begin)
             if not _transient(whole, item.first, r, found.best):
-                item = replace(item, start=Start(_in_front(turns, stages), uncertainty), first=item.begin)
+                item = replace(item, start=Start(in_front(turns, stages), uncertainty), first=item.begin)
         begun.append(item)
     return begun
 
@@ -165,7 +180,7 @@ def _whole(item: Course) -> Course:
     return replace(item, first=item.begin)
 
 
-def _in_front(turns: tuple[float, ...], stages: Sequence[Stage]) -> tuple[float, ...]:
+def in_front(turns: tuple[float, ...], stages: Sequence[Stage]) -> tuple[float, ...]:
     """Drive values at which the plays see those turns."""
     drives = []
     for before, turn in itertools.pairwise((0.0, *turns)):

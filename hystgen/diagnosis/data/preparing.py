@@ -328,7 +328,7 @@ def prepare(
     if not any(float(np.ptp(item.y[item.known])) > 0.0 for item in to_fit if item.known.any()):
         names = ", ".join(item.name for item in to_fit)
         raise IdentificationError(f"{names}: the measured output is constant where it is compared; check the sensor")
-    reach = pi.largest(fit_courses)
+    reach = _reach(fit_courses)
     samples = sum(course.used for course in fit_courses)
     drive = (min(c.drive_range[0] for c in fit_courses), max(c.drive_range[1] for c in fit_courses))
     places = np.array(pi.dense(reach, samples, acceptance.PLAYS).thresholds)
@@ -357,10 +357,20 @@ def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Cours
     itself, since a fit needs it. Held-out ones count together: a memory found without the effects that are still to be
     named may be wrong by as much as they do, and then stands for an error that no name removes.
     """
-    begun = start.needed(to_fit, least=acceptance.FEW_COMPARED)
+    low, high = min(float(c.v.min()) for c in to_fit), max(float(c.v.max()) for c in to_fit)
+    largest = 0.5 * (1.0 - pi.LEAST_RETURN) * (high - low)  # wider plays may exist, but hardly move
+    begun = start.needed(to_fit, least=acceptance.FEW_COMPARED, largest=largest)
     solution, _ = pi.solve(begun, None, 0.0)
-    begun_held = start.of_model(held, (), solution.thresholds, solution.weights, _least(held))
+    begun_held = start.of_model(held, (), solution.thresholds, solution.weights, _least(held), largest)
     return begun, begun_held, solution.sense.sentences(len(solution.thresholds) - 1)
+
+
+def _reach(courses: Sequence[Course]) -> float:
+    """The largest threshold of the fits: of a play that moves visibly, even at the ends of the range only.
+
+    What wider plays do between there and a fit's usual reach would be left, and stand for an effect.
+    """
+    return pi.largest(courses, pi.LEAST_RETURN)
 
 
 def _least(courses: Sequence[Course]) -> float:

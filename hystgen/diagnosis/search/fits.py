@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.diagnosis.data.items import Item
-from hystgen.diagnosis.search.hypothesis import Actuator, NotFiniteError, Structure, Sums
+from hystgen.diagnosis.search import acceptance
+from hystgen.diagnosis.search.hypothesis import Actuator, NotFiniteError, Structure, Sums, Turns
 from hystgen.effects.base import Effect
-from hystgen.identification import joint, pi, reduction, stage_content
+from hystgen.identification import joint, pi, reduction, stage_content, start
 from hystgen.identification.joint import DIFFERENCE, Shaped
 from hystgen.identification.pi import root_mean_square
 from hystgen.identification.quality import SEED, TAILS, correlation_time
@@ -29,6 +30,9 @@ Array = NDArray[np.float64]
 
 POLISHED = 1e-5
 """A search ends after a step that lowers the error by a smaller share: far below any difference that decides."""
+
+RESTARTS = 4
+"""Most searches for start memories beside the same effects."""
 
 
 class _Block:
@@ -199,6 +203,42 @@ def begun(structure: Structure, items: Sequence[Item], start: Array, p: Array) -
 def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> Fitted:
     """The end of a search from a start; `p`: weights close to the best ones."""
     return begun(structure, items, start, p).further().found(p)
+
+
+# Start memories beside the effects ---------------------------------------------------------------------------
+
+
+def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> Fitted:
+    """The fit with start memories that fit beside its effects, for records whose memory was found without a history.
+
+    What an effect does was part of the memory that was found without it. The output less what the effects do is what
+    the plays have to explain, so that their weights are known in the search for a memory (`start.of_model`). The
+    numbers are then fitted anew to `quick`, and so on until the error no longer falls by `BETTER`.
+    """
+    if all(item.history is not None or item.turns is None for item in items):
+        return fitted
+    for _ in range(RESTARTS):
+        found = dict(fitted.structure.starts)
+        for item in items:
+            if item.history is None and item.turns is not None:
+                found[item.turns] = _turns(fitted, item) or found.get(item.turns, item.turns)
+        structure = replace(fitted.structure, starts=tuple(found.items()))
+        if structure.starts == fitted.structure.starts:
+            break
+        other = fit(structure, quick, fitted.shape, fitted.weights)
+        if not other.rms < (1.0 - acceptance.BETTER) * fitted.rms:
+            break
+        fitted = other
+    return fitted
+
+
+def _turns(fitted: Fitted, item: Item) -> Turns | None:
+    """Drive values that lead virgin plays to the start memory that fits an item best; None if none is found."""
+    actuator, r, p = fitted.actuator, fitted.structure.thresholds, fitted.weights
+    seen = actuator.course(item, actuator.error(item, p))
+    alone = replace(seen, y=seen.y + reduction.prediction(seen.v, seen.history, r, p), history=None)
+    (found,) = start.of_model([alone], (), r, p, 1.0)
+    return None if found.start is None else start.in_front(found.start.turns, actuator.stages)
 
 
 def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fitted, pi.Weights]:

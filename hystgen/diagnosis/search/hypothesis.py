@@ -29,6 +29,7 @@ from hystgen.plays import operators
 from hystgen.records import Record
 
 Array = NDArray[np.float64]
+Turns = tuple[float, ...]
 
 
 # The forward model: plays behind a front, effects around them, free start states -----------------------------
@@ -60,6 +61,8 @@ class Actuator:
         default_factory=dict, compare=False, repr=False
     )
     """Gain and offset over a run, kept with the effect and the run, since the `id` of a deleted one may be reused."""
+    starts: tuple[tuple[Turns, Turns], ...] = ()
+    """Start memories found beside the effects: the turns of an item, and those that replace them."""
 
     def at(self, place: Place) -> Sequence[Effect]:
         """The effects at one place of the chain, in its order."""
@@ -189,15 +192,25 @@ class Actuator:
     def _moving(self) -> object:
         """A key of everything, except the record, that the movement of the plays depends on."""
         movers = tuple(effect for effect in self.at(Place.PLAYS) if effect.moves_plays())
-        return self.thresholds.tobytes(), tuple(self.at(Place.DRIVE)), self.stages, movers
+        return self.thresholds.tobytes(), tuple(self.at(Place.DRIVE)), self.stages, movers, self.starts
 
-    def _input(self, item: Item) -> tuple[Array, Run, Array, Array]:
-        """The input of the plays, the run, their thresholds and their start."""
+    def course(self, item: Item, y: Array) -> reduction.Course:
+        """The record as the plays see it, with another output (N,)."""
         a = item.run.v
         for effect in self.at(Place.DRIVE):
             a = effect.drive(a, item.run)
-        course = reduction.Course(item.name, a, a, item.visited, 0, len(a))
-        course = joint.through_front(course, self.stages)
+        course = reduction.Course(item.name, a, y, self._visited(item), 0, len(a))
+        return joint.through_front(course, self.stages)
+
+    def _visited(self, item: Item) -> Turns | None:
+        """Drive values that lead virgin plays to the start memory; None for an unknown one."""
+        if item.history is None and item.turns is not None:
+            return dict(self.starts).get(item.turns, item.turns)
+        return item.visited
+
+    def _input(self, item: Item) -> tuple[Array, Run, Array, Array]:
+        """The input of the plays, the run, their thresholds and their start."""
+        course = self.course(item, item.y)
         start = reduction.start_states(course.v, course.history, self.thresholds)
         return course.v, item.run, self.thresholds, start
 
@@ -308,7 +321,7 @@ class Actuator:
     @cached_property
     def _numbers(self) -> object:
         effects = tuple((type(effect), repr(effect.model_dump())) for effect in self.effects)  # a user's may hold lists
-        return self.thresholds.tobytes(), self.stages, effects
+        return self.thresholds.tobytes(), self.stages, effects, self.starts
 
     def _residual(self, item: Item, p: Array) -> Array:
         """(2, N) at the compared samples: the error before a fit of free components, and its change with the offset."""
@@ -361,11 +374,15 @@ def kept(effect: Effect) -> Part:
 
 @dataclass(frozen=True)
 class Structure:
-    """Thresholds, a front and effects; its shape is the front's, then the numbers of each effect."""
+    """Thresholds, a front and effects; its shape is the front's, then the numbers of each effect.
+
+    `starts`: as of an `Actuator`.
+    """
 
     thresholds: Array
     front: Front
     parts: tuple[Part, ...] = ()
+    starts: tuple[tuple[Turns, Turns], ...] = ()
 
     @property
     def start(self) -> Array:
@@ -406,7 +423,8 @@ class Structure:
 
     def actuator(self, shape: Array) -> Actuator:
         """The actuator of a shape."""
-        return Actuator(self.thresholds, self.front.stages(self.pieces(shape)[0]), tuple(self.effects(shape)))
+        stages = self.front.stages(self.pieces(shape)[0])
+        return Actuator(self.thresholds, stages, tuple(self.effects(shape)), starts=self.starts)
 
     def varied(self, shape: Array, here: Actuator) -> list[Actuator]:
         """The actuators of a shape with each number in turn changed by `DIFFERENCE`; the rest is shared with `here`."""

@@ -253,6 +253,10 @@ class Records:
         with parallel.Pool(searches, self.jobs) as pool:
             return _followed_up(searches, _screened(searches, pool), pool)
 
+    def restarted(self, fitted: Fitted) -> Fitted:
+        """The fit with start memories found beside its effects (`fits.restarted`)."""
+        return fits.restarted(fitted, [*self.to_fit, *self.held], self.quick)
+
     def residual(self, fitted: Fitted) -> float:
         """rms error on held-out records."""
         return rms(fitted.errors(self.held))
@@ -474,7 +478,7 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) ->
     done |= all_of([_Task(_POLISH, k, *numbers[:2], joint.MOST_STEPS) for k, numbers in going_on.items()])
     tried = []
     for k, option in found.items():
-        fitted = Fitted(option.structure, *done[k][:3])
+        fitted = records.restarted(Fitted(option.structure, *done[k][:3]))
         if fitted.rms >= now.rms:
             continue
         errors = fitted.errors(records.held)

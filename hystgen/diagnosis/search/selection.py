@@ -732,7 +732,9 @@ def _rest(found: Sequence[Found], k: int, without: float) -> list[Found]:
 def _without(now: Fitted, name: str, records: Records) -> Fitted | None:
     """The hypothesis without one effect, refitted."""
     smaller = _less(now, name)
-    return None if smaller is None else fits.fit(smaller[0], records.quick, smaller[1], now.weights)
+    if smaller is None:
+        return None
+    return records.restarted(fits.fit(smaller[0], records.quick, smaller[1], now.weights))
 
 
 def _without_refit(now: Fitted, name: str, records: Records) -> Fitted | None:

@@ -32,6 +32,11 @@ CUBIC = "noncongruent, cubic"
 PLACES = 101
 """Places at which a bump is looked for as a start: hundredths of the range."""
 
+LEAST, MOST = -10.0, 40.0
+"""[tenths] Bounds of the coefficients of play functions at the largest drive. The density is 1 where a play is at 0:
+one that rises evenly from 20 to 180 % of its mean ends at 9, with a coefficient of 40. Changed by: second_plants single
+(noncongruent)."""
+
 LOWEST, HIGHEST = -0.8, 2.5
 """Amplitudes of a bump from which a search starts."""
 
@@ -117,7 +122,7 @@ class PlayFunctions(_Noncongruent):
 
             n = terms * len(courses)
             zero = np.zeros(n)
-            return Candidate(label, np.full(n, -10.0), np.full(n, 10.0), zero, build, zero, **more)
+            return Candidate(label, np.full(n, LEAST), np.full(n, MOST), zero, build, zero, **more)
 
         even = np.ones(plays)
         return [
