@@ -366,11 +366,7 @@ class _Searches:
         near = acceptance.TOO_FAR * min(each.now.rms for each in acting(begun))
         searches = [each.further(acceptance.FIRST_STEPS, COARSE) for each in begun if each.now.rms <= near]
         best = min(acting(searches), key=lambda each: each.now.rms)
-        search = best.further(acceptance.SCREENING_STEPS, COARSE)
-        for _ in range(acceptance.LONGER - 1):
-            if search.now.rms >= acceptance.FALLING * best.now.rms:
-                break
-            best, search = search, search.further(acceptance.SCREENING_STEPS, COARSE)
+        search = _while_falling(best, acceptance.SCREENING_STEPS)
         return min(search, *searches, key=lambda each: each.now.rms).found(now.weights)
 
     def _join(self, option: Option, task: _Task) -> Fitted:
@@ -378,8 +374,20 @@ class _Searches:
         assert task.shape is not None
         assert task.weights is not None
         search = fits.begun(option.structure, self.records.quick, task.shape, task.weights)
-        little = COARSE if task.what == _JOIN else fits.POLISHED
-        return (search.further(task.steps, little) if task.steps else search).found(task.weights)
+        if task.what == _POLISH:
+            search = search.further(task.steps)
+        elif task.steps:
+            search = _while_falling(search, task.steps)
+        return search.found(task.weights)
+
+
+def _while_falling(search: Search, steps: int) -> Search:
+    """The search after so many steps, and as many again as long as they lower the error by enough (`FALLING`)."""
+    for _ in range(acceptance.LONGER):
+        before, search = search.now.rms, search.further(steps, COARSE)
+        if search.now.rms >= acceptance.FALLING * before:
+            break
+    return search
 
 
 _Pool = parallel.Pool[_Task, _Numbers]

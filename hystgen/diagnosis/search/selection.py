@@ -214,9 +214,14 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     return [*(each for *_, each in sorted(near, key=order)), *others]
 
 
+ORDER = "creep", "resonance", "lag", "delay", "rate_dependence"
+"""The first in the order of equal effects: a lag, which every amplifier has, or a delay before plays that are late."""
+
+
 def place(name: str) -> int:
-    """Place in the catalogue, with the user's own effects after it."""
-    return effects.CATALOGUE.index(name) if name in effects.CATALOGUE else len(effects.CATALOGUE)
+    """Place in that order, then in the catalogue, with the user's own effects after it."""
+    order = (*ORDER, *(each for each in effects.CATALOGUE if each not in ORDER))
+    return order.index(name) if name in order else len(order)
 
 
 def _at_an_end(fitted: Fitted) -> bool:
@@ -479,6 +484,8 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
         now, latest = step.best.fitted, step
         names = {each.tried.option.name for tried in rankings for each in tried}
         now, found = _exchanged(*_without_needless(now, found, records), names, records)
+        if len(found) > 1 and now is step.best.fitted and not is_noise(records.residual(now), records.noise):
+            now, found = _both_exchanged(step, now, found, records)
         if now is not step.best.fitted:
             latest = None
         if until(now):
@@ -693,14 +700,52 @@ def _exchanged(
 def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
     """Whether an effect gives way to a better one: one with a smaller error, one with fewer numbers and no larger error
     on equal terms, or an equal one that comes earlier in the catalogue.
+
+    With no more numbers all records decide, as in `simplest_first`, if they differ and held-out ones hardly do.
     """
     held, residual = records.held, records.residual(now)
     fewer = free_numbers(now, held) - best.numbers(held)
     if best.held_out <= (1.0 - acceptance.BETTER) * residual:
         return True
+    if fewer >= 0 and best.held_out <= (1.0 + acceptance.BETTER) * residual:
+        every = [*records.to_fit, *held]
+        if better(best.fitted, now, every):
+            return True
     if fewer == 0:
         return best.held_out <= (1.0 + acceptance.EQUAL) * residual and place(best.name) < place(name)
     return fewer > 0 and rms(best.fitted.errors(held, now)) <= residual
+
+
+def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
+    """The effects with a rival in place of the latest and another shape of an earlier one, if that is better.
+
+    The shape of the earlier one was chosen while the latest was missing, and the latest beside that shape: where each
+    holds the other in its place, no exchange of a single one finds the two that belong together.
+    """
+    others = {each.name: each for each in reversed(rivals(step.best, step.tried, records))}
+    follow = sorted(others.values(), key=lambda each: each.held_out)[: acceptance.MOST_RIVALS]
+    every = [*records.to_fit, *records.held]
+    for first in follow:
+        merit = merit_of(step.now, first, records)
+        for k, old in enumerate(found[:-1]):
+            if merit is None or old.name == first.name:
+                continue
+            fitted = _without(first.fitted, old.name, records)
+            if fitted is None:
+                continue
+            then = _step(fitted, 0.0, records, lambda option, name=old.name: option.name == name)  # type: ignore[misc]
+            if then is None or then.merit is None or then.best.name != old.name:
+                continue
+            best = then.best.fitted
+            if not (better(best, now, every) and then.best.held_out <= records.residual(now)):
+                continue
+            names = tuple(dict.fromkeys(each for each in (found[-1].name, *found[-1].rivals) if each != first.name))
+            latest = Found(first.name, first.option.label, 0.0, 0.0, merit.p_value, names)
+            earlier = replace(old, label=then.best.option.label)
+            chain = _in_place(best, [*found[:k], earlier, *found[k + 1 : -1], latest], found[0].before, records)
+            if chain:
+                return best, chain
+    return now, found
 
 
 def _in_place(now: Fitted, found: Sequence[Found], gap: float, records: Records) -> list[Found]:

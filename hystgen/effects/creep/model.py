@@ -18,8 +18,12 @@ from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, P
 FASTEST = 0.01
 """[s] Motion that follows a move faster than this is a lag or friction of the domain walls, not creep."""
 
-MOST_A_DECADE, MOST_OF_A_STATE = 0.06, 0.1
-"""Largest shares that are tried: stages creep by 1 to 2 % per decade, some up to three times that."""
+MOST_A_DECADE, MOST_OF_A_STATE = 0.06, 0.2
+"""Largest shares that are tried: stages creep by 1 to 2 % per decade, some up to three times that; one of a few states
+stands for up to three decades."""
+
+SHORTER = 1.0
+"""Decades by which a search for the ends of a logarithmic spectrum begins inside those of the recorded times."""
 
 LOGARITHMIC = "creep, logarithmic"
 
@@ -137,6 +141,7 @@ class ExponentialCreep(_Creep):
                     build,
                     np.concatenate([places, np.zeros(n)]),
                     beyond=found[1].label if n == 3 else "",
+                    amounts=tuple(range(n, 2 * n)),
                 )
             )
         return found
@@ -217,13 +222,13 @@ class LogarithmicCreep(_Creep):
         wide = high - low
         return [
             Candidate(
-                LOGARITHMIC, np.zeros(1), np.array([MOST_A_DECADE / 0.1]), np.array([0.1]), even, np.zeros(1)
+                LOGARITHMIC, np.zeros(1), np.array([MOST_A_DECADE / 0.1]), np.array([0.1]), even, np.zeros(1), amounts=(0,)
             ),
             Candidate(
                 "creep, logarithmic, free ends",
                 np.array([0.0, low, min(0.3, wide)]), np.array([MOST_A_DECADE / 0.1, high - 0.3, wide]),
                 np.array([0.1, low, wide]), ended, np.array([0.0, low, wide]),
-                beyond=LOGARITHMIC,
+                beyond=LOGARITHMIC, amounts=(0,), grown=lambda x: np.array([x[0], low + SHORTER, wide - 2.0 * SHORTER]),
             ),
         ]  # fmt: skip
 
