@@ -197,9 +197,14 @@ class Model:
         """'corners' or 'loop': what is given, or else the parameter file's, with `auto` decided for `optimize`."""
         emit = self.parameters.emit
         if self.effects:
-            if (engine or emit.engine) == "corners":
-                raise UnsupportedEffectsError("effects are compensated with engine loop; give --engine loop, or auto")
-            return "loop"
+            own = [effect.name for effect in self.effects if effect.moves_plays() or effect.bends_plays()]
+            if own and (engine or emit.engine) == "corners":
+                raise UnsupportedEffectsError(
+                    f"engine corners knows where plays are from where the drive turned, and {' and '.join(own)} "
+                    "moves or bends each play in its own way; give --engine loop, or auto"
+                )
+            if own or (engine or emit.engine) == "auto":
+                return "loop"
         about = (operator or emit.operator, arithmetic or emit.arithmetic)
         return engines.choose(engine or emit.engine, optimize or emit.optimize, self.cascade, *about)
 
@@ -211,7 +216,9 @@ class Model:
             self.need_compensated(arithmetic, self.parameters.emit.operator)
             assert self.parameters.sample_time is not None
             how = self.parameters.emit.compensation
-            return chain_tables.build(self.chain, arithmetic, self.parameters.sample_time, how, self._lsb).tables
+            return chain_tables.build(
+                self.chain, arithmetic, self.parameters.sample_time, how, self._lsb, engine
+            ).tables
         return tables.build(self.cascade, arithmetic, engine, lsb=self._lsb)
 
     @property

@@ -969,7 +969,6 @@ def test_model_simulate_takes_time_columns_or_the_sample_time() -> None:
 @pytest.mark.parametrize(("ask", "said"), [
     (lambda m: m.inverse().simulate([0.0], "q15"), "a reference in q15 moves the drive by 7 % of its range; use q31"),
     (lambda m: hystgen.emit(m, "nowhere", arithmetic="q15"), "a reference in q15 moves the drive by 7 % of its range"),
-    (lambda m: hystgen.emit(m, "nowhere", engine="corners"), "engine loop"),
     (lambda m: hystgen.verify(m, arithmetic="q15"), "a reference in q15 moves the drive by 7 % of its range"),
     (lambda m: m.session(), r"of a model with effects \(lag, creep\) is not supported yet"),
 ])  # fmt: skip
@@ -1223,7 +1222,8 @@ def test_commands_that_do_not_cover_effects_name_them(run: Callable[..., tuple[i
             "`sample_time: 1.0e-4`, the time between two calls of step in s"
         )
         assert not out.exists()
-    path.write_text(path.read_text() + "sample_time: 1.0e-3\n")
+    moved = "    - {name: rate_dependence, shape: relaxation, time_constant: 0.1}\nsample_time: 1.0e-3\n"
+    path.write_text(path.read_text() + moved)
     code, said, err = run("emit", path, "-o", out, "--engine", "corners")
     assert (code, said) == (1, "")
     assert err.startswith(f"{path}: error: ")

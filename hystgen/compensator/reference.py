@@ -56,7 +56,7 @@ def operations(t: Tables | FixedTables | ChainTables) -> Operations:
     """The functions of the bit reference for the arithmetic and the engine of these tables."""
     if isinstance(t, ChainTables):
         drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
-        return _chain_operations(t.fixed, drives, outputs)
+        return _chain_operations(t.fixed, t.plays.engine == LOOP, drives, outputs)
     return _operations(t.engine == LOOP, t.fixed, t.has_front)
 
 
@@ -74,10 +74,10 @@ def _operations(loops: bool, fixed: bool, front: bool) -> Operations:
 
 @functools.cache
 def _chain_operations(
-    fixed: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
+    fixed: bool, loops: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
 ) -> Operations:
     own = chain_step_fixed if fixed else chain_step_float
-    return chain_step.made_of(own.BLOCKS, own.CODES, drives, outputs)
+    return chain_step.made_of(own.BLOCKS if loops else own.CORNERS, own.CODES, drives, outputs)
 
 
 def _corner_operations(

@@ -36,7 +36,8 @@ from hystgen.plays import slots
 @dataclass(frozen=True)
 class Field:
     """A field of an instance: `kind` is that of a number, flag, status, or of a block and then made of `members`, real
-    numbers r or those of fixed point as in `Kind`, and `flags`; with a `count` it is an array."""
+    numbers r or those of fixed point as in `Kind`, and `flags`, or a type of the corner engine; with a `count` it is an
+    array."""
 
     kind: str
     name: str
@@ -394,8 +395,26 @@ def instance(op: str, t: ChainTables, blocks: Sequence[Block], plays: int, kept:
         *([Field("flag", "filled", "there are references"), Field("status", "bits", "of the last step")] if inverse
           else []),
         Field("status", "status"),
-        Field("play", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept),
+        *(_corners(t, inverse, plays) if t.plays.engine == slots.CORNERS
+          else [Field("play", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept)]),
         *([Field("signal", "bent", "what each contributes", plays + 1)] if moving else []),
+    ]  # fmt: skip
+
+
+def _corners(t: ChainTables, inverse: bool, plays: int) -> list[Field]:
+    """The memory of the plays of engine corners."""
+    sought = [Field("flag", "sought", "a solution has been found since the plays followed")] * inverse
+    if not t.fixed:
+        undo = [Field("place", "undo", "where the plays were before the solution")] * inverse
+        return [*sought, Field("plays", "plays"), *undo, Field("corner", "corner", "", plays + 1)]
+    following = "at which another play begins to follow"
+    return [
+        *sought,
+        Field("place", "here"),
+        Field("signal", "next", f"output, along the move, {following}") if inverse
+        else Field("play", "next", f"input {following}"),
+        Field("kink", "kink", "of the present step; here rather than on the stack"),
+        Field("corner", "corner", "", max(plays, 1)),
     ]  # fmt: skip
 
 

@@ -262,19 +262,22 @@ def _memory(
     for op in ("forward", "inverse"):
         if getattr(options, op):
             fields = chain.get(op)
-            members = [_field(each, arithmetic, layout) for each in fields] if fields else [known[f"{op}_t"]]
+            members = [_field(each, arithmetic, layout, known) for each in fields] if fields else [known[f"{op}_t"]]
             sizes.append((op, layout.struct(*members)[0]))
     a_play, _ = known["corner_t" if options.engine == "corners" else "play_t"]
     more = _constants(plays, arithmetic, layout, known, kinds, n + 1) + a_play * len(sizes)
     return Memory(_constants(text, arithmetic, layout, known, kinds), sizes, more)
 
 
-def _field(field: Field, arithmetic: Arithmetic, layout: Layout) -> tuple[int, int]:
-    """Size and alignment of a field of an instance."""
+def _field(
+    field: Field, arithmetic: Arithmetic, layout: Layout, known: Mapping[str, tuple[int, int]]
+) -> tuple[int, int]:
+    """Size and alignment of a field of an instance; `known`: of the types of the corner engine."""
     real = (arithmetic.bytes, arithmetic.bytes)
     signal, fine = ((8, 8), (4, 4)) if arithmetic.fixed else (real, real)
     whole = (layout.integer, layout.integer)
-    one = {"flag": (1, 1), "status": whole, "signal": signal, "fine": fine, "play": fine}.get(field.kind, real)
+    one = {"flag": (1, 1), "status": whole, "signal": signal, "fine": fine, "play": fine}.get(field.kind)
+    one = one or known.get(f"{field.kind}_t", real)
     members = [*(_LETTERS.get(letter, real) for letter in field.members), *field.flags * [(1, 1)]]
     size, alignment = layout.struct(*members) if members else one
     return size * max(field.count, 1), alignment

@@ -196,7 +196,9 @@ def compiled_of(parameters: Parameters, cascade: StaticModel, options: Options) 
     assert parameters.sample_time is not None, "emit_options asks for it"
     how = parameters.emit.compensation
     lsb = (parameters.emit.drive_lsb, parameters.emit.output_lsb)
-    return chain_tables.build(Chain(cascade, effects), options.arithmetic, parameters.sample_time, how, lsb)
+    return chain_tables.build(
+        Chain(cascade, effects), options.arithmetic, parameters.sample_time, how, lsb, options.engine
+    )
 
 
 def values_of(parameters: Parameters, cascade: StaticModel, options: Options) -> SimpleNamespace:
@@ -250,6 +252,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     kernels = runtime.needed(
         [*runtime.table_pieces(family), *runtime.kernel_pieces(family)], sorted(runtime.used(pieces))
     )
+    carried = runtime.carried(family, pieces) if shared else kernels
     values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family)
     values.types = ""
     if glue:
@@ -270,7 +273,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.status = _status(values)
     values.macros = _macros(values)
     text = runtime.render(kernels, prefix, family, static=True)
-    values.kernels = "" if shared else text
+    values.kernels = runtime.render(carried, prefix, family, static=True)
     types = [*runtime.memory_pieces(family), *runtime.table_pieces(family), *([] if glue else states)]
     values.cost = _cost(cascade, options, values, text, types)
     values.details = _details(parameters, cascade, options, values)

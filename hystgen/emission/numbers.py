@@ -79,7 +79,7 @@ def chain_fields(
     glue = chain.glue(compiled, operators, name, behind)
     limits, dtype = tables.limits, tables.threshold.dtype.type
     bounds = chain_bounds(compiled, options.arithmetic)
-    plays = _float_fields(parameters, static, options, prefix)
+    plays = _float_fields(parameters, static, options, prefix, tables.plays)
     return {
         **plays,
         "numbers": tables,
@@ -104,8 +104,9 @@ def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Opt
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
     glue = chain.glue(compiled, operators, name, behind)
     curves, counts = _curves(plays, name, prefix, options) if plays.fronts else ([], [])
+    corners = options.engine == "corners"
     pointers = _fixed_loop_pointers(plays, name, options)
-    own = [_loop_tables(pointers, plays, name, prefix)]
+    own = [] if corners else [_loop_tables(pointers, plays, name, prefix)]
     if tables.moving.scanned and options.inverse:
         others = [f"{name}_relaxing_{part}" for part in ("slope", "reciprocal", "shift")]
         own.append(_loop_tables([*pointers[:2], *others, *pointers[5:]], plays, name, prefix, "relaxing"))
@@ -115,7 +116,8 @@ def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Opt
         **about,
         **{end: operand(value) for end, value in ends},
         "numbers": tables,
-        "arrays": _fixed_loop_fields(plays, name, prefix, options),
+        "arrays": _fixed_corner_fields(plays, name, prefix, options, True) if corners
+        else _fixed_loop_fields(plays, name, prefix, options),
         "beside": [*curves, *glue.arrays, *own, *glue.beside],
         "stages": [],
         "fronts": bool(plays.fronts),
@@ -141,14 +143,22 @@ def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Opt
     }  # fmt: skip
 
 
-def _float_fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
+def _float_fields(
+    parameters: Parameters, cascade: StaticModel, options: Options, prefix: str, numbers: Tables | None = None
+) -> dict[str, Any]:
+    """`numbers`: of the plays in a model with effects."""
     name, real_t = parameters.name, f"{prefix}_real_t"
     corners = options.engine == "corners"
-    numbers = float_tables.build_float(cascade, options.arithmetic, options.engine, True, True)
+    chain = numbers is not None
+    if numbers is None:
+        numbers = float_tables.build_float(cascade, options.arithmetic, options.engine, True, True)
     dtype = numbers.threshold.dtype.type
     bounds = error_bounds(cascade, options.arithmetic, options.engine)
     stages = [stage(numbers, j, name, real_t, options) for j in range(len(numbers.stage_kind))]
-    arrays = (_corner_fields if corners else _loop_fields)(numbers, name, prefix, options)
+    arrays = (
+        _corner_fields(numbers, name, prefix, options, chain) if corners
+        else _loop_fields(numbers, name, prefix, options)
+    )  # fmt: skip
     own = [] if corners else [_loop_tables(_loop_pointers(name, options), numbers, name, prefix)]
     return {
         **_limits(numbers),
@@ -200,10 +210,10 @@ def _loop_tables(
     return constant(f"{prefix}_tables_t {name}_{whose}_tables", entries.splitlines())
 
 
-def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options) -> list[str]:
-    """The tables of engine corners, one operator after the other."""
+def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options, chain: bool) -> list[str]:
+    """The tables of engine corners, one operator after the other; `chain`: of a model with effects."""
     arrays = []
-    front = len(numbers.stage_kind) > 0
+    front = len(numbers.stage_kind) > 0 and not chain
     for operator, curve, starts, wanted in (
         ("forward", numbers.forward, (numbers.forward_first, numbers.forward_zero), options.forward),
         ("inverse", numbers.inverse, (numbers.inverse_first, numbers.inverse_zero), options.inverse),
@@ -301,7 +311,10 @@ def _fixed_fields(parameters: Parameters, cascade: StaticModel, options: Options
     corners = options.engine == "corners"
     numbers, form = fixed_tables.build(cascade, options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb)
     limits = numbers.limits
-    arrays = (_fixed_corner_fields if corners else _fixed_loop_fields)(numbers, name, prefix, options)
+    arrays = (
+        _fixed_corner_fields(numbers, name, prefix, options, False) if corners
+        else _fixed_loop_fields(numbers, name, prefix, options)
+    )  # fmt: skip
     own = [] if corners else [_loop_tables(_fixed_loop_pointers(numbers, name, options), numbers, name, prefix)]
     curves, counts = _curves(numbers, name, prefix, options) if numbers.fronts else ([], [])
     fine = int(limits[slots.FINE])
@@ -392,8 +405,9 @@ def _fixed_loop_pointers(numbers: FixedTables, name: str, options: Options) -> l
     return [*pointers, *map(literal, ends)]
 
 
-def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: Options) -> list[str]:
-    """The tables of engine corners: one curve for both operators, and what a start memory is made of."""
+def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: Options, chain: bool) -> list[str]:
+    """The tables of engine corners: one curve for both operators, and what a start memory is made of; `chain`: of a
+    model with effects."""
     limits = numbers.limits
     never = (numbers.reach[-1], numbers.way[-1], 0, 0, 1)
     plays = (numbers.reach[:-1], numbers.way[:-1], numbers.slope[1:], numbers.reciprocal[1:], numbers.shift[1:])
@@ -409,7 +423,7 @@ def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: 
         table("int32_t", f"{name}_model_zero", list(numbers.zero)),
     ]
     for operator, first, wanted in (("forward", 0, options.forward), ("inverse", 2, options.inverse)):
-        if wanted and numbers.fronts:
+        if wanted and numbers.fronts and not chain:
             drives = ", ".join(
                 f"{{{literal(numbers.applied[j])}, {'true' if numbers.ascending[j] else 'false'}}}"
                 for j in (first, first + 1)

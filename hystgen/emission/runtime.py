@@ -213,34 +213,45 @@ class Variant:
             if self.fixed:
                 files.append("front_two_curves.c" if self.branches else "front_curve.c")
             files.append("inverse_two_branches.c" if self.branches else "inverse_one_branch.c")
-        elif self.fixed or self.engine == "loop":
+        elif self.fixed or self.chain or self.engine == "loop":
             files.append("front_finer.c" if self.finer and not self.chain else "front_none.c")
-        return (*files, *(self._loop() if self.engine == "loop" else self._corners()), "status.c")
+        own = self._chain() if self.chain else self._loop() if self.engine == "loop" else self._corners()
+        return (*files, *own, "status.c")
+
+    @property
+    def _start(self) -> str:
+        """The file with the start memory of engine loop."""
+        return "loop_start_list.c" if self.start_list else "loop_start.c"
+
+    def _chain(self) -> tuple[str, ...]:
+        """The files of a model with effects, apart from its blocks."""
+        front = "branches" if self.branches else "front" if self.fronts else "plain"
+        kind, loops = "fixed" if self.fixed else "float", self.engine == "loop"
+        slew = ("chain_slew.c",) if self.braked else ("chain_slew.c", "chain_unbraked.c")
+        slew = slew if self.slew else ("chain_free.c",)
+        brake = ("chain_braked.c",) * self.braked
+        delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
+        if not self.moves:
+            plays: tuple[str, ...] = ("chain_plays.c" if loops else f"chain_corners_{kind}.c",)
+        elif not self.bends:
+            plays = ("stretch.c", f"relaxing_{kind}.c", "chain_relaxing.c")
+        else:
+            before = {"relaxing": ("stretch.c",), "dashpot": (f"yield_{kind}.c",)}.get(self.moves, ())
+            kept = () if self.moves == "dashpot" else ("moved_kept.c",)
+            bent = "bent_fixed.c" if self.fixed and self.bends != "none" else f"bent_{self.bends}.c"
+            known = () if self.bends == "none" else ("bent_known.c",)
+            moved = (*before, f"moved_{self.moves}.c", *kept, bent, *known)
+            plays = (*moved, "chain_moving.c", f"search_{kind}.c")
+        finer = ("chain_finer.c" if loops else "chain_corners_finer.c") if self.finer else "chain_whole.c"
+        chain = ("chain.c", "chain_loop.c" if loops else "chain_corners.c", "chain_calls.c")
+        start = (self._start,) if loops else ()
+        return (*start, f"loop_{front}.c", delay, *slew, f"chain_{kind}.c", *brake, *plays, finer, *chain, *more)
 
     def _loop(self) -> tuple[str, ...]:
         front = "branches" if self.branches else "front" if self.fronts else "plain"
         kind = "fixed" if self.fixed else "float"
-        start = "loop_start_list.c" if self.start_list else "loop_start.c"
-        if self.chain:
-            slew = ("chain_slew.c",) if self.braked else ("chain_slew.c", "chain_unbraked.c")
-            slew = slew if self.slew else ("chain_free.c",)
-            brake = ("chain_braked.c",) * self.braked
-            delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
-            if not self.moves:
-                plays: tuple[str, ...] = ("chain_plays.c",)
-            elif not self.bends:
-                plays = ("stretch.c", f"relaxing_{kind}.c", "chain_relaxing.c")
-            else:
-                before = {"relaxing": ("stretch.c",), "dashpot": (f"yield_{kind}.c",)}.get(self.moves, ())
-                kept = () if self.moves == "dashpot" else ("moved_kept.c",)
-                bent = "bent_fixed.c" if self.fixed and self.bends != "none" else f"bent_{self.bends}.c"
-                known = () if self.bends == "none" else ("bent_known.c",)
-                moved = (*before, f"moved_{self.moves}.c", *kept, bent, *known)
-                plays = (*moved, "chain_moving.c", f"search_{kind}.c")
-            finer = "chain_finer.c" if self.finer else "chain_whole.c"
-            return (start, f"loop_{front}.c", delay, *slew, f"chain_{kind}.c", *brake, *plays, finer, "chain.c", *more)
         return (
-            start,
+            self._start,
             f"loop_{front}.c",
             f"loop_output_{kind}.c",
             "loop.c",
@@ -333,6 +344,13 @@ def _pieces(files: Iterable[str]) -> list[Piece]:
 def kernel_pieces(family: Family) -> list[Piece]:
     """Every piece of every kernel file of an arithmetic, callees before callers."""
     return _pieces(family.kernel_files)
+
+
+def carried(family: Family, pieces: Iterable[Piece]) -> list[Piece]:
+    """The pieces of kernel files that `pieces` need although a shared run time keeps them to itself."""
+    shared = {piece.name for piece in _pieces(family.kernels)}
+    own = [piece for piece in kernel_pieces(family) if piece.name not in shared]
+    return needed(own, sorted(used(pieces)))
 
 
 def table_pieces(family: Family) -> list[Piece]:

@@ -24,6 +24,7 @@ import math
 
 import numpy as np
 
+from hystgen.compensator import engines
 from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, error_bounds, largest_sum
 from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.layout import Compiled
@@ -263,7 +264,7 @@ def condition(compiled: Compiled) -> str:
 def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     """Bounds for `arithmetic` 'float32' or 'float64', if nothing but gains and temperatures is set from outside."""
     static = dataclasses.replace(compiled.static, output_offset=0.0)
-    plays = error_bounds(static, arithmetic, "loop")
+    plays = error_bounds(static, arithmetic, engines.ENGINES[compiled.tables.plays.engine])
     pi = static.pi
     gain = (2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]) / static.front_slopes[0] if pi.weights[0] > 0.0 else math.inf
     only_seen = 0.0  # by creep behind plays whose drive is limited: errors of the sum that the inverse undoes

@@ -93,22 +93,33 @@ there."""
 
 
 def build(
-    chain: Chain, arithmetic: str, seconds: float, how: Compensation, lsb: tuple[float | None, float | None]
+    chain: Chain,
+    arithmetic: str,
+    seconds: float,
+    how: Compensation,
+    lsb: tuple[float | None, float | None],
+    engine: str,
 ) -> Compiled:
     """The model in 'q31' or 'q15' at steps of `seconds`, if none of its effects is among the `tables.refusals`.
 
     Raises FormatError if a given LSB does not fit the type, or a signal or a constant does not fit the arithmetic.
     """
-    return _Builder(chain, arithmetic, seconds, how, lsb).build()
+    return _Builder(chain, arithmetic, seconds, how, lsb, engine).build()
 
 
 class _Builder:
     """The steps of `build`, each of which uses the results of those before it."""
 
     def __init__(
-        self, chain: Chain, arithmetic: str, seconds: float, how: Compensation, lsb: tuple[float | None, float | None]
+        self,
+        chain: Chain,
+        arithmetic: str,
+        seconds: float,
+        how: Compensation,
+        lsb: tuple[float | None, float | None],
+        engine: str,
     ) -> None:
-        self.arithmetic, self.seconds, self.how = arithmetic, seconds, how
+        self.arithmetic, self.seconds, self.how, self.engine = arithmetic, seconds, how, engine
         self.about = ARITHMETICS[arithmetic]
         self.static, self.parts = chain.cascade, Parts.of(chain.effects)
         self.low, self.high = output_range(self.static, self.parts, seconds)
@@ -130,7 +141,7 @@ class _Builder:
         beyond, self.reached = self._beyond() if self.lags else (0, True)
         bent = moving.largest_bend(static, self.parts.plays)
         led = bool(self.lags or self.own_drives)
-        self.inner = Builder(plain, self.arithmetic, "loop", inner, self.given, beyond, led, bent)
+        self.inner = Builder(plain, self.arithmetic, self.engine, inner, self.given, beyond, led, bent)
         plays, _ = self.inner.build()
         room = LARGEST.bit_length() - 2 - math.ceil(math.log2(self.sizes.largest))
         if room < 1:

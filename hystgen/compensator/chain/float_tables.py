@@ -104,7 +104,7 @@ def _heat(
     )
 
 
-def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> Compiled:
+def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation, engine: str) -> Compiled:
     """The model in 'float32' or 'float64' at steps of `seconds`.
 
     None of its effects is among the `tables.refusals`. Raises FormatError if a number does not fit the arithmetic.
@@ -120,7 +120,9 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation) -> C
             raise FormatError((("model", "effects"), message))
         return found.astype(dtype)
 
-    plays = build_float(dataclasses.replace(static, output_offset=0.0), arithmetic, "loop", True, True)
+    plays = build_float(dataclasses.replace(static, output_offset=0.0), arithmetic, engine, True, True)
+    free = {end: getattr(plays.forward, end) for end in ("limit", "inside", "range")}
+    plays = plays._replace(inverse=plays.inverse._replace(**free))  # what is limited is the drive in front of a lag
     low, high = inward(*output_range(static, parts, seconds), dtype)
     if not low < high:
         raise FormatError((("input_range",), f"the range of the output is narrower than {arithmetic} can tell apart"))

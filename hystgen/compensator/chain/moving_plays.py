@@ -89,8 +89,9 @@ def movement(kind: Kind) -> tuple[Function, Function, Function, Function]:
     return moved, left, keep, put
 
 
-def operators(kind: Kind) -> tuple[Function, Function, Function]:
-    """`follow`, `started` and `inverse_input` of models with effects, as functions of tables, state and a number."""
+def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
+    """`start`, `follow`, `started` and `inverse_input` of models with effects, as functions of tables, state and a
+    number."""
     level, asked, solve, bent = kind.level, kind.asked, kind.solve, kind.bent
     relaxing_follow, relaxing_input = kind.relaxing_follow, kind.relaxing_input
     moved, left, keep, put = movement(kind)
@@ -159,6 +160,10 @@ def operators(kind: Kind) -> tuple[Function, Function, Function]:
 
     searched = kind.search(sum_at)
 
+    @jit(inline=True)
+    def start(t: ChainTables, s: ChainState, zero: int) -> None:
+        """The plays are at the start memory, or all at 0, as `step.plays_of` sets them."""
+
     @jit
     def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
         """The plays follow their input w. Returns their sum."""
@@ -196,4 +201,4 @@ def operators(kind: Kind) -> tuple[Function, Function, Function]:
             return solve(t.plays, s.plays, total)
         return searched(t, s, total)
 
-    return follow, started, inverse_input
+    return start, follow, started, inverse_input

@@ -32,7 +32,7 @@ class Blocks(NamedTuple):
     target: Function  # of the preview's line
     delayed: Function  # the delayed drive, from those that wait
     front: tuple[Function, Function]  # forward, inverse
-    plays: tuple[Function, Function, Function]  # follow, started, inverse input
+    plays: tuple[Function, Function, Function, Function]  # start, follow, started, inverse input
     finer: Function  # the signal in front of the plays, with bits below their input
     braked: Function  # the drive within reach from which a lag does not overshoot
     own: tuple[Function, Function, Function]  # of the user's own: product, signal into a block, signal out of it

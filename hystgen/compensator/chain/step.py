@@ -1,8 +1,8 @@
 """One step of a model with effects: the bit reference of `c_runtime/chain.c`, and the operations around it.
 
 Blocks in front of the plays (lag) and behind them (creep, gain) absorb the applied drive forwards and are solved
-backwards; the plays between them are those of engine loop. The functions of the blocks, and the conversion between
-codes and signals, come from the arithmetic (`step_float`, `step_fixed`).
+backwards; the plays between them are those of engine loop or corners. The functions of the blocks, and the conversion
+between codes and signals, come from the arithmetic (`step_float`, `step_fixed`).
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from hystgen.effects.creep.compensator import CreepState
 from hystgen.effects.delay.compensator import Waiting, delay_put, delay_rest
 from hystgen.effects.kinds import OwnBlock
 from hystgen.plays import loop
+from hystgen.plays.corners.corners_fixed import new_fixed_memory
+from hystgen.plays.corners.corners_float import new_memory
 from hystgen.plays.loop import (
     ANSWER,
     BITS,
@@ -37,6 +39,7 @@ from hystgen.plays.loop import (
     loop_output,
 )
 from hystgen.plays.slots import (
+    CORNERS,
     DOMAIN,
     HELD,
     INPUT_CLAMPED,
@@ -63,12 +66,13 @@ from hystgen.plays.slots import (
 )
 
 SET, OUTPUT, APPLIED, REACHED = range(4)
-MOVING = 0
+MOVING, OPERATOR = range(2)
 
 
 class ChainState(NamedTuple):
     """One instance. `real`: the offset set from outside, the last result of the output side, the last applied drive,
-    and the drive behind a slew limit of the forward operator; `flags`: whether any drive has been applied yet."""
+    and the drive behind a slew limit of the forward operator; `flags`: whether any drive has been applied yet, and 1
+    for the inverse operator; `corners`: the plays of engine corners, `()` in engine loop, which has them in `plays`."""
 
     plays: State
     lost: Reals  # (n + 1,), what rounding took from each play that a nonlinear dashpot moves
@@ -85,14 +89,19 @@ class ChainState(NamedTuple):
     line: Line
     real: Reals
     flags: Counts
+    corners: Any
+    kink: Reals  # (4,), in fixed point, of the solution that engine corners has found
 
 
 def new_state(t: ChainTables, inverse: bool) -> ChainState:
     """Memory for one instance of an operator; `init` sets it."""
     dtype = t.threshold.dtype
     modes, waiting = (0, 0) if inverse else (len(t.mode), t.delay.samples)
+    corners = int(t.plays.engine == CORNERS)
+    memory = new_fixed_memory if t.fixed else new_memory
+    loops = loop.new_state(t.plays)
     return ChainState(
-        loop.new_state(t.plays),
+        loops._replace(play=loops.play[:0]) if corners else loops,
         np.zeros(len(t.threshold), dtype),
         np.zeros(len(t.threshold), dtype),
         np.zeros((len(t.lag.block), 5 if t.fixed else 6), dtype),
@@ -106,7 +115,9 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         np.zeros(t.own.place[-1], dtype),
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
         np.zeros(4, dtype),
-        np.zeros(1, np.int64),
+        np.array([0, int(inverse)], np.int64),
+        memory(len(t.threshold) - 1, dtype) if corners else (),
+        np.zeros(4 * corners, dtype),
     )
 
 
@@ -138,7 +149,7 @@ def made_of(
     saturated, unsaturated = blocks.saturation
     preview_target, delayed = blocks.target, blocks.delayed
     front_forward, front_inverse = blocks.front
-    follow, started, inverse_input = blocks.plays
+    start, follow, started, inverse_input = blocks.plays
     finer, braked = blocks.finer, blocks.braked
     finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared = codes
     plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
@@ -223,6 +234,7 @@ def made_of(
         """Start memory of the parameter file, and its settings."""
         settings_reset(t, s)
         plays_init(t.plays, s.plays, inverse)
+        start(t, s, 0)
         begin(t, s)
         if not inverse:
             s.plays.real[ANSWER] = expected(t, s)
@@ -231,6 +243,7 @@ def made_of(
     def reset(t: ChainTables, s: ChainState, inverse: int) -> None:
         """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
         plays_reset(t.plays, s.plays, inverse)
+        start(t, s, 1)
         begin(t, s)
         if not inverse:
             s.plays.real[ANSWER] = expected(t, s)

@@ -10,7 +10,7 @@ from typing import Any
 from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_fixed
-from hystgen.compensator.chain import moving_fixed, own_fixed
+from hystgen.compensator.chain import corners_fixed, moving_fixed, own_fixed
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
     BRAKED_DROP,
@@ -181,6 +181,7 @@ BLOCKS = Blocks(
     (front_forward, front_inverse), moving_fixed.PLAYS, finer, braked,
     (own_fixed.product, own_fixed.entered, own_fixed.left),
 )  # fmt: skip
+CORNERS = BLOCKS._replace(plays=corners_fixed.PLAYS, finer=corners_fixed.finer)
 CODES = Codes(
     step_fixed.finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared
 )  # fmt: skip

@@ -6,7 +6,7 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_float
-from hystgen.compensator.chain import moving_float, own
+from hystgen.compensator.chain import corners_float, moving_float, own
 from hystgen.compensator.chain.layout import FALLING, RISING, ChainTables, Stages
 from hystgen.compensator.chain.preview import preview_target
 from hystgen.compensator.chain.sides import Blocks
@@ -74,4 +74,5 @@ BLOCKS = Blocks(
     lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, delayed,
     (front_forward, front_inverse), moving_float.PLAYS, finer, braked, (own.product, own.passed, own.passed),
 )  # fmt: skip
+CORNERS = BLOCKS._replace(plays=corners_float.PLAYS)
 CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)

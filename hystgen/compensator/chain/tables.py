@@ -25,14 +25,16 @@ def build(
     seconds: float,
     how: Compensation = STANDARD,
     lsb: tuple[float | None, float | None] = (None, None),
+    engine: str = "loop",
 ) -> Compiled:
-    """The model in an arithmetic at steps of `seconds`; `lsb` as in `hystgen.compensator.tables.build`.
+    """The model in an arithmetic at steps of `seconds`; `lsb` as in `hystgen.compensator.tables.build`; `engine`: of
+    plays that no effect moves or bends, 'corners' or 'loop'.
 
     None of its effects is among the `refusals`. Raises FormatError if a number does not fit the arithmetic.
     """
     if ARITHMETICS[arithmetic].fixed:
-        return fixed_tables.build(chain, arithmetic, seconds, how, lsb)
-    return float_tables.build(chain, arithmetic, seconds, how)
+        return fixed_tables.build(chain, arithmetic, seconds, how, lsb, engine)
+    return float_tables.build(chain, arithmetic, seconds, how, engine)
 
 
 def _behind_slew(chain: Chain) -> int:

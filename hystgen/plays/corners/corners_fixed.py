@@ -37,7 +37,7 @@ def new_fixed_memory(plays: int, dtype: Any = np.int64) -> FixedMemory:
     corners = max(plays, 1)
     return FixedMemory(
         real=np.zeros(LEVEL + 1, dtype),
-        counts=np.zeros(15, np.int64),
+        counts=np.zeros(16, np.int64),
         output=np.zeros(corners, dtype),
         input=np.zeros(corners, dtype),
         top=np.zeros(corners, np.int64),

@@ -14,7 +14,7 @@ from hystgen.plays.slots import Counts, Reals
  DRIVE, UNDO_DRIVE, REFERENCE, LEVEL) = range(19)  # fmt: skip  (CAP .. SIGN: in floating point)
 # and in `Memory.counts`
 (K, DEPTH, RISING, LIMITED, UNDO_K, UNDO_DEPTH, UNDO_RISING, STEPPED, COMMITTED, REPEAT, BITS, STATUS,
- ASCENDING, UNDO_ASCENDING, ON) = range(15)  # fmt: skip  (ON: in fixed point)
+ ASCENDING, UNDO_ASCENDING, ON, SOUGHT) = range(16)  # fmt: skip  (ON: in fixed point; SOUGHT: with effects)
 # `here` and `undo` of the operators in C: where the first numbers of each are, in `Memory.real` and `Memory.counts`
 HERE, UNDO = (INPUT, K), (UNDO_INPUT, UNDO_K)
 BOTTOM = 2  # `rose` of the bottom, which is opposite to both directions
@@ -60,7 +60,7 @@ def new_memory(plays: int, dtype: Any) -> Memory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
     return Memory(
         real=np.zeros(LEVEL + 1, dtype),
-        counts=np.zeros(15, np.int64),
+        counts=np.zeros(16, np.int64),
         output=np.zeros(plays + 1, dtype),
         passed=np.zeros((plays + 1, 2), dtype),
         top=np.zeros(plays + 1, np.int64),

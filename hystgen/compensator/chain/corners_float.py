@@ -1,0 +1,66 @@
+"""Plays of engine corners in a model with effects, in floating point: `chain_corners_float.c`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hystgen.basics.jit import jit
+from hystgen.compensator.chain.layout import ChainTables
+from hystgen.compensator.chain.step import OPERATOR, ChainState
+from hystgen.plays.corners import corners_float
+from hystgen.plays.corners.corners_float import (
+    HERE,
+    INPUT,
+    OUTPUT,
+    SOUGHT,
+    UNDO,
+    copy_place,
+    forget_line,
+    move_to_output,
+    plays_step,
+)
+
+
+@jit
+def start(t: ChainTables, s: ChainState, zero: int) -> None:
+    """The plays are at the start memory, or all at 0."""
+    p = t.plays
+    s.corners.counts[SOUGHT] = 0
+    if s.flags[OPERATOR]:
+        corners_float.start(p.inverse, s.corners, p.inverse_zero if zero else p.inverse_first)
+    else:
+        corners_float.start(p.forward, s.corners, p.forward_zero if zero else p.forward_first)
+
+
+@jit
+def started(t: ChainTables, s: ChainState) -> Any:  # noqa: ARG001  as in fixed point
+    """Sum of the plays."""
+    return s.corners.real[INPUT] if s.flags[OPERATOR] else s.corners.real[OUTPUT]
+
+
+@jit
+def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
+    """The plays follow their input w. Returns their sum."""
+    m = s.corners
+    if not s.flags[OPERATOR]:
+        return plays_step(t.plays.forward, m, w)
+    if w != m.real[OUTPUT]:
+        if m.counts[SOUGHT]:
+            copy_place(m, HERE, UNDO)
+            forget_line(t.plays.inverse, m)
+        if w != m.real[OUTPUT]:
+            move_to_output(t.plays.inverse, m, w)
+    m.counts[SOUGHT] = 0
+    return m.real[INPUT]
+
+
+@jit
+def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
+    """Input of the plays at which their sum is h."""
+    m = s.corners
+    copy_place(m, UNDO, HERE)
+    m.counts[SOUGHT] = 1
+    return plays_step(t.plays.inverse, m, h)
+
+
+PLAYS = start, follow, started, inverse_input
