@@ -3,7 +3,8 @@
     python benchmarks/engine_costs.py [-o hystgen]
 
 Instructions are the mean over a decaying multisine, strict -O2 build of zig, for both operators, every arithmetic, with
-and without a memoryless part (a dead zone). Code is that of a module at -O2, of zig and gcc the larger one, for every
+and without a memoryless part (a dead zone), and the same for few numbers of plays with the effect that takes least, a gain.
+Code is that of a module at -O2, of zig and gcc the larger one, for every
 kind that `hystgen.compensator.engines.kind` tells apart. Both on a Cortex-M0+ without and a Cortex-M4F with an FPU. The
 shipped tables are read by `hystgen.compensator.engines`, so that the same parameters give the same C everywhere.
 """
@@ -22,8 +23,7 @@ import numpy as np
 import targets as bench
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.compensator import engines
-from hystgen.compensator.reference import Session
+from hystgen.compensator import engines, reference
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options
 from hystgen.emission.options import OPERATORS
@@ -34,7 +34,9 @@ from hystgen.verification import comparison, compilers, cross, emulator, sources
 
 PLAYS = (1, 2, 3, 4, 6, 8, 16)
 CODE_PLAYS = 10  # plays where code is measured; with 64 at most 16 bytes more or less: gcc, float32 and q31, both cores
-KINDS = ("pi", "gpi")
+KINDS = ("pi", "gpi", "effects", "gpi_effects")
+GAIN = "  effects: [{name: thermal, gain_per_degree: 0.001}]\nsample_time: 1.0e-3\n"
+EFFECT_PLAYS = (1, 4, 16)  # with effects, where a step takes more that does not depend on them
 DEAD_ZONE = "{kind: dead_zone, thresholds: [-5, 0, 5], weights: [-0.2, 1.2, 0.2]}"
 TANH = "{kind: tanh, ascending: {a0: 15, a1: 0.1, a2: 0.1, a3: 0.2}}"
 BRANCHES = TANH[:-1] + ", descending: {a0: 15, a1: 0.1, a2: 0.1, a3: 0.5}}"
@@ -51,27 +53,27 @@ SHIPPED = Path(__file__).resolve().parents[1] / "hystgen" / "compensator"
 
 
 @functools.cache
-def model(n: int, front: str) -> Model:
-    """The benchmark's model, as it is or behind stages."""
+def model(n: int, front: str, effects: str = "") -> Model:
+    """The benchmark's model, as it is or behind stages, and with effects."""
     p = bench.model(n).parameters.model.pi
     text = (
         f"hystgen: 1\nname: bench\ninput_range: [-{bench.RANGE}, {bench.RANGE}]\nmodel:\n  pi:\n"
         f"    thresholds: {list(p.thresholds)}\n    weights: {list(p.weights)}\n"
     )
-    return Model(parse_parameters(text + (f"  memoryless: {front}\n" if front else ""), "bench.yaml"))
+    return Model(parse_parameters(text + (f"  memoryless: {front}\n" if front else "") + effects, "bench.yaml"))
 
 
 def means(folder: Path, n: int, kind: str, arithmetic: str, engine: str) -> dict[str, dict[str, float]]:
     """Mean instructions of a sample on each core, for each operator."""
-    one = model(n, DEAD_ZONE if kind == "gpi" else "")
+    one = model(n, DEAD_ZONE if kind.startswith("gpi") else "", GAIN if kind.endswith("effects") else "")
     files = sources.write(folder, one, emit_options(one, "both", arithmetic, engine))
     numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
     ends = numbers.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
     drive = bench.multisine(bench.SAMPLES) * float(min(abs(ends[0]), ends[1]))
     drive = np.rint(drive) if real.kind == "i" else drive
     call = np.full(len(drive), slots.OP_STEP, dtype=np.uint8)
-    session = Session(one.cascade, "forward", arithmetic, engine)
-    signals: dict[str, Any] = {"forward": drive, "inverse": session.run(drive)[0].astype(float)}
+    wanted, _ = reference.answers(numbers, False, call, drive)
+    signals: dict[str, Any] = {"forward": drive, "inverse": wanted.astype(float)}
     found: dict[str, dict[str, float]] = {op: {} for op in signals}
     for core in engines.CORES:
         target = targets.find(core)
@@ -114,7 +116,7 @@ def main() -> None:
     sizes: list[tuple[Any, ...]] = []
     with tempfile.TemporaryDirectory(prefix="hystgen-costs-") as place:
         for arithmetic, kind, n, engine in itertools.product(ARITHMETICS, KINDS, PLAYS, engines.ENGINES):
-            if arguments.only != "sizes":
+            if arguments.only != "sizes" and (n in EFFECT_PLAYS or not kind.endswith("effects")):
                 found = means(Path(place) / f"{len(costs)}", n, kind, arithmetic, engine)
                 costs += [(op, arithmetic, kind, n, engine, *map(round, cores.values())) for op, cores in found.items()]
                 print(*costs[-1], flush=True)

@@ -13,7 +13,7 @@ from typing import Any
 
 import jinja2
 import numpy as np
-from modelfiles import CHAINS, FILES
+from modelfiles import CHAINS, FILES, LED
 
 import hystgen
 from hystgen.arithmetic import ARITHMETICS
@@ -140,20 +140,22 @@ def build(
     change: Callable[[str], str] = lambda text: text,
 ) -> Target:
     """Emit a model, whose C `change` may alter, and build its fuzzer; in fixed point with both engines, but models with
-    effects, which `loop` alone has."""
+    effects only if `engine` is corners, since some have loop alone."""
     clang = compilers.find("clang")
     assert clang, "clang is not installed"
     real = ARITHMETICS[arithmetic].number
     fixed = real.kind == "i"
-    chain = name in CHAINS
-    model = Model(parse_parameters({**FILES, **CHAINS}[name], f"{name}.yaml"))
+    chain = name in {**CHAINS, **LED}
+    text = {**FILES, **CHAINS, **LED}[name]
+    text += "emit: {compensation: {noise_gain: 1.0e+9}}\n" * (chain and "emit:" not in text)
+    model = Model(parse_parameters(text, f"{name}.yaml"))
     hystgen.emit(model, folder, operator="both", arithmetic=arithmetic, engine=engine)
     source = folder / f"{name}.c"
     source.write_text(change(source.read_text()))
     sources = [source]
-    twin = f"{name}_twin" if fixed and not chain else ""
+    twin = f"{name}_twin" if fixed and (not chain or engine == "corners") else ""
     if twin:
-        other = Model(parse_parameters(FILES[name].replace(f"name: {name}\n", f"name: {twin}\n"), f"{twin}.yaml"))
+        other = Model(parse_parameters(text.replace(f"name: {name}\n", f"name: {twin}\n"), f"{twin}.yaml"))
         hystgen.emit(
             other, folder, operator="both", arithmetic=arithmetic, engine="loop" if engine == "corners" else "corners"
         )

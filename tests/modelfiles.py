@@ -105,4 +105,7 @@ CHAINS = {
 }  # fmt: skip
 """Models with effects, every block and every kind of each; some can be emitted as an inverse alone."""
 
+LED = {"led": chain("led", "name: lag, time_constant: 0.01", "name: creep, time_constants: [0.1], weights: [0.05]")}
+"""Of which in q31 the signal in front of the plays has bits below their input, which matters to engine corners."""
+
 INVERSE_ALONE = ("viscous_twin",)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import BRANCHES, CHAINS, TANH, chain, head
+from modelfiles import BRANCHES, CHAINS, LED, TANH, chain, head
 
 import hystgen
 from hystgen.basics import jit
@@ -22,8 +22,6 @@ from hystgen.parameters.files import parse_parameters
 from hystgen.plays import slots
 
 T = 1e-3
-LED = chain("led", "name: lag, time_constant: 0.01", "name: creep, time_constants: [0.1], weights: [0.05]")
-"""In q31 the signal in front of its plays has bits below their input."""
 FRONTS = ("", "", TANH, BRANCHES, "  memoryless: {kind: dead_zone, thresholds: [-1, 0, 1], weights: [-0.8, 3, -0.6]}\n")
 SOME = (
     "name: creep, time_constants: [0.004, 0.3], weights: [0.05, 0.1]", "name: lag, time_constant: {lag}",
@@ -81,6 +79,8 @@ def called(rng: np.random.Generator, one: Compiled, inverse: bool, n: int) -> tu
     again = rng.random(n) < 0.1
     again[0] = False
     x[again] = x[np.maximum.accumulate(np.where(again, 0, np.arange(n)))[again]]
+    x[again] += rng.integers(-1, 2, n)[again] * rng.choice([0, 1, 80], n)[again]  # or a few codes away
+    x = np.clip(x, -most - 1, most)
     return rng.choice(kinds, n).astype(np.uint8), np.rint(x)
 
 
@@ -90,7 +90,7 @@ def test_engines_agree_in_fixed_point_whatever_is_called(arithmetic: str) -> Non
     rng = np.random.default_rng([36, len(arithmetic), int(arithmetic == "q31")])
     compared = different = finer = 0
     for k in range(18):
-        one = model(LED if k == 0 else drawn(rng))
+        one = model(LED["led"] if k == 0 else drawn(rng))
         try:
             pair = [built(one, arithmetic, engine) for engine in ("loop", "corners")]
         except FormatError:  # codes too coarse for it
@@ -120,7 +120,7 @@ def reference_signal(one: Compiled, seed: int, n: int, share: float) -> Run:
 @pytest.mark.parametrize("name", ["creeping", "lagging", "quick", "worn", "led"])
 def test_floating_point_stays_within_its_bounds(name: str) -> None:
     """Against the compensator and the chain in double precision, which share no code with it."""
-    one = model({**CHAINS, "led": LED}[name])
+    one = model({**CHAINS, **LED}[name])
     numbers = built(one, "float32", "corners")
     run = reference_signal(numbers, 3, 250, 0.9)
     with jit.plain():
@@ -171,7 +171,7 @@ BITS = [("creeping", "q31"), ("creeping", "float32"), ("everything", "q15"), ("e
 @pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize(("name", "arithmetic"), BITS)
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
-    one = model({**CHAINS, "led": LED}[name])
+    one = model({**CHAINS, **LED}[name])
     report = hystgen.verify(one, arithmetic, "both", engine="corners", compiler=["gcc"], length=1500)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} >= {"forward", "inverse"}
@@ -181,7 +181,7 @@ def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
 @pytest.mark.thorough
 @pytest.mark.parametrize(("name", "arithmetic"), [("everything", "float32"), ("everything", "q31"), ("led", "q31")])
 def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:
-    one = model({**CHAINS, "led": LED}[name])
+    one = model({**CHAINS, **LED}[name])
     cores = ["cortex-m4f", "cortex-m0plus", "rv32imac"]
     report = hystgen.verify(one, arithmetic, "both", engine="corners", targets=cores, target_length=150)
     assert report.ok, report.table()

@@ -62,13 +62,17 @@ def test_fuzzing_finds_nothing(name: str, arithmetic: str, engine: str, tmp_path
 @needs_clang
 @pytest.mark.slow(one_in=4)
 @pytest.mark.parametrize(
-    ("name", "arithmetic"),
-    [("creeping", "q31"), ("lagging", "q15"), ("quick", "q31"), ("warm", "q15"), ("worn", "q31"), ("late", "q15"),
-     ("relaxing", "q31"), ("wider", "q15"), ("drifting", "q31"), ("drifting_late", "q15"), ("everything", "q15")],
+    ("name", "arithmetic", "engine"),
+    [("creeping", "q31", "corners"), ("lagging", "q15", "corners"), ("quick", "q31", "corners"),
+     ("warm", "q15", "corners"), ("worn", "q31", "corners"), ("late", "q15", "corners"), ("relaxing", "q31", "loop"),
+     ("wider", "q15", "loop"), ("drifting", "q31", "loop"), ("drifting_late", "q15", "corners"),
+     ("everything", "q15", "corners"), ("led", "q31", "corners"), ("creeping", "float32", "corners")],
 )  # fmt: skip
-def test_fuzzing_finds_nothing_in_models_with_effects(name: str, arithmetic: str, tmp_path: Path) -> None:
-    """With settings in between, against the reference."""
-    assert fuzz(tmp_path, min(SECONDS, 4.0), name, arithmetic, "loop") > 300
+def test_fuzzing_finds_nothing_in_models_with_effects(
+    name: str, arithmetic: str, engine: str, tmp_path: Path
+) -> None:
+    """With settings in between, against the reference and in fixed point the other engine."""
+    assert fuzz(tmp_path, min(SECONDS, 4.0), name, arithmetic, engine) > 300
 
 
 def changed_entry(text: str) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from types import SimpleNamespace
 
-from modelfiles import CHAINS
+from modelfiles import CHAINS, LED
 from mutants import MODELS
 
 from hystgen.emission import module, runtime
@@ -67,13 +67,15 @@ UNITS = (
     ("drifting_late", "q15", "loop"),
     ("heated", "float64", "loop"),
     ("heated", "q31", "loop"),
+    ("creeping", "float32", "corners"),
+    ("led", "q31", "corners"),
 )
 """Every file of `c_runtime/` is in one of them."""
 
 
 def model(name: str) -> Model:
     """The model of a parameter file under the name of the run time."""
-    text = {**MODELS, **CHAINS}[name]
+    text = {**MODELS, **CHAINS, **LED}[name]
     return Model(parse_parameters(text, f"{name}.yaml").model_copy(update={"name": "hystgen"}))
 
 

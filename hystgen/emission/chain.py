@@ -407,12 +407,10 @@ def _corners(t: ChainTables, inverse: bool, plays: int) -> list[Field]:
     if not t.fixed:
         undo = [Field("place", "undo", "where the plays were before the solution")] * inverse
         return [*sought, Field("plays", "plays"), *undo, Field("corner", "corner", "", plays + 1)]
-    following = "at which another play begins to follow"
     return [
         *sought,
         Field("place", "here"),
-        Field("signal", "next", f"output, along the move, {following}") if inverse
-        else Field("play", "next", f"input {following}"),
+        Field("signal", "next", "output, along the move, at which another play begins to follow"),
         Field("kink", "kink", "of the present step; here rather than on the stack"),
         Field("corner", "corner", "", max(plays, 1)),
     ]  # fmt: skip

@@ -11,7 +11,7 @@ from hystgen.arithmetic import ARITHMETICS, Arithmetic
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.chain import blocks, costs
-from hystgen.compensator.chain.layout import ChainTables
+from hystgen.compensator.chain.layout import ARRIVING_BITS, ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.effects.kinds import Kind, Rows
 from hystgen.emission.chain import Field
@@ -201,9 +201,8 @@ def estimate(
     """
     corners = options.engine == "corners"
     known = options.arithmetic != "float64"  # a double of the AVR is a float
-    static = numbers.plays if isinstance(numbers, ChainTables) else numbers
     worst = [
-        (op, worst_case(cascade.pi.n, op, corners, static)) for op in ("forward", "inverse") if getattr(options, op)
+        (op, worst_case(cascade.pi.n, op, corners, numbers)) for op in ("forward", "inverse") if getattr(options, op)
     ]
     if isinstance(numbers, ChainTables):
         products = chain_products(numbers)
@@ -283,9 +282,10 @@ def _field(
     return size * max(field.count, 1), alignment
 
 
-def worst_case(n: int, op: str, corners: bool, numbers: Tables | FixedTables) -> str:
+def worst_case(n: int, op: str, corners: bool, tables: Tables | FixedTables | ChainTables) -> str:
     """The largest numbers of multiplications and comparisons in one step as functions of n, without those of tanh and
-    atanh; b are the bits of n."""
+    atanh, and of effects; b are the bits of n."""
+    numbers: Tables | FixedTables = tables.plays if isinstance(tables, ChainTables) else tables
     stages: list[tuple[int, int]] = []
     fixed = isinstance(numbers, FixedTables)
     if isinstance(numbers, FixedTables):
@@ -294,6 +294,11 @@ def worst_case(n: int, op: str, corners: bool, numbers: Tables | FixedTables) ->
         stages = [(int(kind), int(size)) for kind, size in zip(numbers.stage_kind, numbers.stage_size, strict=True)]
         fronts = bool(stages)
     products, compares, per_play, per_bit = _worst_of_plays(op, corners, fixed, corners and not fronts)
+    if corners and op == "inverse" and isinstance(tables, ChainTables):
+        # plays follow what was applied, which may be elsewhere than what was solved for: two searches
+        products, compares, per_bit = (7, 25, 4) if fixed else (30, 26, 4)
+        if fixed and tables.number[ARRIVING_BITS]:  # and a third one for the remainder of a solution
+            products, compares, per_bit = products + 2, compares + 10, per_bit + 2
     per_play_products = 0 if corners else 1 if op == "forward" else 2 if fixed else 3
     passes = 1 if op == "forward" else 2 + int(numbers.branches)
     compares += (2 if op == "forward" else 16) * int(bool(numbers.branches))

@@ -243,9 +243,10 @@ class Variant:
             moved = (*before, f"moved_{self.moves}.c", *kept, bent, *known)
             plays = (*moved, "chain_moving.c", f"search_{kind}.c")
         finer = ("chain_finer.c" if loops else "chain_corners_finer.c") if self.finer else "chain_whole.c"
+        plays = (*plays, finer) if loops else (finer, *plays)
         chain = ("chain.c", "chain_loop.c" if loops else "chain_corners.c", "chain_calls.c")
         start = (self._start,) if loops else ()
-        return (*start, f"loop_{front}.c", delay, *slew, f"chain_{kind}.c", *brake, *plays, finer, *chain, *more)
+        return (*start, f"loop_{front}.c", delay, *slew, f"chain_{kind}.c", *brake, *plays, *chain, *more)
 
     def _loop(self) -> tuple[str, ...]:
         front = "branches" if self.branches else "front" if self.fronts else "plain"

@@ -11,18 +11,39 @@ from hystgen.compensator.chain.layout import ARRIVING_BITS, LARGEST_LEVEL, LEVEL
 from hystgen.compensator.chain.moving_fixed import asked, level
 from hystgen.compensator.chain.step import OPERATOR, ChainState
 from hystgen.plays.corners import corners_fixed
-from hystgen.plays.corners.corners_fixed import FAR, along, find, move_to_input, move_to_solution, plays_step, solve
-from hystgen.plays.corners.corners_float import INPUT, NEXT, OUTPUT, SOUGHT
-from hystgen.plays.fixed import over_slope
+from hystgen.plays.corners.corners_fixed import (
+    FAR,
+    FixedMemory,
+    Kink,
+    along,
+    find,
+    find_input,
+    gained,
+    go_on,
+    next_output,
+    solve,
+)
+from hystgen.plays.corners.corners_float import INPUT, NEXT, OUTPUT, RISING, SOUGHT
+from hystgen.plays.fixed import FixedPlayTables, over_slope
+from hystgen.plays.slots import Reals
+
+
+@jit
+def keep(to: Reals, kink: Kink) -> None:
+    """Field by field."""
+    for i in range(4):
+        to[i] = kink[i]
 
 
 @jit
 def start(t: ChainTables, s: ChainState, zero: int) -> None:
-    """The plays are at the start memory, or all at 0."""
+    """The plays are at the start memory, or all at 0; nothing is known but where they are."""
     m = s.corners
     corners_fixed.start(t.plays, m, t.plays.zero if zero else t.plays.start)
+    for i in range(4):
+        s.kink[i] = 0
+    m.real[NEXT] = -FAR
     m.counts[SOUGHT] = 0
-    m.real[NEXT] = -FAR if s.flags[OPERATOR] else m.real[INPUT]
 
 
 @jit
@@ -32,18 +53,45 @@ def started(t: ChainTables, s: ChainState) -> Any:
 
 
 @jit
+def move_on(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: Any) -> bool:
+    """Move the plays to an input between the kink and the next one. False if it lies elsewhere."""
+    kink = (kept[0], kept[1], kept[2], kept[3])
+    moved = gained(t, m, kink, w)
+    if moved < 0 or kink[0] + moved > m.real[NEXT]:
+        return False
+    go_on(m, kink, w, moved)
+    return True
+
+
+@jit
+def moved(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: Any) -> bool:
+    """The same to any input between this kink and its next one, once it has been found."""
+    m.real[NEXT] = next_output(t, m, (kept[0], kept[1], kept[2], kept[3]))
+    return move_on(t, m, kept, w)
+
+
+@jit
 def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
     """The plays follow their input w. Returns their sum."""
     m = s.corners
-    if not s.flags[OPERATOR]:
-        return level(t, plays_step(t.plays, m, w))
-    if m.counts[SOUGHT]:
-        m.real[NEXT] = move_to_solution(t.plays, m, (s.kink[0], s.kink[1], s.kink[2], s.kink[3]), w)
+    if s.flags[OPERATOR]:
+        there = m.counts[SOUGHT] != 0 and moved(t.plays, m, s.kink, w)
     else:
-        move_to_input(t.plays, m, w)
-        m.real[NEXT] = -FAR
+        turns = w < m.real[INPUT] if m.counts[RISING] else w > m.real[INPUT]
+        there = not turns and move_on(t.plays, m, s.kink, w)
+    if not there:
+        keep(s.kink, find_input(t.plays, m, w))
+        moved(t.plays, m, s.kink, w)
     m.counts[SOUGHT] = 0
     return level(t, m.real[OUTPUT])
+
+
+@jit
+def seen(t: ChainTables, m: FixedMemory, kept: Reals, w: Any) -> None:
+    """The kink before a solution w that is refined: plays that begin to follow at w do not count."""
+    x = along(m, w)
+    if t.number[ARRIVING_BITS] > 0 and x > along(m, m.real[INPUT]):
+        keep(kept, find(t.plays, m, x - 1, False))
 
 
 @jit
@@ -51,9 +99,9 @@ def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
     """Input of the plays at which their sum is h."""
     m = s.corners
     w, kink = solve(t.plays, m, asked(t, h), m.real[NEXT])
-    for i in range(4):
-        s.kink[i] = kink[i]
+    keep(s.kink, kink)
     m.counts[SOUGHT] = 1
+    seen(t, m, s.kink, w)
     return w
 
 
@@ -63,22 +111,18 @@ def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
     bits = t.number[ARRIVING_BITS]
     if bits == 0:
         return a
-    whole = a << bits
     m = s.corners
+    whole = a << bits
     x = along(m, w)
-    beyond = h > t.number[LARGEST_LEVEL] or h < -t.number[LARGEST_LEVEL]
-    if beyond or x < along(m, m.real[INPUT]):  # or w was limited
+    on = x - along(m, m.real[INPUT])
+    if h > t.number[LARGEST_LEVEL] or h < -t.number[LARGEST_LEVEL] or on < 0:
         return whole
-    k = 0
-    left = along(m, (h << t.number[LEVEL_DROP]) - m.real[OUTPUT])
-    if x > along(m, m.real[INPUT]):
-        kink = find(t.plays, m, x - 1, False)
-        k = kink[2]
-        left = along(m, h << t.number[LEVEL_DROP]) - (kink[0] + t.plays.slope[k + 1] * (x - kink[1]))
+    k = s.kink[2] + 1 if on > 0 else 1
+    left = along(m, h << t.number[LEVEL_DROP]) - s.kink[0] - t.plays.slope[k] * (x - s.kink[1])
     size = -left if left < 0 else left
-    if size > t.plays.slope[k + 1]:
+    if size > t.plays.slope[k]:
         return whole
-    more = over_slope(t.plays, size << bits, k + 1)
+    more = over_slope(t.plays, size << bits, k)
     return whole + along(m, -more if left < 0 else more)
 
 
