@@ -378,7 +378,7 @@ REFUSED = [
         '4:66: model.pi.initial_state: has 0 values, at least 1 needed; add to the list',
     ]),
     case('state_text', pi("thresholds: [0, 1], weights: [1, 1], initial_state: zero"), [
-        '4:66: model.pi.initial_state: must be a number or a list of numbers, not the text "tuned"; write it like 0.0',
+        '4:66: model.pi.initial_state: must be a number or a list of numbers, not the text "zero"; write it like 0.0',
     ]),
     case('state_mapping', pi("thresholds: [0, 1], weights: [1, 1], initial_state: {}"), [
         '4:66: model.pi.initial_state: must be a number or a list of numbers, not a mapping; write it like 0.0',

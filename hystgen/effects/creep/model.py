@@ -222,7 +222,8 @@ class LogarithmicCreep(_Creep):
         wide = high - low
         return [
             Candidate(
-                LOGARITHMIC, np.zeros(1), np.array([MOST_A_DECADE / 0.1]), np.array([0.1]), even, np.zeros(1), amounts=(0,)
+                LOGARITHMIC, np.zeros(1), np.array([MOST_A_DECADE / 0.1]), np.array([0.1]), even, np.zeros(1),
+                amounts=(0,),
             ),
             Candidate(
                 "creep, logarithmic, free ends",
