@@ -26,7 +26,7 @@ from hystgen.arithmetic.factors import error as missed
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER
 from hystgen.compensator.chain.bounds import SAME
-from hystgen.compensator.chain.layout import ChainTables, Parts, largest_way
+from hystgen.compensator.chain.layout import ChainTables, largest_way
 from hystgen.compensator.chain.moving import (
     DASHPOT,
     DILATED,
@@ -39,6 +39,7 @@ from hystgen.compensator.chain.moving import (
     yield_error,
 )
 from hystgen.compensator.chain.own_fixed import Formats, asked_of_input
+from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, upward
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.creep import compensator as creep

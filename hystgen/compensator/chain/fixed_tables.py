@@ -40,7 +40,6 @@ from hystgen.compensator.chain.layout import (
     Codes,
     Compiled,
     OwnChainTables,
-    Parts,
     braked,
     fastest,
     output_range,
@@ -48,6 +47,7 @@ from hystgen.compensator.chain.layout import (
 )
 from hystgen.compensator.chain.moving import Bumps
 from hystgen.compensator.chain.own_fixed import Formats
+from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.fixed_tables import TABLE_MAX, Builder, FixedCurve, lsbs, nearest
 from hystgen.effects import bend
 from hystgen.effects.ageing import compensator as ageing

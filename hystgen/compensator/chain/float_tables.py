@@ -19,13 +19,13 @@ from hystgen.compensator.chain.layout import (
     ChainTables,
     Compiled,
     OwnChainTables,
-    Parts,
     Stages,
     braked,
     fastest,
     output_range,
     read,
 )
+from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.float_tables import build_float, inward
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import AgeingTables

@@ -15,9 +15,10 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import noise, own, preview
 from hystgen.compensator.chain.noise import Smoothing
 from hystgen.compensator.chain.own import Linear, OwnTables
+from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.chain.preview import Shaped, Taps
 from hystgen.effects.ageing.compensator import AgeingTables
-from hystgen.effects.base import Effect, Place
+from hystgen.effects.base import Effect
 from hystgen.effects.creep import compensator as creep
 from hystgen.effects.creep.compensator import CreepTables
 from hystgen.effects.delay.compensator import DelayTables
@@ -112,44 +113,6 @@ class OwnChainTables(ChainTables):
         """Their blocks, in front of the plays and behind."""
         blocks = tuple(effect.block for effect in self.own_effects if effect.block is not None)
         return blocks[: self.own.ahead], blocks[self.own.ahead :]
-
-
-@dataclass(frozen=True)
-class Parts:
-    """The effects of a model by their part in the chain, each list in the order of the chain."""
-
-    lags: list[Any]
-    creeps: list[Any]
-    ageing: list[Any]
-    thermal: list[Any]
-    heat: list[Any]
-    drift: list[Any]
-    modes: list[Any]
-    saturations: list[Any]
-    slew: list[Any]
-    plays: list[Effect]
-    delay: float
-    own_drives: list[Effect]
-    own_outputs: list[Effect]
-
-    @classmethod
-    def of(cls, effects: Sequence[Effect]) -> Parts:
-        """Sort the effects of a chain."""
-
-        def called(name: str) -> list[Any]:
-            return [effect for effect in effects if effect.name == name]
-
-        thermal_effects = called("thermal")
-        return cls(
-            [each for each in called("lag") if each.time_constant > 0.0], called("creep"), called("ageing"),
-            [each for each in thermal_effects if each.columns], [each for each in thermal_effects if not each.columns],
-            called("drift"), [each for each in called("resonance") if each.block is None], called("saturation"),
-            called("slew_limit"),
-            [effect for effect in effects if effect.place is Place.PLAYS],
-            math.fsum(each.time for each in called("delay")),
-            [effect for effect in effects if effect.block and effect.place is Place.DRIVE],
-            [effect for effect in effects if effect.block and effect.place is not Place.DRIVE],
-        )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +22,7 @@ from numpy.typing import NDArray
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import moving, own
 from hystgen.compensator.chain.own import Linear
+from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.chain.preview import Taps, averages, whole
 from hystgen.effects.base import decays
 from hystgen.effects.creep import compensator as creep
@@ -30,9 +30,6 @@ from hystgen.effects.lag import compensator as lag
 from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.rate_dependence.compensator import Movement
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate
-
-if TYPE_CHECKING:
-    from hystgen.compensator.chain.layout import Parts
 
 Array = NDArray[np.float64]
 

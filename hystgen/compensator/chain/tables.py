@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.chain.chain import Chain
 from hystgen.compensator.chain import fixed_tables, float_tables, moving, own
-from hystgen.compensator.chain.layout import Compiled, Parts
+from hystgen.compensator.chain.layout import Compiled
+from hystgen.compensator.chain.parts import Parts
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.model import SHAPES as AGEING
 from hystgen.effects.base import USER, Effect, Place
