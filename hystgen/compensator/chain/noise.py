@@ -95,8 +95,11 @@ class Gain:
             passed = passed * (one.slope - float(np.sum(late)) + states)
             direct, rest = direct * one.slope, rest * one.rest
         for block in self.own:
-            passed = passed / block.backward.response(z)
-            direct, rest = direct / block.backward.d, rest * block.rest
+            if block.exact:
+                passed, direct = passed * block.forward.response(z), direct * block.forward.d
+            else:
+                led = led * block.backward.response(z)
+            rest = rest * block.rest
         found = np.zeros(len(z))
         for slope, plays, at_once in self._plays(z):
             later, first = plays * passed, at_once * direct
@@ -231,7 +234,7 @@ def least(gain: Gain, limit: float, room: int, centred: bool) -> Smoothing:
     least gain."""
     holding, failing = [], []
     for times in range(1, MOST_TIMES + 1):
-        one, most = narrowest(gain, limit, times, room // times - 1.0, centred)
+        one, most = narrowest(gain, limit, times, max(room // times - 1.0, 1.0), centred)
         if most <= limit * (1.0 + SAME):
             holding.append((one.variance, one))
         else:
