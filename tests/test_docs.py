@@ -197,7 +197,7 @@ class Page:
             main(arguments[:to], prog_name="hystgen")
         self.code = int(stopped.value.code or 0)
         printed = "".join(
-            line for line in out.getvalue().splitlines(keepends=True) if not line.startswith("compiling for this")
+            line for line in out.getvalue().splitlines(keepends=True) if line.rstrip() not in (jit.ONCE, jit.EVERY_TIME)
         )
         if to < len(arguments):
             (self.folder / arguments[to + 1]).write_text(printed)
