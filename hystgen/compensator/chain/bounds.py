@@ -249,16 +249,17 @@ def condition(compiled: Compiled) -> str:
     """The condition of `rounding` in words, if only the range bounds the difference of two drives; else "".
 
     A led lag misses its target by a second difference, so that plays and creep behind it have not seen what was solved
-    for; their memory then differs between two drives, and the lead amplifies that. Thresholds that grow with the rate
-    amplify an earlier difference of the drives. A lag that is braked behind a slew limit gives up more of its lead than
-    the limit cuts off.
+    for; their memory then differs between two drives, and the lead amplifies that. So does a block of the user's own in
+    front while the drive is limited: what it keeps of an earlier difference moves plays that the same drive would have
+    moved alike. Thresholds that grow with the rate amplify an earlier difference of the drives. A lag that is braked
+    behind a slew limit gives up more of its lead than the limit cuts off.
     """
     if compiled.tables.braked:
         return f"{SAME} and no slew limit acts"
-    led = not all(compiled.tables.lag.exact)
+    missed = not all(compiled.tables.lag.exact) or compiled.tables.own.ahead > 0
     remembered = compiled.static.pi.n > 0 or len(compiled.tables.creep.block) > 0
     dilated = compiled.tables.moving.moves == moving.DILATED
-    return SAME if dilated or (led and remembered) else ""
+    return SAME if dilated or (missed and remembered) else ""
 
 
 def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
@@ -266,10 +267,16 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     static = dataclasses.replace(compiled.static, output_offset=0.0)
     plays = error_bounds(static, arithmetic, engines.ENGINES[compiled.tables.plays.engine])
     pi = static.pi
-    gain = (2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]) / static.front_slopes[0] if pi.weights[0] > 0.0 else math.inf
+    same = bool(condition(compiled))
+    gain = math.inf
+    if pi.weights[0] > 0.0:
+        whole_gain = 2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]
+        gain = (1.0 / pi.weights[0] if same else whole_gain) / static.front_slopes[0]
+        at_once = gain * static.front_slopes[0] / whole_gain  # for plays that hold the same, as `rounding` states
+        plays = dataclasses.replace(plays, rounding=plays.rounding * at_once)
     only_seen = 0.0  # by creep behind plays whose drive is limited: errors of the sum that the inverse undoes
     if compiled.tables.moving.used:
-        least = moving.least_slope(static, compiled.parts.plays) / 2.0
+        least = moving.least_slope(static, compiled.parts.plays) * (1.0 if same else 0.5)
         if compiled.tables.moving.moves == moving.DILATED:
             least = min(least, moving.least_dilated(static, compiled.parts.plays, compiled.seconds))
         gain = 1.0 / least / static.front_slopes[0]
@@ -277,11 +284,11 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
         shift, rounding, search = (sum(each) for each in pairs)
         shifts = np.full(pi.n, shift)
         there, back = moving.of_shifts(static, compiled.parts.plays, compiled.tables.moving.moves, shifts)
-        only_seen = gain * (there - back)
-        own = gain * (back + rounding + search)
+        counting = there if same else back
+        only_seen = gain * (there - counting)
+        own = gain * (counting + rounding + search)
         plays = ErrorBounds(plays.forward + there + rounding, plays.inverse + own, plays.rounding + own)
     u = float(np.finfo(arithmetic).eps) / 2 + float(np.finfo("float64").eps) / 2
-    same = bool(condition(compiled))
     ways = _one(compiled, arithmetic, True, same), _one(compiled, "float64", False, same)
     forward, asked = (sum(each) for each in zip(*ways, strict=True))
     whole = static.input_range[1] - static.input_range[0]

@@ -7,7 +7,8 @@ and absorbed as sent: the plays see that rounding, or behind a lag `rate/2` code
 in front of the plays and in output codes behind them.
 
 A led lag misses its target by a second difference, so that plays behind it have not seen what was solved for: their
-memory differs between two drives, and the lead amplifies that up to the range of the drive. `rounding` is then the
+memory differs between two drives, and the lead amplifies that up to the range of the drive. A block of the user's own
+in front has such an effect while the drive is limited. `rounding` is then the
 difference from a compensator in double precision that has seen the same drives. Behind a memoryless part it holds only
 while nothing is limited, since a lag cannot be led beyond the drive's range there.
 """
@@ -372,7 +373,7 @@ class Bounds:
 
     def _plays(self, arriving: float, way: float | None = None) -> float:
         """Error of the sum of the plays, in output codes, for an error in front of the memoryless part; `way` as
-        `_way` if none is given."""
+        `_way`, which is taken if none is given."""
         steep = self.static.front_slopes[1] * self._steepest / float(self.inner.output_lsb)
         level = 0.5 * self._signal if self.drop else 0.0
         moved, _ = self._moved(self._way if way is None else way)
@@ -422,28 +423,54 @@ class Bounds:
             error = self._creep_gain(numbers) * (error + self._creep(j) + self._creep_back(j) + states)
         return error
 
-    def _arriving_error(self, way: float | None = None) -> float:
-        """Error of the signal that the inverse asks for in front of the memoryless part, in units of signals."""
-        code = self._arrival()
-        short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
-        steep = self.static.front_slopes[1]
-        t = self.tables.moving
-        solution = 1.5 * float(self.inner.step) if t.used and not t.scanned else float(self.inner.solved())
-        solved = solution / self._arriving + steep * float(self.inner.back())
-        slowed = self.slowed * float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
-        solved += steep * (code[0] if self.condition else sum(code) + short + slowed)  # both have seen it, or not
+    def _residual(self, way: float, solved: float) -> float:
+        """Error of the sum of the plays at the input that the inverse finds, in output units, for an error `solved` of
+        that input in units of signals; `way` as `_way`."""
         missed_by = self._plays(0.0, way) * float(self.inner.output_lsb) + self._steepest * solved * self._arriving
-        undone = self._moved(self._way if way is None else way)[1] * float(self.inner.output_lsb)
         for numbers in self.creeps:  # their states have seen the sum of the plays
             missed_by *= numbers.slope * self._creep_gain(numbers)
         for each in self.behind:
             missed_by = self._passed(each, 0.0, missed_by)
-        residual = self._asked() * float(self.inner.output_lsb) + missed_by - undone
-        return self._gain() * residual / self._arriving
+        return self._asked() * float(self.inner.output_lsb) + missed_by
+
+    def _solution(self) -> float:
+        """Rounding of the input of the plays that is found, in units of signals."""
+        t = self.tables.moving
+        solution = 1.5 * float(self.inner.step) if t.used and not t.scanned else float(self.inner.solved())
+        return solution / self._arriving
+
+    def _arriving_error(self, way: float) -> float:
+        """Error of the signal that the inverse asks for in front of the memoryless part, in units of signals."""
+        code, steep = self._arrival(), self.static.front_slopes[1]
+        short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
+        slowed = self.slowed * float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
+        solved = self._solution() + steep * float(self.inner.back())
+        solved += steep * (code[0] if self.condition else sum(code) + short + slowed)  # both have seen it, or not
+        return self._gain() * self._residual(way, solved) / self._arriving
+
+    def _found_error(self) -> float:
+        """The same of the inverse's answer, with what it undoes, or under its `condition`: plays then hold the same,
+        and what it finds is off by its own rounding."""
+        if not self.condition:
+            undone = self._moved(self._way)[1] * float(self.inner.output_lsb)
+            return self._arriving_error(self._way) - self._gain() * undone / self._arriving
+        seen = self._residual(self._way, self.static.front_slopes[1] * self._arrival()[0])
+        own = self._solution() / self.static.front_slopes[0] + float(self.inner.back())
+        return self._gain_at_once() * seen / self._arriving + own
+
+    def _gain_at_once(self) -> float:
+        """Largest change of the drive in front of the memoryless part per change of the plays' sum, for plays that have
+        seen the same drives."""
+        least = float(self.static.pi.weights[0])
+        if self.bumps.curves:
+            least = least_slope(self.static, self.parts.plays)
+        if self.tables.moving.moves == DILATED:
+            least = min(least, least_dilated(self.static, self.parts.plays, self.seconds))
+        return 1.0 / least / self.static.front_slopes[0]
 
     def _gain(self) -> float:
-        """Largest change of the drive in front of the memoryless part per change of the plays' sum."""
-        if self.tables.moving.moves == DILATED:  # for plays that have seen the same drives
+        """The same for plays that have seen what each compensator has sent."""
+        if self.tables.moving.moves == DILATED:  # bounds are those at once; drives that are held may be farther
             least = least_dilated(self.static, self.parts.plays, self.seconds)
             if self.bumps.curves:
                 least = min(least, 0.5 * least_slope(self.static, self.parts.plays))
@@ -487,10 +514,9 @@ class Bounds:
     @property
     def condition(self) -> str:
         """The condition of `rounding` in words, if only the range bounds the difference of two drives; else ""."""
-        led = any(not exact for exact, _ in self.lags)
+        missed = self.ahead or any(not exact for exact, _ in self.lags)
         dilated = self.tables.moving.moves == DILATED
-        followed = self.lags or self.ahead
-        if not (led or dilated or (followed and (not self.reached or self.parts.slew))):
+        if not (missed or dilated or (self.lags and (not self.reached or self.parts.slew))):
             return ""
         if not self.reached:
             return f"{SAME}, nothing limited"
@@ -498,7 +524,15 @@ class Bounds:
 
     def rounding(self) -> float:
         """Bound of the inverse on the same branch and under its `condition`, in drive codes."""
-        return self._codes(self._arriving_error())
+        own = self._codes(self._found_error())
+        return max(own, self._limits_off()) if self.condition else own
+
+    def _limits_off(self) -> float:
+        """How far the limits of the drive are off because they are whole codes."""
+        lsb = self.inner.drive_lsb
+        rates = (rate for each in self.parts.slew for rate in (each.rate, each.falling_rate))
+        slew = [steps - math.floor(steps) for steps in (Fraction(rate * self.seconds) / lsb for rate in rates)]
+        return upward(max([self.inner.drive_short() / lsb, *slew]))
 
     def inverse(self) -> float:
         """Bound of the inverse in drive codes, with the effect of another branch and of limits."""
@@ -508,4 +542,4 @@ class Bounds:
             return self.rounding()
         gap = self.static.branch_gap
         other = self._gain() * self.static.pi.slopes[-1] * gap + gap / self.static.front_slopes[0]
-        return self._codes(self._arriving_error() + 1.001 * other / self._arriving)
+        return self._codes(self._found_error() + 1.001 * other / self._arriving)
