@@ -2,7 +2,7 @@
 
 Forward, engine `loop`: rounded thresholds, start memory and stage constants move a play by no more than their own
 error, because a play never amplifies a difference of its input, threshold or start value (3); sums and products add
-their unit roundoffs.
+their unit roundoffs (`LoopRoundings`).
 
 Engine `corners`: an answer is computed from the corner below it, which was an answer itself, so that the roundings of
 up to n + 1 corners and of the answer add up. `CornerRoundings` counts the roundings of one of them.
@@ -118,6 +118,38 @@ class CornerRoundings:
         return cls(u * forward, u * inverse, u * early, SECOND_ORDER * u * margin)
 
 
+@dataclass(frozen=True)
+class LoopRoundings:
+    """Roundings of the loop engine in unit roundoffs u, derived operation by operation from `c_runtime/loop_*.c`.
+
+    `level`: the largest sum of the plays, in output units; `summed`: errors of that sum, for plays that have seen the
+    same inputs; `solved`: what solving for their input adds to them, in output units.
+
+    A play is at most Z_i = max |low + r_i|, |high - r_i| or its start away from 0, where it is to within a rounding of
+    its threshold and of the sum with it, u (Z_i + r_i). A rounded weight and its product add 2 u p_i Z_i, each of n
+    sums u times the level.
+    """
+
+    level: float
+    summed: float
+    solved: float
+
+    @classmethod
+    def of(cls, cascade: StaticModel) -> LoopRoundings:
+        """The roundings of a model."""
+        pi = cascade.pi
+        p, r, start = (np.abs(np.array(each)) for each in (pi.weights, pi.thresholds, pi.start))
+        low, high = cascade.play_range
+        far = np.maximum(np.maximum(np.abs(low + r), np.abs(high - r)), start)
+        level = float(p @ far)
+        summed = 2.0 * level + float(p[1:] @ (far + r)[1:]) + pi.n * level
+        # the sum over those that follow: the level less that of the others and a product (table), two sums, its
+        # reciprocal (table) and product; where the next one would follow, a place that is known as well as a play
+        c = float(np.sum(p))
+        solved = 2.0 * float(p @ r) + 2.0 * level + 3.0 * c * float(far[0]) + 2.0 * c * float(np.max(far + r))
+        return cls(level, summed, solved)
+
+
 def _one(cascade: StaticModel, kind: str, engine: str) -> tuple[float, float]:
     """Forward error, and the residual eta of the inverse in output units, for one arithmetic."""
     eps = float(np.finfo(kind).eps) / 2
@@ -136,17 +168,17 @@ def _one(cascade: StaticModel, kind: str, engine: str) -> tuple[float, float]:
             residual = slope * residual + back
         front, front_inverse = max(front, error), max(front_inverse, residual)
 
-    size = largest_sum(cascade)
     underflow = (8 * pi.n + 16) * float(np.finfo(kind).smallest_subnormal) * (1 + total)
     if engine == "loop":
-        forward = total * (front + eps * (4 * w + 5 * pi.thresholds[-1]))
-        forward += eps * ((pi.n + 3) * size + 2 * (size + offset)) + underflow
-        return forward, forward + eps * (5 * (size + 2 * offset) + 4 * size) + total * front_inverse
-    one = CornerRoundings.of(cascade, kind)
+        one = LoopRoundings.of(cascade)
+        forward = total * front + eps * (one.summed + one.level + 2 * offset) + underflow
+        reference = 4 * one.level + 4 * offset  # rounded limits, and the difference from a rounded offset
+        return forward, forward + eps * (one.solved + reference) + total * front_inverse
+    corner = CornerRoundings.of(cascade, kind)
     answers = pi.n + 2  # n + 1 corners below an answer
     offsets = eps * (total * w + 2 * offset) + underflow
-    forward = answers * one.forward + total * front + offsets
-    return forward, answers * one.inverse + total * (front + front_inverse) + offsets
+    forward = answers * corner.forward + total * front + offsets
+    return forward, answers * corner.inverse + total * (front + front_inverse) + offsets
 
 
 def error_bounds(cascade: StaticModel, arithmetic: str, engine: str) -> ErrorBounds:

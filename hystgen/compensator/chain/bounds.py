@@ -25,7 +25,7 @@ import math
 import numpy as np
 
 from hystgen.compensator import engines
-from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, error_bounds, largest_sum
+from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, LoopRoundings, error_bounds
 from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.layout import Compiled
 from hystgen.effects.ageing import compensator as ageing
@@ -56,7 +56,8 @@ class _Sizes:
 def _sizes(compiled: Compiled) -> _Sizes:
     static, t = compiled.static, compiled.tables
     drive = max(abs(end) for end in static.input_range)
-    plays = largest_sum(dataclasses.replace(static, output_offset=0.0))
+    bent = moving.largest_bend(static, compiled.parts.plays)
+    plays = LoopRoundings.of(static).level + math.fsum(map(abs, static.pi.weights)) * bent
     output = plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
     output *= math.prod(each.forward.largest for each in compiled.own[t.own.ahead :])
     ends = [abs(float(t.limits[slots.OUTPUT_MIN])), abs(float(t.limits[slots.OUTPUT_MAX]))]

@@ -434,9 +434,17 @@ class Bounds:
         return self._asked() * float(self.inner.output_lsb) + missed_by
 
     def _solution(self) -> float:
-        """Rounding of the input of the plays that is found, in units of signals."""
-        t = self.tables.moving
-        solution = 1.5 * float(self.inner.step) if t.used and not t.scanned else float(self.inner.solved())
+        """Rounding of the input of the plays that is found, in units of signals.
+
+        With bits below it, what remains of the sum is divided by the slope of the plays that follow to that input.
+        Others may follow in the rest of a step: the slope is then too small by down to `p_0/sum p`, and of what is then
+        more than a step nothing is added.
+        """
+        t, step = self.tables.moving, float(self.inner.step)
+        solution = 1.5 * step if t.used and not t.scanned else float(self.inner.solved())
+        if self.finer:
+            weights = self.static.pi.weights
+            solution += max(0.5 - weights[0] / math.fsum(weights), 0.0) * step
         return solution / self._arriving
 
     def _arriving_error(self, way: float) -> float:
