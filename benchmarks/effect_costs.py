@@ -4,7 +4,8 @@
 
 Code is that of a module at -O2, of zig and gcc the larger one (RISC-V: zig); instructions are the mean of the inverse,
 or of the forward operator for what that alone has, strict -O2 build of zig, over a slow sine. `any` is what any effect
-at all adds, a gain among it, which is the least of them; the others are more than that, or less. Plays that a search
+at all adds, a gain among it, which is the least of them (`any_corners`: with engine corners, code alone); the others
+are more than that, or less. Plays that a search
 finds have that in common, `dilated`, and more than that; `braked` is what a lag and a slew limit take together beyond
 what each of them does. `effect_sizes.csv`, which the banner of emitted files is made
 from, has the code on both cores that `hystgen.compensator.engines` speaks of; `docs/effects.csv` all cores.
@@ -75,13 +76,15 @@ def model(effect: str) -> Model:
 Measures = tuple[dict[str, int], dict[str, float]]
 
 
-def measured(folder: Path, effect: str, arithmetic: str, cores: list[str], operator: str = "inverse") -> Measures:
+def measured(
+    folder: Path, effect: str, arithmetic: str, cores: list[str], operator: str = "inverse", engine: str = "loop"
+) -> Measures:
     """Bytes of code and mean instructions of a sample of an operator on each core."""
     one = model(effect)
-    options = emit_options(one, operator, arithmetic, "loop")
+    options = emit_options(one, operator, arithmetic, engine)
     files = sources.write(folder, one, options)
     constants = module.cost_of(one.parameters, one.cascade, options).memory.tables
-    numbers, real = one.tables(arithmetic, "loop"), ARITHMETICS[arithmetic].number
+    numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
     first = slots.OUTPUT_MIN if operator == "inverse" else slots.DRIVE_MIN
     low, high = (float(end) for end in numbers.limits[first : first + 2])
     u = 0.5 * (low + high) + 0.4 * (high - low) * np.sin(0.01 * np.arange(600))
@@ -124,6 +127,11 @@ def main() -> None:
             ahead = measured(Path(place) / f"forward-{arithmetic}", "gain", arithmetic, cores, "forward")
             moved = measured(Path(place) / f"moved-{arithmetic}", "dilated", arithmetic, cores)
             apart: dict[str, Measures] = {}
+            (bare, _), (with_corners, _) = (
+                measured(Path(place) / f"{effect}-corners-{arithmetic}", effect, arithmetic, cores, engine="corners")
+                for effect in ("", "gain")
+            )
+            sizes.append(("any_corners", arithmetic, *(with_corners[core] - bare[core] for core in cores)))
             for effect in ("any", *EFFECTS):
                 folder = Path(place) / f"{effect}-{arithmetic}"
                 operator = OPERATORS.get(effect, "inverse")

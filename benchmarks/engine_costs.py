@@ -3,8 +3,8 @@
     python benchmarks/engine_costs.py [-o hystgen]
 
 Instructions are the mean over a decaying multisine, strict -O2 build of zig, for both operators, every arithmetic, with
-and without a memoryless part (a dead zone), and the same for few numbers of plays with the effect that takes least, a
-gain. Code is that of a module at -O2, of zig and gcc the larger one, for every kind that
+and without a memoryless part (a dead zone), and the same with the effect that takes least, a gain, for few numbers of
+plays. Code is that of a module at -O2, of zig and gcc the larger one, for every kind that
 `hystgen.compensator.engines.kind` tells apart. Both on a Cortex-M0+ without and a Cortex-M4F with an FPU. The shipped
 tables are read by `hystgen.compensator.engines`, so that the same parameters give the same C everywhere.
 """

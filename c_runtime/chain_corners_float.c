@@ -38,7 +38,10 @@ static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
 
 /* The plays follow their input w. Returns their sum. */
 static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
-    return hystgen_plays_step(&hystgen_forward_curve, &self->plays, self->corner, w);
+    if (w < self->plays.here.input || w > self->plays.here.input) {
+        (void)hystgen_plays_step(&hystgen_forward_curve, &self->plays, self->corner, w);
+    }
+    return hystgen_forward_started(self);
 }
 
 /* The plays follow their input w. Returns their sum. */
@@ -59,5 +62,8 @@ static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_
 static hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
     hystgen_copy_place(&self->undo, &self->plays.here);
     self->sought = true;
-    return hystgen_plays_step(&hystgen_inverse_curve, &self->plays, self->corner, h);
+    if (h < self->plays.here.input || h > self->plays.here.input) {
+        (void)hystgen_plays_step(&hystgen_inverse_curve, &self->plays, self->corner, h);
+    }
+    return self->plays.here.output;
 }

@@ -203,10 +203,12 @@ class Model:
                     f"engine corners knows where plays are from where the drive turned, and {' and '.join(own)} "
                     "moves or bends each play in its own way; give --engine loop, or auto"
                 )
-            if own or (engine or emit.engine) == "auto":
+            if own:
                 return "loop"
         about = (operator or emit.operator, arithmetic or emit.arithmetic)
-        return engines.choose(engine or emit.engine, optimize or emit.optimize, self.cascade, *about)
+        return engines.choose(
+            engine or emit.engine, optimize or emit.optimize, self.cascade, *about, effects=bool(self.effects)
+        )
 
     def tables(self, arithmetic: str, engine: str) -> Tables | FixedTables | ChainTables:
         """The numbers of the emitted model in one arithmetic, with the parameter file's LSBs in fixed point."""
@@ -258,13 +260,14 @@ class Model:
         if not self.effects:
             return self.session("forward", arithmetic, engine, clamp).run(v)[0]
         if arithmetic is not None:
-            return self._reference(v, arithmetic, t, extra, inverse=False)
+            return self._reference(v, arithmetic, engine, t, extra, inverse=False)
         return self.chain.simulate([self.run(v, t, extra, clamp)])[0]
 
     def _reference(
         self,
         x: ArrayLike,
         arithmetic: str,
+        engine: str | None,
         t: ArrayLike | None,
         extra: Mapping[str, ArrayLike] | None,
         inverse: bool,
@@ -288,7 +291,8 @@ class Model:
                 f"drift is counted from the first sample, and t begins at {float(record.t[0]):g} s; give t from 0 on"
             )
         how = self.parameters.emit.compensation
-        return run.answers(tables.build(self.chain, arithmetic, seconds, how, self._lsb), record, inverse)
+        chosen = self.engine(engine, arithmetic=arithmetic)
+        return run.answers(tables.build(self.chain, arithmetic, seconds, how, self._lsb, chosen), record, inverse)
 
     def run(
         self,
@@ -378,7 +382,7 @@ class InverseModel:
         if not self.forward.effects:
             return self.forward.session("inverse", arithmetic, engine, clamp).run(u)[0]
         if arithmetic is not None:
-            return self.forward._reference(u, arithmetic, t, extra, inverse=True)
+            return self.forward._reference(u, arithmetic, engine, t, extra, inverse=True)
         ends = self.forward.cascade.input_range if clamp else (-math.inf, math.inf)
         return self.forward.compensator.drives(self.forward.run(u, t, extra), ends)
 

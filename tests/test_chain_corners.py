@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import BRANCHES, CHAINS, LED, TANH, chain, head
+from modelfiles import BRANCHES, CHAINS, LED, PLAYS, TANH, chain, head
 
 import hystgen
 from hystgen.basics import jit
@@ -198,5 +198,21 @@ def test_plays_that_an_effect_moves_or_bends_are_those_of_engine_loop(effect: st
         one.engine("corners")
 
 
-def test_one_corner_engine_needs_plays() -> None:
+def test_auto_is_the_engine_that_costs_less() -> None:
+    """By `FLASH / CYCLES`, with what effects add to the code; for size engine loop, as without effects."""
+    one = model(CHAINS["creeping"])
+    assert all(one.engine("auto", "inverse", each) == "corners" for each in ("float32", "float64", "q31", "q15"))
+    assert one.engine("auto", "inverse", "float32", "size") == "loop"
+    few = model(CHAINS["creeping"].replace(PLAYS, "\n  pi: {thresholds: [0, 1], weights: [2, 0.5]}\n"))
+    assert few.engine("auto", "inverse", "float32") == "corners"
+    assert few.engine("auto", "inverse", "q31") == few.engine("auto", "inverse", "q15") == "loop"
+    u = np.linspace(0.0, 3.0, 20)
+    for each in (one, few):  # and what simulates an arithmetic computes as what is emitted
+        chosen = each.engine("auto", arithmetic="float32")
+        with jit.plain():
+            found, same = each.inverse().simulate(u, "float32"), each.inverse().simulate(u, "float32", engine=chosen)
+        assert np.array_equal(found, same)
+
+
+def test_engine_corners_needs_plays() -> None:
     assert model(CHAINS["straight"]).engine("corners") == "loop", "as without effects"

@@ -388,7 +388,7 @@ def checked(
     """Of each operator its name, random calls and what they are given, and the C with the checks of `granted_states`,
     compiled and run with them; `wrong`: a bound that is a 64th of what it should be."""
     own, n = one.name, 20_000
-    options = emit_options(one, "inverse" if own in INVERSE_ALONE else "both", arithmetic)
+    options = emit_options(one, "inverse" if own in INVERSE_ALONE else "both", arithmetic, "loop")
     written = sources.write(folder, one, options)
     source = folder / f"{own}.c"
     source.write_text(granted_states(source.read_text(), compiled(one, arithmetic)[0], own, wrong))

@@ -1,7 +1,8 @@
 """The engine of a model and its code size, from tables measured on emulated cores.
 
-`benchmarks/engine_costs.py` makes both tables. `engine_costs.csv` has the instructions per sample, as a mean over a
-decaying multisine; `code_sizes.csv` the bytes of code of a module, the larger figure of two compilers.
+`benchmarks/engine_costs.py` makes two tables. `engine_costs.csv` has the instructions per sample, as a mean over a
+decaying multisine; `code_sizes.csv` the bytes of code of a module, the larger figure of two compilers. What effects add
+to the code is in `effect_sizes.csv`, made by `benchmarks/effect_costs.py`.
 """
 
 from __future__ import annotations
@@ -23,8 +24,11 @@ SMALL, FLASH, CYCLES = "cortex-m0plus", 32768, 4800
 """The controller that `auto` decides for: a core, its bytes of flash, and its cycles in a sample (48 MHz at 10 kHz)."""
 
 
-def choose(engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str) -> str:
+def choose(
+    engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str, effects: bool = False
+) -> str:
     """The engine that `auto` stands for; an explicit one is kept, but a model without plays always takes `loop`.
+    `effects`: the model has some, none of which moves or bends plays.
 
     `optimize` speed: fewer instructions, as a geometric mean over both cores. size: less code on both cores. auto: the
     smaller share of a small controller's flash plus its time; the break-even is `FLASH / CYCLES`, 6.8 bytes of code for
@@ -37,7 +41,7 @@ def choose(engine: str, optimize: str, cascade: StaticModel, operator: str, arit
         return "loop"
     if engine != "auto":
         return engine
-    costs = {each: _cost(each, optimize, cascade, operator, arithmetic) for each in ENGINES}
+    costs = {each: _cost(each, optimize, cascade, operator, arithmetic, effects) for each in ENGINES}
     return "corners" if costs["corners"] < costs["loop"] else "loop"
 
 
@@ -56,14 +60,25 @@ def kind(cascade: StaticModel, arithmetic: str) -> str:
     return f"{front}_branches" if cascade.branches_differ else front
 
 
-def _cost(engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str) -> float:
-    code = code_bytes(cascade, operator, arithmetic, engine)
+def effect_bytes(arithmetic: str, engine: str) -> Mapping[str, int]:
+    """Bytes of code that any effect at all adds to an operator."""
+    return effect_sizes()["any" if engine == "loop" else "any_corners", arithmetic]
+
+
+def _cost(engine: str, optimize: str, cascade: StaticModel, operator: str, arithmetic: str, effects: bool) -> float:
+    operators = ("forward", "inverse") if operator == "both" else (operator,)
+    code = dict(code_bytes(cascade, operator, arithmetic, engine))
+    if effects:  # what each of them adds is the same with both engines
+        more = effect_bytes(arithmetic, engine)
+        code = {core: size + len(operators) * more[core] for core, size in code.items()}
     if optimize == "size":
         return sum(code.values())
-    front = "gpi" if cascade.stages else "pi"
+    kind = "gpi" if cascade.stages else "pi"
+    if effects:
+        kind = "gpi_effects" if cascade.stages else "effects"
     instructions = dict.fromkeys(CORES, 0.0)
-    for one in ("forward", "inverse") if operator == "both" else (operator,):
-        measured = _instructions()[one, arithmetic, front, engine]
+    for one in operators:
+        measured = _instructions()[one, arithmetic, kind, engine]
         costs = measured[max(plays for plays in measured if plays <= cascade.pi.n)]
         instructions = {core: instructions[core] + costs[core] for core in CORES}
     if optimize == "speed":
@@ -79,6 +94,15 @@ def _instructions() -> dict[tuple[str, str, str, str], dict[int, dict[str, float
         about = (row["operator"], row["arithmetic"], row["kind"], row["engine"])
         found.setdefault(about, {})[int(row["n"])] = {core: float(row[core]) for core in CORES}
     return found
+
+
+@functools.cache
+def effect_sizes() -> dict[tuple[str, str], dict[str, int]]:
+    """Bytes of code that each part of a model with effects adds on each core, for each arithmetic."""
+    return {
+        (row["part"], row["arithmetic"]): {core: int(row[core]) for core in CORES}
+        for row in _rows("effect_sizes.csv")
+    }
 
 
 @functools.cache

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-import functools
 from collections import Counter
-from pathlib import Path
 
 from hystgen.compensator import engines
 from hystgen.compensator.chain import moving
@@ -16,8 +13,9 @@ PARTS = (
     "any", "creep", "lag", "lag_exact", "ageing", "heat", "gain", "clock", "preview", "slew", "braked", "tanh",
     "dead_zone", "relaxing", "dilated", "dashpot", "polynomial", "centre", "mode", "delay",
 )  # fmt: skip
-"""Parts of the code: `any` once for a model with effects, the others once for each kind of block in it; `dilated` for
-all plays whose input is found by a search, `braked` for a lag and a slew limit together."""
+"""Parts of the code: `any` (with engine corners `any_corners`) once for a model with effects, the others once for
+each kind of block in it; `dilated` for all plays whose input is found by a search, `braked` for a lag and a slew
+limit together."""
 
 OPERATORS = {"preview": "inverse", "mode": "forward", "delay": "forward"}
 """Parts that only one operator has, and that operator."""
@@ -37,19 +35,11 @@ def parts(t: ChainTables, operator: str) -> list[str]:
         "mode": len(t.mode), "delay": t.delay.samples,
         "polynomial": t.moving.bends == moving.POLYNOMIAL, "centre": t.moving.bends == moving.CENTRE,
     })  # fmt: skip
-    return ["any", *(part for part in PARTS[1:] if found[part] and OPERATORS.get(part, operator) == operator)]
+    common = "any" if t.plays.engine == slots.LOOP else "any_corners"
+    return [common, *(part for part in PARTS[1:] if found[part] and OPERATORS.get(part, operator) == operator)]
 
 
 def code_bytes(t: ChainTables, arithmetic: str, operator: str) -> dict[str, int]:
     """Bytes of code at -O2 that effects add to an operator on each of `engines.CORES`."""
-    found = [_sizes()[part, arithmetic] for part in parts(t, operator)]
+    found = [engines.effect_sizes()[part, arithmetic] for part in parts(t, operator)]
     return {core: sum(each[core] for each in found) for core in engines.CORES}
-
-
-@functools.cache
-def _sizes() -> dict[tuple[str, str], dict[str, int]]:
-    with (Path(engines.__file__).parent / "effect_sizes.csv").open(encoding="ascii", newline="") as file:
-        rows = list(csv.DictReader(file))
-    return {
-        (row["part"], row["arithmetic"]): {core: int(row[core]) for core in engines.CORES} for row in rows
-    }
