@@ -180,6 +180,16 @@ def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
 
 
 @pytest.mark.slow(one_in=3)
+@pytest.mark.parametrize("arithmetic", ["q31", "float32"])
+def test_a_shared_run_time_keeps_searches_to_itself(arithmetic: str) -> None:
+    """The module carries what it needs of them."""
+    one = model(LED["led"])
+    how = {"engine": "corners", "layout": "shared-runtime"}
+    report = hystgen.verify(one, arithmetic, "both", **how, compiler=["gcc"], length=400)
+    assert report.ok, report.table()
+
+
+@pytest.mark.slow(one_in=3)
 @pytest.mark.thorough
 @pytest.mark.parametrize(("name", "arithmetic"), [("everything", "float32"), ("everything", "q31"), ("led", "q31")])
 def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:

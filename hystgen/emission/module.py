@@ -273,7 +273,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.status = _status(values)
     values.macros = _macros(values)
     text = runtime.render(kernels, prefix, family, static=True)
-    values.kernels = runtime.render(carried, prefix, family, static=True)
+    values.kernels = runtime.render(carried, prefix, family, static=True, name=name)
     types = [*runtime.memory_pieces(family), *runtime.table_pieces(family), *([] if glue else states)]
     values.cost = _cost(cascade, options, values, text, types)
     values.details = _details(parameters, cascade, options, values)

@@ -422,13 +422,13 @@ def _joined(pieces: Iterable[Piece]) -> str:
     return text
 
 
-def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -> str:
-    """Kernels as C text under `prefix`; `static` for files that carry them as their own."""
+def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool, name: str = "") -> str:
+    """Kernels as C text under `prefix`; `static` for files that carry them as their own, of the model `name`."""
     text = _joined(pieces)
     text = text.replace("HYSTGEN_FIXED_KERNEL ", "HYSTGEN_KERNEL " if family.fixed else "HYSTGEN_API ")
     text = text.replace("HYSTGEN_API ", "static " if static else "")
     text = text.replace("HYSTGEN_KERNEL ", "HYSTGEN_APART " if static else "")
-    return _named(text, prefix, family, prefix)
+    return _named(text, prefix, family, name or prefix)
 
 
 def render_operators(pieces: Iterable[Piece], name: str, corners: int, prefix: str, family: Family) -> str:
