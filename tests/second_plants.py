@@ -379,10 +379,20 @@ FOREIGN = {each.__name__: each for each in (other_axis, room, changing_weights, 
 # Cases ------------------------------------------------------------------------------------------------------
 
 
-def unabsorbed(y: Sequence[Array], v: Sequence[Array]) -> float:
+def beside_steps(x: Array) -> NDArray[np.bool_]:
+    """The samples within two of a step of the drive (in ranges) that takes two samples at most."""
+    near = np.zeros(len(x), dtype=bool)
+    for k in range(1, len(x) - 3):
+        size = abs(x[k + 2] - x[k])
+        if size > 0.02 and max(abs(x[k] - x[k - 1]), abs(x[k + 3] - x[k + 2])) < 0.05 * size:
+            near[k - 1 : k + 5] = True
+    return near
+
+
+def unabsorbed(y: Sequence[Array], v: Sequence[Array], without_steps: bool = False) -> float:
     """rms that plays with weights of any sign and an offset per record leave: a plain linear fit behind the first move.
 
-    Of all records together; plays over thresholds up to half the range.
+    Of all records together; plays over thresholds up to half the range. `without_steps`: not of samples `beside_steps`.
     """
     tables, targets = [], []
     for one, drive in zip(y, v, strict=True):
@@ -397,9 +407,10 @@ def unabsorbed(y: Sequence[Array], v: Sequence[Array]) -> float:
         behind = max(int(np.argmax(x)), int(np.argmin(x)))
         if np.ptp(x) < 0.5 or behind > 0.8 * len(x):  # its memory is never known
             continue
-        part = np.stack(rows)[:, behind:]
+        used = behind + np.flatnonzero(~(without_steps & beside_steps(x)[behind:]))
+        part = np.stack(rows)[:, used]
         tables.append(part - part.mean(axis=1, keepdims=True))
-        targets.append(one[behind:] - one[behind:].mean())
+        targets.append(one[used] - one[used].mean())
     table, target = np.concatenate(tables, axis=1).T, np.concatenate(targets)
     solution, *_ = np.linalg.lstsq(table, target, rcond=None)
     return float(np.sqrt(np.mean((target - table @ solution) ** 2)))
@@ -445,19 +456,21 @@ def case(kind: str, seed: int, folder: Path) -> str:
     span = float(np.ptp(np.concatenate(output({})))) if foreign is None else 1.0
     noise = max(NOISE * span, bare)
 
-    def strength(run: Callable[[float], list[Array]], wanted: float) -> float:
+    def strength(run: Callable[[float], list[Array]], wanted: float, without_steps: bool = False) -> float:
         low, high = 1e-4, 1.0
         for _ in range(9):
             middle = float(np.sqrt(low * high))
-            low, high = (middle, high) if unabsorbed(run(middle), v) < wanted else (low, middle)
+            low, high = (middle, high) if unabsorbed(run(middle), v, without_steps) < wanted else (low, middle)
         return float(np.sqrt(low * high))
 
     strengths: dict[str, float] = {}
     ratios: list[float] = []
     for name in chosen:
         ratio = float(np.exp(rng.uniform(np.log(5.0), np.log(20.0))))
-        strengths[name] = strength(lambda x, name=name: output({name: x}), ratio * noise)  # type: ignore[misc]
-        left = unabsorbed(output({name: strengths[name]}), v)
+        # a limit that only a step within two samples meets is a delay of that step, and no record shows which
+        apart = name == "slew_limit"
+        strengths[name] = strength(lambda x, name=name: output({name: x}), ratio * noise, apart)  # type: ignore[misc]
+        left = unabsorbed(output({name: strengths[name]}), v, apart)
         ratios.append(float(np.sqrt(max(left**2 - bare**2, 0.0))) / noise)
     if foreign is not None:
         ratio = float(np.exp(rng.uniform(np.log(5.0), np.log(20.0))))
