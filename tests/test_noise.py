@@ -56,6 +56,7 @@ def measured(one: Model) -> float:
     return float(np.max(gain)) * one.cascade.pi.slopes[-1]
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize(
     ("effects", "options"),
     [
@@ -88,6 +89,7 @@ def rows(times: int, width: float, centred: bool) -> np.ndarray[Any, Any]:
     return row[::-1]
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize(
     ("effects", "limit", "preview"),
     [
@@ -150,6 +152,7 @@ def test_a_sine_loses_what_is_printed(period: int, loss: str) -> None:
     assert 100.0 * (1.0 - passed) == pytest.approx(float(loss), abs=0.06 if period == 50 else 0.006)
 
 
+@pytest.mark.slow(one_in=3)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 def test_averages_have_the_bits_and_the_bounds_of_the_rest(arithmetic: str) -> None:
     """Against the compensator in double precision, to which the averaged reference is given."""
