@@ -125,14 +125,19 @@ class Measured:
         return np.rint(x / unit) if self.compiled.codes else np.float32(x).astype(float)
 
     def _extra(self, one: Compiled) -> dict[str, Array]:
-        return {"temperature": np.round(20.0 + np.sin(3.0 * self.t), 2)} if len(one.tables.gain) else {}
+        """A temperature in half degrees, which every arithmetic has."""
+        return {"temperature": 20.0 + 0.5 * np.round(4.0 * np.sin(30.0 * self.t))} if len(one.tables.gain) else {}
 
     def forward(self, v: Array) -> float:
         """Error of the forward operator, output units."""
         given = self.given(v, self.drive)
         extra = self._extra(self.compiled)
         found = answers(self.compiled, Run(self.t, given, extra), False).astype(float) * self.output
-        return float(np.max(np.abs(found - self.model.simulate(given * self.drive, t=self.t, extra=extra))))
+        exact = self.model.simulate(given * self.drive, t=self.t, extra=extra)
+        if self.compiled.codes is not None:  # a gain may take the output beyond its codes
+            most = float(self.compiled.tables.limits[slots.CODE_MAX]) * self.output
+            exact = np.clip(exact, -most, most)
+        return float(np.max(np.abs(found - exact)))
 
     def inverse(self, v: Array) -> float:
         """Error of the inverse, drive units, asked for where the model is with this drive."""
