@@ -21,7 +21,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import units
-from modelfiles import CHAINS, FILES
+from modelfiles import CHAINS, FILES, LED
 from ruamel.yaml import YAML
 
 import hystgen
@@ -55,6 +55,8 @@ MODULES = (  # every kind of model, operator, arithmetic, engine and layout
     ("everything", "inverse", "q31", "loop", "self-contained"),
     ("relaxing", "both", "q15", "loop", "shared-runtime"),
     ("worn", "both", "q15", "loop", "single-header"),
+    ("everything", "inverse", "float32", "corners", "self-contained"),
+    ("led", "both", "q31", "corners", "shared-runtime"),
 )
 
 # cppcheck reads no system header; these are what <float.h> says on every target, and the core whose code has most to
@@ -84,7 +86,7 @@ class Finding:
 
 def emit(folder: Path, name: str, operator: str, arithmetic: str, engine: str, layout: str) -> list[Path]:
     """Emit a module into `folder` and return the C files to compile."""
-    model = Model(parse_parameters({**FILES, **CHAINS}[name], f"{name}.yaml"))
+    model = Model(parse_parameters({**FILES, **CHAINS, **LED}[name], f"{name}.yaml"))
     hystgen.emit(model, folder, operator=operator, arithmetic=arithmetic, engine=engine, layout=layout)
     if layout == "single-header":
         (folder / f"{name}.c").write_text(f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n')

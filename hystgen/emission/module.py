@@ -252,8 +252,8 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     kernels = runtime.needed(
         [*runtime.table_pieces(family), *runtime.kernel_pieces(family)], sorted(runtime.used(pieces))
     )
-    carried = runtime.carried(family, pieces) if shared else kernels
-    values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family)
+    carried = runtime.carried(family, pieces) if shared else []
+    values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family, carried)
     values.types = ""
     if glue:
         types = runtime.chain_types(own_types, "\n".join(glue.states.values()), family)
@@ -273,7 +273,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.status = _status(values)
     values.macros = _macros(values)
     text = runtime.render(kernels, prefix, family, static=True)
-    values.kernels = runtime.render(carried, prefix, family, static=True, name=name)
+    values.kernels = runtime.render_carried(carried, name, prefix, family) if shared else text
     types = [*runtime.memory_pieces(family), *runtime.table_pieces(family), *([] if glue else states)]
     values.cost = _cost(cascade, options, values, text, types)
     values.details = _details(parameters, cascade, options, values)

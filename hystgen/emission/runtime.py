@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -422,25 +422,34 @@ def _joined(pieces: Iterable[Piece]) -> str:
     return text
 
 
-def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool, name: str = "") -> str:
-    """Kernels as C text under `prefix`; `static` for files that carry them as their own, of the model `name`."""
+def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -> str:
+    """Kernels as C text under `prefix`; `static` for files that carry them as their own."""
     text = _joined(pieces)
     text = text.replace("HYSTGEN_FIXED_KERNEL ", "HYSTGEN_KERNEL " if family.fixed else "HYSTGEN_API ")
     text = text.replace("HYSTGEN_API ", "static " if static else "")
     text = text.replace("HYSTGEN_KERNEL ", "HYSTGEN_APART " if static else "")
-    return _named(text, prefix, family, name or prefix)
+    return _named(text, prefix, family, prefix)
 
 
-def render_operators(pieces: Iterable[Piece], name: str, corners: int, prefix: str, family: Family) -> str:
+def render_carried(pieces: Sequence[Piece], name: str, prefix: str, family: Family) -> str:
+    """Pieces of kernel files that the model `name` carries beside the shared run time `prefix`, under its own name."""
+    text = _joined(pieces)
+    return _named(text, prefix, family, name, frozenset(piece.name for piece in pieces))
+
+
+def render_operators(
+    pieces: Iterable[Piece], name: str, corners: int, prefix: str, family: Family, carried: Sequence[Piece] = ()
+) -> str:
     """Operators, or the types of their instances, as C text of the model `name` with the run time `prefix`.
 
-    `corners`: how many the corner engine takes, 0 for engine loop.
+    `corners`: how many the corner engine takes, 0 for engine loop; `carried`: as in `render_carried`.
     """
     text = _joined(pieces)
     apart = corners > 0 and not family.fixed
     text = text.replace("HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART " if apart else "static ")
     text = text.replace("HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART " if family.fixed else "static ")
-    return _named(text.replace("HYSTGEN_CORNERS", str(corners)), prefix, family, name)
+    known = frozenset(piece.name for piece in carried)
+    return _named(text.replace("HYSTGEN_CORNERS", str(corners)), prefix, family, name, known)
 
 
 def api(
@@ -464,8 +473,10 @@ def _own(family: Family) -> frozenset[str]:
     return frozenset([*(piece.name for piece in pieces), *(f"hystgen_{kind}" for kind in family.types)])
 
 
-def _named(text: str, prefix: str, family: Family, name: str) -> str:
-    """The text with the names of a model and of its run time."""
+def _named(
+    text: str, prefix: str, family: Family, name: str, carried: frozenset[str] = frozenset()
+) -> str:
+    """The text with the names of a model and of its run time; `carried`: those that the model has in its place."""
     for shared, here in family.signals.items():
         cast = f"({shared})"
         if here == "hystgen_real_t":
@@ -476,7 +487,7 @@ def _named(text: str, prefix: str, family: Family, name: str) -> str:
         text = re.sub(r"hystgen_(play|reach|sum)_t", "hystgen_real_t", text)
     for constant, value in family.constants.items():
         text = text.replace(constant, value)
-    own = _own(family)
+    own = _own(family) - carried
 
     def renamed(found: re.Match[str]) -> str:
         before = prefix if found[0] in own else name
