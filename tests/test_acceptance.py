@@ -323,6 +323,18 @@ class TestScreening:
         assert len(path.log) == calls
         assert sum(steps for steps, _ in path.log) == 2 * calls
 
+    @pytest.mark.parametrize(("factor", "calls"), [(0.75, 4), (0.85, 1)])
+    def test_a_joint_search_that_falls_goes_on(
+        self, factor: float, calls: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Creep of three states falls slowly, and far below where five steps end."""
+        path = Path([factor ** (k / 5.0) for k in range(40)])
+        monkeypatch.setattr(fits, "begun", lambda *_: path)
+        task = screening._Task(screening._JOIN, 0, np.zeros(0), np.zeros(0), 5)
+        searches = screening._Searches(None, None, [], SimpleNamespace(quick=None))  # type: ignore[arg-type]
+        searches._join(SimpleNamespace(structure=None), task)  # type: ignore[arg-type]
+        assert [steps for steps, _ in path.log] == [5] * calls
+
     @pytest.mark.parametrize(("start", "reached"), [(4.5, True), (5.5, False)])
     def test_a_start_far_off_is_left(self, start: float, reached: bool, monkeypatch: pytest.MonkeyPatch) -> None:
         """The best end is on its way."""
@@ -383,7 +395,8 @@ def _followed(screen: Sequence[tuple[float, float]], joint: Sequence[float]) -> 
     ]
     pairs = [screening._Pair(option, option) for _ in screen]
     now: Any = SimpleNamespace(rms=1.0, weights=None)
-    searches = screening._Searches(now, now, pairs, SimpleNamespace(tick=None, held=[]))  # type: ignore[arg-type]
+    records: Any = SimpleNamespace(tick=None, held=[], restarted=lambda fitted: fitted)
+    searches = screening._Searches(now, now, pairs, records)
     screening._followed_up(searches, kept_ones, Pool())  # type: ignore[arg-type]
     return steps
 

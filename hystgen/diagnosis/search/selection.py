@@ -81,7 +81,8 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
     """Merit of a tried effect, or why it has none.
 
     It has none if chance explains the difference, if it removes too little to stand out of the noise, if it hardly
-    shows in the held-out or in the fitted records, or if records of only one loop do not support a name.
+    shows in the held-out or in the fitted records, or if records of only one loop do not support a name. Chance does
+    not halve an error to which nothing was fitted, however few the events in which that shows.
 
     `least`: the rms to be removed, as a multiple of the remaining error or the noise; by default the threshold for a
     first or a further effect.
@@ -96,7 +97,7 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
         short = held if held.removed < acceptance.SEEN_IN_BOTH * max(records.noise, held.left) else fitted
         return Refusal("little", short.removed, needed * max(records.noise, short.left))
     p_value = difference(held.without, held.errors)
-    if p_value > acceptance.P_REPEATED:
+    if p_value > acceptance.P_REPEATED and held.left > acceptance.FAR_LESS * rms(held.without):
         return Refusal("chance", p_value, acceptance.P_REPEATED)
     if p_value > acceptance.P_SURE:
         of_fitted = difference(fitted.without, fitted.errors)
