@@ -136,7 +136,7 @@ def test_noise(error: float, share: float, noise: bool) -> None:
 )
 def test_chance(held_out: float, fitted: float, named: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """The p-value of held-out records, or a larger one beside a small one of the fitted records."""
-    better = Made("better", 1, (0.5, 0.5))
+    better = Made("better", 1, (0.6, 0.6))
     best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
     records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
     monkeypatch.setattr(selection, "difference", lambda _, after: held_out if after is best.errors else fitted)
@@ -145,6 +145,17 @@ def test_chance(held_out: float, fitted: float, named: bool, monkeypatch: pytest
         monkeypatch.setattr(selection, "difference", lambda *_, p_value=p_value: p_value)
         other: Any = SimpleNamespace(held_out=1.2, errors=[])
         assert selection.alike(other, SimpleNamespace(held_out=1.0, errors=[]), 0.1) is open_  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(("left", "named"), [(0.6, False), (0.4, True)])
+def test_what_chance_does_not_explain(left: float, named: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It does not halve an error to which nothing was fitted, even if few blocks show it."""
+    better = Made("better", 1, (left, left))
+    best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), left, better.errors(HELD))  # type: ignore[arg-type]
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
+    values = iter((0.1, 1e-6))
+    monkeypatch.setattr(selection, "difference", lambda *_: next(values))
+    assert (selection.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("of_fitted", [False, True])
