@@ -7,8 +7,8 @@ or of the forward operator for what that alone has, strict -O2 build of zig, ove
 at all adds, a gain among it, which is the least of them (`any_corners`: with engine corners, code alone); the others
 are more than that, or less. Plays that a search
 finds have that in common, `dilated`, and more than that; `braked` is what a lag and a slew limit take together beyond
-what each of them does. `effect_sizes.csv`, which the banner of emitted files is made
-from, has the code on both cores that `hystgen.compensator.engines` speaks of; `docs/effects.csv` all cores.
+what each of them does, `quiet` what it takes beyond a lag. `effect_sizes.csv`, which the banner of emitted files is
+made from, has the code on both cores that `hystgen.compensator.engines` speaks of; `docs/effects.csv` all cores.
 """
 
 from __future__ import annotations
@@ -58,6 +58,7 @@ EFFECTS = {
     "centre": "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2",
     "mode": "name: resonance, frequency: 30, damping: 0.05",
     "delay": "name: delay, time: 2.6e-3",
+    "quiet": "name: lag, time_constant: 0.01",
 }
 """A model of one effect for each part that `hystgen.compensator.chain.costs` counts."""
 assert {"any", *EFFECTS} == set(PARTS)
@@ -69,7 +70,7 @@ def model(effect: str) -> Model:
     text = "hystgen: 1\nname: bench\ninput_range: [-10, 10]\nsample_time: 1.0e-3\nmodel:\n  pi:\n"
     text += f"    thresholds: {[0.45 * k for k in range(CODE_PLAYS + 1)]}\n    weights: {[0.7] + [0.05] * CODE_PLAYS}\n"
     text += f"  effects:\n    - {{{EFFECTS[effect]}}}\n" if effect else ""
-    text += "emit: {compensation: {compensate: [drift, self_heating]}}\n"
+    text += f"emit: {{compensation: {{compensate: [drift, self_heating], quiet: {str(effect == 'quiet').lower()}}}}}\n"
     return Model(parse_parameters(text, "bench.yaml"))
 
 
@@ -139,6 +140,7 @@ def main() -> None:
                 code, counts = measures
                 before = base if effect == "any" else moved if effect in MOVED else least
                 before = ahead if operator == "forward" else before
+                before = apart["lag"] if effect == "quiet" else before
                 if effect == "braked":
                     before = together([apart["lag"], apart["slew"]], least)
                 apart[effect] = measures

@@ -35,6 +35,12 @@ typedef struct {
 } hystgen_lag_exact_t;
 
 typedef struct {
+    int64_t arrived; /* in front of the plays */
+    int64_t reference;
+    uint32_t equal; /* references in a row, up to one more than a drive waits for to stand still */
+} hystgen_quiet_t;
+
+typedef struct {
     int64_t before; /* input of the last sample */
     int64_t off;    /* output less input */
     int64_t rate;   /* of `off`, per radian of the mode */

@@ -32,6 +32,12 @@ typedef struct {
 } hystgen_lag_exact_t;
 
 typedef struct {
+    hystgen_real_t arrived; /* in front of the plays */
+    hystgen_real_t reference;
+    uint32_t equal; /* references in a row, up to one more than a drive waits for to stand still */
+} hystgen_quiet_t;
+
+typedef struct {
     hystgen_real_t before; /* input of the last sample */
     hystgen_real_t off;    /* output less input */
     hystgen_real_t rate;   /* of `off`, per radian of the mode */

@@ -146,6 +146,11 @@ class Model:
         if operator != "forward":
             self.inverse()
             self._check_noise_gain(arithmetic)
+            if self.parameters.emit.compensation.quiet and self.cascade.branches_differ:
+                raise UnsupportedEffectsError(
+                    "emit.compensation.quiet: with effects, a memoryless part with two branches goes from one to the "
+                    "other at rest; give both branches the same numbers, or leave out quiet"
+                )
 
     def _check_noise_gain(self, arithmetic: str) -> None:
         """Raise UnsupportedEffectsError where the inverse makes more of the reference's noise than is allowed."""

@@ -108,4 +108,12 @@ CHAINS = {
 LED = {"led": chain("led", "name: lag, time_constant: 0.01", "name: creep, time_constants: [0.1], weights: [0.05]")}
 """Of which in q31 the signal in front of the plays has bits below their input, which matters to engine corners."""
 
+BRAKED = chain("braked", "name: lag, time_constant: 0.01", "name: slew_limit, rate: 500, falling_rate: 300")
+"""A lag behind a slew limit, kept from overshooting."""
+
+CALM = chain(
+    "calm", CREEP, "name: lag, time_constant: 0.01", "name: slew_limit, rate: 3000", "name: delay, time: 2.0e-3"
+) + "emit: {compensation: {quiet: true, noise_gain: 1000}}\n"
+"""A drive that stands still at rest, behind a brake and a preview."""
+
 INVERSE_ALONE = ("viscous_twin",)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import BRANCHES, CHAINS, CREEP, FILES, INVERSE_ALONE, chain
+from modelfiles import BRANCHES, CALM, CHAINS, CREEP, FILES, INVERSE_ALONE, TANH, chain
 from scipy import signal
 from scipy.integrate import solve_ivp
 
@@ -94,6 +94,101 @@ def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:
     known = [core for core in cores if core in hystgen.verification.targets.NAMES]
     report = hystgen.verify(noisy(name), arithmetic, operator(name), "loop", targets=known, target_length=150)
     assert report.ok, report.table()
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q15"])
+def test_c_of_a_quiet_drive_gives_the_bits_of_the_reference(arithmetic: str) -> None:
+    report = hystgen.verify(model("calm", CALM), arithmetic, "inverse", compiler=["gcc"], length=1500)
+    assert report.ok, report.table()
+
+
+@pytest.mark.slow(one_in=2)
+@pytest.mark.thorough
+@pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
+def test_cores_give_the_bits_of_a_quiet_drive(arithmetic: str) -> None:
+    cores = ["host", "cortex-m4f", "cortex-m0plus"]
+    report = hystgen.verify(
+        model("calm", CALM), arithmetic, "inverse", compiler=["gcc"], length=1500, targets=cores, target_length=150
+    )
+    assert report.ok, report.table()
+
+
+LAG = "name: lag, time_constant: 0.01"
+FAST = "name: creep, time_constants: [0.004, 0.015, 0.03], weights: [0.02, 0.03, 0.05]"
+SETTLED = {"q31": 700}
+"""[samples] Ten of the slowest of these time constants, and a hundred; the tail is a lead of less than a code of 2^32
+behind twenty. Others: 400."""
+QUIETED = {
+    "lag": chain("lag", LAG),
+    "lag_and_creep": chain("lag_and_creep", LAG, FAST, front=TANH),
+    "short_lag": chain("short_lag", "name: lag, time_constant: 4.0e-4", FAST),
+    "late": chain("late", LAG, "name: delay, time: 2.6e-3", FAST),
+    "braked": chain("braked", LAG, "name: slew_limit, rate: 700, falling_rate: 400", FAST),
+    "creep_alone": chain("creep_alone", "name: creep, shape: logarithmic, per_decade: 0.02, t0: 0.1, t_min: 1.0e-3, "
+                         "t_max: 1.0e4", front=TANH),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
+@pytest.mark.parametrize("name", QUIETED)
+def test_a_quiet_drive_stands_still(name: str, arithmetic: str) -> None:
+    """Behind a move down and one up it changes in the direction of creep alone, which turns at most once, and without
+    creep not at all; the displacement, of the model in double precision, stays as near as the drive is kept."""
+    rng = np.random.default_rng([len(name), len(arithmetic)])
+    one = model(name, QUIETED[name] + "emit: {compensation: {quiet: true}}\n")
+    numbers = tables.build(one.chain, arithmetic, T, one.parameters.emit.compensation)
+    low, high = (float(end) for end in numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+    down, up = low + (high - low) * rng.uniform(0.2, 0.8, 2)
+    way = 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, 60))
+    moves = [low + (high - low) * way, high + (down - high) * way, down + (up - down) * way]
+    held = SETTLED.get(arithmetic, 400) + 100
+    u = np.concatenate([*moves[:2], np.full(held, down), moves[2], np.full(held, up)])
+    u = np.rint(u) if numbers.codes else np.float32(u).astype(float)
+    t = np.arange(len(u)) * T
+    with jit.plain():
+        v = answers(numbers, Run(t, u, {}), True).astype(float)
+    drive, output, unit = 1.0, 1.0, 1.0
+    if numbers.codes:
+        drive, output = float(numbers.codes.drive_lsb), float(numbers.codes.output_lsb)
+        unit = drive / 2.0 ** int(numbers.tables.number[layout.DRIVE_BITS])
+    error = np.abs(one.simulate(v * drive, t=t) / output - u)
+    kept = 2.0 * unit * float(numbers.tables.number[layout.DITHER]) + 0.5 * drive * (numbers.codes is not None)
+    allowed = 1.1 * one.cascade.pi.slopes[-1] * one.cascade.front_slopes[1] * kept / output  # creep adds 10 %
+    allowed += 2e-8 * (high - low) + np.max(np.abs(np.diff(u, 2))) / 8.0 * (name == "late")  # between two samples
+    for end in (120 + held, len(u)):
+        still = slice(end - 100, end - numbers.ahead)
+        way = np.sign(np.diff(v[still]))
+        way = way[way != 0.0]
+        assert np.count_nonzero(np.diff(way)) <= (name != "lag")
+        assert name != "lag" or not len(way)
+        assert np.max(error[still]) < allowed
+    if name in ("creep_alone", "short_lag"):  # whose bound does not ask for the same drives
+        codes = numbers.codes
+        bound = codes.inverse_error * drive if codes else bounds.chain_bounds(numbers, arithmetic).inverse
+        assert np.max(np.abs(v * drive - one.inverse().simulate(u * output, t=t, clamp=True))) <= bound
+
+
+def test_a_quiet_drive_moves_when_the_reference_does() -> None:
+    """A code of the reference, and a jump of the offset, while the drive stands still: the lag is led at once."""
+    one = model("lag", QUIETED["lag"] + "emit: {compensation: {quiet: true}}\n")
+    numbers = tables.build(one.chain, "q15", T, one.parameters.emit.compensation)
+    step, offset = slots.OP_STEP, slots.OP_OFFSET
+    op = np.array([*[step] * 100, *[step] * 3, *[step] * 97, offset, *[step] * 3], dtype=np.uint8)
+    x = np.array([*[5000] * 100, *[5001] * 100, 300, *[5001] * 3])
+    v, status = reference.answers(numbers.tables, True, op, x, compiled=False)
+    assert len(set(v[60:100].tolist())) == 1
+    assert v[100] > v[99] + 5
+    assert len(set(v[160:200].tolist())) == 1
+    assert numbers.codes
+    code = float(numbers.codes.output_lsb / numbers.codes.drive_lsb) / one.cascade.pi.slopes[-1]
+    assert v[201] < v[199] - 5 * 300 * code, "five times what it comes to at rest"
+    assert not np.any(status), "and no status tells of it"
+
+
+def test_two_branches_are_not_quiet() -> None:
+    one = model("lagging", CHAINS["lagging"] + "emit: {compensation: {quiet: true}}\n")
+    with pytest.raises(UnsupportedEffectsError, match="two branches goes from one to the other at rest"):
+        emitted_files(one)
 
 
 EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "bumpy", "drifting"), 1e-12) | {

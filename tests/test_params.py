@@ -601,15 +601,16 @@ REFUSED = [
         'compensation',
     ]),
     case('compensation', H + M + "emit:\n  compensation: {preview: -1, drive_hold: x, noise_gain: 0, taps: 4, corner: 1.5,"
-         " resonance: tuned, quiet: true}\n", [
+         " resonance: tuned, quiet: x, still: true}\n", [
         '6:27: emit.compensation.preview: must be at least 0, not -1; correct the number',
         '6:43: emit.compensation.drive_hold: must be straight or held, not the text "x"; choose one of them',
         '6:58: emit.compensation.noise_gain: must be above 0, not 0; correct the number',
         '6:67: emit.compensation.taps: must be 3 or 5, not 4; choose one of them',
         '6:78: emit.compensation.corner: must be a whole number, not 1.5; write it like 12',
         '6:94: emit.compensation.resonance: must be inverse, notch, shaper or none, not the text "tuned"; choose one of them',
-        '6:101: emit.compensation.quiet: unknown key; known here are preview, drive_hold, noise_gain, max_rate, '
-        'resonance, taps, corner, compensate',
+        '6:108: emit.compensation.quiet: must be true or false, not the text "x"; write one of them, without quotes',
+        '6:111: emit.compensation.still: unknown key; known here are preview, drive_hold, noise_gain, max_rate, '
+        'resonance, taps, corner, quiet, compensate',
     ]),
     case('compensate', H + M + "emit: {compensation: {compensate: [lag]}}\nnot_separable: [[creep], [a, b, c], 3]\n", [
         '5:36: emit.compensation.compensate[0]: must be drift or self_heating, not the text "lag"; choose one of them',

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from types import SimpleNamespace
 
-from modelfiles import CHAINS, LED
+from modelfiles import CALM, CHAINS, LED
 from mutants import MODELS
 
 from hystgen.emission import module, runtime
@@ -67,6 +67,8 @@ UNITS = (
     ("drifting_late", "q15", "loop"),
     ("heated", "float64", "loop"),
     ("heated", "q31", "loop"),
+    ("calm", "float32", "loop"),
+    ("calm", "q15", "loop"),
     ("creeping", "float32", "corners"),
     ("led", "q31", "corners"),
 )
@@ -75,7 +77,7 @@ UNITS = (
 
 def model(name: str) -> Model:
     """The model of a parameter file under the name of the run time."""
-    text = {**MODELS, **CHAINS, **LED}[name]
+    text = {**MODELS, **CHAINS, **LED, "calm": CALM}[name]
     return Model(parse_parameters(text, f"{name}.yaml").model_copy(update={"name": "hystgen"}))
 
 
@@ -98,11 +100,12 @@ def _states(values: SimpleNamespace) -> list[str]:
 
 
 def _blocks(values: SimpleNamespace) -> list[str]:
-    """The files of blocks, that of the preview where there is one."""
+    """The files of blocks, without those of a preview, a delay and a quiet drive where there are none."""
     if not values.variant.chain:
         return []
     blocks = runtime.FIXED_CHAIN_BLOCKS if values.fixed else runtime.CHAIN_BLOCKS
-    missing = {"preview": not len(values.numbers.tap), "delay": not values.numbers.delay.samples}
+    t = values.numbers
+    missing = {"preview": not len(t.tap), "delay": not t.delay.samples, "quiet": not t.quiet}
     return [file for file in blocks if not missing.get(file.split(".")[0].split("_")[0])]
 
 

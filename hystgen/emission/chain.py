@@ -14,6 +14,7 @@ from hystgen.compensator.chain import blocks, moving
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
     BRAKED_DROP,
+    DITHER,
     DRIVE_BITS,
     LARGEST_LEVEL,
     LEAST_CODE,
@@ -332,6 +333,8 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     constants.append(("WAITING", f"{t.delay.samples}u", "samples of the drive that wait"))
     if t.delay.samples and not t.fixed:
         constants.append(("WAITED", operand(t.delay.share[0]), "part of the step after the oldest that is over"))
+    constants.append(("QUIET", f"{t.quiet}u", "equal references behind which the drive stands still"))
+    constants.append(("DITHER", operand(t.number[DITHER]), "by which it goes to and fro at rest"))
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
     constants += _fixed_constants(t) if t.fixed else []
     if t.moving.used:
@@ -387,6 +390,7 @@ def instance(op: str, t: ChainTables, blocks: Sequence[Block], plays: int, kept:
         Field("real", "answer", f"{'drive' if inverse else 'displacement'} returned last"),
         Field("signal", "offset", "set beside that of the model"),
         *(field for block in blocks for field in block.fields),
+        *([Field("quiet", "quiet", members="wwi" if t.fixed else "rri")] if inverse and t.quiet else []),
         *([Field("signal", "line", "references, the newest one last", taps)] if inverse and taps else []),
         *([Field("real", "waiting", "drives", waiting), Field("status", "oldest", "of them")] if waiting else []),
         Field("flag", "ascending", "direction of the drive's last move"),
@@ -442,20 +446,33 @@ def _functions(
     self_t = f"hystgen_{op}_t *self"
     apart = "HYSTGEN_APART" if t.fixed else "static"  # its products of 64 bits stay off the stack of what calls it
 
-    def through(blocks: Sequence[Block], verb: str, x: str, side: str, comment: str) -> str:
-        lines = [f"{x} = {block.call(verb, x)};" for block in blocks] or ["(void)self;"]
+    def through(
+        blocks: Sequence[Block], verb: str, x: str, side: str, comment: str, more: Sequence[str] = ()
+    ) -> str:
+        lines = [*(f"{x} = {block.call(verb, x)};" for block in blocks), *more] or ["(void)self;"]
         if verb == "resting" and not any("self" in line for line in lines):
             lines = ["(void)self;", *lines]
         head = f"static hystgen_signal_t hystgen_{op}_{side}_{verb}({self_t}, hystgen_signal_t {x})"
         return _function(comment, head, [*lines, f"return {x};"])
 
-    yield through(before, "rest", "v", "drive_side", "Settles at drive v. Returns what is in front of the plays.")
-    yield through(before, "absorb", "v", "drive_side", "Drive v at this sample. Returns what is in front of the plays.")
+    quiet = inverse and bool(t.quiet)
+    rest, absorb = (["hystgen_quiet_rest(&self->quiet, v);"], ["self->quiet.arrived = v;"]) if quiet else ([], [])
+    yield through(before, "rest", "v", "drive_side", "Settles at drive v. Returns what is in front of the plays.", rest)
+    yield through(
+        before, "absorb", "v", "drive_side", "Drive v at this sample. Returns what is in front of the plays.", absorb
+    )
     yield through(after, "rest", "h", "output_side", "Settles at the sum h of the plays. Returns the output.")
     yield through(after, "absorb", "h", "output_side", "The sum of the plays is h at this sample. Returns the output.")
     if inverse:
         back = list(reversed(before)), list(reversed(after))
-        yield through(back[0], "solve", "a", "drive_side", "The drive that leads to a in front of the plays.")
+        leads = "The drive that leads to a in front of the plays."
+        if quiet:
+            lines = ["hystgen_signal_t v = a;", *(f"v = {block.call('solve', 'v')};" for block in back[0])]
+            lines.append("return hystgen_quiet_drive(&self->quiet, a, v, self->applied);")
+            head = f"static hystgen_signal_t hystgen_inverse_drive_side_solve({self_t}, hystgen_signal_t a)"
+            yield _function(leads, head, lines)
+        else:
+            yield through(back[0], "solve", "a", "drive_side", leads)
         yield through(back[1], "solve", "y", "output_side", "The sum of the plays that gives y at this sample.")
         yield through(back[1], "resting", "y", "output_side", "The sum of the plays that gives y at rest.")
     lines = ["hystgen_signal_t x = y;"] if behind else []
@@ -480,10 +497,12 @@ def _functions(
             f"y = hystgen_{stage['kind']}_inverse({stage['table']}, y{stage['limited']});" for stage in reversed(behind)
         ]
         unused = [] if any(stage["limited"] for stage in behind) else ["(void)limited;"]
+        counted = ["hystgen_quiet_count(&self->quiet, u);"] * quiet
         yield _function(
             "The output of the chain that gives the displacement u; `limited` tells whether none does.",
-            f"static hystgen_signal_t hystgen_inverse_undisplaced(const {self_t}, hystgen_signal_t u, bool *limited)",
-            [*lines, *unused, "return y;"],
+            f"static hystgen_signal_t hystgen_inverse_undisplaced({'' if quiet else 'const '}{self_t}, "
+            "hystgen_signal_t u, bool *limited)",
+            [*lines, *unused, *counted, "return y;"],
         )
         put = [
             line for each in clocks

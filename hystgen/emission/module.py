@@ -20,7 +20,7 @@ from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import tables as chain_tables
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
-from hystgen.compensator.chain.layout import SHARE_BITS, Compiled, OwnChainTables
+from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, SHARE_BITS, Compiled, OwnChainTables
 from hystgen.effects import own as own_effects
 from hystgen.effects.base import USER
 from hystgen.emission import chain, cost, numbers, own, runtime, selftest
@@ -235,7 +235,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.variant = runtime.Variant(
         options.engine, values.fixed, values.fronts, values.branches, values.finer, values.saturates, values.start_list,
         compiled is not None, compiled is not None and bool(compiled.tables.slew),
-        compiled is not None and bool(compiled.tables.braked),
+        compiled is not None and bool(compiled.tables.braked), compiled is not None and bool(compiled.tables.quiet),
         compiled is not None and compiled.tables.delay.samples > 0,
         compiled is not None and bool(compiled.parts.ageing), *(chain.plays(compiled.tables) if compiled else ()),
     )  # fmt: skip
@@ -437,6 +437,20 @@ def _cost(
     return cost.estimate(cascade, options, values.numbers, text, "".join(values.arrays), types, fields)
 
 
+def _quiet(values: SimpleNamespace, options: Options) -> list[str]:
+    """When and how far a drive is kept at rest."""
+    t = values.numbers
+    if not (options.inverse and values.variant.quiet):
+        return []
+    kept, unit = float(t.number[DITHER]), values.units.drive.replace(",", "")
+    if values.fixed:
+        kept, unit = kept / 2.0 ** int(t.number[DRIVE_BITS]), " drive codes"
+    return [
+        f"Quiet: after {t.quiet} equal references the drive stands still while it is within {kept:.4g}{unit} of what "
+        "it has to be at rest; what arrives in front of the plays is then within twice that of what is sought"
+    ]
+
+
 def _selftest_cost(options: Options, found: cost.Cost, samples: int) -> list[str]:
     constants, instance = cost.selftest_bytes(options, found.memory, samples, cost.CORE_32)
     lines = ["", f"Cost (32-bit target): {constants} bytes of constants, {instance} bytes of RAM for its own instance"]
@@ -475,6 +489,7 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         f"layout {options.layout}",
         *(f"Not compensated: {words}" for words in options.left_out),
         *values.reading,
+        *_quiet(values, options),
         *([""] if values.precision else []),
         *values.precision,
         "",

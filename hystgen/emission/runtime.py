@@ -31,13 +31,14 @@ FLOAT_KERNELS = (
 )
 CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
 CHAIN_BLOCKS = (
-    *(kind.file for kind in KINDS), "delay.c", "delay_float.c", "preview.c", "preview_float.c", "product_float.c",
+    *(kind.file for kind in KINDS), "delay.c", "delay_float.c", "preview.c", "preview_float.c", "quiet_float.c",
+    "quiet.c", "product_float.c",
 )  # fmt: skip
 FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
 FIXED_CHAIN_BLOCKS = (
     "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "braked_fixed.c", "gain_fixed.c", "ageing_fixed.c",
     "heat_fixed.c", "mode_fixed.c", "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c",
-    "bend.c", "stops.c", "product_fixed.c",
+    "quiet_fixed.c", "quiet.c", "bend.c", "stops.c", "product_fixed.c",
 )  # fmt: skip
 """Files that models with effects carry themselves, even with a shared run time."""
 
@@ -177,8 +178,9 @@ class Variant:
     `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
     drive code, or with effects what arrives there has bits below them; `saturates`: output codes are limited;
     `start_list`: each play starts at its own value; `chain`: it has effects, `slew`: one of them keeps the drive within
-    a rate, `braked`: and a lag behind that from overshooting, `waits`: it does not act at once, `ages`: one is a gain
-    that follows the travel, `moves` and `bends`: how plays move and are bent where that is not as in engine loop.
+    a rate, `braked`: and a lag behind that from overshooting, `quiet`: the drive stands still at rest, `waits`: it does
+    not act at once, `ages`: one is a gain that follows the travel, `moves` and `bends`: how plays move and are bent
+    where that is not as in engine loop.
     """
 
     engine: str
@@ -191,6 +193,7 @@ class Variant:
     chain: bool = False
     slew: bool = False
     braked: bool = False
+    quiet: bool = False
     waits: bool = False
     ages: bool = False
     moves: str = ""
@@ -229,7 +232,7 @@ class Variant:
         kind, loops = "fixed" if self.fixed else "float", self.engine == "loop"
         slew = ("chain_slew.c",) if self.braked else ("chain_slew.c", "chain_unbraked.c")
         slew = slew if self.slew else ("chain_free.c",)
-        brake = ("chain_braked.c",) * self.braked
+        brake = ("chain_within.c", f"chain_braked{'_quiet' * self.quiet}.c") if self.braked else ()
         delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
         if not self.moves:
             plays: tuple[str, ...] = ("chain_plays.c" if loops else f"chain_corners_{kind}.c",)

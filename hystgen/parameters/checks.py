@@ -516,6 +516,8 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
         "int_type": "must be a whole number",
         "int_from_float": "must be a whole number",
         "int_parsing": "must be a whole number",
+        "bool_type": "must be true or false",
+        "bool_parsing": "must be true or false",
         "string_type": "must be text",
         "tuple_type": "must be a list",
         "model_type": "must be a mapping",
@@ -525,6 +527,7 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
     advice = {
         "must be a number": "write it like 0.45",
         "must be a whole number": "write it like 12",
+        "must be true or false": "write one of them, without quotes",
         "must be text": "put it in quotes",
         "must be a list": "write [ ] around the values",
         "must be a mapping": "write `key: value` pairs in it",

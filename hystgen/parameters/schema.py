@@ -249,6 +249,11 @@ class Compensation(_Part):
     corner: Annotated[int, Field(ge=0, le=100)] = Field(
         default=0, description="corners of the reference are rounded by three moving averages of this number of samples"
     )
+    quiet: bool = Field(
+        default=False,
+        description="the drive stands still while the reference does, but for what creep asks of it; references that "
+        "move by a code now and then get larger leads",
+    )
 
     compensate: tuple[Literal["drift", "self_heating"], ...] = Field(
         default=(),
@@ -270,7 +275,9 @@ class EmitDefaults(_Part):
     optimize: Literal["auto", "speed", "size"] = Field(
         default="auto", description="what engine auto chooses for: instructions, code, or both weighed"
     )
-    drive_lsb: Positive | None = Field(default=None, description="fixed point: input units per code")
+    drive_lsb: Positive | None = Field(
+        default=None, description="fixed point, and a quiet drive in floating point: input units per code"
+    )
     output_lsb: Positive | None = Field(default=None, description="fixed point: output units per code")
     compensation: Compensation = Field(default=Compensation(), description="how effects are compensated in the C")
 

@@ -143,9 +143,13 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
         kinds += [slots.OP_GAIN, slots.OP_TRAVEL, slots.OP_TRAVELLED]
     if inverse:
         kinds += [slots.OP_COMMIT, slots.OP_EXPECTED, slots.OP_CORRECT, *([slots.OP_PUSH] * (len(tables.tap) > 0))]
-    for name, chance in (("settings now and then", 0.01), ("settings", 0.4)):
+    names = [("settings now and then", 0.01), ("settings", 0.4)]
+    names += [("settings at rest", 0.02)] * (inverse and tables.quiet > 0)
+    for name, chance in names:
         walk = np.cumsum(rng.normal(0, 0.02, length))
         x = (low + high) / 2 + 0.6 * (high - low) * np.sin(walk)
+        if name == "settings at rest":
+            x = np.repeat(x, 5 * tables.quiet)[:length]
         op = np.where(rng.random(length) < chance, rng.choice(kinds, length), slots.OP_STEP).astype(np.uint8)
         op[rng.random(length) < 0.003] = slots.OP_RESET
         op[rng.random(length) < 0.001] = slots.OP_INIT

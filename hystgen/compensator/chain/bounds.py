@@ -27,7 +27,7 @@ import numpy as np
 from hystgen.compensator import engines
 from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, LoopRoundings, error_bounds
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.layout import Compiled
+from hystgen.compensator.chain.layout import DITHER, Compiled
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import TABLE_ERROR
 from hystgen.effects.creep import compensator as creep
@@ -41,6 +41,9 @@ from hystgen.front.tanh import kernels
 from hystgen.plays import slots
 
 SAME = "both have seen the same drives"
+
+STILL = "the drive does not stand still"
+"""Of a quiet drive in front of a lag: what has arrived is then within twice its dither of what is sought."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -246,6 +249,11 @@ def _seen(compiled: Compiled) -> float:
     return max(found, 1.0)
 
 
+def _kept(compiled: Compiled) -> float:
+    """How far the input of the plays can be from the one that is sought while the drive stands still."""
+    return 2.0 * float(compiled.tables.number[DITHER])
+
+
 def condition(compiled: Compiled) -> str:
     """The condition of `rounding` in words, if only the range bounds the difference of two drives; else "".
 
@@ -255,12 +263,13 @@ def condition(compiled: Compiled) -> str:
     moved alike. Thresholds that grow with the rate amplify an earlier difference of the drives. A lag that is braked
     behind a slew limit gives up more of its lead than the limit cuts off.
     """
+    more = f" and {STILL}" if compiled.tables.quiet else ""
     if compiled.tables.braked:
-        return f"{SAME} and no slew limit acts"
+        return f"{SAME} and no slew limit acts{more}"
     missed = not all(compiled.tables.lag.exact) or compiled.tables.own.ahead > 0
     remembered = compiled.static.pi.n > 0 or len(compiled.tables.creep.block) > 0
     dilated = compiled.tables.moving.moves == moving.DILATED
-    return SAME if dilated or (missed and remembered) else ""
+    return SAME + more if dilated or (missed and remembered) else ""
 
 
 def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
@@ -294,6 +303,10 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     forward, asked = (sum(each) for each in zip(*ways, strict=True))
     whole = static.input_range[1] - static.input_range[0]
     seen = 1.0 if same else _seen(compiled)
+    if compiled.tables.quiet and not same:  # the plays have seen the drive that was kept
+        kept = _kept(compiled)
+        apart = gain * pi.slopes[-1] * static.front_slopes[1] * kept
+        plays = ErrorBounds(plays.forward, plays.inverse + kept + apart, plays.rounding + kept + apart)
     inverse, rounding = (
         min(SECOND_ORDER * _lags(compiled, seen * own + (seen - 1.0) * only_seen + gain * asked, u, same), whole)
         for own in (plays.inverse, plays.rounding)

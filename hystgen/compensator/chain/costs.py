@@ -11,13 +11,13 @@ from hystgen.plays import slots
 
 PARTS = (
     "any", "creep", "lag", "lag_exact", "ageing", "heat", "gain", "clock", "preview", "slew", "braked", "tanh",
-    "dead_zone", "relaxing", "dilated", "dashpot", "polynomial", "centre", "mode", "delay",
+    "dead_zone", "relaxing", "dilated", "dashpot", "polynomial", "centre", "mode", "delay", "quiet",
 )  # fmt: skip
 """Parts of the code: `any` (with engine corners `any_corners`) once for a model with effects, the others once for
-each kind of block in it; `dilated` for all plays whose input is found by a search, `braked` for a lag and a slew
-limit together."""
+each kind of block in it; `dilated` for all plays whose input is found by a search, `braked` for a lag and a slew limit
+together, `quiet` for a drive that stands still at rest."""
 
-OPERATORS = {"preview": "inverse", "mode": "forward", "delay": "forward"}
+OPERATORS = {"preview": "inverse", "quiet": "inverse", "mode": "forward", "delay": "forward"}
 """Parts that only one operator has, and that operator."""
 
 
@@ -32,7 +32,7 @@ def parts(t: ChainTables, operator: str) -> list[str]:
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),
         "relaxing": t.moving.scanned, "dilated": t.moving.used and not t.moving.scanned,
         "dashpot": t.moving.moves == moving.DASHPOT,
-        "mode": len(t.mode), "delay": t.delay.samples,
+        "mode": len(t.mode), "delay": t.delay.samples, "quiet": t.quiet,
         "polynomial": t.moving.bends == moving.POLYNOMIAL, "centre": t.moving.bends == moving.CENTRE,
     })  # fmt: skip
     common = "any" if t.plays.engine == slots.LOOP else "any_corners"

@@ -26,8 +26,8 @@ from hystgen.arithmetic.factors import MANTISSA_BITS, lifted
 from hystgen.arithmetic.factors import error as missed
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER
-from hystgen.compensator.chain.bounds import SAME
-from hystgen.compensator.chain.layout import ChainTables, largest_way
+from hystgen.compensator.chain.bounds import SAME, STILL
+from hystgen.compensator.chain.layout import DITHER, ChainTables, largest_way
 from hystgen.compensator.chain.moving import (
     DASHPOT,
     DILATED,
@@ -308,11 +308,18 @@ class Bounds:
         here = sum(self._lag(j, *sizes)[0] for j, sizes in places) + sum(each.output for each in self.ahead)
         here += 0.5 * 2.0**self.finer if self.finer else 0.0
         code = 0.5 * 2.0**self._fine
+        if self._kept:
+            return here, code + self._kept
         if self.lags:
             exact, (rate, theta, _, _) = self.lags[0]
             return here, code * (1.0 if exact else rate * (1.0 + 2.0 * theta))
         rounded = bool(self.static.stages or self.ahead) or self._fine > 0
         return here, code * rounded
+
+    @property
+    def _kept(self) -> float:
+        """How far the input of the plays can be from the one that is sought while the drive stands still."""
+        return 2.0 * float(self.tables.number[DITHER]) if self.tables.quiet and not self.condition else 0.0
 
     @cached_property
     def _shares(self) -> list[tuple[float, float]]:
@@ -509,7 +516,7 @@ class Bounds:
 
     def _codes(self, error: float) -> float:
         """The error of the drive in drive codes, for an error in front of the plays in units of signals."""
-        own = SECOND_ORDER * self._led(error) / 2.0**self._fine
+        own = SECOND_ORDER * self._led(error + self._kept) / 2.0**self._fine
         whole = float(self.inner.drive[1] - self.inner.drive[0])
         return upward(Fraction(min(own + DOUBLE * whole, whole)))
 
@@ -526,9 +533,10 @@ class Bounds:
         dilated = self.tables.moving.moves == DILATED
         if not (missed or dilated or (self.lags and (not self.reached or self.parts.slew))):
             return ""
+        more = f" and {STILL}" if self.tables.quiet else ""
         if not self.reached:
-            return f"{SAME}, nothing limited"
-        return f"{SAME} and no slew limit acts" if self.tables.braked else SAME
+            return f"{SAME}, nothing limited{more}"
+        return (f"{SAME} and no slew limit acts" if self.tables.braked else SAME) + more
 
     def rounding(self) -> float:
         """Bound of the inverse on the same branch and under its `condition`, in drive codes."""

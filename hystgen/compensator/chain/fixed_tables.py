@@ -27,6 +27,7 @@ from hystgen.compensator.chain.fixed_bounds import Bend, Bounds, Sizes
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
     BRAKED_DROP,
+    DITHER,
     DRIVE_BITS,
     LARGEST_LEVEL,
     LEAST_CODE,
@@ -42,7 +43,9 @@ from hystgen.compensator.chain.layout import (
     OwnChainTables,
     braked,
     fastest,
+    lead,
     output_range,
+    quiet,
     read,
 )
 from hystgen.compensator.chain.moving import Bumps
@@ -175,6 +178,7 @@ class _Builder:
             np.array(self._numbers(), dtype=np.int64),
             int(bool(self.parts.slew)),
             braked(self.parts, [exact for exact, _ in self.lags]),
+            quiet(self.how, self.taps),
         )
         if self.parts.own_drives or self.parts.own_outputs:
             tables = OwnChainTables(*tables)
@@ -355,7 +359,7 @@ class _Builder:
 
     def _numbers(self) -> list[int]:
         span = self.inner.drive[1] - self.inner.drive[0]
-        found = [0] * 14
+        found = [0] * 15
         found[OFFSET] = self.signal(self.static.output_offset)
         found[1] = self.signal(self.high - self.low)
         found[2], found[3] = self.slew(span)
@@ -367,6 +371,7 @@ class _Builder:
         found[MOST_CODE] = self.inner.drive[1] + 2 * span
         found[SHARE_BITS] = 31 - self.about.code_bits
         found[DRIVE_BITS], found[ARRIVING_BITS] = self.inner.fine + self.finer, self.finer
+        found[DITHER] = (1 << found[DRIVE_BITS]) + math.ceil(lead(self.lags, self.own_drives))
         found[BRAKED_DROP] = max((span << found[DRIVE_BITS]).bit_length() + 2 - COARSE.bit_length(), 0)
         return found
 

@@ -22,7 +22,9 @@ from hystgen.compensator.chain.layout import (
     Stages,
     braked,
     fastest,
+    lead,
     output_range,
+    quiet,
     read,
 )
 from hystgen.compensator.chain.parts import Parts
@@ -43,6 +45,10 @@ from hystgen.effects.thermal.compensator import HeatTables
 from hystgen.front.tanh import kernels
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
+
+ROUNDINGS = 4.0
+"""[half last bits of the largest drive] What rounding leaves between the input of the plays that is sought and the one
+that arrives: those of the goal and of the state of a lag. Set by: tests/test_chain.py -k stands_still."""
 
 
 def _behind(parts: Parts, arithmetic: str) -> Stages:
@@ -104,8 +110,10 @@ def _heat(
     )
 
 
-def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation, engine: str) -> Compiled:
-    """The model in 'float32' or 'float64' at steps of `seconds`.
+def build(
+    chain: Chain, arithmetic: str, seconds: float, how: Compensation, engine: str, drive_lsb: float | None
+) -> Compiled:
+    """The model in 'float32' or 'float64' at steps of `seconds`; `drive_lsb`: code of the drive's converter.
 
     None of its effects is among the `tables.refusals`. Raises FormatError if a number does not fit the arithmetic.
     """
@@ -136,16 +144,18 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation, engi
     taps, ahead = reading.taps, reading.ahead(how.preview)
     rates = [(each.rate * seconds, each.falling_rate * seconds) for each in parts.slew]
     rising, falling = (min(each) for each in zip(*rates, strict=True)) if rates else (0.0, 0.0)
-    lead = math.prod((2.0 / row[lag.LATE if exact else lag.RATE] for exact, row in lags), start=8.0)
+    lead_room = math.prod((2.0 / row[lag.LATE if exact else lag.RATE] for exact, row in lags), start=8.0)
     steepest = 1.0 / (min(static.pi.weights) if parts.lags and min(static.pi.weights) > 0.0 else 1.0)
     weights = float(np.sum(np.abs(taps.weights))) if taps else 1.0
     drives, outputs = ([own.linear(each, seconds) for each in side] for side in (parts.own_drives, parts.own_outputs))
-    lead *= math.prod(max(one.backward.largest, 1.0) for one in (*drives, *outputs))
-    most = max(map(abs, static.input_range)) * lead + span * weights * lead * steepest
+    lead_room *= math.prod(max(one.backward.largest, 1.0) for one in (*drives, *outputs))
+    most = max(map(abs, static.input_range)) * lead_room + span * weights * lead_room * steepest
     reals([most], "intermediate results")
     first = np.cumsum([0, *(len(one.terms) for one in creeps)])
     waited, waiting = delay.numbers(parts.delay, seconds)
     max_rate = fastest(static, parts, seconds, how)
+    rounded = ROUNDINGS * float(np.finfo(dtype).eps) / 2 * max(map(abs, static.input_range))
+    dither = max(rounded * max(lead(lags, drives), 1.0), drive_lsb or 0.0)
     tables = ChainTables(
         plays,
         plays.limits,
@@ -168,9 +178,10 @@ def build(chain: Chain, arithmetic: str, seconds: float, how: Compensation, engi
         own.build(drives, outputs, reals),
         _behind(parts, arithmetic),
         reals(taps.weights if taps else [], "weights of the preview"),
-        reals([static.output_offset, span, rising, falling, VERIFIED_SHARE], "offset or rates"),
+        reals([static.output_offset, span, rising, falling, VERIFIED_SHARE, dither], "offset or rates"),
         int(bool(rates)),
         braked(parts, [exact for exact, _ in lags]),
+        quiet(how, taps),
     )
     if drives or outputs:
         tables = OwnChainTables(*tables)

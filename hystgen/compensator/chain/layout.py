@@ -32,12 +32,13 @@ from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import MOST_REFERENCES, Compensation
 from hystgen.plays.slots import Counts, Reals
 
-OFFSET, FARTHEST, RISING, FALLING, SHARE = range(5)
+OFFSET, FARTHEST, RISING, FALLING, SHARE, DITHER = range(6)
 """Places in `ChainTables.number`: output offset, the largest offset that may be set, how far the drive may rise and
-fall in a step, and the share with which verification corrects."""
+fall in a step, the share with which verification corrects, and how far a drive at rest goes to and fro, as a signal in
+front of the plays."""
 
 LEVEL_BITS, LEVEL_DROP, LARGEST_LEVEL, LEAST_CODE, MOST_CODE, SHARE_BITS, DRIVE_BITS, ARRIVING_BITS, BRAKED_DROP = (
-    range(5, 14)
+    range(6, 15)
 )
 """Further places in fixed point: bits of a signal behind the plays below an output code, bits of a sum of the plays
 below those of a signal, the largest sum asked of the plays, the least and largest code of a drive before it is limited,
@@ -90,6 +91,7 @@ class ChainTables(NamedTuple):
     number: Reals
     slew: int  # 1 if the rate of the drive is limited
     braked: int  # 1 if a lag behind that limit is kept from overshooting
+    quiet: int  # equal references behind which the drive stands still, 0 if it never has to
 
     @property
     def fixed(self) -> bool:
@@ -194,6 +196,28 @@ class Compiled:
     def noisy(self, limit: float) -> bool:
         """Whether the noise gain exceeds a limit, by more than its own rounding."""
         return self.noise_gain > limit * (1.0 + noise.SAME)
+
+
+QUIET = 32
+"""[samples] Equal references behind which the drive stands still. A ramp in codes that moves more often is led all the
+time; a slower one gets a lead at each code anyway, which then makes up for the dither too. What is kept does not depend
+on it: that is a matter of the dither alone."""
+
+
+def quiet(how: Compensation, taps: Taps | None) -> int:
+    """`ChainTables.quiet`: those, and as many as the preview sums beside the first."""
+    return QUIET + (len(taps.weights) if taps else 1) - 1 if how.quiet else 0
+
+
+def lead(lags: Sequence[tuple[bool, tuple[float, float, float, float]]], ahead: Sequence[Linear]) -> float:
+    """Largest gain from what arrives in front of the plays to the drive, 0 if the drive itself arrives there."""
+    if not lags and not ahead:
+        return 0.0
+    gains = [
+        (2.0 - rate) / (late - second) if exact else (1.0 + 2.0 * second) * (2.0 - rate) / rate
+        for exact, (rate, second, late, _) in lags
+    ]
+    return math.prod([*gains, *(max(one.backward.largest, 1.0) for one in ahead)])
 
 
 def braked(parts: Parts, exact: Sequence[bool]) -> int:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.chain.layout import FALLING, FARTHEST, OFFSET, RISING, SHARE, ChainTables
+from hystgen.compensator.chain.layout import DITHER, FALLING, FARTHEST, OFFSET, RISING, SHARE, ChainTables
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat
 from hystgen.compensator.chain.sides import Blocks, sides_of
 from hystgen.compensator.layout import clamp_drive, inverse_clamp
@@ -65,14 +65,15 @@ from hystgen.plays.slots import (
     Reals,
 )
 
-SET, OUTPUT, APPLIED, REACHED = range(4)
-MOVING, OPERATOR = range(2)
+SET, OUTPUT, APPLIED, REACHED, ARRIVED, REFERENCE = range(6)
+MOVING, OPERATOR, EQUAL = range(3)
 
 
 class ChainState(NamedTuple):
     """One instance. `real`: the offset set from outside, the last result of the output side, the last applied drive,
-    and the drive behind a slew limit of the forward operator; `flags`: whether any drive has been applied yet, and 1
-    for the inverse operator; `corners`: the plays of engine corners, `()` in engine loop, which has them in `plays`."""
+    the drive behind a slew limit of the forward operator, and of a quiet drive what arrived in front of the plays and
+    the last reference; `flags`: whether any drive has been applied yet, 1 for the inverse operator, and the number of
+    equal references; `corners`: the plays of engine corners, `()` in engine loop, which has them in `plays`."""
 
     plays: State
     lost: Reals  # (n + 1,), what rounding took from each play that a nonlinear dashpot moves
@@ -114,8 +115,8 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         Waiting(np.zeros(waiting, dtype), np.zeros(1, np.int64)),
         np.zeros(t.own.place[-1], dtype),
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
-        np.zeros(4, dtype),
-        np.array([0, int(inverse)], np.int64),
+        np.zeros(6, dtype),
+        np.array([0, int(inverse), 0], np.int64),
         memory(len(t.threshold) - 1, dtype) if corners else (),
         np.zeros(4 * corners, dtype),
     )
@@ -209,6 +210,43 @@ def made_of(
         for j in range(len(t.ageing.turns)):
             ageing_move(t.ageing, s.ageing, j, v - s.real[APPLIED])
 
+    # ---------------------------------------------------------------- quiet.c
+
+    @jit
+    def quiet_rest(t: ChainTables, s: ChainState, a: Any) -> None:
+        """Everything has settled with a in front of the plays."""
+        s.real[ARRIVED] = a
+        s.real[REFERENCE] = t.limits[ZERO]
+        s.flags[EQUAL] = 0
+
+    @jit
+    def quiet_count(t: ChainTables, s: ChainState, u: Any) -> None:
+        """Count references that are equal to the next one, u."""
+        if u != s.real[REFERENCE]:
+            s.real[REFERENCE] = u
+            s.flags[EQUAL] = 0
+        if s.flags[EQUAL] <= t.quiet:
+            s.flags[EQUAL] += 1
+
+    @jit
+    def quiet_drive(t: ChainTables, s: ChainState, a: Any, v: Any) -> Any:
+        """The drive for a in front of the plays: v, which leads there, or one that stands still."""
+        most = t.number[DITHER]
+        away = v - a
+        if s.flags[EQUAL] > t.quiet:
+            most = most + most
+            away = a - s.real[ARRIVED]
+        if away > most or away < -most:
+            s.flags[EQUAL] = 0
+        if s.flags[EQUAL] < t.quiet:
+            return v
+        if s.flags[EQUAL] == t.quiet:
+            return a
+        last = entered_drive(t, s.real[APPLIED])
+        if a - last > t.number[DITHER] or last - a > t.number[DITHER]:
+            return a
+        return last
+
     # ---------------------------------------------------------------- chain.c
 
     @jit
@@ -225,7 +263,9 @@ def made_of(
         drive = s.plays.real[DRIVE]
         s.plays.real[DRIVE] = arriving(t, entered_drive(t, drive))
         s.real[APPLIED] = drive
-        drive_side_rest(t, s, entered_drive(t, drive))
+        a = drive_side_rest(t, s, entered_drive(t, drive))
+        if t.quiet:
+            quiet_rest(t, s, a)
         s.plays.real[LEVEL] = started(t, s)
         s.real[OUTPUT] = output_side_rest(t, s, s.plays.real[LEVEL])
 
@@ -257,6 +297,10 @@ def made_of(
             travelled(t, s, v)
         x = entered_drive(t, reached)
         a = drive_side_absorb(t, s, x) if moving else drive_side_rest(t, s, x)
+        if t.quiet:
+            s.real[ARRIVED] = a
+            if not moving:
+                quiet_rest(t, s, a)
         h = follow(t, s, arrive(t.plays, s.plays, arriving(t, a)))
         s.plays.real[LEVEL] = h
         s.real[OUTPUT] = output_side_absorb(t, s, h) if moving else output_side_rest(t, s, h)
@@ -278,7 +322,7 @@ def made_of(
     def inverse_slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
         """The drive in reach that is nearest to v, or from which a lag does not overshoot."""
         near = slewed(t, s, s.real[APPLIED], v)
-        if not t.braked or not s.flags[MOVING]:
+        if not t.braked or not s.flags[MOVING] or (t.quiet and s.flags[EQUAL] >= t.quiet):
             return near
         return slewed(t, s, s.real[APPLIED], braked(t, s, v, near))
 
@@ -347,6 +391,8 @@ def made_of(
         level = inverse_clamp(t, u)
         if level != u:
             s.plays.counts[STATUS] |= INPUT_CLAMPED
+        if t.quiet:
+            quiet_count(t, s, entered_level(t, level))
         wanted, limited = undisplaced(t, s, entered_level(t, level))
         if limited:
             s.plays.counts[STATUS] |= DOMAIN
@@ -379,7 +425,12 @@ def made_of(
         s.plays.counts[BITS] = 0
         w = inverse_input(t, s, h)
         a = finer(t, s, h, w, inverse_drive(t.plays, s.plays, h, w))
-        v = drive_code(t, drive_side_solve(t, s, a) if moving else a)
+        v = a
+        if moving:
+            v = drive_side_solve(t, s, a)
+            if t.quiet:
+                v = quiet_drive(t, s, a, v)
+        v = drive_code(t, v)
         reached = inverse_slewed(t, s, v)
         if reached != v:
             s.plays.counts[BITS] |= SLEW_LIMITED

@@ -35,7 +35,7 @@ def build(
     """
     if ARITHMETICS[arithmetic].fixed:
         return fixed_tables.build(chain, arithmetic, seconds, how, lsb, engine)
-    return float_tables.build(chain, arithmetic, seconds, how, engine)
+    return float_tables.build(chain, arithmetic, seconds, how, engine, lsb[0])
 
 
 def _behind_slew(chain: Chain) -> int:

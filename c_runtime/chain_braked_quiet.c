@@ -1,0 +1,18 @@
+#include "hystgen_runtime.h"
+
+/* The drive nearest to v that the amplifier reaches in one step, or from which the lag behind it
+   does not overshoot unless the drive stands still; v itself in the first one. */
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(const hystgen_inverse_t *self,
+                                                              hystgen_reach_t v) {
+    const hystgen_reach_t near = hystgen_inverse_within(self, v);
+    if (!self->moving) {
+        return v;
+    }
+    if (hystgen_quiet_still(&self->quiet)) {
+        return near;
+    }
+    const hystgen_signal_t drive =
+        hystgen_braked_drive(&hystgen_braked_1, &self->braked_1, hystgen_reaching(near),
+                             hystgen_reaching(v > near ? v - near : near - v));
+    return hystgen_inverse_within(self, hystgen_drive_code(drive));
+}
