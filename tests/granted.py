@@ -111,6 +111,8 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
 # INPUT    halves lie between the ends that a search begins with
 # DRAWN    a play that its input draws along, at once or by a dashpot, ends between where it was and that input, and so
 #          does an input that counts as standing still on its way
+# ASKED    what is asked of a lag, a third of the size that its states were given room for at most
+# COARSE   numbers that a lead is searched with are cut off there, and the search begins with a size and a lead above it
 # LOST     what rounding to whole numbers leaves
 CLOCK = (
     r"    GRANTED(self->part >= 0 && self->part < PART);\n"
@@ -134,6 +136,11 @@ STATES = [
     (r"(int64_t NAME_lag_solve\([^{]*\{\n)",
      r"\1    WITHIN(self->high, LAG);\n    WITHIN(self->wanted, LAG);\n"),
     (r"(int64_t NAME_lag_exact_(?:absorb|solve)\([^{]*\{\n)", r"\1    WITHIN(self->next, LAG);\n"),
+    (r"(int64_t NAME_braked_(?:room|along)\([^{]*\{\n)",
+     r"\1    WITHIN(self->earlier, ASKED);\n    WITHIN(self->lag.asked, ASKED);\n    WITHIN(self->lag.wanted, LAG);\n"
+     r"    WITHIN(self->lag.high, LAG);\n"),
+    (r"(        const int32_t middle = low \+ [^;]*;\n)",
+     r"        GRANTED(low >= 0 && low <= high && high <= COARSE);\n\1        GRANTED(middle <= COARSE);\n"),
     (r"(int64_t NAME_mode_absorb\([^{]*\{\n)",
      r"\1    WITHIN(x, SIGNAL);\n    WITHIN(self->before, SIGNAL);\n    WITHIN(self->off, MODE);\n"
      r"    WITHIN(self->rate, MODE);\n"),
@@ -186,6 +193,7 @@ def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") ->
         "SIGNAL": codes.largest, "CODE": int(t.limits[CODE_MAX]),
         "DRIVE": max(map(abs, t.plays.limits[:2].tolist())) * 2 ** int(t.number[ARRIVING_BITS]),
         "CREEP": most(t.creep.block.tolist(), creep.DROP, 50) - 1, "LAG": most(t.lag.block.tolist(), lag.DROP, 50),
+        "ASKED": most(t.lag.block.tolist(), lag.DROP, 50) // 3, "COARSE": lag.COARSE,
         "MODE": most(t.mode.tolist(), resonance.DROP, 50), **(clock(t.clock[0].tolist()) if len(t.clock) else {}),
         "RISE": 2 ** (thermal.RISE_BITS + 1), "INVERSE": 2 * thermal.ONE + 2, "PLAY": max(map(abs, ends)),
         "INPUT": int(t.moving.farthest), "LOST": 2 ** int(t.moving.yield_bits) // 2,

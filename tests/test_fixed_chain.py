@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from granted import clock, granted_states
-from modelfiles import CHAINS, INVERSE_ALONE, TANH, chain
+from modelfiles import BRAKED, CALM, CHAINS, INVERSE_ALONE, TANH, chain
 
 from hystgen.arithmetic import ARITHMETICS, factors
 from hystgen.basics import jit
@@ -404,12 +404,15 @@ def checked(
         yield op, call, x, subprocess.run([folder / op, str(n)], input=given, capture_output=True, check=False)
 
 
+PROVED = CHAINS | {"braked": BRAKED, "calm": CALM}
+
+
 @pytest.mark.slow(one_in=2)
-@pytest.mark.parametrize("name", CHAINS)
+@pytest.mark.parametrize("name", PROVED)
 @BOTH
 def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_path: Path) -> None:
     """States stay within what their formats were chosen by, as the proof takes for granted."""
-    one, real = model(CHAINS[name]), ARITHMETICS[arithmetic].number
+    one, real = model(PROVED[name]), ARITHMETICS[arithmetic].number
     numbers = one.tables(arithmetic, "loop")
     flags = ["-fsanitize=undefined", "-fno-sanitize-recover=all"]
     for op, call, x, done in checked(tmp_path, one, arithmetic, flags):
@@ -425,10 +428,11 @@ def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_pa
 @pytest.mark.parametrize(
     ("name", "fact"),
     [("creeping", "CREEP"), ("creeping", "SIGNAL"), ("drifting", "PART"), ("aged", "INVERSE"),
-     ("heated", "RISE"), ("relaxing", "PLAY"), ("dashpot", "LOST"), ("dashpot", "INPUT"), ("late", "MODE")],
+     ("heated", "RISE"), ("relaxing", "PLAY"), ("dashpot", "LOST"), ("dashpot", "INPUT"), ("late", "MODE"),
+     ("braked", "ASKED"), ("braked", "COARSE")],
 )  # fmt: skip
 def test_what_proofs_take_for_granted_is_looked_at(name: str, fact: str, tmp_path: Path) -> None:
-    runs = checked(tmp_path, model(CHAINS[name]), "q31", [], fact)
+    runs = checked(tmp_path, model(PROVED[name]), "q31", [], fact)
     assert any("beyond what the range analysis says" in done.stderr.decode() for *_, done in runs)
 
 

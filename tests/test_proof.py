@@ -119,6 +119,8 @@ EFFECTS = {
     "slewed": ("name: slew_limit, rate: 500, falling_rate: 300",),
     "delayed": ("name: delay, time: 2.6e-3",),
     "lagged": ("name: lag, time_constant: 0.01",),
+    "braked": ("name: lag, time_constant: 0.01", "name: slew_limit, rate: 500, falling_rate: 300"),
+    "calmed": ("name: lag, time_constant: 0.01",),
     "prompt": ("name: lag, time_constant: 4.0e-4",),
     "rung": ("name: resonance, frequency: 30, damping: 0.05",),
     "drifted": ("name: drift, shape: curved, rate: 0.05, change: 0.01",),
@@ -132,6 +134,8 @@ EFFECTS = {
 }
 """Models with one effect, every block and every kind of plays. What `granted_states` lists is looked at in runs of
 `test_fixed_chain`; instances are static there."""
+
+QUIET = "emit: {compensation: {quiet: true}}\n"
 
 COMPENSATED = {"drifted": "drift", "heated": "self_heating"}
 """What of these is asked for although nothing measures it."""
@@ -169,6 +173,7 @@ def frama_c() -> str:
 
 def model(name: str) -> Model:
     chains = {own: chain(own, *effects, compensate=COMPENSATED.get(own, "")) for own, effects in EFFECTS.items()}
+    chains["calmed"] += QUIET
     return Model(parse_parameters({**FILES, **chains, "many": MANY, "sixteen": SIXTEEN}[name], f"{name}.yaml"))
 
 
@@ -180,7 +185,8 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     if engine == "corners":
         source.write_text(granted(source.read_text(), one, arithmetic))
     if name in EFFECTS:
-        compiled = chain_tables.build(one.chain, arithmetic, float(one.parameters.sample_time or 0.0))
+        how = one.parameters.emit.compensation
+        compiled = chain_tables.build(one.chain, arithmetic, float(one.parameters.sample_time or 0.0), how)
         source.write_text(granted_states(source.read_text(), compiled, name))
         (folder / "driver.c").write_text(chain_driver(one, arithmetic))
         return source
@@ -281,6 +287,7 @@ EFFECT_FAULTS = [
     ("drifted", r"(\(t->slope \+ self->gained\)) \* ahead", r"\1 * self->part", "signed overflow"),
     ("heated", r"way >= 0 \? way : -way, t->coarse", "way >= 0 ? way : -way, 0", "signed downcast"),
     ("viscous", r"(sum \+= t->weight\[i\] \* z);", r"\1 * r;", "signed overflow"),
+    ("braked", r"\(int64_t\)(\(middle \+ margin\) \* \(middle)", r"\1", "signed overflow"),
     ("dashpot", r"\(k = 4; k > 0; --k\)( \{\s*y = piece)", r"(k = 5; k > 0; --k)\1", "out of bounds"),
 ]  # fmt: skip
 
