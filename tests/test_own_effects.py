@@ -164,7 +164,10 @@ FIXED = {
     "slow follower": ("name: user:follower, bandwidth: 30", CREEP),
     "both": (DROOP, FOLLOWER, CREEP, "name: saturation, level: 12"),
     "part of a mode": (PART, CREEP),
+    "ringing part": ("name: resonance, shape: part, frequency: 60, damping: 0.01, share: 0.05",),
 }
+RINGS = 1024.0
+"""[output codes] Of a mode that rings for 265 samples, what its rounded factors make in that time is a share of it."""
 
 
 @pytest.mark.parametrize("effects", FIXED.values(), ids=list(FIXED))
@@ -198,7 +201,7 @@ def test_fixed_point_stays_within_its_bounds(tmp_path: Path, arithmetic: str, ef
         assert np.max(np.abs(v - wanted / drive)) <= codes.inverse_rounding < 1e-2 * (high - low)
         y = computed(compiled.tables, False, op, v, compiled=False)[0].astype(float)
         exact = np.clip(one.simulate(v * drive, t=t) / displacement, -most - 1.0, most)
-        assert np.max(np.abs(y - exact)) <= codes.forward_error < 64.0
+        assert np.max(np.abs(y - exact)) <= codes.forward_error < (64.0 if effects != FIXED["ringing part"] else RINGS)
 
 
 @pytest.mark.parametrize("arithmetic", ["float64", "q31", "q15"])

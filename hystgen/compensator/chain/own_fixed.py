@@ -37,10 +37,11 @@ class Formats:
 
 @dataclass
 class _Number:
-    """A number of a table, and the largest size of its arguments."""
+    """A number of a table, and the largest size of its arguments; `exact`: its factor is taken for the number."""
 
     value: float
     row: tuple[int, int, int, int]
+    exact: bool
     seen: float = 0.0
 
     def __mul__(self, x: _Traced) -> _Traced:
@@ -48,7 +49,7 @@ class _Number:
         *_, drop, lift = self.row
         scaled = self.value * 2.0 ** (drop - lift)
         wrong = abs(self.value) * (x.error + (2.0**drop if drop else 0.0))
-        wrong += 2.0**lift * (0.5 + error(scaled) * x.size / 2.0**drop)
+        wrong += 2.0**lift * (0.5 + (0.0 if self.exact else error(scaled) * x.size / 2.0**drop))
         return x.made(abs(self.value) * x.size, wrong)
 
 
@@ -88,11 +89,15 @@ class _Trace:
     given: float
     asked: float
 
-    def run(self, rows: Sequence[tuple[int, int, int, int]], bits: int) -> tuple[list[float], float, float, float]:
+    def run(
+        self, rows: Sequence[tuple[int, int, int, int]], bits: int, exact: bool
+    ) -> tuple[list[float], float, float, float]:
         """For signals with `bits` more bits: the largest argument of each number, the largest size, and the roundings
-        of absorb and of solve."""
+        of absorb and of solve; `exact`: without those of the factors, which are shares of the signals and which no
+        bits of these make smaller."""
         most = [0.0]
-        numbers = [_Number(*each) for each in zip(self.linear.numbers.tolist(), rows, strict=True)]
+        pairs = zip(self.linear.numbers.tolist(), rows, strict=True)
+        numbers = [_Number(value, row, exact) for value, row in pairs]
 
         def signal(size: float) -> _Traced:
             return _Traced(0.0, 0.0, most).made(size * 2.0**bits, 0.0)
@@ -126,13 +131,13 @@ def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
     """
     trace = _Trace(linear, given, asked)
     values = linear.numbers.tolist()
-    seen, most, noise, _ = trace.run([_row(value, 0.0) for value in values], 0)
+    seen, most, noise, _ = trace.run([_row(value, 0.0) for value in values], 0, True)
     wanted = max(math.ceil(math.log2(max(noise, 1.0))), 0) + GUARD
     bits = min(wanted, STATE_BITS - math.ceil(math.log2(most)))
     if bits < 0 or bits + code < wanted - GUARD + 1:
         raise OverflowError("no room")
     rows = [_row(value, size * 2.0**bits) for value, size in zip(values, seen, strict=True)]
-    _, _, output, answer = trace.run(rows, bits)
+    _, _, output, answer = trace.run(rows, bits, False)
     return Formats(linear, rows, bits, output / 2.0**bits + 0.5, answer / 2.0**bits + 0.5)
 
 
