@@ -1,7 +1,8 @@
 #include "hystgen_runtime.h"
 
 /* Creep as a block of the chain. Part of each state follows a move at once, so that the block is
-   exactly invertible. `ahead` is the output at the next sample for an input of 0. */
+   exactly invertible; a state holds what it adds to the next output for an input of 0 there. `ahead`
+   is the sum of them. */
 
 /* Everything has settled at the input x. Returns the output. */
 static hystgen_real_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen_creep_t *self,
@@ -9,13 +10,11 @@ static hystgen_real_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen
     hystgen_real_t ahead = 0;
     unsigned int i;
     for (i = 0; i < t->n; ++i) {
-        const hystgen_creep_term_t *term = &t->term[i];
-        const hystgen_real_t settled = term->weight * x;
+        const hystgen_real_t settled = t->term[i].share * x;
         state[i].high = settled;
         state[i].low = 0;
-        ahead = ahead + (settled + (term->early * x - term->rate * settled));
+        ahead = ahead + settled;
     }
-    self->before = x;
     self->ahead = ahead;
     return t->rest * x;
 }
@@ -35,20 +34,17 @@ static hystgen_real_t hystgen_creep_solve(const hystgen_creep_table_t *t,
 static hystgen_real_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystgen_creep_t *self,
                                            hystgen_creep_state_t *state, hystgen_real_t x) {
     const hystgen_real_t y = self->ahead + t->slope * x;
-    const hystgen_real_t before = self->before;
     hystgen_real_t ahead = 0;
     unsigned int i;
     for (i = 0; i < t->n; ++i) {
-        const hystgen_creep_term_t *term = &t->term[i];
         const hystgen_real_t high = state[i].high;
         const hystgen_real_t change =
-            (term->early * before + term->late * x) - term->rate * high + state[i].low;
+            t->term[i].rate * (t->term[i].share * x - high) + state[i].low;
         const hystgen_real_t next = high + change;
         state[i].high = next;
         state[i].low = change - (next - high); /* what rounding took from the sum */
-        ahead = ahead + (next + (term->early * x - term->rate * next));
+        ahead = ahead + next;
     }
-    self->before = x;
     self->ahead = ahead;
     return y;
 }

@@ -9,8 +9,7 @@ typedef struct {
 } hystgen_creep_state_t;
 
 typedef struct {
-    hystgen_real_t before; /* input of the last sample */
-    hystgen_real_t ahead;  /* output of the next one for an input of 0 */
+    hystgen_real_t ahead; /* output of the next sample for an input of 0 */
 } hystgen_creep_t;
 
 typedef struct {

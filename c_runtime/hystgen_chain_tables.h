@@ -2,15 +2,13 @@
 #ifndef HYSTGEN_CHAIN_TABLES_H
 #define HYSTGEN_CHAIN_TABLES_H
 
-/* A state of creep, scaled by its share of the output: X += early h_before + late h - rate X. */
+/* What a state of creep adds to the next output by inputs up to now: X += rate (share h - X). */
 typedef struct {
     hystgen_real_t rate;
-    hystgen_real_t early;
-    hystgen_real_t late;
-    hystgen_real_t weight;
+    hystgen_real_t share;
 } hystgen_creep_term_t;
 
-/* Creep behind the plays: y = d h + X_1 + X_2 + ... */
+/* Creep behind the plays: y = slope h + X_1 + X_2 + ..., with the X of the sample before. */
 typedef struct {
     const hystgen_creep_term_t *term;
     hystgen_real_t slope; /* change of y with h at once */

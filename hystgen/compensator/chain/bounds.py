@@ -97,11 +97,10 @@ def _saturation(compiled: Compiled, u: float, kind: str) -> tuple[float, float, 
 
 def _creep(compiled: Compiled, j: int, size: float, u: float) -> tuple[float, float]:
     """Roundings of the output of a block whose input is at most `size`, and the gain of its inverse."""
-    t = compiled.tables.creep
-    term = t.term[t.first[j] : t.first[j + 1]].astype(float)
-    rate, late, weight = term[:, creep.RATE], term[:, creep.LATE], term[:, creep.WEIGHT]
-    total, rest = float(np.sum(weight)), float(t.block[j, creep.REST])
-    states = (13.0 + len(term)) * total + u * float(np.sum(weight / rate))
+    _, rest, terms = creep.numbers(compiled.parts.creeps[j], compiled.seconds)
+    rate, late, weight = terms[:, creep.RATE], terms[:, creep.LATE], terms[:, creep.WEIGHT]
+    total = float(np.sum(weight))
+    states = (16.0 + len(terms)) * total + u * float(np.sum(weight / rate))
     around = rest - 2.0 * total + 2.0 * float(np.sum(late))
     slope = rest - total + float(np.sum(late))
     return u * size * (states + 4.0 * rest), 1.0 / around if around > 0.0 else 2.0 / slope - 1.0 / rest

@@ -167,7 +167,7 @@ def build(
         CreepTables(
             reals(rows, "constants of the creep").reshape(len(rows), 4),
             first.astype(np.int64),
-            reals(np.concatenate([np.empty((0, 4)), *(one.terms for one in creeps)]), "constants of the creep"),
+            reals(np.concatenate([np.empty((0, 2)), *(creep.shares(one.terms) for one in creeps)]), "creep"),
         ),
         DelayTables(reals([waited] * (waiting > 0), "the delay"), waiting),
         reals([resonance.numbers(each, seconds).table for each in parts.modes], "the modes").reshape(-1, 5),

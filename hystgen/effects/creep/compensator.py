@@ -96,22 +96,35 @@ def numbers(effect: ExponentialCreep | LogarithmicCreep, seconds: float) -> Cree
     return CreepNumbers(one.slope, one.direct + float(np.sum(one.weights)), terms)
 
 
+RATE, EARLY, LATE, WEIGHT = 0, 1, 2, 3
+
+
+def shares(terms: Array) -> Array:
+    """Constants (m, 2) of the states in floating point: 1 - E, and `k = c (1 - b1)`.
+
+    What a state adds to the next output for an input of 0 there, `A = E X + c b0 h`, follows `A += (1 - E)(k h - A)`,
+    since `b0 + b1 = 1 - E`.
+    """
+    return np.column_stack([terms[:, RATE], terms[:, WEIGHT] - terms[:, LATE]])
+
+
 # ---------------------------------------------------------------- creep.c
 
 SLOPE, INVERSE_SLOPE, REST, INVERSE_REST = 0, 1, 2, 3
-RATE, EARLY, LATE, WEIGHT = 0, 1, 2, 3
-BEFORE, AHEAD = 0, 1
+SHARE = 1
+BEFORE, AHEAD = 1, 0
 HIGH, LOW = 0, 1
 
 
 KIND = Kind(
-    "creep", ("slope", "inverse_slope", "rest", "inverse_rest"), ("before", "ahead"),
-    rows=Rows("term", ("rate", "early", "late", "weight"), ("high", "low")), counts=("n",),
+    "creep", ("slope", "inverse_slope", "rest", "inverse_rest"), ("ahead",),
+    rows=Rows("term", ("rate", "share"), ("high", "low")), counts=("n",),
 )  # fmt: skip
 
 
 class CreepTables(NamedTuple):
-    """All creep blocks of a model: `block` (k, 4), the states of each from `first` (k + 1) on in `term` (m, 4)."""
+    """All creep blocks of a model: `block` (k, 4), the states of each from `first` (k + 1) on in `term` (m, 2),
+    in fixed point more of either."""
 
     block: Reals
     first: Counts
@@ -122,11 +135,12 @@ def constants(t: CreepTables) -> Iterator[Constants]:
     """The numbers of each block."""
     for j, row in enumerate(t.block):
         terms = t.term[t.first[j] : t.first[j + 1]]
-        yield Constants(KIND, row, (1 + 5 * len(terms), 1), terms, (len(terms),))
+        yield Constants(KIND, row, (1 + 2 * len(terms), 1), terms, (len(terms),))
 
 
 class CreepState(NamedTuple):
-    """`block` (k, 2): input before, and the output that the next input 0 would give; `state` (m, 2): in two parts."""
+    """`block` (k, 2): the output that the next input 0 would give, or in fixed point the same input, and that input;
+    `state` (m, 2): in two parts."""
 
     block: Reals
     state: Reals
@@ -137,11 +151,10 @@ def creep_rest(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     """Everything has settled at the input x. Returns the output."""
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
-        state = t.term[i, WEIGHT] * x
-        s.state[i, HIGH] = state
+        settled = t.term[i, SHARE] * x
+        s.state[i, HIGH] = settled
         s.state[i, LOW] = zero(x)
-        ahead = ahead + (state + (t.term[i, EARLY] * x - t.term[i, RATE] * state))
-    s.block[j, BEFORE] = x
+        ahead = ahead + settled
     s.block[j, AHEAD] = ahead
     return t.block[j, REST] * x
 
@@ -162,16 +175,13 @@ def creep_solve(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:
 def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     """The input is x at this sample. Returns the output."""
     y = s.block[j, AHEAD] + t.block[j, SLOPE] * x
-    before = s.block[j, BEFORE]
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
         state = s.state[i, HIGH]
-        change = (t.term[i, EARLY] * before + t.term[i, LATE] * x) - t.term[i, RATE] * state
-        change = change + s.state[i, LOW]
+        change = t.term[i, RATE] * (t.term[i, SHARE] * x - state) + s.state[i, LOW]
         following = state + change
         s.state[i, HIGH] = following
         s.state[i, LOW] = change - (following - state)
-        ahead = ahead + (following + (t.term[i, EARLY] * x - t.term[i, RATE] * following))
-    s.block[j, BEFORE] = x
+        ahead = ahead + following
     s.block[j, AHEAD] = ahead
     return y
