@@ -1,8 +1,8 @@
 #include "hystgen_runtime.h"
 
 /* Creep as a block of the chain. Part of each state follows a move at once, so that the block is
-   exactly invertible; a state holds what it adds to the next output for an input of 0 there. `ahead`
-   is the sum of them. */
+   exactly invertible; a state holds what it adds to the next output for an input of 0 there.
+   `ahead` is the sum of them. */
 
 /* Everything has settled at the input x. Returns the output. */
 static hystgen_real_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen_creep_t *self,
