@@ -634,26 +634,35 @@ def measured(name: str) -> dict[tuple[str, ...], dict[str, int]]:
 def test_auto_takes_the_engine_that_was_measured_cheaper() -> None:
     """By operator, arithmetic and kind; between the measured numbers of plays the next smaller one decides."""
     instructions, code = measured("engine_costs.csv"), measured("code_sizes.csv")
-    counts = sorted({int(row[3]) for row in instructions})
-    assert len(instructions) == 2 * 4 * 2 * len(counts) * 2
-    assert counts[0] == 1
+    more = measured("effect_sizes.csv")
     chosen = set()
-    for operator, arithmetic, kind, n, _ in instructions:
-        front = "dead_zone" if kind == "gpi" else "pi"
-        costs: dict[str, dict[str, float]] = {"speed": {}, "size": {}, "auto": {}}
-        for engine in ENGINES:
-            spent = instructions[operator, arithmetic, kind, n, engine]
-            taken = code[operator, arithmetic, front, engine]
-            costs["speed"][engine] = spent["cortex-m0plus"] * spent["cortex-m4f"]
-            costs["size"][engine] = taken["cortex-m0plus"] + taken["cortex-m4f"]
-            costs["auto"][engine] = taken["cortex-m0plus"] / 32768 + spent["cortex-m0plus"] / 4800
-        stages = (DeadZone([-0.5, 0.0, 0.5], [0.1, 0.1, 0.1]),) if kind == "gpi" else ()
-        for plays in (int(n), int(n) + 1) if int(n) + 1 not in counts else (int(n),):
-            pi = PI(np.linspace(0, 0.5, plays + 1).tolist(), [1.0] * (plays + 1))
-            for optimize, of in costs.items():
-                cheaper = "corners" if of["corners"] < of["loop"] else "loop"
-                assert choose("auto", optimize, Cascade(pi, stages, 0.0, (-1.0, 1.0)), operator, arithmetic) == cheaper
-                chosen.add((optimize, cheaper))
+    for kind in ("pi", "gpi", "effects", "gpi_effects"):
+        counts = sorted({int(row[3]) for row in instructions if row[2] == kind})
+        assert counts[0] == 1
+        rows = [row[:4] for row in instructions if row[2] == kind and row[4] == "loop"]
+        assert len(rows) == 2 * 4 * len(counts)
+        for operator, arithmetic, _, n in rows:
+            effects = kind.endswith("effects")
+            costs: dict[str, dict[str, float]] = {"speed": {}, "size": {}, "auto": {}}
+            for engine in ENGINES:
+                spent = instructions[operator, arithmetic, kind, n, engine]
+                taken = code[operator, arithmetic, "dead_zone" if kind.startswith("gpi") else "pi", engine]
+                if effects:
+                    added = more["any" if engine == "loop" else "any_corners", arithmetic]
+                    taken = {core: size + added[core] for core, size in taken.items()}
+                costs["speed"][engine] = spent["cortex-m0plus"] * spent["cortex-m4f"]
+                costs["size"][engine] = taken["cortex-m0plus"] + taken["cortex-m4f"]
+                costs["auto"][engine] = taken["cortex-m0plus"] / 32768 + spent["cortex-m0plus"] / 4800
+            stages = (DeadZone([-0.5, 0.0, 0.5], [0.1, 0.1, 0.1]),) if kind.startswith("gpi") else ()
+            for plays in (int(n), int(n) + 1) if int(n) + 1 not in counts else (int(n),):
+                pi = PI(np.linspace(0, 0.5, plays + 1).tolist(), [1.0] * (plays + 1))
+                cascade = Cascade(pi, stages, 0.0, (-1.0, 1.0))
+                for optimize, of in costs.items():
+                    cheaper = "corners" if of["corners"] < of["loop"] else "loop"
+                    if effects and optimize == "auto" and arithmetic in ("q31", "q15"):
+                        cheaper = "loop"  # of which the stack is known to stay within 128 bytes
+                    assert choose("auto", optimize, cascade, operator, arithmetic, effects) == cheaper
+                    chosen.add((optimize, cheaper))
     assert {("speed", "loop"), ("speed", "corners"), ("auto", "loop"), ("auto", "corners"), ("size", "loop")} <= chosen
     assert choose("auto", "auto", Cascade(PI([0], [1])), "both", "q15") == "loop"
     assert choose("loop", "speed", Cascade(PI([0, 0.5], [1, 1])), "both", "q15") == "loop"
