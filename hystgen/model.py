@@ -168,7 +168,7 @@ class Model:
                 raise UnsupportedEffectsError(
                     f"with a noise gain of {gain:.4g} one of the {high - low} codes of a reference in {arithmetic} "
                     f"moves the drive by {100.0 * gain / (high - low):.2g} % of its range; use "
-                    f"{ARITHMETICS[arithmetic].finer}, or allow it with emit.compensation.noise_gain"
+                    f"{ARITHMETICS[arithmetic].finer}, or hold or allow it with emit.compensation.noise_gain"
                 )
             return
         if compiled.noisy(how.noise_gain):

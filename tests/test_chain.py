@@ -691,11 +691,15 @@ def test_what_shapes_is_emitted_with_the_bits_of_the_reference(by: str) -> None:
     slow = CHAINS["late"].replace("frequency: 30", "frequency: 0.4")
     one = model("slow", slow + f"emit: {{compensation: {{resonance: {by}}}}}\n")
     what = {
-        "shaper": r"half a period of 0\.4 Hz is 125. samples, and a shaper keeps 1000 at most",
-        "notch": r"a notch for 0\.4 Hz takes 1594 samples, and keeps 1000 at most",
+        "shaper": r"half a period of 0\.4 Hz is 125. samples, and the C keeps 1000 at most",
+        "notch": r"a notch for 0\.4 Hz takes 1594 samples, and the C keeps 1000 at most",
     }[by]
     with pytest.raises(FormatError, match=what):
         tables.build(one.chain, "float32", T, one.parameters.emit.compensation)
+    modes = [Resonance(name="resonance", frequency=frequency, damping=0.02) for frequency in (0.9, 1.1)]
+    with pytest.raises(FormatError, match=r"the modes take 1\d\d\d samples one behind the other, and the C keeps 1000"):
+        preview.taps(0.0, modes, T, by=by)
+    assert len(preview.taps(0.0, modes[1:], T, by=by).weights) <= 1000
 
 
 @pytest.mark.parametrize("by", ["shaper", "notch"])
@@ -705,7 +709,7 @@ def test_what_shapes_says_how_late_it_is(by: str) -> None:
     how = one.parameters.emit.compensation
     numbers, plain = tables.build(one.chain, "float64", T, how), compiled(model("straight"), "float64")
     text = module.files(one.parameters, one.cascade, emit_options(one))["straight.h"].replace("\n * ", " ")
-    found = re.search(r"is ([0-9.]+) samples late for it, and off a sine with 200 samples .* by ([0-9.]+) %", text)
+    found = re.search(r"the motion ([0-9.]+) samples late, and a sine with 200 samples .* by ([0-9.]+) %", text)
     assert found
     assert "which is" in text
     k = np.arange(900)

@@ -220,7 +220,7 @@ REFUSED = [
         '5:1: effects: unknown key; it belongs in model',
         '6:1: weights: unknown key; it belongs in model.pi',
         '7:1: preview: unknown key; it belongs in emit.compensation',
-        '8:8: emit.sample_time: unknown key; it belongs in the top level',
+        '8:8: emit.sample_time: unknown key; it belongs at the top level',
     ]),
     case('odd_unknown_keys', H + M + '"a b\\n": 1\n' + "k" * 70 + ": 2\n", [
         '5:1: "a b\\n": unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',

@@ -333,8 +333,8 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     constants.append(("WAITING", f"{t.delay.samples}u", "samples of the drive that wait"))
     if t.delay.samples and not t.fixed:
         constants.append(("WAITED", operand(t.delay.share[0]), "part of the step after the oldest that is over"))
-    constants.append(("QUIET", f"{t.quiet}u", "equal references behind which the drive stands still"))
-    constants.append(("DITHER", operand(t.number[DITHER]), "by which it goes to and fro at rest"))
+    constants.append(("QUIET", f"{t.quiet}u", "equal references after which the drive stands still"))
+    constants.append(("DITHER", operand(t.number[DITHER]), "signal by which a drive at rest goes to and fro"))
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
     constants += _fixed_constants(t) if t.fixed else []
     if t.moving.used:

@@ -19,8 +19,9 @@ from hystgen.basics.version import __version__
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import tables as chain_tables
+from hystgen.compensator.chain.bounds import UNSLEWED, together
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
-from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, SHARE_BITS, Compiled, OwnChainTables
+from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, SHARE_BITS, Compiled
 from hystgen.effects import own as own_effects
 from hystgen.effects.base import USER
 from hystgen.emission import chain, cost, numbers, own, runtime, selftest
@@ -315,11 +316,11 @@ def _limits(values: SimpleNamespace) -> list[str]:
         found.append((f"FORWARD_MAX_ERROR{lsb}", values.forward_max_error, bound + output))
     if values.inverse:
         found.append((f"INVERSE_MAX_ERROR{lsb}", values.inverse_max_error, bound + drive))
-    condition = values.condition or ("no slew limit acts" if values.variant.slew else "")
+    condition = values.condition or UNSLEWED * values.variant.slew
     apart = condition and values.inverse_rounding_error != values.inverse_max_error
     if values.inverse and (values.branches or apart):
         branch = "both take the same branch" if values.branches else ""
-        words = f"the same while {' and '.join(filter(None, [branch, condition]))}"
+        words = f"the same while {together(branch, condition)}"
         found.append((f"INVERSE_ROUNDING_ERROR{lsb}", values.inverse_rounding_error, words))
     return [define(f"{values.NAME}_{name}", value, comment) for name, value, comment in found]
 
@@ -353,8 +354,8 @@ def _reading(compiled: Compiled) -> list[str]:
     if (kept := compiled.shaped) is not None:
         missed = 100.0 * kept.missed(PERIODS[-1])
         found.append(
-            f"Resonance: behind a step of the reference the stage does not ring ({kept.by}). Not for tracking: the "
-            f"motion is {kept.late:.3g} samples late for it, and off a sine with {PERIODS[-1]} samples a period by "
+            f"Resonance: after a step of the reference the stage does not ring ({kept.by}). Not for tracking: it makes "
+            f"the motion {kept.late:.3g} samples late, and a sine with {PERIODS[-1]} samples a period is missed by "
             f"{missed:.2g} % of its size"
         )
     return found
@@ -446,8 +447,8 @@ def _quiet(values: SimpleNamespace, options: Options) -> list[str]:
     if values.fixed:
         kept, unit = kept / 2.0 ** int(t.number[DRIVE_BITS]), " drive codes"
     return [
-        f"Quiet: after {t.quiet} equal references the drive stands still while it is within {kept:.4g}{unit} of what "
-        "it has to be at rest; what arrives in front of the plays is then within twice that of what is sought"
+        f"Quiet: after {t.quiet} equal references the drive stands still as long as it is within {kept:.4g}{unit} of "
+        "the drive that is needed at rest; the input of the plays is then within twice that of the one sought"
     ]
 
 
@@ -481,7 +482,9 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         "Use: one instance per actuator, init once, then step from one context only. init takes the start memory of "
         f"the parameter file; reset starts again from plays at 0.{single if values.single_header else ''}{rounding}"
     )
-    uncounted = " without blocks of your own" * isinstance(values.numbers, OwnChainTables)
+    shapes = ((effect.name, getattr(effect, "shape", "")) for effect in parameters.model.effects if effect.block)
+    blocks = dict.fromkeys(f"{name} ({shape})" if shape else name for name, shape in shapes)
+    uncounted = f" without {' and '.join(blocks)}" if blocks else ""
     return [
         "",
         *([about] if about else []),

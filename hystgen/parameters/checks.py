@@ -45,11 +45,11 @@ _PARTS: dict[str, type[BaseModel]] = {
 }
 
 _PLACES: dict[str, type[BaseModel]] = {
-    "the top level": schema.Parameters,
-    "model": schema.ModelParameters,
-    "model.pi": schema.PIParameters,
-    "emit": schema.EmitDefaults,
-    "emit.compensation": schema.Compensation,
+    "at the top level": schema.Parameters,
+    "in model": schema.ModelParameters,
+    "in model.pi": schema.PIParameters,
+    "in emit": schema.EmitDefaults,
+    "in emit.compensation": schema.Compensation,
 }
 """Where a key belongs that stands at another place."""
 
@@ -196,7 +196,7 @@ class _Checker:
         elif kind == "extra_forbidden":
             known = self._keys(path[:-1])
             place = next((place for place, part in _PLACES.items() if key in part.model_fields), None)
-            advice = f"it belongs in {place}" if place else _nearest(key, known)
+            advice = f"it belongs {place}" if place else _nearest(key, known)
             self.add(path, f"unknown key; {advice or 'known here are ' + ', '.join(known)}{hint}", at_key=True)
         elif value is None:
             self.add(path, _NO_VALUE, at_key=isinstance(path[-1], str))

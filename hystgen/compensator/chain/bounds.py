@@ -41,9 +41,16 @@ from hystgen.front.tanh import kernels
 from hystgen.plays import slots
 
 SAME = "both have seen the same drives"
+UNSLEWED = "no slew limit acts"
 
 STILL = "the drive does not stand still"
 """Of a quiet drive in front of a lag: what has arrived is then within twice its dither of what is sought."""
+
+
+def together(*conditions: str) -> str:
+    """Conditions that all have to hold, in words; empty ones are left out."""
+    *others, last = [each for each in conditions if each] or [""]
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 @dataclasses.dataclass(frozen=True)
@@ -262,13 +269,13 @@ def condition(compiled: Compiled) -> str:
     moved alike. Thresholds that grow with the rate amplify an earlier difference of the drives. A lag that is braked
     behind a slew limit gives up more of its lead than the limit cuts off.
     """
-    more = f" and {STILL}" if compiled.tables.quiet else ""
+    still = STILL * (compiled.tables.quiet > 0)
     if compiled.tables.braked:
-        return f"{SAME} and no slew limit acts{more}"
+        return together(SAME, UNSLEWED, still)
     missed = not all(compiled.tables.lag.exact) or compiled.tables.own.ahead > 0
     remembered = compiled.static.pi.n > 0 or len(compiled.tables.creep.block) > 0
     dilated = compiled.tables.moving.moves == moving.DILATED
-    return SAME + more if dilated or (missed and remembered) else ""
+    return together(SAME, still) if dilated or (missed and remembered) else ""
 
 
 def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:

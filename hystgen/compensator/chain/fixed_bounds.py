@@ -26,7 +26,7 @@ from hystgen.arithmetic.factors import MANTISSA_BITS, lifted
 from hystgen.arithmetic.factors import error as missed
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER
-from hystgen.compensator.chain.bounds import SAME, STILL
+from hystgen.compensator.chain.bounds import SAME, STILL, UNSLEWED, together
 from hystgen.compensator.chain.layout import DITHER, ChainTables, largest_way
 from hystgen.compensator.chain.moving import (
     DASHPOT,
@@ -533,10 +533,10 @@ class Bounds:
         dilated = self.tables.moving.moves == DILATED
         if not (missed or dilated or (self.lags and (not self.reached or self.parts.slew))):
             return ""
-        more = f" and {STILL}" if self.tables.quiet else ""
+        still = STILL * (self.tables.quiet > 0)
         if not self.reached:
-            return f"{SAME}, nothing limited{more}"
-        return (f"{SAME} and no slew limit acts" if self.tables.braked else SAME) + more
+            return together(SAME, "nothing is limited", still)
+        return together(SAME, UNSLEWED * self.tables.braked, still)
 
     def rounding(self) -> float:
         """Bound of the inverse on the same branch and under its `condition`, in drive codes."""

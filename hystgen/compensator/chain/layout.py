@@ -91,7 +91,7 @@ class ChainTables(NamedTuple):
     number: Reals
     slew: int  # 1 if the rate of the drive is limited
     braked: int  # 1 if a lag behind that limit is kept from overshooting
-    quiet: int  # equal references behind which the drive stands still, 0 if it never has to
+    quiet: int  # equal references after which the drive stands still, 0 if it never has to
 
     @property
     def fixed(self) -> bool:
@@ -147,7 +147,7 @@ class Compiled:
     asked: int | None = None
     smoothing: Smoothing | None = None
     shaped: Shaped | None = None
-    """like the smoothing in the taps"""
+    """what the taps contain beside a delay and inverted modes"""
     codes: Codes | None = None
     """of fixed point"""
 
@@ -199,7 +199,7 @@ class Compiled:
 
 
 QUIET = 32
-"""[samples] Equal references behind which the drive stands still. A ramp in codes that moves more often is led all the
+"""[samples] Equal references after which the drive stands still. A ramp in codes that moves more often is led all the
 time; a slower one gets a lead at each code anyway, which then makes up for the dither too. What is kept does not depend
 on it: that is a matter of the dither alone."""
 

@@ -59,7 +59,9 @@ def taps(
 
     A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`; 5 undo that up to a fourth
     difference. `corner`: three centred moving averages over this number of samples smooth the reference. `by`: how a
-    mode that would ring behind a step is kept from it.
+    mode that would ring after a step is kept from it.
+
+    Raises FormatError if modes that are kept from ringing take more references than the C keeps.
     """
     samples = delay / seconds
     whole = math.floor(samples)
@@ -71,6 +73,8 @@ def taps(
             row = shaper(mode, seconds) if by == "shaper" else notch(mode, seconds)
             weights = np.convolve(weights, row)
             first -= len(row) - 1
+            if len(weights) > MOST_REFERENCES:
+                raise _too_long(f"the modes take {len(weights)} samples one behind the other")
             continue
         a1, a2 = denominator(mode, seconds)
         weights = np.convolve(weights, np.array([a2, a1, 1.0]) / (1.0 + a1 + a2))
@@ -99,7 +103,7 @@ def shaper(mode: Resonance, seconds: float) -> NDArray[np.float64]:
     half = math.pi / math.atan2(pole.imag, pole.real)
     n = max(math.ceil(half) - 1, 1)
     if n >= MOST_REFERENCES:
-        raise _too_long(f"half a period of {mode.frequency:g} Hz is {half:.0f} samples, and a shaper")
+        raise _too_long(f"half a period of {mode.frequency:g} Hz is {half:.0f} samples")
     early, late = pole**-n, pole ** -(n + 1)
     rows = [[1.0, 1.0, 1.0], [1.0, early.real, late.real], [0.0, early.imag, late.imag]]
     now, soon, last = np.linalg.solve(rows, [1.0, 0.0, 0.0])
@@ -120,12 +124,12 @@ def notch(mode: Resonance, seconds: float) -> NDArray[np.float64]:
     a1, a2 = denominator(mode, seconds)
     width = 1.0 / math.tanh(math.pi * mode.frequency * seconds)
     if 2.0 * width + 2.0 > MOST_REFERENCES:
-        raise _too_long(f"a notch for {mode.frequency:g} Hz takes {2.0 * width + 2.0:.0f} samples, and")
+        raise _too_long(f"a notch for {mode.frequency:g} Hz takes {2.0 * width + 2.0:.0f} samples")
     return np.convolve(np.array([a2, a1, 1.0]) / (1.0 + a1 + a2), averages(2, width, centred=False))
 
 
 def _too_long(what: str) -> FormatError:
-    message = f"{what} keeps {MOST_REFERENCES} at most; sample more slowly, or choose inverse"
+    message = f"{what}, and the C keeps {MOST_REFERENCES} at most; sample more slowly, or choose inverse"
     return FormatError((("emit", "compensation", "resonance"), message))
 
 

@@ -139,8 +139,8 @@ def constants(t: CreepTables) -> Iterator[Constants]:
 
 
 class CreepState(NamedTuple):
-    """`block` (k, 2): the output that the next input 0 would give, or in fixed point the same input, and that input;
-    `state` (m, 2): in two parts."""
+    """`block` (k, 2): the output at the next sample for an input of 0, or in fixed point for the same input as at the
+    last one, which is the second column; `state` (m, 2): in two parts."""
 
     block: Reals
     state: Reals
