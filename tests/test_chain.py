@@ -681,6 +681,19 @@ def test_a_notch_is_two_poles_that_come_to_an_end(frequency: float, damping: flo
     assert gains[0] <= gains[1] * (1.0 + 1e-9)
 
 
+@pytest.mark.parametrize(("by", "left"), [("shaper", 0.147), ("notch", 0.135)])
+def test_a_mode_that_is_not_as_identified_rings(by: preview.By, left: float) -> None:
+    """10 % lower: by the share of a step that the docs state, and no more if it is as much higher."""
+    found = preview.taps(0.0, [Resonance(name="resonance", frequency=20.0, damping=0.02)], 1e-4, by=by)
+    v = np.concatenate([[0.0], np.cumsum(found.weights[::-1]), np.ones(1500)])
+    rings = []
+    for w0 in (2.0 * np.pi * 18.0, 2.0 * np.pi * 22.0):
+        y = signal.lsim(([w0**2], [1.0, 0.04 * w0, w0**2]), v, 1e-4 * np.arange(len(v)))[1]
+        rings.append(np.max(np.abs(y - 1.0)[len(found.weights) :]))
+    assert rings[0] == pytest.approx(left, abs=5e-4)
+    assert rings[1] <= rings[0]
+
+
 @pytest.mark.parametrize("by", ["shaper", "notch"])
 def test_what_shapes_is_emitted_with_the_bits_of_the_reference(by: str) -> None:
     one = with_options("late", resonance=by)
