@@ -167,7 +167,8 @@ def test_averages_have_the_bits_and_the_bounds_of_the_rest(arithmetic: str) -> N
     u = np.rint((1.0 + 6.0 * np.sin(np.cumsum(rng.uniform(0.0, 0.03, 900)))) / output * 64.0) / 64.0
     u = np.rint(u) if codes else u
     t = np.arange(len(u)) * T
-    v = answers(numbers, Run(t, u, {}), True).astype(float)
+    with jit.plain():
+        v = answers(numbers, Run(t, u, {}), True).astype(float)
     assert numbers.smoothing is not None
     half = (len(numbers.smoothing.row) - 1) // 2
     averaged = np.convolve(np.pad(u * output, half, mode="edge"), numbers.smoothing.row, mode="valid")
