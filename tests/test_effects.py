@@ -261,6 +261,22 @@ def test_candidates_build_effects_over_all_their_bounds(effect: Effect) -> None:
             assert np.max(np.abs(nothing - CASCADE.simulate(v))) < tolerance
 
 
+@pytest.mark.parametrize("session", [0.05, 0.15, 8.0, 1e6])
+def test_a_start_from_a_simpler_shape_lies_within_bounds(session: float) -> None:
+    """However short the session, and wherever the search for the simpler shape has ended."""
+    about = About((-4.0, 4.0), 8.0, 1e-3, session, session, 50.0, 30.0, tuple(THRESHOLDS), frozenset({"temperature"}))
+    found = {each.label: each for kind in dict.fromkeys(map(type, EVERY)) for each in kind.candidates(about)}
+    grown = [each for each in found.values() if each.grown]
+    assert len(grown) >= 8
+    rng = np.random.default_rng(6)
+    for candidate in grown:
+        simple = found[candidate.beyond]
+        shares = [0.0, 1.0, *rng.uniform(size=8)]
+        for x in (simple.low + (simple.high - simple.low) * share for share in shares):
+            start = candidate.grown(x)  # type: ignore[misc]
+            assert np.all((candidate.low <= start) & (start <= candidate.high)), candidate.label
+
+
 def test_what_no_record_shows_ringing_is_no_resonance() -> None:
     """Less than three samples per period, or no peak: in the records that is a delay or a lag."""
     about = About((0.0, 1.0), 10.0, 1e-3, 1.0, 1.0, 5.0, 3.0, (0.0,), ringing=(200.0, 450.0))

@@ -23,7 +23,11 @@ MOST_A_DECADE, MOST_OF_A_STATE = 0.06, 0.2
 stands for up to three decades."""
 
 SHORTER = 1.0
-"""Decades by which a search for the ends of a logarithmic spectrum begins inside those of the recorded times."""
+"""[decades] A search for the ends of a logarithmic spectrum begins this far inside those of the recorded times."""
+
+SHORTEST = 0.3
+"""[decades] Least width of such a spectrum: a factor of two, less than one of its states stands for. That of the
+recorded times (`span`) is never less."""
 
 LOGARITHMIC = "creep, logarithmic"
 
@@ -220,6 +224,7 @@ class LogarithmicCreep(_Creep):
             )  # fmt: skip
 
         wide = high - low
+        inside = min(SHORTER, 0.5 * (wide - SHORTEST))  # a short session has not as many decades
         return [
             Candidate(
                 LOGARITHMIC, np.zeros(1), np.array([MOST_A_DECADE / 0.1]), np.array([0.1]), even, np.zeros(1),
@@ -227,9 +232,9 @@ class LogarithmicCreep(_Creep):
             ),
             Candidate(
                 "creep, logarithmic, free ends",
-                np.array([0.0, low, min(0.3, wide)]), np.array([MOST_A_DECADE / 0.1, high - 0.3, wide]),
+                np.array([0.0, low, SHORTEST]), np.array([MOST_A_DECADE / 0.1, high - SHORTEST, wide]),
                 np.array([0.1, low, wide]), ended, np.array([0.0, low, wide]),
-                beyond=LOGARITHMIC, amounts=(0,), grown=lambda x: np.array([x[0], low + SHORTER, wide - 2.0 * SHORTER]),
+                beyond=LOGARITHMIC, amounts=(0,), grown=lambda x: np.array([x[0], low + inside, wide - 2.0 * inside]),
             ),
         ]  # fmt: skip
 
