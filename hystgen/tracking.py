@@ -23,6 +23,9 @@ MOST_UNKNOWN = 0.8
 fifth of a record of `examples/` the rms error is 0.12 to 2.0 times that over all of it, over a twentieth 0.02 to 3.1
 times. Set by: benchmarks/chosen_numbers.py unknown."""
 
+READING = ("preview", "drive_hold", "resonance", "taps", "corner", "noise_gain", "quiet")
+"""Keys of `emit.compensation` with which the C tracks something else than the reference, or later."""
+
 LINE, PLAYS, WHOLE = "straight line", "plays alone", "whole model"
 """The compensators that turn the reference into a drive."""
 
@@ -67,6 +70,18 @@ class Tracking:
                 name = each.name if which == LINE else ""
                 lines.append(f"{name:{width}}  {which:14} {each.rms(which):6.3f}  {each.most(which):7.3f}")
         return "\n".join(lines)
+
+
+def left_out(model: Model) -> str:
+    """A sentence about options of the parameter file that `track` leaves out, empty if there are none."""
+    how = model.parameters.emit.compensation
+    keys = [key for key in READING if getattr(how, key) != type(how).model_fields[key].default]
+    if not model.effects or not keys:
+        return ""
+    return (
+        f"the figures are those of the inverse in double precision, without {', '.join(keys)} of emit.compensation; the "
+        "header of the emitted C says how late its motion is"
+    )
 
 
 def track(

@@ -71,6 +71,11 @@ def test_track_prints_a_table_and_draws(tmp_path: Path, run: Callable[..., tuple
     assert out.splitlines()[-1] == str(tmp_path / "t.svg")
     assert "straight line" in out
     assert (tmp_path / "t.svg").stat().st_size > 1000
+    assert "without" not in err
+    (tmp_path / "quiet.yaml").write_text(TEXT + "emit: {compensation: {noise_gain: 4, quiet: true}}\n")
+    code, shown, err = run("track", tmp_path / "quiet.yaml", tmp_path / "crept.csv")
+    assert "without noise_gain, quiet of emit.compensation" in err
+    assert shown == "".join(out.splitlines(keepends=True)[:-1])
     np.savetxt(tmp_path / "v.csv", rows[:, :2], delimiter=",", header="t,v", comments="")
     code, out, err = run("track", tmp_path / "crept.yaml", tmp_path / "v.csv")
     assert (code, out) == (2, "")

@@ -52,6 +52,8 @@ def track(
         for note in record.notes:
             console.note(f"warning: {record.name}: {note}")
     found = guarded(params, lambda: tracking.track(model, read, visited or (), rest, skip))
+    if note := tracking.left_out(model):
+        console.note(f"warning: {note}")
     console.say(found.table())
     if plot:
         guarded(params, lambda: plots.show_tracking(found, plot))

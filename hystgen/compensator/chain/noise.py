@@ -3,7 +3,7 @@
 What leads, leads by differences, whose gain grows with the frequency. A moving average over w samples divides a
 difference by w at most: `(1 - z)(1 + z + .. + z^(n-1) + e z^n) = 1 - (1 - e) z^n - e z^(n+1)` has no gain above 2, as
 `1 - z` itself. Averages are weights of the preview like all others: no state, no recursion, hence no limit cycles, and
-centred ones shift nothing in time. Poles in front of the lead that hold the same limit leave 3 to 50 times the error
+centred ones shift nothing in time. Poles in front of the lead that hold the same limit leave 5 to 50 times the error
 of smooth references with a preview, and 1.02 to 1.9 times without (benchmarks/chosen_numbers.py averages).
 
 One average stands in front of all leads. Blocks in series are linear about an operating point, so that only the product
@@ -52,8 +52,8 @@ SERIES = 1.1
 and rises again over two."""
 
 MOST_TIMES = 4
-"""[averages] Most that stand one behind the other. Two lose least for a lag or a mode, three for both; more differ from
-these by a tenth at most, and a fifth is never the best. Set by: benchmarks/chosen_numbers.py averages."""
+"""[averages] Most that stand one behind the other. For half the gain one loses least, for a twentieth two, and three
+where a lag and a mode are led together; a fifth is never the best. Set by: benchmarks/chosen_numbers.py averages."""
 
 
 @dataclass(frozen=True)
