@@ -79,8 +79,8 @@ def left_out(model: Model) -> str:
     if not model.effects or not keys:
         return ""
     return (
-        f"the figures are those of the inverse in double precision, without {', '.join(keys)} of emit.compensation; the "
-        "header of the emitted C says how late its motion is"
+        f"the figures are those of the inverse in double precision, without {', '.join(keys)} of emit.compensation; "
+        "the header of the emitted C says how late its motion is"
     )
 
 
