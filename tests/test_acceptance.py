@@ -231,6 +231,13 @@ def test_equal_effects_come_in_the_order_of_the_catalogue(more: float, first: st
     assert first_of(Made("delay", 1, (1.0, 1.0)), Made("lag", 1, (more, 1.0))) == first
 
 
+@pytest.mark.parametrize("name", ["lag", "delay", "resonance"])
+def test_what_an_amplifier_does_comes_before_plays_that_are_late(name: str) -> None:
+    """Unlike in the catalogue, if both are equal."""
+    assert first_of(Made("rate_dependence", 1, (1.0, 1.0)), Made(name, 1, (1.004, 1.0))) == name
+    assert first_of(Made("rate_dependence", 1, (1.0, 1.0)), Made("slew_limit", 1, (1.004, 1.0))) == "rate_dependence"
+
+
 class TestForwardSelection:
     @pytest.fixture(autouse=True)
     def _without_fits(self, monkeypatch: pytest.MonkeyPatch) -> None:

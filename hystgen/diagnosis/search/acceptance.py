@@ -130,8 +130,8 @@ acceptance::test_equal_effects_come_in_the_order_of_the_catalogue,
 acceptance::test_what_chance_does_not_explain."""
 
 EQUAL = 0.005
-"""[share of an error] Errors that differ by less than this are equal, and the order of the catalogue decides. The last
-steps of a search change an error by far less. Changed by:
+"""[share of an error] Errors that differ by less than this are equal, and `selection.place` decides. The last steps of
+a search change an error by far less. Changed by:
 acceptance::test_equal_effects_come_in_the_order_of_the_catalogue."""
 
 MOST_OF_GAP = 0.5

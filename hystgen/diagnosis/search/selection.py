@@ -169,9 +169,9 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     much better the best one fits (two shapes of one effect each have their own free states, which are part of the
     effect). Or its held-out error is within a few per cent, and its fitted error is no larger, or larger by chance, or,
     if a number of the best is at an end of its range, larger by less than an effect is worth.
-    With equal numbers of parameters all records decide, or the order of the catalogue if they hardly differ: a lag,
-    which every amplifier has, before a delay. A candidate with a far larger fitted error than another is not the best
-    because of a small lead on held-out records, which may consist mostly of yet another effect.
+    With equal numbers of parameters all records decide, or their `place` if they hardly differ: a lag, which every
+    amplifier has, before a delay. A candidate with a far larger fitted error than another is not the best because of a
+    small lead on held-out records, which may consist mostly of yet another effect.
     """
     if not tried:
         return []
@@ -216,7 +216,8 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
 
 
 ORDER = "creep", "resonance", "lag", "delay", "rate_dependence"
-"""The first in the order of equal effects: a lag, which every amplifier has, or a delay before plays that are late."""
+"""The first of equal effects, in their order. What every amplifier or converter has, a lag or a delay, comes before
+plays that are late."""
 
 
 def place(name: str) -> int:
@@ -700,7 +701,7 @@ def _exchanged(
 
 def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
     """Whether an effect gives way to a better one: one with a smaller error, one with fewer numbers and no larger error
-    on equal terms, or an equal one that comes earlier in the catalogue.
+    on equal terms, or an equal one with an earlier `place`.
 
     With no more numbers all records decide, as in `simplest_first`, if they differ and held-out ones hardly do.
     """
