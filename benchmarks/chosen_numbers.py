@@ -1,13 +1,14 @@
 """Runs that set numbers which no test of a model can set: what each would cost or spoil with another value.
 
     python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths] [visits]
-        [averages]
+        [averages] [shifts]
 
 lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.thermal.compensator.MOST_CHANGE`; decades:
 `effects.ageing.compensator.DECADES`; sweeps: `emission.worth.SWEEPS`; unknown: `tracking.MOST_UNKNOWN`; exact:
 `diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`; visits:
-`chain.chain.VISIT_SAMPLES`; averages: `compensator.chain.noise.MOST_TIMES`. All of them take some seconds; what is
-random has fixed seeds.
+`chain.chain.VISIT_SAMPLES`; averages: `compensator.chain.noise.MOST_TIMES`; shifts: the bounds of
+`compensator.chain.moving.found_shifted`. All of them take some seconds, shifts a minute; what is random has fixed
+seeds.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -26,7 +27,7 @@ from numpy.typing import NDArray
 import hystgen
 from hystgen import plants
 from hystgen.chain import chain
-from hystgen.compensator.chain import noise, preview, tables
+from hystgen.compensator.chain import moving, noise, preview, tables
 from hystgen.compensator.chain.layout import SAMPLES_A_SWEEP
 from hystgen.diagnosis.data import signals
 from hystgen.diagnosis.data.items import Item
@@ -233,13 +234,58 @@ def averages() -> None:
             print(f"  {name:18} {share:5.2f}", *(f"{each:7.3f}" for each in errors), int(np.argmin(variances)) + 1)
 
 
+def shifts() -> None:
+    """How near to `found_shifted` a search comes: steps in which plays follow, more or less, drawn and changed.
+
+    For given steps the largest error is a sum over all shifts, `sum |c_ik|`, whose factors are followed backwards.
+    """
+    print("shifts: largest error that a search finds, share of the bound; plays in order of thresholds, or in any")
+    rng = np.random.default_rng(9)
+    for in_order in (True, False):
+        found = []
+        for _ in range(12):
+            n = int(rng.integers(2, 6))
+            p = 10.0 ** rng.uniform(-2.0, 2.0, n + 1)
+            steps, most = [(np.arange(n) < k).astype(float) for k in range(n, 0, -1)], 0.0
+            for _ in range(2500):
+                tried, k = list(steps), int(rng.integers(len(steps)))
+                change = rng.random()
+                if change < 0.4 and len(tried) < 40:
+                    tried[k:k] = [_followed(rng, n, in_order)] if change < 0.3 else [tried[k]] * 3
+                elif change < 0.5 and len(tried) > 1:
+                    del tried[k]
+                else:
+                    factors = np.exp(rng.normal(0.0, 0.4, 1 if in_order else n))
+                    tried[k] = _followed(rng, n, in_order) if change < 0.7 else np.clip(tried[k] * factors, 0.0, 1.0)
+                if (error := _reached(p, tried)) > most:
+                    steps, most = tried, error
+            found.append(most / moving.found_shifted(p, p, np.ones(n), in_order))
+        print(f"  {'in order' if in_order else 'any order':9}", *(f"{each:5.2f}" for each in sorted(found)))
+
+
+def _followed(rng: np.random.Generator, n: int, in_order: bool) -> NDArray[np.float64]:
+    """Shares (n,) of their way that plays go in a step; in order, none more than one with a smaller threshold."""
+    shares = np.where(rng.random(n) < rng.uniform(0.2, 0.9), rng.choice([1.0, 0.3, 0.1, 0.01], n), 0.0)
+    return np.sort(shares)[::-1] if in_order else shares
+
+
+def _reached(p: NDArray[np.float64], steps: Sequence[NDArray[np.float64]]) -> float:
+    """Largest `e` with `p_0 e + sum p_i d_i = 0` behind the steps, over all shifts of the input up to 1 in each."""
+    factor, total = -p[1:] / p[0], 0.0
+    for shares in reversed(steps):
+        kept = factor - p[1:] * float(shares @ factor) / float(p[0] + p[1:] @ shares)
+        total += float(np.sum(np.abs(shares * kept)))
+        factor = (1.0 - shares) * kept
+    return total
+
+
 def _lost(response: NDArray[np.complex128]) -> float:
     """Rms of what a response changes, %."""
     return 100.0 * math.sqrt(float(np.mean(np.abs(response - 1.0) ** 2)))
 
 
 RUNS: dict[str, Callable[[], None]] = {
-    each.__name__: each for each in (lag, newton, decades, sweeps, unknown, exact, lengths, visits, averages)
+    each.__name__: each for each in (lag, newton, decades, sweeps, unknown, exact, lengths, visits, averages, shifts)
 }
 
 

@@ -224,7 +224,8 @@ def found_shifted(most: Array, least: Array, shifts: Array, in_order: bool) -> f
     Places that take heat up slowly can gain some anew from others. A search of schedules for sets of 3 to 6 weights
     over up to four decades found sums of at most 1.13 times that if rates do not rise with the threshold (`in_order`),
     all below those without the second term, which are taken here. For rates in any order it found up to 0.7 of
-    `2 g log(sum p/p_0)`, which is no less than those sums in whatever order of the plays.
+    `2 g log(sum p/p_0)`, which is no less than those sums in whatever order of the plays. Neither is proved for plays
+    that follow in part; benchmarks/chosen_numbers.py shifts searches again, and comes to 0.86 and 0.64 of them.
     """
     slopes = np.cumsum(least)
     if in_order:
