@@ -235,6 +235,14 @@ def test_composes_with_the_forward_model_that_shares_no_code(name: str, seed: in
     assert np.max(np.abs(y - run.v)[free]) <= EXACT[name] * span
 
 
+@pytest.mark.parametrize("name", CHAINS)
+def test_an_inverse_simulated_twice_begins_at_the_start_memory_both_times(name: str) -> None:
+    one = model(name).inverse()
+    run = record(compiled(model(name), "float64"), 1, 60, share=0.4)
+    first, again = (one.simulate(run.v, t=run.t, extra=run.extra, clamp=True) for _ in range(2))
+    assert np.array_equal(first, again)
+
+
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 def test_a_lag_behind_a_slew_limit_does_not_overshoot(arithmetic: str) -> None:
     """A step over half the range, up and down; the model in double precision is what the drive moves."""

@@ -67,9 +67,14 @@ class Actuator:
         mover = next((effect for effect in effects if effect.moves_plays()), None)
         self.movement = None if mover is None else Movement(mover, self.r, self.p)  # type: ignore[arg-type]
         self.start = np.array(pi.start)
+        self.start_over()
+
+    def start_over(self) -> None:
+        """Back to the start memory."""
         self.plays = self.start.copy()
         self.ascending = True
-        self.drive = float(static.front_inverse(float(pi.start[0]))) if static.start_is_defined else 0.0
+        at = float(self.start[0])
+        self.drive = float(self.static.front_inverse(at)) if self.static.start_is_defined else 0.0
         self.advance(math.inf)
 
     def advance(self, seconds: float) -> None:
@@ -201,7 +206,8 @@ class Compensator:
             [block for effect in effects if effect.place is place and (block := filter_block(effect))]
             for place in (Place.DRIVE, Place.LINEAR)
         )
-        self.blocks: list[Block] = [*drives, Actuator(static, plays), *outputs]
+        self.actuator = Actuator(static, plays)
+        self.blocks: list[Block] = [*drives, self.actuator, *outputs]
         self.slew = self._called("slew_limit")
         lags = [block for block in drives if isinstance(block, lag.LagBlock)]
         self.braked = lags[0] if self.slew and len(lags) == 1 else None
@@ -220,6 +226,7 @@ class Compensator:
         """
         asked = np.ones(len(reference.t), dtype=bool) if asked is None else asked
         first = int(np.argmax(asked))
+        self.actuator.start_over()
         t, n = reference.t, len(reference.t)
         gains = self._gains(reference)
         targets = self._targets(reference, asked)
