@@ -268,7 +268,7 @@ def test_a_compiler_that_does_not_find_the_c_library_is_called_again(tmp_path: P
     """Twice, since zig on a busy machine finds it at the next call; another failure is believed at once."""
     calls = tmp_path / "calls"
     program = (
-        f"import pathlib, sys; calls = pathlib.Path({str(calls)!r}); before = calls.read_text() if calls.exists() else ''; "
+        f"import pathlib, sys; calls = pathlib.Path({str(calls)!r}); calls.touch(); before = calls.read_text(); "
         f"calls.write_text(before + '.'); len(before) < {times} and sys.exit(sys.argv[1])"
     )
     for message, number, fails in ((compilers.NO_LIBC, min(times + 1, 3), not works), ("other", 1, True)):
