@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import re
-import sys
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from pathlib import Path
@@ -148,7 +146,7 @@ def test_a_compiler_may_be_a_command_of_several_words(tmp_path: Path, monkeypatc
 @pytest.mark.parametrize(
     ("command", "message"),
     [
-        ("gcc 'a", 'the compiler "gcc \'a" is not a command: No closing quotation; correct it'),
+        ("gcc 'a", "the compiler \"gcc 'a\" is not a command: No closing quotation; correct it"),
         (" ", "a compiler is named by a command; write gcc, clang, zig or another"),
     ],
 )
@@ -225,7 +223,9 @@ def test_no_compiler_at_all_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_the_records_are_what_they_are_called(arithmetic: str, inverse: bool) -> None:
     numbers = tables.build(model("listed").cascade, arithmetic)
     real = numbers.threshold.dtype.type
-    records = {name: (op, x.astype(real)) for name, op, x in signals.suite(numbers, np.dtype(real), inverse, 100_000)}
+    records = {
+        name: (op, x.astype(real)) for name, op, x in signals.suite(numbers, np.dtype(real), inverse, 100_000)
+    }
     assert all(len(op) == len(x) == 100_000 for op, x in records.values())
     low, high = numbers.limits[2:4] if inverse else numbers.limits[:2]
 
@@ -261,19 +261,3 @@ def test_the_records_are_what_they_are_called(arithmetic: str, inverse: bool) ->
     called = {int(call) for op, _ in records.values() for call in np.unique(op)}
     expected = {slots.OP_STEP, slots.OP_RESET, slots.OP_INIT}
     assert called == (expected | {slots.OP_COMMIT} if inverse else expected)
-
-
-@pytest.mark.parametrize(("times", "works"), [(2, True), (3, False)])
-def test_a_compiler_that_does_not_find_the_c_library_is_called_again(tmp_path: Path, times: int, works: bool) -> None:
-    """Twice, since zig on a busy machine finds it at the next call; another failure is believed at once."""
-    calls = tmp_path / "calls"
-    program = (
-        f"import pathlib, sys; calls = pathlib.Path({str(calls)!r}); calls.touch(); before = calls.read_text(); "
-        f"calls.write_text(before + '.'); len(before) < {times} and sys.exit(sys.argv[1])"
-    )
-    for message, number, fails in ((compilers.NO_LIBC, min(times + 1, 3), not works), ("other", 1, True)):
-        calls.unlink(missing_ok=True)
-        one = compilers.Compiler("zig", (sys.executable, "-c", program, message))
-        with pytest.raises(compilers.CompileError, match=message) if fails else contextlib.nullcontext():
-            one.run(["-o", tmp_path / "out"])
-        assert len(calls.read_text()) == number

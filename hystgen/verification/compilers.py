@@ -33,13 +33,6 @@ DEFAULTS = [*USER, *(["-march=native"] if platform.machine() in ("x86_64", "AMD6
 
 NAMES = ("gcc", "clang", "zig")
 
-NO_LIBC = "failed to find libc installation"
-"""What zig 0.17 says now and then on a busy machine, of a C library that it finds at the next call: on two cores with a
-load of 5 to 18, 38 of some thousand calls of a run of the tests failed so, and none of 120 on an idle one."""
-
-TRIES = 3
-"""Calls of a compiler that says so, before its failure is believed."""
-
 
 class CompileError(RuntimeError):
     """The compiler refused; the message holds its output."""
@@ -55,16 +48,13 @@ class Compiler:
     def run(self, arguments: Sequence[str | Path]) -> None:
         """Run the compiler; its temporary files go where its output goes. Raises CompileError with what it printed."""
         folder = Path(arguments[list(arguments).index("-o") + 1]).parent
-        for _ in range(TRIES):
-            try:
-                done = subprocess.run(
-                    [*self.command, *map(str, arguments)], capture_output=True, encoding="utf-8", errors="replace",
-                    check=False, stdin=subprocess.DEVNULL, env={**os.environ, **_own(self.name), "TMPDIR": str(folder)},
-                )  # fmt: skip
-            except OSError as failure:
-                raise CompileError(f"{self.name} cannot be started: {failure.strerror}") from None
-            if NO_LIBC not in done.stderr:
-                break
+        try:
+            done = subprocess.run(
+                [*self.command, *map(str, arguments)], capture_output=True, encoding="utf-8", errors="replace",
+                check=False, stdin=subprocess.DEVNULL, env={**os.environ, **_own(self.name), "TMPDIR": str(folder)},
+            )  # fmt: skip
+        except OSError as failure:
+            raise CompileError(f"{self.name} cannot be started: {failure.strerror}") from None
         if done.returncode:
             raise CompileError(f"{self.name} failed:\n{(done.stderr or done.stdout).strip()}")
 
