@@ -38,9 +38,9 @@ Array = NDArray[np.float64]
 Generator = np.random.Generator
 
 T, LENGTH = 1e-3, 600
-"""[s, samples] Sample time and length of a record. Time constants above are counted in samples; a record lasts longer
-than what effects remember within a step, and 30 of them a model take a minute. Longer ones find more of what adds up:
-dashpots came to a quarter of their bound in 1e5 samples, to a fortieth in 600."""
+"""[s, samples] Sample time and length of a record. Time constants above are chosen in samples, so that the first sets
+units only. Longer records find more of what adds up: 600 samples of random models come to a 44th of a dashpot's bound
+forwards, and 1e5 of one of them, shaken, to a quarter."""
 
 RELAXING = "name: rate_dependence, shape: relaxation, time_constant"
 CENTRE = "name: noncongruent, shape: centre, centre: 1, width: 2, amplitude"

@@ -213,7 +213,7 @@ KERNELS = (
 def test_the_same_bytes_on_another_processor(tmp_path: Path) -> None:
     """Searches with a front, and for effects, end in the same numbers although the last bits of sums differ."""
     if platform.machine() not in ("x86_64", "AMD64"):
-        (pytest.fail if os.environ.get("CI") else pytest.skip)("the kernels are those of x86 processors, as CI has them")
+        (pytest.fail if os.environ.get("CI") else pytest.skip)("the kernels are those of x86 processors")
     v, y = plant(branched, 3)
     write_csv(tmp_path / "loops.csv", v, y)
     found = []

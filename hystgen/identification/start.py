@@ -98,15 +98,17 @@ def needed(
 ) -> list[Course]:
     """The courses, with a start memory (`estimated`) for those of which too little could be compared without one.
 
-    `least`: share of the samples of a course that is enough; `largest`: threshold above which no play is of interest.
+    `least`: share of the samples of a course that is enough; `largest`: threshold above which plays hardly move, whose
+    memory is left out of account where too little could be compared with it and no start memory is found.
     """
-    short = [lacking(item, least, largest) for item in courses]
+    known = [_enough(item, least, largest) for item in courses]
+    short = [lacking(item, least) for item in courses]
     if not any(short):
-        return [unknown(item, largest) for item in courses]
+        return known
     found = estimated(courses, stages, wanted)
     return [
-        unknown(item, largest) if not lacks or item.start is None else item
-        for item, lacks in zip(found, short, strict=True)
+        item if lacks and item.start is not None else other
+        for item, other, lacks in zip(found, known, short, strict=True)
     ]
 
 
@@ -124,8 +126,8 @@ def of_model(
     """
     if len(thresholds) == 1:  # without plays there is nothing to know
         return [replace(item, start=Start((), 0.0), first=item.begin) for item in courses]
-    begun = [unknown(item, largest) for item in courses]
-    places = [k for k, item in enumerate(begun) if lacking(item, least, largest)]
+    begun = [_enough(item, least, largest) for item in courses]
+    places = [k for k, item in enumerate(begun) if lacking(item, least)]
     if places:
         some = [unknown(begun[k]) for k in places]
         for k, before, item in zip(places, some, _started(some, stages, thresholds, weights), strict=True):
@@ -141,6 +143,12 @@ def unknown(item: Course, largest: float = math.inf) -> Course:
     return replace(item, start=None).resettled(largest)
 
 
+def _enough(item: Course, least: float, largest: float) -> Course:
+    """The course from where every play is known, or, if that leaves too little, those up to the threshold `largest`."""
+    exact = unknown(item)
+    return exact if exact.used >= least * _whole(item).used else unknown(item, largest)
+
+
 def findable(item: Course) -> bool:
     """Whether the drive of a record goes up and down again far enough (`pi.LEAST_TRAVEL`) to show a start memory."""
     v = item.v[item.begin : item.last]
@@ -149,12 +157,9 @@ def findable(item: Course) -> bool:
     return bool(min(reduction.ways(v)) >= pi.LEAST_TRAVEL * np.ptp(v) > 0.0)
 
 
-def lacking(item: Course, least: float, largest: float = math.inf) -> bool:
-    """Whether less than the share `least` of a course can be compared without a start memory, and one can be found.
-
-    `largest`: as in `unknown`.
-    """
-    return findable(item) and unknown(item, largest).used < least * _whole(item).used
+def lacking(item: Course, least: float) -> bool:
+    """Whether less than the share `least` of a course can be compared without a start memory, and one can be found."""
+    return findable(item) and unknown(item).used < least * _whole(item).used
 
 
 def _started(
