@@ -757,7 +757,7 @@ def test_a_record_that_says_nothing_is_told(held_out: bool, tmp_path: Path) -> N
     rng = np.random.default_rng(1)
     ends = [rng.permutation(np.linspace(0, 100, 11)) for _ in "abcd"]
     drives = [np.concatenate([[50, 100, 0], np.interp(np.arange(900), np.arange(0, 901, 90), x)]) for x in ends]
-    drives.append(np.linspace(0.0, 100.0, 300))
+    drives.append(np.linspace(0.0, 100.0, 600))
     made = [
         record(v, noisy(brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0), 0.01), name)
         for v, name in zip(drives, [*"abcd", "sweep"], strict=True)
@@ -767,7 +767,7 @@ def test_a_record_that_says_nothing_is_told(held_out: bool, tmp_path: Path) -> N
     spec = " ".join(found.notes)
     assert ("sweep: there is too little to judge by" in spec) is held_out
     assert ("that can judge: c set aside" in spec) is held_out
-    assert ("sweep: says next to nothing, 15 samples" in spec) is not held_out
+    assert ("sweep: says next to nothing, 1 sample" in spec) is not held_out
     assert found.verdict == "nothing_missing"
 
 

@@ -243,7 +243,7 @@ def least(gain: Gain, limit: float, room: int, centred: bool) -> Smoothing:
 
 
 def narrowest(gain: Gain, limit: float, times: int, widest: float, centred: bool) -> tuple[Smoothing, float]:
-    """The least width of so many averages that holds the limit, and its gain; the widest one if none does."""
+    """The least width at which `times` averages hold the limit, and its gain; the widest one if none does."""
     near, sizes = gain.near, gain(gain.near)
 
     def holds(width: float) -> bool:
