@@ -1,12 +1,12 @@
 """Runs that set numbers which no test of a model can set: what each would cost or spoil with another value.
 
     python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths] [visits]
-        [averages] [shifts]
+        [quiet] [averages] [shifts]
 
 lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.thermal.compensator.MOST_CHANGE`; decades:
 `effects.ageing.compensator.DECADES`; sweeps: `emission.worth.SWEEPS`; unknown: `tracking.MOST_UNKNOWN`; exact:
-`diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`; visits:
-`chain.chain.VISIT_SAMPLES`; averages: `compensator.chain.noise.MOST_TIMES`; shifts: the bounds of
+`diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`; visits: `chain.chain.VISIT_SAMPLES`;
+quiet: `compensator.chain.layout.QUIET`; averages: `compensator.chain.noise.MOST_TIMES`; shifts: the bounds of
 `compensator.chain.moving.found_shifted`. All of them take some seconds, shifts a minute; what is random has fixed
 seeds.
 """
@@ -27,7 +27,8 @@ from numpy.typing import NDArray
 import hystgen
 from hystgen import plants
 from hystgen.chain import chain
-from hystgen.compensator.chain import moving, noise, preview, tables
+from hystgen.compensator import reference
+from hystgen.compensator.chain import layout, moving, noise, preview, tables
 from hystgen.compensator.chain.layout import SAMPLES_A_SWEEP
 from hystgen.diagnosis.data import signals
 from hystgen.diagnosis.data.items import Item
@@ -37,6 +38,8 @@ from hystgen.effects.ageing.model import LogarithmicAgeing
 from hystgen.effects.base import Run
 from hystgen.effects.lag.compensator import LagBlock
 from hystgen.parameters.files import parse_parameters
+from hystgen.parameters.schema import Compensation
+from hystgen.plays import slots
 from hystgen.records import Record
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -195,6 +198,29 @@ def visits() -> None:
         print(f"  {effect.partition(',')[0].removeprefix('name: '):15}", *(f"{x:8.1e}" for x in changes))
 
 
+def quiet() -> None:
+    """What a quiet drive misses of slow ramps, behind a lag of 10 samples in q15, and how often the drive changes.
+
+    Rms of what arrives less the rounded reference, output codes, from the end of the first second on.
+    """
+    counts = (2, 8, layout.QUIET, 128)
+    print(f"quiet: samples a code of the ramp; error led always, and quiet from {counts} equal references on; changes")
+    one = hystgen.Model(parse_parameters(WITH_EFFECT.format(effect="name: lag, time_constant: 0.01"), "stage_x.yaml"))
+    for samples in (3, 10, 20, 40, 100, 400):
+        u = np.rint(-2000.0 + np.arange(4000) / samples)
+        errors, changes = [], []
+        for count in (0, *counts):
+            with mock.patch.object(layout, "QUIET", count):
+                numbers = tables.build(one.chain, "q15", 1e-3, Compensation(quiet=count > 0))
+            assert numbers.codes is not None
+            v, _ = reference.answers(numbers.tables, True, np.full(len(u), slots.OP_STEP, dtype=np.uint8), u)
+            y = one.simulate(v * float(numbers.codes.drive_lsb), t=1e-3 * np.arange(len(u)))
+            error = (y / float(numbers.codes.output_lsb) - u)[1000:]
+            errors.append(math.sqrt(float(np.mean(error**2))))
+            changes.append(int(np.count_nonzero(np.diff(v[1000:]))))
+        print(f"  {samples:4}", *(f"{x:6.3f}" for x in errors), " ", *(f"{x:5}" for x in changes))
+
+
 def averages() -> None:
     """What averages lose of smooth references, and poles in front of the lead that hold the same noise gain.
 
@@ -285,7 +311,8 @@ def _lost(response: NDArray[np.complex128]) -> float:
 
 
 RUNS: dict[str, Callable[[], None]] = {
-    each.__name__: each for each in (lag, newton, decades, sweeps, unknown, exact, lengths, visits, averages, shifts)
+    each.__name__: each
+    for each in (lag, newton, decades, sweeps, unknown, exact, lengths, visits, quiet, averages, shifts)
 }
 
 

@@ -382,7 +382,7 @@ class _Searches:
 
 
 def _while_falling(search: Search, steps: int) -> Search:
-    """The search after so many steps, and as many again as long as they lower the error by enough (`FALLING`)."""
+    """The search after `steps` steps, and as many again for as long as they lower the error by enough (`FALLING`)."""
     for _ in range(acceptance.LONGER):
         before, search = search.now.rms, search.further(steps, COARSE)
         if search.now.rms >= acceptance.FALLING * before:
