@@ -199,9 +199,9 @@ class Compiled:
 
 
 QUIET = 32
-"""[samples] Equal references after which the drive stands still. Set by: benchmarks/chosen_numbers.py quiet. Behind a lag
-of 10 samples in q15 a ramp of a code in 20 samples then arrives as without it; with 8 it is missed by 0.088 codes (rms)
-instead of 0.077. With 128 a ramp of a code in 100 samples still dithers at all of them, with 32 at a third."""
+"""[samples] Equal references after which the drive stands still. Set by: benchmarks/chosen_numbers.py quiet. Behind a
+lag of 10 samples in q15 a ramp of a code in 20 samples then arrives as without it; with 8 it is missed by 0.088 codes
+(rms) instead of 0.077. With 128 a ramp of a code in 100 samples still dithers all the time, with 32 a third of it."""
 
 
 def quiet(how: Compensation, taps: Taps | None) -> int:

@@ -32,7 +32,8 @@ POLISHED = 1e-5
 """A search ends after a step that lowers the error by a smaller share: far below any difference that decides."""
 
 RESTARTS = 4
-"""Most searches for start memories beside the same effects."""
+"""[searches] Most for start memories beside the same effects. Each has to lower the error by `BETTER` for another to
+follow, so that this bounds the time alone."""
 
 
 class _Block:
