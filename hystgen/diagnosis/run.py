@@ -136,13 +136,6 @@ class _Done:
     found: Outcome
     notes: tuple[str, ...] = ()
 
-    @property
-    def explained(self) -> bool:
-        """Whether something was named, or nothing but noise is left."""
-        return bool(self.found.found) or acceptance.is_noise(
-            rms(self.found.fitted.errors(self.records.to_fit)), self.noise.rms
-        )
-
     def noting(self, note: str) -> _Done:
         """The same with one more note."""
         return replace(self, notes=(*self.notes, note))
@@ -203,27 +196,18 @@ class _Task:
     def _searched(self, history: History) -> _Done:
         """The search from the nominal model, or without its front if that misleads it.
 
-        A front fitted to one loop may follow an effect there, or stand in the way of one. If held-out records are
-        predicted better without the front, the search with it has to do better in the end than the names that are found
-        without it; so has a search with it that names nothing and leaves more than noise.
+        A front fitted to one loop may follow an effect there. If held-out records are predicted better without the
+        front, the search with it has to do better in the end than the names that are found without it.
         """
         ready, refit, bare = self._begun(history)
-        if bare is None:
-            return self._thorough(ready, refit)
-        if selection.better(bare(ready), refit(ready), ready.held):
+        if bare is not None and selection.better(bare(ready), refit(ready), ready.held):
             without = self._thorough(ready, bare)
             if without.found.found and not without.found.bends:
                 return without.noting(NO_FRONT)
             done = self._thorough(ready, refit)
-        else:
-            done = self._thorough(ready, refit)
-            if done.explained:
-                return done
-            without = self._thorough(ready, bare)
-            if not without.found.found:
-                return done
-        better = selection.better(without.found.fitted, done.found.fitted, ready.held)
-        return without.noting(NO_FRONT) if better else done
+            better = selection.better(without.found.fitted, done.found.fitted, ready.held)
+            return without.noting(NO_FRONT) if better else done
+        return self._thorough(ready, refit)
 
     def _thorough(self, ready: Prepared, refit: Refit) -> _Done:
         """The search, and another one if nothing could be named although much error remains.
@@ -231,7 +215,8 @@ class _Task:
         In the second, the end of each fitted record judges too, since it may show what held-out records do not.
         """
         done = self._search(ready, refit)
-        if done.explained:
+        left = rms(done.found.fitted.errors(done.records.to_fit))
+        if done.found.found or acceptance.is_noise(left, done.noise.rms):
             return done
         more = preparing.with_ends(ready)
         again = None if more is None else self._search(more, refit)
