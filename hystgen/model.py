@@ -23,7 +23,6 @@ from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters, load_parameters
-from hystgen.parameters.schema import MOST_REFERENCES
 from hystgen.plays import slots
 
 if TYPE_CHECKING:
@@ -154,6 +153,7 @@ class Model:
 
     def _check_noise_gain(self, arithmetic: str) -> None:
         """Raise UnsupportedEffectsError where the inverse makes more of the reference's noise than is allowed."""
+        from hystgen.compensator.chain import noise
         from hystgen.compensator.chain import tables as chain_tables
 
         how, seconds = self.parameters.emit.compensation, self.parameters.sample_time
@@ -171,11 +171,7 @@ class Model:
                     f"{ARITHMETICS[arithmetic].finer}, or hold or allow it with emit.compensation.noise_gain"
                 )
             return
-        if compiled.noisy(how.noise_gain):
-            raise UnsupportedEffectsError(
-                f"averages over {MOST_REFERENCES} samples of the reference, the most that the C keeps, leave a noise "
-                f"gain of {gain:.4g}, more than emit.compensation.noise_gain = {how.noise_gain:g}; allow that much"
-            )
+        noise.check(gain, how.noise_gain)
 
     def refusals(self, operator: str, arithmetic: str) -> list[tuple[Effect, str]]:
         """The effects that an emitted operator cannot have, with the reasons; none without a sample time."""
@@ -356,7 +352,7 @@ class Model:
         """The inverse in double precision of a model with effects; raises as `inverse`."""
         from hystgen.compensator.chained import Compensator
 
-        return Compensator(self.chain, self.parameters.emit.compensation.compensate)
+        return Compensator(self.chain, self.parameters.emit.compensation)
 
 
 @dataclass(frozen=True, repr=False)
@@ -381,7 +377,8 @@ class InverseModel:
         """Drive (N,) for the reference samples `u` (N,); arguments as for `Model.simulate`.
 
         With effects the whole reference is known: delays and modes take it before its time, and everything is at rest
-        at the first sample. What a mode leaves is its reference's fourth difference over 6, what a lag leaves a quarter
+        at the first sample. It is read as `emit.compensation` of the parameter file says, in samples of the record;
+        `quiet` changes nothing in double precision, which has no codes to dither between. What a mode leaves is its reference's fourth difference over 6, what a lag leaves a quarter
         of the second difference of the drive behind it; all else is exact.
         """
         if not self.forward.effects:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.compensator.chain.layout import LEAST_LATE
 from hystgen.identification import identify
 from hystgen.identification.prepared import samples_in
 from hystgen.model import Model
@@ -22,9 +23,6 @@ MOST_UNKNOWN = 0.8
 """[share of a record] If the drive reaches the second of its ends later than this, the whole record is judged. Over a
 fifth of a record of `examples/` the rms error is 0.12 to 2.0 times that over all of it, over a twentieth 0.02 to 3.1
 times. Set by: benchmarks/chosen_numbers.py unknown."""
-
-READING = ("preview", "drive_hold", "resonance", "taps", "corner", "noise_gain", "quiet")
-"""Keys of `emit.compensation` with which the C tracks something else than the reference, or later."""
 
 LINE, PLAYS, WHOLE = "straight line", "plays alone", "whole model"
 """The compensators that turn the reference into a drive."""
@@ -72,15 +70,17 @@ class Tracking:
         return "\n".join(lines)
 
 
-def left_out(model: Model) -> str:
-    """A sentence about options of the parameter file that `track` leaves out, empty if there are none."""
-    how = model.parameters.emit.compensation
-    keys = [key for key in READING if getattr(how, key) != type(how).model_fields[key].default]
-    if not model.effects or not keys:
+def late(model: Model, records: Sequence[Record]) -> str:
+    """A sentence about how late the motion is if `emit.compensation` makes it so, else empty."""
+    if not model.effects:
+        return ""
+    step = float(np.median(np.diff(records[0].t)))
+    samples = model.compensator.reading(step).late(model.parameters.emit.compensation.preview)
+    if samples <= LEAST_LATE:
         return ""
     return (
-        f"the figures are those of the inverse in double precision, without {', '.join(keys)} of emit.compensation; "
-        "the header of the emitted C says how late its motion is"
+        f"with emit.compensation of the parameter file the motion of the whole model is {samples:.3g} samples late, "
+        "which counts as error"
     )
 
 

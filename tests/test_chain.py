@@ -413,7 +413,7 @@ def test_stays_within_its_bounds(name: str, seed: int) -> None:
     run = record(numbers, seed)
     ends = tuple(float(end) for end in numbers.tables.limits[:2])
     v = answers(numbers, run, True).astype(float)
-    wanted = Compensator(one.chain, one.parameters.emit.compensation.compensate).drives(run, ends)  # type: ignore[arg-type]
+    wanted = Compensator(one.chain, one.parameters.emit.compensation).drives(run, ends)  # type: ignore[arg-type]
     known = N - numbers.ahead
     assert np.max(np.abs(v - wanted)[:known]) <= bound.inverse
     if operator(name) == "both":

@@ -13,6 +13,7 @@ import pytest
 from scipy import signal
 
 import hystgen
+from hystgen.basics import jit
 from hystgen.basics.problems import EffectsError, NotInvertibleError
 from hystgen.cascade import PI, Cascade
 from hystgen.chain.chain import Chain
@@ -206,18 +207,6 @@ def test_a_mode_arrives_as_the_mean_of_three_samples() -> None:
         both([mode], (), times(uneven=True), smooth(times(uneven=True)))
 
 
-def test_thresholds_that_grow_too_fast_are_stood_in_for() -> None:
-    """Their own inverse would chatter: drives are as smooth as those of the static one."""
-    t = times()
-    fast = effect("rate_dependence", betas=(5.0 * T,) * 9)
-    v, y = both([fast], (), t, smooth(t))
-    static = both([], (), t, smooth(t))[0]
-    rough = [float(np.max(np.abs(np.diff(each, 2)))) for each in (v, static)]
-    assert rough[0] < 2.0 * rough[1]
-    plain = Chain(Cascade(PLAYS, (), 1.0, (0.0, 100.0)), [fast]).simulate([Run(t, static, {})])[0]
-    assert float(np.std(y - smooth(t))) < 0.3 * float(np.std(plain - smooth(t)))
-
-
 FILE = """\
 hystgen: 1
 name: stage_x
@@ -236,6 +225,85 @@ def model(tmp_path: Path) -> Callable[[str], hystgen.Model]:
         return hystgen.load(tmp_path / "stage_x.yaml")
 
     return of
+
+
+RUNG = """\
+    - {name: resonance, frequency: 20, damping: 0.02}
+    - {name: delay, time: 2.6e-3}
+    - {name: lag, time_constant: 0.01}
+emit: {compensation: {%s}}
+"""
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        "resonance: notch", "resonance: shaper", "resonance: none", "taps: 5", "noise_gain: 8",
+        "noise_gain: 8, preview: 0", "preview: 0", "preview: 9", "corner: 6", "drive_hold: held", "quiet: true",
+        "resonance: notch, corner: 7, preview: 2, drive_hold: held",
+    ],
+)  # fmt: skip
+def test_the_reference_is_read_as_the_c_reads_it(options: str, model: Callable[[str], hystgen.Model]) -> None:
+    """Double precision against the bit reference of float64, whose rounding a lead of 250 leaves below 1e-11."""
+    one = model(RUNG % options)
+    rng = np.random.default_rng(0)
+    u = np.concatenate([np.full(20, 7.0), 7.0 + np.cumsum(0.02 * rng.normal(size=180))])
+    with jit.plain():
+        emitted = one.inverse().simulate(u, "float64")
+    assert float(np.max(np.abs(one.inverse().simulate(u, clamp=True) - emitted))) < 1e-10
+    usual = model(RUNG % "").inverse().simulate(u, clamp=True)
+    assert np.array_equal(one.inverse().simulate(u, clamp=True), usual) == (options in ("quiet: true", "preview: 9"))
+
+
+@pytest.mark.parametrize("by", ["notch", "shaper"])
+def test_a_step_that_is_shaped_or_notched_leaves_no_ringing(by: str, model: Callable[[str], hystgen.Model]) -> None:
+    """From the first step on, where the plays have only one way to go; it rings by more than half of it otherwise."""
+    mode = f"    - {{name: resonance, frequency: 20, damping: 0.02}}\nemit: {{compensation: {{resonance: {by}}}}}\n"
+    one = model(mode)
+    u = np.where(np.arange(300) < 20, 1.0, 6.0)
+    y = one.simulate(one.inverse().simulate(u))
+    assert float(np.max(np.abs(y - u)[100:])) < 1e-12 * 5.0
+    still = model(mode.replace(by, "none"))
+    assert float(np.max(np.abs(still.simulate(still.inverse().simulate(u)) - u)[100:])) > 0.5 * 5.0
+
+
+def test_options_that_count_samples_need_them_at_even_times(model: Callable[[str], hystgen.Model]) -> None:
+    lag = "    - {name: lag, time_constant: 0.01}\nemit: {compensation: {%s}}\n"
+    t = times(uneven=True)
+    with pytest.raises(EffectsError, match=r"emit\.compensation needs samples at even times; resample"):
+        model(lag % "corner: 4").inverse().simulate(smooth(t), t=t)
+    with pytest.raises(EffectsError, match=r"leave a noise gain of 1, more than emit\.compensation\.noise_gain = 0\.5"):
+        model(lag % "noise_gain: 0.5").inverse().simulate(smooth(times()), t=times())
+    assert np.all(np.isfinite(model(lag % "quiet: true").inverse().simulate(smooth(t), t=t)))
+
+
+def test_references_before_a_record_are_its_first(
+    model: Callable[[str], hystgen.Model], run: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    """What was driven before a record is no reference; a linear stage does not remember it either."""
+    shaped = RUNG.replace("    - {name: lag, time_constant: 0.01}\n", "") % "resonance: shaper"
+    text = (FILE + shaped).replace("[0, 5, 10, 20], weights: [0.1, 0.02, 0.02, 0.03]", "[0], weights: [0.2]")
+    (tmp_path / "stage_x.yaml").write_text(text)
+    t = times()
+    np.savetxt(tmp_path / "u.csv", np.column_stack([t, smooth(t)]), delimiter=",", header="t,u", comments="")
+    found = []
+    for history in ((), ("--history", "80,20")):
+        code, out, err = run("simulate", tmp_path / "stage_x.yaml", tmp_path / "u.csv", "--operator", "inverse", *history)
+        assert (code, err) == (0, "")
+        found.append(out)
+    assert found[0] == found[1]
+
+
+def test_thresholds_that_grow_too_fast_are_stood_in_for() -> None:
+    """Their own inverse would chatter: drives are as smooth as those of the static one."""
+    t = times()
+    fast = effect("rate_dependence", betas=(5.0 * T,) * 9)
+    v, y = both([fast], (), t, smooth(t))
+    static = both([], (), t, smooth(t))[0]
+    rough = [float(np.max(np.abs(np.diff(each, 2)))) for each in (v, static)]
+    assert rough[0] < 2.0 * rough[1]
+    plain = Chain(Cascade(PLAYS, (), 1.0, (0.0, 100.0)), [fast]).simulate([Run(t, static, {})])[0]
+    assert float(np.std(y - smooth(t))) < 0.3 * float(np.std(plain - smooth(t)))
 
 
 def test_what_has_no_inverse_says_why(model: Callable[[str], hystgen.Model]) -> None:

@@ -1258,3 +1258,24 @@ def test_show_lists_effects_and_what_they_mean(run: Callable[..., tuple[int, str
     assert "thresholds stay in order up to |w'| = 4.5 a second" in out
     assert "inverse  " not in out
     assert (tmp_path / "stage.svg").stat().st_size > 1000
+
+
+def test_show_says_how_the_inverse_reads_the_reference(
+    run: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    path = tmp_path / "stage.yaml"
+    mode = "    - {name: resonance, frequency: 20, damping: 0.02}\nsample_time: 1.0e-3\n"
+    path.write_text(FILE + mode)
+    _, out, _ = run("show", path)
+    assert out.splitlines()[-1].endswith("samples of the reference on either side of the present one: no ringing, no delay")
+    for option, said, last in (
+        ("resonance: notch", "a notch, see below", "    Resonance: after a step of the reference the stage does not ring"),
+        ("resonance: none", "none, as emit.compensation.resonance says", "        compensation: none"),
+        ("noise_gain: 8", "samples of the reference on either side", "    Noise: references are averaged twice over"),
+        ("quiet: true", "samples of the reference on either side", "    Quiet: after 34 equal references"),
+    ):
+        path.write_text(f"{FILE}{mode}emit: {{compensation: {{{option}}}}}\n")
+        code, out, err = run("show", path)
+        assert (code, err) == (0, "")
+        assert f"compensation: {said}" in out
+        assert out.splitlines()[-1].startswith(last)

@@ -108,7 +108,7 @@ def test_stays_within_its_bounds(name: str, arithmetic: str, seed: int, share: f
     drive = float(codes.drive_lsb)
     v = answers(numbers, given, True).astype(float)
     ends = tuple(float(end) * drive for end in numbers.tables.limits[:2])
-    wanted = Compensator(one.chain, one.parameters.emit.compensation.compensate).drives(exact, ends) / drive  # type: ignore[arg-type]
+    wanted = Compensator(one.chain, one.parameters.emit.compensation).drives(exact, ends) / drive  # type: ignore[arg-type]
     left = np.abs(v - wanted)[: N - numbers.ahead]
     assert np.max(left) <= codes.inverse_error
     assert bool(codes.condition) == (name in ("lagging", "quick", "straight", "everything", "wider", "dilated"))
@@ -256,7 +256,7 @@ def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(arithmetic:
     ends = numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1]
     u = np.rint(np.clip(one.simulate(v, t=t) / output, *ends))
     range_of_drive = tuple(float(end) * drive for end in numbers.tables.limits[:2])
-    wanted = Compensator(one.chain, ["self_heating"]).drives(Run(t, u * output), range_of_drive) / drive  # type: ignore[arg-type]
+    wanted = Compensator(one.chain, Compensation(compensate=("self_heating",))).drives(Run(t, u * output), range_of_drive) / drive  # type: ignore[arg-type]
     worst = float(np.max(np.abs(answers(numbers, Run(t, u), True) - wanted)))
     assert worst <= codes.inverse_error < 4.0 * worst
 

@@ -71,15 +71,30 @@ def test_track_prints_a_table_and_draws(tmp_path: Path, run: Callable[..., tuple
     assert out.splitlines()[-1] == str(tmp_path / "t.svg")
     assert "straight line" in out
     assert (tmp_path / "t.svg").stat().st_size > 1000
-    assert "without" not in err
-    (tmp_path / "quiet.yaml").write_text(TEXT + "emit: {compensation: {noise_gain: 4, quiet: true}}\n")
-    code, shown, err = run("track", tmp_path / "quiet.yaml", tmp_path / "crept.csv")
-    assert "without noise_gain, quiet of emit.compensation" in err
-    assert shown == "".join(out.splitlines(keepends=True)[:-1])
+    assert "late" not in err
+    (tmp_path / "late.yaml").write_text(TEXT + "emit: {compensation: {corner: 21, preview: 10}}\n")
+    code, _, err = run("track", tmp_path / "late.yaml", tmp_path / "crept.csv")
+    assert "the motion of the whole model is 20 samples late, which counts as error" in err
     np.savetxt(tmp_path / "v.csv", rows[:, :2], delimiter=",", header="t,v", comments="")
     code, out, err = run("track", tmp_path / "crept.yaml", tmp_path / "v.csv")
     assert (code, out) == (2, "")
     assert "y" in err
+
+
+def test_what_rounds_corners_or_makes_late_counts_as_error() -> None:
+    """Creep is taken back exactly, so that the motion is the reference as it was averaged and delayed."""
+    record = recorded(0.0)
+    model = Model(parse_parameters(TEXT + "emit: {compensation: {corner: 21, preview: 10}}\n"))
+    (one,) = tracking.track(model, [record]).records
+    mean = np.full(21, 1.0 / 21)
+    averaged = one.reference
+    for _ in range(3):  # of the last 21 samples each: 30 samples late, of which 10 are known ahead
+        averaged = np.convolve(np.pad(averaged, 20, mode="edge"), mean)[20:-40]
+    motion = np.append(averaged[10:], np.full(10, averaged[-1]))
+    assert record.y is not None
+    reached = motion - one.reference + record.y - one.reference
+    reached -= np.mean(reached[one.known :])
+    assert float(np.max(np.abs(one.errors[tracking.WHOLE] - reached)[one.known : -60])) < 1e-3 * float(np.ptp(reached))
 
 
 def test_tracking_needs_the_motion() -> None:

@@ -52,7 +52,7 @@ def track(
         for note in record.notes:
             console.note(f"warning: {record.name}: {note}")
     found = guarded(params, lambda: tracking.track(model, read, visited or (), rest, skip))
-    if note := tracking.left_out(model):
+    if note := tracking.late(model, read):
         console.note(f"warning: {note}")
     console.say(found.table())
     if plot:

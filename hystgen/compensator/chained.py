@@ -2,6 +2,9 @@
 
 The compensator keeps only the actuator's states. In each sample it solves for the drive from the output backwards,
 block by block, limits it, and absorbs the applied drive forwards. A delay and a mode need the reference ahead of time.
+
+The reference is read as the C reads it: the same weights of its samples, at the steps of the record. Only `quiet` and
+`max_rate` are about the C alone, since double precision has no codes between which a drive could dither.
 """
 
 from __future__ import annotations
@@ -19,6 +22,9 @@ from hystgen.basics.problems import EffectsError, NotInvertibleError, Unsupporte
 from hystgen.chain.blocks import Block
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
+from hystgen.compensator.chain import noise, preview
+from hystgen.compensator.chain.layout import Read, read
+from hystgen.compensator.chain.parts import Parts
 from hystgen.effects import own
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.base import Array, Effect, Place, Run
@@ -26,10 +32,10 @@ from hystgen.effects.creep import compensator as creep
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag.model import Lag
 from hystgen.effects.rate_dependence.compensator import Movement
-from hystgen.effects.resonance.compensator import led
 from hystgen.effects.saturation.compensator import unsaturated
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.model import SelfHeating
+from hystgen.parameters.schema import Compensation
 
 EVEN = 1e-3
 """Largest relative difference of steps that count as equal: about the error of a mode's inverse, `w0^2 T^2/12`, which
@@ -41,6 +47,8 @@ ROUNDING = 1e-14
 TURNS = 8
 """Most iterations in a sample, if the gain depends on the drive to be found. 500 jumps over a quarter of the range,
 with a loss of 1 % per decade from half the range on, converge to the last bit in 5 iterations on average, 7 at most."""
+
+STANDARD = Compensation()
 
 TAKEN_IN = frozenset({
     "creep", "rate_dependence", "resonance", "lag", "delay", "slew_limit", "saturation", "thermal", "ageing",
@@ -187,20 +195,21 @@ def filter_block(effect: Effect) -> Block | None:
 class Compensator:
     """Drives for a reference; leaves out a sensor's own nonlinearity, since the reference is the true displacement.
 
-    `compensate`: `drift`, which begins at t = 0, and `self_heating`, to include them although nothing measures them.
-    Raises NotInvertibleError and UnsupportedEffectsError with all reasons.
+    `how`: how the reference is read, in samples of the record, and what is compensated although nothing measures it:
+    `drift`, which begins at t = 0, and `self_heating`. Raises NotInvertibleError and UnsupportedEffectsError with all
+    reasons.
     """
 
-    def __init__(self, chain: Chain, compensate: Collection[str] = ()) -> None:
+    def __init__(self, chain: Chain, how: Compensation = STANDARD) -> None:
         static, effects = chain.cascade, chain.effects
         creeping = [effect for effect in effects if isinstance(effect, creep.EFFECTS)]
         missing = [*(reason for each in creeping for reason in creep.problems(each)), *static.inverse_problems()]
         if missing:
             raise NotInvertibleError(missing)
-        refused = [reason for effect in effects if (reason := refusal(effect, compensate))]
+        refused = [reason for effect in effects if (reason := refusal(effect, how.compensate))]
         if refused:
             raise UnsupportedEffectsError(f"the inverse cannot take in {', '.join(refused)}; remove it from the model")
-        self.static, self.effects = static, effects
+        self.static, self.effects, self.how = static, effects, how
         plays = [effect for effect in effects if effect.place is Place.PLAYS]
         drives, outputs = (
             [block for effect in effects if effect.place is place and (block := filter_block(effect))]
@@ -211,8 +220,7 @@ class Compensator:
         self.slew = self._called("slew_limit")
         lags = [block for block in drives if isinstance(block, lag.LagBlock)]
         self.braked = lags[0] if self.slew and len(lags) == 1 else None
-        self.modes = [effect for effect in self._called("resonance") if effect.block is None]
-        self.delay = math.fsum(effect.time for effect in self._called("delay"))
+        self.parts = Parts.of(effects)
 
     def _called(self, name: str) -> list[Any]:
         return [effect for effect in self.effects if effect.name == name]
@@ -295,7 +303,7 @@ class Compensator:
 
     def _gains(self, reference: Run) -> list[tuple[Array, Array]]:
         """Gain and offset (N,) by each logged temperature, at the time when the drive of a sample takes effect."""
-        ahead = reference.t + self.delay
+        ahead = reference.t + self.parts.delay
         extra = {name: np.interp(ahead, reference.t, column) for name, column in reference.extra.items()}
         later = Run(reference.t, reference.v, extra)
         logged = [effect for effect in self._called("thermal") if effect.columns]
@@ -308,19 +316,40 @@ class Compensator:
             wanted = wanted - np.where(asked, effect.added(reference), 0.0)
         for effect in reversed(self._called("saturation")):
             wanted = unsaturated(effect, wanted)
-        t = reference.t
-        if not self.modes:
-            return np.asarray(np.interp(t + self.delay, t, wanted)) if self.delay else wanted
-        steps = np.diff(t)[asked[1:] & asked[:-1]]
-        step = float(np.median(steps)) if len(steps) else 1.0
-        if len(steps) and float(np.max(np.abs(steps - step))) > EVEN * step:
-            raise EffectsError("the inverse of a resonance needs samples at even times; resample the reference")
+        t, how = reference.t, self.how
+        modes = self.parts.modes if how.resonance != "none" else []
+        if not (modes or how.corner or how.noise_gain or how.drive_hold == "held" or how.preview is not None):
+            return np.asarray(np.interp(t + self.parts.delay, t, wanted)) if self.parts.delay else wanted
+        step = _even_step(t, asked, "the inverse of a resonance" if modes else "emit.compensation")
+        found = self.reading(step)
+        if found.taps is None:
+            return wanted
+        first = found.taps.first - found.missing(how.preview)
+        target = np.array(wanted)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], asked.astype(np.int8), [0]])))
+        for begin, end in edges.reshape(-1, 2):  # the reference holds before a record and behind it
+            times, values = t[begin:end], wanted[begin:end]
+            target[begin:end] = sum(
+                weight * np.interp(times + (first + i) * step, times, values)
+                for i, weight in enumerate(found.taps.weights.tolist())
+                if weight
+            )
+        return target
 
-        def given(modes: Sequence[Any], times: Array) -> Array:
-            """The input that the first of the modes in series needs."""
-            if not modes:
-                return np.asarray(np.interp(times, t, wanted))
-            before, now, after = (given(modes[1:], times + way) for way in (-step, 0.0, step))
-            return led(modes[0], before, now, after, step)
+    def reading(self, step: float) -> Read:
+        """How the reference is read at samples `step` apart. Raises UnsupportedEffectsError where no averages hold the
+        noise gain."""
+        found = read(self.static, self.parts, step, self.how)
+        if self.how.noise_gain is not None:
+            gain = noise.largest(noise.Gain(self.static, self.parts, step, found.taps or preview.PLAIN))
+            noise.check(gain, self.how.noise_gain)
+        return found
 
-        return given(self.modes, t + self.delay)
+
+def _even_step(t: Array, asked: NDArray[np.bool_], what: str) -> float:
+    """The time in s between two references. Raises EffectsError where `what` does not get them at even times."""
+    steps = np.diff(t)[asked[1:] & asked[:-1]]
+    step = float(np.median(steps)) if len(steps) else 1.0
+    if len(steps) and float(np.max(np.abs(steps - step))) > EVEN * step:
+        raise EffectsError(f"{what} needs samples at even times; resample the reference")
+    return step

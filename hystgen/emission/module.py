@@ -21,7 +21,7 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import tables as chain_tables
 from hystgen.compensator.chain.bounds import UNSLEWED, together
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
-from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, SHARE_BITS, Compiled
+from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, LEAST_LATE, SHARE_BITS, Compiled
 from hystgen.effects import own as own_effects
 from hystgen.effects.base import USER
 from hystgen.emission import chain, cost, numbers, own, runtime, selftest
@@ -29,9 +29,6 @@ from hystgen.emission.options import OPTIONS, Options, seal
 from hystgen.emission.text import WIDTH, comment_text, define, fit, literal
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters, parameters_sha256
-
-LEAST_LATE = 1e-6
-"""[samples] Motion that is less late is in time: the means of ages are sums with rounding."""
 
 PERIODS = (50, 200)
 """[samples] Periods for which the header states what is lost of a sine: a fast one, as long as the fastest sweep for
@@ -242,7 +239,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     )  # fmt: skip
     glue: chain.Glue | None = getattr(values, "glue", None)
     values.timing = _timing(parameters, compiled) if compiled else []
-    values.reading = _reading(compiled) if compiled and options.inverse else []
+    values.reading = [*_reading(compiled), *_quiet(values)] if compiled and options.inverse else []
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
     values.corners = (max(n, 1) if values.fixed else n + 1) if corners else 0
     front = render("front.c.j2", values) if values.stages else ""
@@ -423,6 +420,12 @@ def calls_of(parameters: Parameters, cascade: StaticModel, options: Options) -> 
     return glue.calls if glue else {}
 
 
+def reading_of(parameters: Parameters, cascade: StaticModel, options: Options) -> list[str]:
+    """How the inverse of a model with effects reads the reference, as in its banner: one sentence for each option."""
+    found: list[str] = values_of(parameters, cascade, options).reading
+    return found
+
+
 def cost_of(parameters: Parameters, cascade: StaticModel, options: Options) -> cost.Cost:
     """The cost of the emitted model, as in its banner."""
     found: cost.Cost = values_of(parameters, cascade, options).cost
@@ -438,10 +441,10 @@ def _cost(
     return cost.estimate(cascade, options, values.numbers, text, "".join(values.arrays), types, fields)
 
 
-def _quiet(values: SimpleNamespace, options: Options) -> list[str]:
+def _quiet(values: SimpleNamespace) -> list[str]:
     """When and how far a drive is kept at rest."""
     t = values.numbers
-    if not (options.inverse and values.variant.quiet):
+    if not values.variant.quiet:
         return []
     kept, unit = float(t.number[DITHER]), values.units.drive.replace(",", "")
     if values.fixed:
@@ -492,7 +495,6 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         f"layout {options.layout}",
         *(f"Not compensated: {words}" for words in options.left_out),
         *values.reading,
-        *_quiet(values, options),
         *([""] if values.precision else []),
         *values.precision,
         "",

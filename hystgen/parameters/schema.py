@@ -225,7 +225,7 @@ products in a step; a preview of 1 s at 1 kHz."""
 
 
 class Compensation(_Part):
-    """How the C compensates effects."""
+    """How the inverse compensates effects."""
 
     preview: Annotated[int, Field(ge=0, le=MOST_REFERENCES)] | None = Field(
         default=None,
@@ -279,7 +279,7 @@ class EmitDefaults(_Part):
         default=None, description="fixed point, and a quiet drive in floating point: input units per code"
     )
     output_lsb: Positive | None = Field(default=None, description="fixed point: output units per code")
-    compensation: Compensation = Field(default=Compensation(), description="how effects are compensated in the C")
+    compensation: Compensation = Field(default=Compensation(), description="how the inverse compensates effects")
 
 
 class Parameters(_Part):

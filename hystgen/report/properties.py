@@ -7,12 +7,17 @@ import math
 from typing import Any
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics.problems import EffectsError, FormatError, counted, percent
+from hystgen.basics.problems import EffectsError, FormatError, NotInvertibleError, counted, percent
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.bounds import error_bounds
+from hystgen.compensator.chain.preview import rings
+from hystgen.effects import Effect
+from hystgen.effects.resonance.model import Resonance
+from hystgen.emission import module
 from hystgen.emission.calls import emit_options
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.model import SETTLED, Model
+from hystgen.parameters.schema import Compensation
 
 HARD_RATIO = 1e6
 """Slope ratio from which a warning is given: a rounding of float32, 6e-8, is then 6 % of the drive."""
@@ -114,8 +119,6 @@ def settling(model: Model, within: float = SETTLED) -> str:
 
 def cost(model: Model) -> str:
     """Cost of the C that `emit` would write, that of the forward operator if there is no inverse; "" if it refuses."""
-    from hystgen.emission import module
-
     options = emit_options(model, operator="forward" if model.cascade.inverse_problems() else None)
     try:
         found = module.cost_of(model.parameters, model.cascade, options)
@@ -144,9 +147,27 @@ def _effects(model: Model) -> list[str]:
                 value = getattr(effect, key)
                 lines.append(f"        {key} = {_shown(value)}: {field.description}")
         lines += [f"        {remark}" for remark in effect.remarks(tuple(model.cascade.pi.thresholds))]
-        if effect.compensation:
-            lines.append(f"        compensation: {effect.compensation}")
-    return lines
+        if words := _compensation(effect, model.parameters.emit.compensation):
+            lines.append(f"        compensation: {words}")
+    return [*lines, *(f"    {words}" for words in _reading(model))]
+
+
+def _compensation(effect: Effect, how: Compensation) -> str:
+    """How far the inverse can correct an effect; of a mode, what `emit.compensation.resonance` makes of that."""
+    if not isinstance(effect, Resonance) or how.resonance == "inverse":
+        return effect.compensation
+    if how.resonance == "none":
+        return "none, as emit.compensation.resonance says"
+    return f"a {how.resonance}, see below" if rings(effect, how.resonance) else effect.compensation
+
+
+def _reading(model: Model) -> list[str]:
+    """How the inverse reads the reference, as the banner of its C says; nothing where `emit` refuses it."""
+    try:
+        options = emit_options(model, operator="inverse")
+        return module.reading_of(model.parameters, model.cascade, options)
+    except (FormatError, NotInvertibleError, EffectsError):
+        return []
 
 
 def _shown(value: Any) -> str:

@@ -51,6 +51,9 @@ TRAVEL_BITS = 16
 VERIFIED_SHARE = 0.125
 """The share with which verification corrects: a number of every arithmetic."""
 
+LEAST_LATE = 1e-6
+"""[samples] Motion that is less late is in time: the means of ages are sums with rounding."""
+
 SAMPLES_A_SWEEP = 50
 """Fewest samples from one end of the drive's range to the other for which bounds are stated: a triangle at a hundredth
 of the sample rate still has its shape, and errors by ageing and by contacts within a step are small."""
@@ -165,18 +168,12 @@ class Compiled:
     @property
     def ahead(self) -> int:
         """NAME_PREVIEW: what the model needs, or what was asked for."""
-        return self.needed if self.asked is None else self.asked
-
-    @property
-    def needed(self) -> int:
-        """Samples by which the taps read ahead."""
-        return max(self.taps.ahead, 0) if self.taps else 0
+        return Read(self.taps, self.smoothing, self.shaped).ahead(self.asked)
 
     @property
     def late(self) -> float:
         """Samples by which the motion is late on a ramp."""
-        missing = max(self.needed - self.ahead, 0)
-        return missing + sum(each.late for each in (self.smoothing, self.shaped) if each)
+        return Read(self.taps, self.smoothing, self.shaped).late(self.asked)
 
     @cached_property
     def own(self) -> list[Linear]:
@@ -192,10 +189,6 @@ class Compiled:
     def noise_gain(self) -> float:
         """Largest gain from reference to drive over all frequencies, divided by the gain at rest."""
         return noise.largest(noise.Gain(self.static, self.parts, self.seconds, self.taps or preview.PLAIN))
-
-    def noisy(self, limit: float) -> bool:
-        """Whether the noise gain exceeds a limit, by more than its own rounding."""
-        return self.noise_gain > limit * (1.0 + noise.SAME)
 
 
 QUIET = 32
@@ -258,7 +251,20 @@ class Read(NamedTuple):
 
     def ahead(self, asked: int | None) -> int:
         """`Compiled.ahead`."""
-        return asked if asked is not None else max(self.taps.ahead, 0) if self.taps else 0
+        return asked if asked is not None else self.needed
+
+    @property
+    def needed(self) -> int:
+        """Samples by which the taps read ahead."""
+        return max(self.taps.ahead, 0) if self.taps else 0
+
+    def missing(self, asked: int | None) -> int:
+        """Samples of these that are not known ahead of the motion."""
+        return max(self.needed - self.ahead(asked), 0)
+
+    def late(self, asked: int | None) -> float:
+        """Samples by which the motion is late on a ramp."""
+        return self.missing(asked) + sum(each.late for each in (self.smoothing, self.shaped) if each)
 
 
 def read(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> Read:

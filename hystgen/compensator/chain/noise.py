@@ -19,6 +19,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.basics.problems import UnsupportedEffectsError
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import moving, own
 from hystgen.compensator.chain.own import Linear
@@ -30,6 +31,7 @@ from hystgen.effects.lag import compensator as lag
 from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.rate_dependence.compensator import Movement
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate
+from hystgen.parameters.schema import MOST_REFERENCES
 
 Array = NDArray[np.float64]
 
@@ -153,6 +155,16 @@ def peaks(gain: Callable[[Array], Array], near: Array) -> tuple[Array, Array]:
 def largest(gain: Gain) -> float:
     """The largest gain over all frequencies."""
     return float(np.max(peaks(gain, gain.near)[0]))
+
+
+def check(gain: float, limit: float) -> None:
+    """Raise UnsupportedEffectsError where the widest averages leave a noise gain above its limit, by more than its own
+    rounding."""
+    if gain > limit * (1.0 + SAME):
+        raise UnsupportedEffectsError(
+            f"averages over {MOST_REFERENCES} samples of the reference, the most that the C keeps, leave a noise gain "
+            f"of {gain:.4g}, more than emit.compensation.noise_gain = {limit:g}; allow that much"
+        )
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A mode: what leads to a wanted motion, from three samples of it; and as a block of the forward operator.
+"""A mode: its poles at samples, and as a block of the forward operator.
 
 The block keeps how far the output lies `off` its input, and the `rate` of that, both 0 at rest, so that rounding ends
 with the motion. Only the forward operator has it: the zeros of a second-order system sampled with straight input, near
@@ -36,16 +36,6 @@ def denominator(effect: Resonance, step: float) -> tuple[float, float]:
     apart = math.sqrt(zeta * zeta - 1.0)
     slow, fast = math.exp(-angle / (zeta + apart)), math.exp(-(zeta + apart) * angle)
     return -(slow + fast), slow * fast
-
-
-def led(effect: Resonance, before: Array, now: Array, after: Array, step: float) -> Array:
-    """What the mode has to be given (N,) so that it moves as wanted, from samples a step apart.
-
-    `(x_(k+1) + a1 x_k + a2 x_(k-1))/(1 + a1 + a2)`: no recursion, hence stable for every frequency and damping. What
-    arrives is `(x_(k+1) + 4 x_k + x_(k-1))/6`, without delay and without ringing at corners.
-    """
-    a1, a2 = denominator(effect, step)
-    return np.asarray((after + a1 * now + a2 * before) / (1.0 + a1 + a2))
 
 
 @dataclass(frozen=True)

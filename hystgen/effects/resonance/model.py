@@ -121,7 +121,7 @@ class Resonance(_Mode):
     order: ClassVar[int] = 1
     later: ClassVar[tuple[str, ...]] = ("shape",)
     compensated: ClassVar[Compensated] = "approximate"
-    compensation: ClassVar[str] = "three samples of the reference around the present one: no ringing, no delay"
+    compensation: ClassVar[str] = "samples of the reference on either side of the present one: no ringing, no delay"
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
