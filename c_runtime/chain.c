@@ -35,7 +35,7 @@ static hystgen_signal_t hystgen_forward_played(hystgen_forward_t *self, hystgen_
     if (reached < late || reached > late) {
         self->status |= HYSTGEN_STATUS_SLEW_LIMITED;
     }
-    const hystgen_signal_t x = hystgen_entered_drive((hystgen_real_t)reached);
+    const hystgen_signal_t x = hystgen_entered_drive(reached);
     const hystgen_signal_t a = self->moving ? hystgen_forward_drive_side_absorb(self, x)
                                             : hystgen_forward_drive_side_rest(self, x);
     self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, hystgen_arriving(a)));

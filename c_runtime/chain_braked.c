@@ -9,7 +9,7 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(const hystgen_inve
         return v;
     }
     const hystgen_signal_t drive =
-        hystgen_braked_drive(&hystgen_braked_1, &self->braked_1, hystgen_reaching(near),
-                             hystgen_reaching(v > near ? v - near : near - v));
+        hystgen_braked_drive(&hystgen_braked_1, &self->braked_1, hystgen_entered_drive(near),
+                             hystgen_entered_drive(v > near ? v - near : near - v));
     return hystgen_inverse_within(self, hystgen_drive_code(drive));
 }

@@ -8,15 +8,6 @@ static inline bool hystgen_finite(hystgen_signal_t x) {
     return true;
 }
 
-static inline hystgen_signal_t hystgen_entered_drive(hystgen_real_t v) {
-    return (hystgen_signal_t)v * ((hystgen_signal_t)1 << HYSTGEN_DRIVE_BITS);
-}
-
-/* A drive that may lie beyond every code, as a signal. */
-static inline hystgen_signal_t hystgen_reaching(hystgen_reach_t v) {
-    return (hystgen_signal_t)v * ((hystgen_signal_t)1 << HYSTGEN_DRIVE_BITS);
-}
-
 /* A signal in front of the plays, in units of their input. */
 static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a) {
     return (hystgen_fine_t)hystgen_nearest(a, HYSTGEN_ARRIVING_BITS);

@@ -6,14 +6,6 @@ static bool hystgen_finite(hystgen_signal_t x) {
     return x >= -HYSTGEN_REAL_MAX && x <= HYSTGEN_REAL_MAX; /* false for NaN */
 }
 
-static inline hystgen_signal_t hystgen_entered_drive(hystgen_real_t v) {
-    return v;
-}
-
-static inline hystgen_signal_t hystgen_reaching(hystgen_reach_t v) {
-    return v;
-}
-
 static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a) {
     return a;
 }

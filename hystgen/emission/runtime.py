@@ -31,14 +31,14 @@ FLOAT_KERNELS = (
 )
 CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
 CHAIN_BLOCKS = (
-    *(kind.file for kind in KINDS), "delay.c", "delay_float.c", "preview.c", "preview_float.c", "quiet_float.c",
+    *(kind.file for kind in KINDS), "delay.c", "delay_float.c", "preview.c", "preview_float.c", "entered_float.c",
     "quiet.c", "product_float.c",
 )  # fmt: skip
 FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
 FIXED_CHAIN_BLOCKS = (
     "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "braked_fixed.c", "gain_fixed.c", "ageing_fixed.c",
     "heat_fixed.c", "mode_fixed.c", "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c", "preview_fixed.c",
-    "quiet_fixed.c", "quiet.c", "bend.c", "stops.c", "product_fixed.c",
+    "entered_fixed.c", "quiet.c", "bend.c", "stops.c", "product_fixed.c",
 )  # fmt: skip
 """Files that models with effects carry themselves, even with a shared run time."""
 
