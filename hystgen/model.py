@@ -378,8 +378,9 @@ class InverseModel:
 
         With effects the whole reference is known: delays and modes take it before its time, and everything is at rest
         at the first sample. It is read as `emit.compensation` of the parameter file says, in samples of the record;
-        `quiet` changes nothing in double precision, which has no codes to dither between. What a mode leaves is its reference's fourth difference over 6, what a lag leaves a quarter
-        of the second difference of the drive behind it; all else is exact.
+        `quiet` changes nothing in double precision, which has no codes to dither between. What a mode leaves is its
+        reference's fourth difference over 6, what a lag leaves a quarter of the second difference of the drive behind
+        it; all else is exact.
         """
         if not self.forward.effects:
             return self.forward.session("inverse", arithmetic, engine, clamp).run(u)[0]

@@ -277,18 +277,16 @@ def test_options_that_count_samples_need_them_at_even_times(model: Callable[[str
     assert np.all(np.isfinite(model(lag % "quiet: true").inverse().simulate(smooth(t), t=t)))
 
 
-def test_references_before_a_record_are_its_first(
-    model: Callable[[str], hystgen.Model], run: Callable[..., tuple[int, str, str]], tmp_path: Path
-) -> None:
+def test_references_before_a_record_are_its_first(run: Callable[..., tuple[int, str, str]], tmp_path: Path) -> None:
     """What was driven before a record is no reference; a linear stage does not remember it either."""
     shaped = RUNG.replace("    - {name: lag, time_constant: 0.01}\n", "") % "resonance: shaper"
     text = (FILE + shaped).replace("[0, 5, 10, 20], weights: [0.1, 0.02, 0.02, 0.03]", "[0], weights: [0.2]")
     (tmp_path / "stage_x.yaml").write_text(text)
-    t = times()
-    np.savetxt(tmp_path / "u.csv", np.column_stack([t, smooth(t)]), delimiter=",", header="t,u", comments="")
+    t, path = times(), tmp_path / "u.csv"
+    np.savetxt(path, np.column_stack([t, smooth(t)]), delimiter=",", header="t,u", comments="")
     found = []
     for history in ((), ("--history", "80,20")):
-        code, out, err = run("simulate", tmp_path / "stage_x.yaml", tmp_path / "u.csv", "--operator", "inverse", *history)
+        code, out, err = run("simulate", tmp_path / "stage_x.yaml", path, "--operator", "inverse", *history)
         assert (code, err) == (0, "")
         found.append(out)
     assert found[0] == found[1]

@@ -14,6 +14,7 @@ import pytest
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import jit
 from hystgen.compensator import reference
+from hystgen.compensator.chain import moving_float
 from hystgen.emission import cost
 from hystgen.front.tanh import compensator as envelopes
 from hystgen.model import Model
@@ -30,7 +31,9 @@ FRONTS = {
 }
 SAMPLES = 600
 
-INDICES = {"shift", "first", "pieces", "ascending", "below", "scale", "counts", "top", "rose"}
+INDICES = {
+    "shift", "first", "pieces", "ascending", "below", "scale", "counts", "top", "rose", "stage_first", "stage_size",
+}  # fmt: skip
 """Arrays of places and numbers of bits, whose comparisons are no operations on numbers of the model."""
 
 
@@ -83,7 +86,7 @@ def comparison(name: str) -> Callable[[Number, Any], bool]:
     return compare
 
 
-for each in ("add", "sub", "mul", "lshift", "rshift", "and_"):
+for each in ("add", "sub", "mul", "truediv", "floordiv", "lshift", "rshift", "and_"):
     for prefix, function in zip(("__", "__r"), arithmetic(each), strict=True):
         setattr(Number, prefix + each.strip("_") + "__", function)
 for each in ("lt", "le", "gt", "ge", "eq", "ne"):
@@ -109,25 +112,25 @@ def model(front: str, n: int, more: str = "") -> Model:
     return Model(parse_parameters(f"{text}    weights: {weights}\n{FRONTS[front]}{more}", "m.yaml"))
 
 
-def dearest(one: Model, name: str, engine: str, inverse: bool) -> tuple[int, int]:
+def dearest(one: Model, name: str, engine: str, inverse: bool, samples: int = SAMPLES) -> tuple[int, int]:
     """Most multiplications and comparisons of a step over jumps of all sizes, beyond the limits too, with commits."""
     tables = one.tables(name, engine)
     code, counted = reference.operations(tables), counting(tables)
     state = counting(reference.new_state(tables, inverse))
     rng = np.random.default_rng(0)
-    x: Any = rng.uniform(-10.5, 10.5, SAMPLES) * rng.choice([1.0, 0.5, 0.1, 0.02], SAMPLES)
-    x[rng.random(SAMPLES) < 0.02] = 11.0
+    x: Any = rng.uniform(-10.5, 10.5, samples) * rng.choice([1.0, 0.5, 0.1, 0.02], samples)
+    x[rng.random(samples) < 0.02] = 11.0
     if ARITHMETICS[name].fixed:
         most = ARITHMETICS[name].code_max
         x = np.clip(np.rint(x / 10.0 * most), -most, most).astype(np.int64)
     elif inverse:
         x = x * one.cascade.output_range[1] / 10.0
-    call = np.where(inverse & (rng.random(SAMPLES) < 0.1), slots.OP_COMMIT, slots.OP_STEP).astype(np.uint8)
+    call = np.where(inverse & (rng.random(samples) < 0.1), slots.OP_COMMIT, slots.OP_STEP).astype(np.uint8)
     arguments, answer, status = counting(x), counting(x[:1]), np.zeros(1, np.uint8)
     found = []
     with jit.plain():
         code.init(counted, state, int(inverse))
-        for k in range(SAMPLES):
+        for k in range(samples):
             Number.products = Number.comparisons = 0
             code.run(counted, state, int(inverse), call[k : k + 1], arguments[k : k + 1], answer, status)
             found.append((Number.products, Number.comparisons) if call[k] == slots.OP_STEP else (0, 0))
@@ -156,6 +159,54 @@ def test_nor_does_one_of_engine_corners_with_an_effect(
     promised[0] += cost.chain_products(tables)["inverse"]
     for met, most in zip(dearest(one, name, "corners", True), promised, strict=True):
         assert met <= most <= 2 * met, (words, met)
+
+
+EFFECTS = {
+    "gain": "name: thermal, gain_per_degree: 0.001",
+    "creep": "name: creep, time_constants: [0.01, 0.1], weights: [0.05, 0.05]",
+    "lag": "name: lag, time_constant: 0.01",
+    "exact lag": "name: lag, time_constant: 3.0e-4",
+    "braked lag": "name: lag, time_constant: 0.01}, {name: slew_limit, rate: 500, falling_rate: 300",
+    "ageing": "name: ageing, loss: 0.01, travel: 50.0",
+    "heat": "name: thermal, source: self_heating, time_constant: 10, heating: 1.0e-5, gain_per_degree: 0.001",
+    "drift": "name: drift, rate: 1.0e-3",
+    "tanh": "name: saturation, level: 60.0",
+    "stops": "name: saturation, shape: stops, lower: -6.0, upper: 6.0, give: 0.1",
+    "mode": "name: resonance, frequency: 50, damping: 0.05",
+    "part of a mode": "name: resonance, shape: part, share: 0.1, frequency: 50, damping: 0.05",
+    "delay": "name: delay, time: 2.6e-3",
+}
+PLAY_EFFECTS = {
+    "relaxation": "name: rate_dependence, shape: relaxation, time_constant: 0.01",
+    "dashpot": "name: rate_dependence, shape: relaxation, time_constant: 0.01, exponent: 2.0",
+    "thresholds": "name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 1.0e-4, 1.0e-4]",
+    "loop centre": "name: noncongruent, shape: centre, amplitude: 0.3, centre: 0, width: 5",
+    "polynomials": "name: noncongruent, coefficients: [[0.05], [0.05], [0.05], [0.05], [0.05]]",
+    "relaxation and centre": "name: rate_dependence, shape: relaxation, time_constant: 0.01}, "
+    "{name: noncongruent, shape: centre, amplitude: 0.3, centre: 0, width: 5",
+}
+
+
+@pytest.mark.slow(one_in=4)
+@pytest.mark.parametrize("name", ["float64", "q31"])
+@pytest.mark.parametrize("effect", EFFECTS | PLAY_EFFECTS)
+def test_nor_does_one_of_engine_loop_with_an_effect(effect: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Comparisons are printed of the plays alone, which one that bends or moves them has too."""
+    for module, kernel, of in ((envelopes, "tanh", math.tanh), (envelopes, "atanh", math.atanh),
+                               (moving_float, "tanh", math.tanh)):  # fmt: skip
+        monkeypatch.setattr(module, kernel, lambda x, _, of=of: Number(of(float(x))))
+    how = "emit: {compensation: {compensate: [drift, self_heating], noise_gain: 1.0e+9}}\n"
+    written = (EFFECTS | PLAY_EFFECTS)[effect]
+    one = model("plays", 5, f"  effects: [{{{written}}}]\nsample_time: 1.0e-3\n{how}")
+    tables = one.tables(name, "loop")
+    for operation in ("forward", "inverse"):
+        words = cost.worst_case(5, operation, False, tables)
+        products, comparisons = (int(each) for each in re.findall(r"(\d+) (?:multiplications|comparisons)", words))
+        products += cost.chain_products(tables)[operation]
+        met = dearest(one, name, "loop", operation == "inverse", 60)
+        assert met[0] <= products <= 2 * met[0], (words, met)
+        if effect in PLAY_EFFECTS:
+            assert met[1] <= comparisons <= 2 * met[1], (words, met)
 
 
 @pytest.mark.parametrize("n", [1, 16, 64])

@@ -256,7 +256,8 @@ def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(arithmetic:
     ends = numbers.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1]
     u = np.rint(np.clip(one.simulate(v, t=t) / output, *ends))
     range_of_drive = tuple(float(end) * drive for end in numbers.tables.limits[:2])
-    wanted = Compensator(one.chain, Compensation(compensate=("self_heating",))).drives(Run(t, u * output), range_of_drive) / drive  # type: ignore[arg-type]
+    compensator = Compensator(one.chain, one.parameters.emit.compensation)
+    wanted = compensator.drives(Run(t, u * output), range_of_drive) / drive  # type: ignore[arg-type]
     worst = float(np.max(np.abs(answers(numbers, Run(t, u), True) - wanted)))
     assert worst <= codes.inverse_error < 4.0 * worst
 

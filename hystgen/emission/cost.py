@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from hystgen.arithmetic import ARITHMETICS, Arithmetic
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
-from hystgen.compensator.chain import blocks, costs
+from hystgen.compensator.chain import blocks, costs, moving
 from hystgen.compensator.chain.layout import ARRIVING_BITS, ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.effects.kinds import Kind, Rows
+from hystgen.effects.lag import compensator as lag
 from hystgen.emission.chain import Field
 from hystgen.emission.options import Options
 from hystgen.emission.runtime import Piece
@@ -225,8 +226,8 @@ def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layou
 
 
 def chain_products(t: ChainTables) -> dict[str, int]:
-    """Multiplications of the blocks of a model with effects in one step, of each operator; in fixed point a product of
-    a signal takes two."""
+    """Multiplications of the blocks in front of the plays and behind them in one step, of each operator; in fixed point
+    a product of a signal takes two."""
     kinds = list(map(int, t.behind.kind if t.fixed else t.behind.stage_kind))
     envelopes = kinds.count(slots.TANH)
     everything, inverse = blocks.every(t, "forward"), blocks.every(t, "inverse")
@@ -234,13 +235,11 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     absorbed, solved = (sum(each.products[way] for each in inverse) for way in (0, 1))
     if t.fixed:
         stages = 2 * (len(kinds) - envelopes) + envelopes * t.behind.bends.coefficient.shape[1]
-        viscous = 4 * (len(t.threshold) - 1) * t.moving.used
-        return {
-            "forward": forward + stages + viscous,
-            "inverse": absorbed + solved + stages + viscous + 2 * len(t.tap),
-        }
+        braked = t.braked * (13 + lag.HALVES)
+        return {"forward": forward + stages, "inverse": absorbed + solved + braked + stages + 2 * len(t.tap)}
     stages = len(kinds) + envelopes
-    return {"forward": forward + stages, "inverse": absorbed + solved + stages + len(t.tap)}
+    braked = t.braked * (7 + 2 * lag.HALVES)
+    return {"forward": forward + stages, "inverse": absorbed + solved + braked + stages + len(t.tap)}
 
 
 def _memory(
@@ -300,6 +299,9 @@ def worst_case(n: int, op: str, corners: bool, tables: Tables | FixedTables | Ch
         if fixed and tables.number[ARRIVING_BITS]:  # and a third one for the remainder of a solution
             products, compares, per_bit = products + 2, compares + 10, per_bit + 2
     per_play_products = 0 if corners else 1 if op == "forward" else 2 if fixed else 3
+    curves = 0
+    if not corners and isinstance(tables, ChainTables):
+        products, per_play_products, compares, per_play, curves = _worst_of_chain(op, tables)
     passes = 1 if op == "forward" else 2 + int(numbers.branches)
     compares += (2 if op == "forward" else 16) * int(bool(numbers.branches))
     kernels = ""
@@ -314,6 +316,8 @@ def worst_case(n: int, op: str, corners: bool, tables: Tables | FixedTables | Ch
         kernels = f", {envelopes} tanh"
         if op == "inverse":
             kernels += f", {envelopes * (1 + int(numbers.branches))} atanh"
+    if curves:
+        kernels += f", {curves * n} tanh of plays"
     many = products + per_play_products * n
     words = f"{many} multiplications" + " of 32 by 32 bits" * fixed
     if per_play_products:
@@ -325,6 +329,48 @@ def worst_case(n: int, op: str, corners: bool, tables: Tables | FixedTables | Ch
     elif per_play:
         words += f" ({compares} + {per_play} n)"
     return words + kernels
+
+
+def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
+    """Multiplications, further ones per play, comparisons, further ones per play, and tanh per play: of plays in engine
+    loop of a model with effects.
+
+    Plain plays follow and are solved for one after the other. Plays that an effect moves or bends in a way of their own
+    are searched for: all of them are summed up once for each bisection. Counted in the bit reference
+    (`tests/test_cost.py`).
+    """
+    m, share = t.moving, 1 + t.fixed  # a product with a factor takes two
+    inverse = op == "inverse"
+    finer = inverse and t.fixed and bool(t.number[ARRIVING_BITS])
+    if not m.used or m.scanned:
+        if not inverse:
+            return 1, 1 + 2 * share * m.scanned, 11 + 2 * t.fixed, 4 + 2 * t.fixed if m.scanned else 2, 0
+        products, per_play, compares, more = (4, 3, 21, 3) if t.fixed else (4, 4, 17, 3)
+        if m.scanned:
+            per_play, more = per_play + 2 * share, more + 3 + t.fixed
+        return products + 2 * finer, per_play + finer, compares + 12 * finer, more + 3 * finer, 0
+    yields = len(m.yields).bit_length() + 3 + 2 * t.fixed
+    moved, kept = {
+        moving.DILATED: ((share, 3 + t.fixed), (0, 0)),
+        moving.RELAXING: ((share, 2 + t.fixed), (share, 2 + t.fixed)),
+        moving.DASHPOT: ((share + 3 + t.fixed, yields), (share + 3 + t.fixed, yields)),
+    }.get(m.moves, ((0, 2), (0, 0)))
+    bent, looked = 0, 0
+    if m.bends != moving.STRAIGHT and t.fixed:
+        bent, looked = m.bump.coefficient.shape[1], int(max(m.bump.pieces)).bit_length() + 5
+    elif m.bends != moving.STRAIGHT:
+        bent = m.curve.shape[1] + 3 if m.bends == moving.POLYNOMIAL else 2
+    tanh = int(m.bends == moving.CENTRE and not t.fixed)
+    twice = 1 + (m.moves == moving.RELAXING)  # what a play contributes, and where it will rest
+    sums = 0 if not inverse else 3 + (2 * m.farthest).bit_length() if t.fixed else 1 + m.halves
+    halved = 0 if t.fixed or not inverse else m.halves
+    return (
+        sums + 1 + halved,
+        sums * (1 + moved[0] + bent) + 1 + moved[0] + kept[0] + twice * bent,
+        2 * sums + 15 + 6 * inverse,
+        sums * (1 + moved[1] + looked) + 2 + moved[1] + kept[1] + twice * looked,
+        tanh * (sums + twice),
+    )
 
 
 def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[int, int, int, int]:

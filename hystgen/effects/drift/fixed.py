@@ -79,7 +79,7 @@ def _samples(slope: float, twice: float, farthest: float) -> int:
 
 def constants(t: Reals) -> list[Constants]:
     """The numbers of the clock of a model, of tables (k, 7)."""
-    return [Constants(KIND, row[:ONE], (2, 0)) for row in t]
+    return [Constants(KIND, row[:ONE], (3, 0)) for row in t]
 
 
 # ---------------------------------------------------------------- clock_fixed.c

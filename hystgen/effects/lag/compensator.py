@@ -151,7 +151,7 @@ class LagTables(NamedTuple):
 def constants(t: LagTables, braked: bool) -> Iterator[Constants]:
     """The numbers of each lag; `braked`: of the one that there is, behind a slew limit."""
     for exact, row in zip(t.exact, t.block, strict=True):
-        yield Constants(EXACT_KIND if exact else BRAKED_KIND if braked else KIND, row, (3, 2))
+        yield Constants(EXACT_KIND if exact else BRAKED_KIND if braked else KIND, row, (3, 3 if exact else 2))
 
 
 @jit
