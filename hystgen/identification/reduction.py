@@ -145,17 +145,18 @@ def _reached(v: Array) -> int:
     return first + int(np.argmax(visit))
 
 
-def travel(course: Course, threshold: float) -> tuple[float, float]:
-    """Peak-to-peak movement of one play over the samples compared, and its movement there and back.
+def travel(course: Course, threshold: float) -> float:
+    """Peak-to-peak movement of one play over the samples compared.
 
-    If the samples begin before the memory of that play is known, the second is the shorter of the ways up and down:
-    while the drive goes one way, a play after an unknown start only shows a straight line.
+    If they begin before the memory of that play is known, no more counts than it would move in a settled loop over the
+    range of the drive: the rest depends on the start, which is at best estimated.
     """
-    start = start_states(course.v, course.history, np.array([threshold]))[0]
+    start = start_states(course.v, course.visited, np.array([threshold]))[0]
     moved = operators.play(course.v[: course.last], threshold, float(start))[course.first :]
     whole = float(np.ptp(moved))
-    known = course.first >= replace(course, start=None).resettled(threshold).first
-    return whole, whole if known else min(ways(moved))
+    if course.first >= replace(course, start=None).resettled(threshold).first:
+        return whole
+    return min(whole, float(np.ptp(course.v[course.begin : course.last])) - 2.0 * threshold)
 
 
 def ways(x: Array) -> tuple[float, float]:

@@ -75,7 +75,8 @@ def estimated(
     begun = [unknown(item) for item in courses]
     places = [k for k, item in enumerate(begun) if findable(item)]
     some = [begun[k] for k in places]
-    reach = pi.largest([_whole(joint.through_front(item, stages)) for item in some])
+    seen = [joint.through_front(item, stages) for item in some]
+    reach = pi.loop_reach(max((float(np.ptp(item.v[item.begin : item.last])) for item in seen), default=0.0))
     if reach == 0.0:
         return begun
     if isinstance(wanted, tuple) and 1 < len(wanted) <= PLAYS + 1 and wanted[-1] <= reach:

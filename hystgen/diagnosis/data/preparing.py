@@ -358,7 +358,7 @@ def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Cours
     named may be wrong by as much as they do, and then stands for an error that no name removes.
     """
     low, high = min(float(c.v.min()) for c in to_fit), max(float(c.v.max()) for c in to_fit)
-    largest = 0.5 * (1.0 - pi.LEAST_RETURN) * (high - low)  # wider plays may exist, but hardly move
+    largest = pi.loop_reach(high - low, pi.LEAST_VISIBLE)  # wider plays may exist, but hardly move
     begun = start.needed(to_fit, least=acceptance.FEW_COMPARED, largest=largest)
     solution, _ = pi.solve(begun, None, 0.0)
     begun_held = start.of_model(held, (), solution.thresholds, solution.weights, _least(held), largest)
@@ -370,7 +370,7 @@ def _reach(courses: Sequence[Course]) -> float:
 
     What wider plays do between there and a fit's usual reach would be left, and stand for an effect.
     """
-    return pi.largest(courses, pi.LEAST_RETURN)
+    return pi.largest(courses, pi.LEAST_VISIBLE)
 
 
 def _least(courses: Sequence[Course]) -> float:
