@@ -44,11 +44,13 @@ class Start:
     """A start memory found by a fit (`start`).
 
     `turns`: drive values that lead virgin plays to it; `uncertainty`: half the width of the 95 % interval of its
-    contribution to the output at the first sample, output units.
+    contribution to the output at the first sample, output units; `once`: threshold of a play that moves from it and is
+    so wide that it hardly moves back in the record, None if there is none.
     """
 
     turns: tuple[float, ...]
     uncertainty: float
+    once: float | None = None
 
 
 @dataclass(frozen=True)

@@ -76,16 +76,19 @@ def estimated(
     places = [k for k, item in enumerate(begun) if findable(item)]
     some = [begun[k] for k in places]
     seen = [joint.through_front(item, stages) for item in some]
-    reach = pi.loop_reach(max((float(np.ptp(item.v[item.begin : item.last])) for item in seen), default=0.0))
-    if reach == 0.0:
+    swing = max((float(np.ptp(item.v[item.begin : item.last])) for item in seen), default=0.0)
+    if swing == 0.0:
         return begun
+    reach, once = pi.loop_reach(swing), None
     if isinstance(wanted, tuple) and 1 < len(wanted) <= PLAYS + 1 and wanted[-1] <= reach:
         r = np.array(wanted)
     else:
         r = np.array(pi.dense(reach, sum(item.last - item.begin for item in some), PLAYS).thresholds)
+        if not isinstance(wanted, tuple):
+            once = pi.rounded(pi.loop_reach(swing, pi.LEAST_VISIBLE), 6)
     for first in range(0, len(places), TOGETHER):
         here = places[first : first + TOGETHER]
-        for k, item in zip(here, _started([begun[k] for k in here], stages, r, None), strict=True):
+        for k, item in zip(here, _started([begun[k] for k in here], stages, r, None, once), strict=True):
             begun[k] = item
     return begun
 
@@ -164,19 +167,29 @@ def lacking(item: Course, least: float) -> bool:
 
 
 def _started(
-    courses: Sequence[Course], stages: Sequence[Stage], r: Array, weights: Array | None
+    courses: Sequence[Course], stages: Sequence[Stage], r: Array, weights: Array | None, once: float | None = None
 ) -> list[Course]:
-    """The courses with the start memories that were found, except for transients."""
+    """The courses with the start memories that were found, except for transients.
+
+    `once`: threshold of a play that joins those of `r` (n+1,) if the error is then clearly smaller. It stands for all
+    that the drive moves once, on its way beyond where it has been: an actuator that came from a wider range has them.
+    """
     inner = [joint.through_front(item, stages) for item in courses]
-    search = _Search(tuple(_System.of(_whole(item), r) for item in inner), r, weights)
-    found = search.result()
+    search = _Search.of(inner, r, weights)
+    found, moved = search.result(), None
+    if once is not None:
+        wider = _Search.of(inner, np.append(r, once), weights)
+        other = wider.result()
+        if other.rms < pi.CLEARLY * found.rms:
+            search, found, r, moved = wider, other, wider.r, once
     begun = []
     for item, seen, (slopes, uncertainty) in zip(courses, inner, search.parted(found), strict=True):
         if item.history is None:
             turns = turns_of(r, float(seen.v[0]) + memory_of(slopes, r))
             whole = replace(seen, start=Start(turns, uncertainty), first=item.begin)
             if not _transient(whole, item.first, r, found.best):
-                item = replace(item, start=Start(in_front(turns, stages), uncertainty), first=item.begin)
+                given = Start(in_front(turns, stages), uncertainty, moved)
+                item = replace(item, start=given, first=item.begin)
         begun.append(item)
     return begun
 
@@ -329,6 +342,11 @@ class _Search:
     systems: tuple[_System, ...]
     r: Array
     known: Array | None
+
+    @classmethod
+    def of(cls, courses: Sequence[Course], r: Array, known: Array | None) -> _Search:
+        """The search for the courses, as plays of thresholds r (n+1,) see them, from their beginning."""
+        return cls(tuple(_System.of(_whole(item), r) for item in courses), r, known)
 
     @property
     def _slopes(self) -> int:
