@@ -167,6 +167,28 @@ class TestTanh:
         up, down = (b.a0 * np.tanh(b.a1 * places + b.a2) + b.a3 for b in (stage.ascending, stage.descending))
         assert np.all(down >= up)
 
+    def test_held_out_records_choose_between_one_branch_and_two(self) -> None:
+        """Plays behind a bent sensor: two branches follow its single loop more closely; smaller loops show them wrong.
+
+        Without the smaller loops nothing tells, and two branches are taken.
+        """
+
+        def swings(fade: float, seed: int) -> tuple[Array, Array]:
+            t = np.linspace(0.0, 6.0, 2000)
+            v = 50.0 - 50.0 * (1.0 - fade * t / 6.0) * np.cos(2.0 * np.pi * t)
+            h = brute_output(v, THRESHOLDS, WEIGHTS, 0.0) / SWING
+            return v, noisy(SWING * (h + 0.2 * (h - 0.5) ** 2), NOISE, seed)
+
+        loop, smaller = record(*swings(0.0, 3), "loop"), record(*swings(0.9, 53), "smaller")
+        alone = hystgen.identify(loop, model="gpi-tanh")
+        judged = hystgen.identify(loop, model="gpi-tanh", holdout=[smaller])
+        two, one = alone.parameters.model.memoryless[0], judged.parameters.model.memoryless[0]
+        assert two.ascending != two.descending
+        assert one.ascending == one.descending
+        assert smaller.y is not None
+        errors = [np.std((smaller.y - fit.predict(smaller))[fit.settled(smaller) :]) for fit in (alone, judged)]
+        assert errors[1] < 0.75 * errors[0]
+
     def test_branches_never_cross(self) -> None:
         """A plant whose falling branch lies below the rising one has no such model: what is fitted is invertible."""
         v, y = plant(lambda x: branched(x, -3.0), 3)

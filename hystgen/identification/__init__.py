@@ -92,9 +92,9 @@ def identify(
       the length of the drive range and the place of 0, in its output); by default both number and places are chosen
       by blocked validation on the records.
     - `breaks`: how many places, or which, a dead-zone sum may bend at, chosen in the same way by default.
-    - `holdout`: records that take no part in any choice but that of `auto`; without them the last quarter of each
-      record gives the held-out figures, from a trial model that has not seen it, and the model written is then
-      fitted to everything.
+    - `holdout`: records that take no part in any choice but that of `auto`, and that of one branch or two of
+      `gpi-tanh`; without them the last quarter of each record gives the held-out figures, from a trial model that has
+      not seen it, and the model written is then fitted to everything.
     - `history`: drive values visited before every record, beginning in a virgin state. Without it, the start of each
       record is ignored until the drive has wiped the memory that matters; if less than half of the record would be
       left, its start memory is estimated together with the weights.
@@ -145,7 +145,7 @@ def identify(
     with parallel.one_thread(), Progress(passes * samples, progress, "fitting") as bar:
         prepared.mask_outliers(courses, held, how.wanted, p0_floor)
         if held:
-            tried = [_try(courses, held, kind, how, bar) for kind in kinds]
+            tried = [_best(courses, held, kind, how, bar) for kind in kinds]
             chosen = _choose(tried)
             rows = [tried[k].as_candidate() for k in range(len(tried))] if len(tried) > 1 else []
             done = tried[chosen]
@@ -237,15 +237,22 @@ class _Tried:
         return replace(self.held_out, part="candidate", model=self.fitted.front.name)
 
 
-def _try(
-    courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, bar: Progress, parts: bool = False
-) -> _Tried:
-    """Fit one kind to courses and compare it with others; `parts`: these are parts of the same records."""
+def _best(courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, bar: Progress) -> _Tried:
+    """Fit one kind to courses and compare it with others, which choose where `gpi.to_judge` leaves them a choice."""
+    found = gpi.to_judge(courses, kind, how.wanted, how.breaks, how.floor, bar.tick)
+    tried = [_compared(fitted, compared, fitted.begun(held)) for fitted, compared in found]
+    return tried[_choose(tried)]
+
+
+def _try(courses: Sequence[Course], ends: Sequence[Course], kind: str, how: _How, bar: Progress) -> _Tried:
+    """Fit one kind to the first parts of records and compare it with the rest of them."""
     fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, how.floor, bar.tick)
-    if parts:
-        begun = [replace(other, start=item.start) for item, other in zip(compared, held, strict=True)]
-    else:
-        begun = fitted.begun(held)
+    begun = [replace(other, start=item.start) for item, other in zip(compared, ends, strict=True)]
+    return _compared(fitted, compared, begun)
+
+
+def _compared(fitted: Fitted, compared: list[Course], begun: Sequence[Course]) -> _Tried:
+    """A fit with its errors on courses that it has not seen."""
     largest = float(fitted.solution.thresholds[-1])
     settled = [replace(item, first=fitted.inner(item).resettled(largest).first) for item in begun]
     for item in settled:
@@ -362,7 +369,7 @@ def _trial(
         fronts.append(front)
         ends.append(end)
     try:
-        tried = [_try(fronts, ends, kind, how, bar, True) for kind in kinds]
+        tried = [_try(fronts, ends, kind, how, bar) for kind in kinds]
     except IdentificationError as failure:
         return [], kinds[0], [], f"nothing was held out: {failure}{instead}"
     chosen = _choose(tried)

@@ -74,25 +74,84 @@ def solve(
     Of several fronts of a kind, takes the one with the fewest shape numbers whose prediction of blocks left out of the
     fit is close to the best. Raises IdentificationError.
     """
+    return _solved(courses, kind, wanted, breaks, floor, tick, lambda found: [_by_blocks(found)])[0]
+
+
+def to_judge(
+    courses: Sequence[Course],
+    kind: str,
+    wanted: int | tuple[float, ...] | None,
+    breaks: int | tuple[float, ...] | None,
+    floor: float,
+    tick: Tick = None,
+) -> list[tuple[Fitted, list[Course]]]:
+    """The fits of one kind among which held-out records choose, the simplest first; otherwise as `solve`.
+
+    Tanh envelopes with one branch and with two: two have a loop by themselves, as wide in a small swing as in a large
+    one. Records of a single swing do not show whether theirs is of that kind, and neither do blocks left out of them.
+    """
+
+    def chosen(found: Sequence[_Found]) -> Sequence[_Found]:
+        return found if kind == "gpi-tanh" else [_by_blocks(found)]
+
+    return _solved(courses, kind, wanted, breaks, floor, tick, chosen)
+
+
+@dataclass(frozen=True)
+class _Found:
+    """A front, its shape with a dense list of plays behind it, and its error on blocks left out of the fit."""
+
+    front: Front
+    shape: Array
+    error: float
+
+
+def _by_blocks(found: Sequence[_Found]) -> _Found:
+    """The front with the fewest shape numbers whose error on blocks left out of the fit is close to the best."""
+    best = found[0]
+    for each in found[1:]:
+        if each.error * FRONT_PARSIMONY < best.error:
+            best = each
+    return best
+
+
+def _solved(
+    courses: Sequence[Course],
+    kind: str,
+    wanted: int | tuple[float, ...] | None,
+    breaks: int | tuple[float, ...] | None,
+    floor: float,
+    tick: Tick,
+    choose: Callable[[Sequence[_Found]], Sequence[_Found]],
+) -> list[tuple[Fitted, list[Course]]]:
+    """The fits with the fronts that `choose` takes."""
     # a start memory found without the front is not exact behind it, but better than too few samples to compare
     courses = start.needed(courses, (), wanted if kind == "pi" else None)
     plain, compared = pi.solve(courses, wanted, floor, tick)
     if kind == "pi":
-        return Fitted(Kept(), np.empty(0), plain), compared
+        return [(Fitted(Kept(), np.empty(0), plain), compared)]
     # the missing front distorts the choice of a plain play sum: search the shape with a dense list of plays
     fine = plain.thresholds
     if not isinstance(wanted, tuple) and plain.reach > 0.0:
         fine = np.array(pi.dense(plain.reach, sum(item.used for item in compared)).thresholds)
-    best: tuple[float, Front, Array] | None = None
-    before: Array | None = None
+    found: list[_Found] = []
     for front in fronts_of(kind, compared, breaks):
-        shaped = _shaped(compared, front, fine, before, tick)
-        before = shaped.shape
-        error = validation(shaped, front)
-        if best is None or error * FRONT_PARSIMONY < best[0]:
-            best = error, front, shaped.shape
-    assert best is not None
-    _, front, shape = best
+        shaped = _shaped(compared, front, fine, found[-1].shape if found else None, tick)
+        found.append(_Found(front, shaped.shape, validation(shaped, front)))
+    return [_finished(courses, compared, each, plain, wanted, floor, tick) for each in choose(found)]
+
+
+def _finished(
+    courses: Sequence[Course],
+    compared: Sequence[Course],
+    found: _Found,
+    plain: Solution,
+    wanted: int | tuple[float, ...] | None,
+    floor: float,
+    tick: Tick,
+) -> tuple[Fitted, list[Course]]:
+    """The fit with a front: plays placed behind it, and its shape found again for them."""
+    front, shape = found.front, found.shape
     courses = start.needed(courses, front.stages(shape, DIGITS), wanted)
     fitted = _solve_behind(courses, front, shape, wanted, floor, tick)
     # the plays may have moved: find the best shape for them again
