@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from recordings import brute_output, brute_plays, noisy, record
 
 import hystgen
-from hystgen.identification import IdentificationError, start
+from hystgen.identification import IdentificationError, reduction, start
 
 Array = NDArray[np.float64]
 
@@ -59,6 +59,21 @@ class TestMemory:
         states = rng.uniform(-30.0, 30.0) + np.concatenate([[0.0], np.cumsum(slopes * np.diff(r))])
         turns = [*start.turns_of(r, states), float(states[0])]
         assert brute_plays(turns, r, 0.0)[-1] == pytest.approx(states, abs=1e-9)
+
+    @pytest.mark.parametrize("seed", range(4))
+    def test_what_a_memory_leaves(self, seed: int) -> None:
+        """With known weights: the sum of squares of a brute run of the plays from that memory, with the best offset."""
+        rng = np.random.default_rng(seed)
+        v = (growing if seed % 2 else never_twice)()
+        y = rng.standard_normal(len(v))
+        y[rng.uniform(size=len(y)) < 0.1] = np.nan
+        r, begin = np.array(PLACES), int(rng.integers(0, 40))
+        course = reduction.Course("random", v, y, None, begin, len(v), begin=begin)
+        slopes = rng.uniform(-1.0, 1.0, len(r) - 1)
+        states = v[0] + np.concatenate([[0.0], np.cumsum(slopes * np.diff(r))])
+        errors = (y - brute_output(v, PLACES, WEIGHTS, states))[begin:]
+        expected = np.sqrt(np.nansum((errors - np.nanmean(errors)) ** 2))
+        assert start._System.of(course, r).left(slopes, np.array(WEIGHTS)) == pytest.approx(expected, rel=1e-12)
 
     @pytest.mark.parametrize("before", [(), (100.0,), (110.0, -5.0), (-20.0, 75.0, 30.0)])
     @pytest.mark.parametrize("drive", [growing, never_twice])

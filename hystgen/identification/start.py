@@ -25,6 +25,7 @@ from hystgen.front.stage import Stage
 from hystgen.identification import joint, pi, reduction
 from hystgen.identification.joint import Shaped
 from hystgen.identification.reduction import Course, Reduced, Start
+from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 
@@ -321,6 +322,17 @@ class _System:
             table = reduction.triangle(table, made)
         return table[1:, 1:]
 
+    def left(self, slopes: Array, p: Array) -> float:
+        """Root of the sum of squares that a memory and weights leave; no table of all plays is reduced for it."""
+        item, begin = self.item, min(self.item.begin, self.settled)
+        states = float(item.v[0]) + memory_of(slopes, self.r)
+        output = operators.play_sum(item.v[: self.settled], self.r, states, p)
+        errors = (item.y[: self.settled] - output)[begin:]
+        errors = errors[np.isfinite(errors)]
+        after = self.tail[:, -1] - self.tail[:, 1:-1] @ p
+        both = np.concatenate([np.ones(len(errors)), self.tail[:, 0]]), np.concatenate([errors, after])
+        return float(np.abs(reduction.triangle(np.column_stack(both))[-1, -1]))
+
     def change(self, held: Array) -> Array:
         """Change of the output with each slope, for the weights `held` of the plays that have not moved."""
         return np.asarray(np.cumsum(held[::-1])[::-1][1:] * np.diff(self.r))
@@ -383,11 +395,17 @@ class _Search:
         """The best memory with at most one turn for every course, each with its own weights."""
         shape = [np.empty(0)]
         for each in self.systems:
-            alone = replace(self, systems=(each,))
             found = each.simple()
-            left = [alone._linear(0.0, slopes, alone._first_weights(slopes)).rms for slopes in found]
+            left = [self._left(each, slopes) for slopes in found]
             shape += [found[int(np.argmin(left))]] if found else []
         return np.concatenate(shape)
+
+    def _left(self, system: _System, slopes: Array) -> float:
+        """What a memory leaves of one course, with the best weights for it alone unless they are known."""
+        if self.known is not None:
+            return system.left(slopes, self.known)
+        alone = replace(self, systems=(system,))
+        return alone._linear(0.0, slopes, alone._first_weights(slopes)).rms
 
     def _first_weights(self, shape: Array) -> Array:
         """Weights that fit best for some slopes."""
