@@ -74,6 +74,7 @@ EVERY = [
     make("saturation", shape="stops", lower=-0.5, upper=2.0, give=0.2),
     make("saturation", level=2.0, centre=-0.7),
     make("resonance", shape="part", frequency=40.0, damping=0.05, share=0.3),
+    make("slew_limit", shape="sudden", rate=30.0, falling_rate=20.0),
 ]
 
 
@@ -204,8 +205,12 @@ def test_finer_samples_give_the_same(effect: Effect) -> None:
     assert np.max(np.abs(here - there)) < (5e-3 if first_order else 3e-4) * np.ptp(there)
 
 
-@pytest.mark.parametrize("effect", [e for e in EVERY if e.name in ("slew_limit", "lag", "creep", "resonance")],
-                         ids=label)  # fmt: skip
+STRAIGHT = [e for e in EVERY if e.name in ("slew_limit", "lag", "creep", "resonance")]
+STRAIGHT = [e for e in STRAIGHT if label(e) != "slew_limit-sudden"]
+"""Effects to which the drive is straight between samples, wherever these are."""
+
+
+@pytest.mark.parametrize("effect", STRAIGHT, ids=label)
 def test_filters_are_exact_between_corners(effect: Effect) -> None:
     """On a broken line samples between its corners change nothing, whatever the steps."""
     rng = np.random.default_rng(4)
@@ -432,6 +437,45 @@ def test_slew_limit_against_a_loop() -> None:
     assert slopes.max() <= up * (1 + 1e-6)
     assert slopes.min() >= -down * (1 + 1e-6)
     assert make("slew_limit", rate=up) == make("slew_limit", rate=up, falling_rate=up)
+
+
+def converted(fine: Array, per: int) -> Array:
+    """What a converter that averages over each of its samples, `per` fine ones long, makes of them."""
+    return np.asarray(fine.reshape(-1, per).mean(axis=1))
+
+
+@pytest.mark.parametrize("where", [0.0, 0.2, 0.5, 0.7])
+def test_sudden_edges_against_a_generator_that_steps(where: float) -> None:
+    """Anywhere in a sample, up and down; a limit that follows slowly arrives when it should, and a straight edge makes
+    it early by up to a sample."""
+    per, rate, samples = 400, 7.0, 60
+    fine = np.repeat([0.0, 1.0], (samples // 3 * per + round(where * per), 2 * samples // 3 * per - round(where * per)))
+    fine -= np.where(np.arange(len(fine)) >= 40 * per + round(where * per), 0.6, 0.0)
+    behind, most = np.empty_like(fine), rate / samples / per
+    a = behind[0] = fine[0]
+    for k in range(1, len(fine)):
+        a = behind[k] = a + min(max(fine[k] - a, -most), most)
+    t, v, expected = (converted(x, per) for x in ((np.arange(len(fine)) + 0.5) / per / samples, fine, behind))
+    beside = np.zeros(samples, dtype=bool)
+    beside[[20, 40]] = True  # where a converter shows a mean over the edge, or over the limit's own corner
+    slopes = np.abs(np.diff(expected))
+    beside[:-1] |= (slopes > 0.01) & (np.abs(slopes - rate / samples) > 0.01 * rate / samples)
+    beside[1:] |= beside[:-1]
+    early = {
+        shape: float(np.max(np.abs(make("slew_limit", shape=shape, rate=rate).drive(v, Run(t, v)) - expected)[~beside]))
+        for shape in ("sudden", "straight")
+    }
+    assert early["sudden"] < 4.0 * most  # the loop begins within one of its steps, and the mean within two
+    assert early["straight"] > 0.4 * rate / samples
+
+
+def test_sudden_edges_leave_other_drives_alone() -> None:
+    """Ramps, sines, corners, one sample aside, and edges that last three samples are straight between samples."""
+    t = np.arange(200.0)
+    corners = np.interp(t, [0, 20, 50, 120, 199], [0.0, 1.0, -1.0, 2.0, 2.0])
+    for v in (t, np.sin(0.9 * t), corners, np.where(t == 90, 1.0, 0.0), np.clip((t - 60.0) / 3.0, 0.0, 1.0)):
+        both = [make("slew_limit", shape=shape, rate=0.2).drive(v, Run(t, v)) for shape in ("straight", "sudden")]
+        assert np.array_equal(*both)
 
 
 # Creep ----------------------------------------------------------------------------------------------------

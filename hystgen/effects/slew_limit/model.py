@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Literal, cast
+from typing import Any, ClassVar, Literal, Self, cast
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from hystgen.basics.jit import jit
@@ -13,6 +14,11 @@ from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, P
 
 BELOW = (0.3, 0.5, 0.7, 1.0, 1.6, 2.2)
 """Starts below the fastest recorded rate, in decades: a limit met never, or always, leaves no trace."""
+
+BESIDE = 10.0
+"""[times] A step of the drive is faster than the changes beside it by at least this; those of a smooth drive are alike.
+Steps between levels at rest are far beyond it, up to the noise of the converter. Changed by:
+test_effects::test_sudden_edges_leave_other_drives_alone."""
 
 LEAST = 3.0
 """The same of the least rate: a step from sample to sample is faster than all else by a hundred times and more."""
@@ -40,12 +46,49 @@ def limit(u: Array, up: Array, down: Array, out: Array) -> None:
         out[k + 1] = x
 
 
-class SlewLimit(Effect):
-    """Slew limit `-S_falling <= a' <= S` of the drive: `a` goes towards `v` as fast as it may.
+@jit
+def sudden(t: Array, u: Array, times: Array, drive: Array, given: NDArray[np.intp]) -> int:
+    """Write the drive with sudden edges into `times` and `drive`, and the place of each sample; returns its length.
 
-    Exact for straight `v` between samples.
+    An edge is a change within one sample or two, `BESIDE` times as fast as those beside it. It happens at the mean
+    time of the change: halfway between two samples, or, where a converter that averages shows a sample on the way, as
+    long before that sample's time is over as it is far on the way. A linear filter tells it from a straight edge only
+    by second differences.
     """
+    times[0], drive[0], given[0] = t[0], u[0], 0
+    n, k, last = 1, 0, len(u) - 1
+    while k < last:
+        before = abs(u[k] - u[k - 1]) / (t[k] - t[k - 1]) if k > 0 else 0.0
+        width = 0
+        for ends in (k + 1, k + 2):
+            if width == 0 and ends <= last and (u[k + 1] - u[k]) * (u[ends] - u[k + 1]) >= 0.0:
+                after = abs(u[ends + 1] - u[ends]) / (t[ends + 1] - t[ends]) if ends < last else 0.0
+                if abs(u[ends] - u[k]) > BESIDE * max(before, after) * (t[ends] - t[k]):
+                    width = ends - k
+        if width == 0:
+            k += 1
+            times[n], drive[n], given[k] = t[k], u[k], n
+            n += 1
+            continue
+        ends = k + width
+        first, second = u[k + 1] - u[k], u[ends] - u[k + 1]
+        late = 0.5 * (first * (t[k] + t[k + 1]) + second * (t[k + 1] + t[ends])) / (first + second)
+        behind = width == 2 and late < t[k + 1]
+        if width == 2 and not behind:
+            times[n], drive[n], given[k + 1] = t[k + 1], u[k], n
+            n += 1
+        times[n], times[n + 1], drive[n], drive[n + 1] = late, late, u[k], u[ends]
+        n += 2
+        if behind:
+            times[n], drive[n], given[k + 1] = t[k + 1], u[ends], n
+            n += 1
+        times[n], drive[n], given[ends] = t[ends], u[ends], n
+        n += 1
+        k = ends
+    return n
 
+
+class _SlewLimit(Effect):
     name: Literal["slew_limit"] = Field(description="name of the effect")
     rate: Positive = Field(description="S, input units per s", examples=[5.0e3])
     falling_rate: Positive = Field(
@@ -58,10 +101,38 @@ class SlewLimit(Effect):
     compensation: ClassVar[str] = "the drive is kept within it, so that the memory is the actuator's"
 
     @model_validator(mode="after")
-    def _same_rate(self) -> SlewLimit:
+    def _same_rate(self) -> Self:
         if self.falling_rate is None:
             object.__setattr__(self, "falling_rate", self.rate)
         return self
+
+    @classmethod
+    def _candidate(cls, label: str, n: int, about: About, **more: Any) -> Candidate:
+        """One rate, or one for each direction, up to the fastest recorded one."""
+        fastest = np.log10(max(about.fastest, 1e-12))
+        shape = cls.model_fields["shape"].annotation.__args__[0]  # type: ignore[union-attr]
+
+        def build(x: Array) -> Effect:
+            rates = {"rate": 10.0 ** float(x[0]), "falling_rate": 10.0 ** float(x[-1])}
+            return cls(name="slew_limit", shape=shape, **rates)  # type: ignore[call-arg]
+
+        none = np.full(n, fastest)
+        start, *others = (none - below for below in BELOW)
+        return Candidate(label, none - LEAST, none, start, build, none, tuple(others), **more)
+
+
+STRAIGHT = "slew limit"
+
+
+class SlewLimit(_SlewLimit):
+    """Slew limit `-S_falling <= a' <= S` of the drive: `a` goes towards `v` as fast as it may.
+
+    Exact for straight `v` between samples.
+    """
+
+    shape: Literal["straight"] = Field(default="straight", description="the drive is straight between samples")
+
+    later: ClassVar[tuple[str, ...]] = ("shape",)
 
     def drive(self, a: Array, run: Run) -> Array:
         """The drive as fast as it may be."""
@@ -71,26 +142,49 @@ class SlewLimit(Effect):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """One rate, then one for each direction, up to the fastest recorded one."""
-        fastest = np.log10(max(about.fastest, 1e-12))
-
-        def build(x: Array) -> SlewLimit:
-            return cls(name="slew_limit", rate=10.0 ** float(x[0]), falling_rate=10.0 ** float(x[-1]))
-
-        def candidate(label: str, n: int, **more: Any) -> Candidate:
-            none = np.full(n, fastest)
-            start, *others = (none - below for below in BELOW)
-            return Candidate(label, none - LEAST, none, start, build, none, tuple(others), **more)
-
+        """One rate, then one for each direction."""
         return [
-            candidate("slew limit", 1),
-            candidate("slew limit, rising and falling", 2, beyond="slew limit", grown=lambda x: np.repeat(x, 2)),
+            cls._candidate(STRAIGHT, 1, about),
+            cls._candidate(
+                f"{STRAIGHT}, rising and falling", 2, about, beyond=STRAIGHT, grown=lambda x: np.repeat(x, 2)
+            ),
         ]
 
 
-SHAPES = (SlewLimit,)
+class SuddenSlewLimit(_SlewLimit):
+    """The same limit behind a drive whose steps take no time (`sudden`); elsewhere it is straight between samples.
+
+    A generator steps where the record has a change within a sample or two. Taken as straight, the limited edge begins
+    up to a sample early, and everything until it arrives is early by as much.
+    """
+
+    shape: Literal["sudden"] = Field(description="steps of the drive within one or two samples take no time")
+
+    def drive(self, a: Array, run: Run) -> Array:
+        """The drive as fast as it may be."""
+        times, drive, given = np.empty(3 * len(a)), np.empty(3 * len(a)), np.empty(len(a), dtype=np.intp)
+        n = sudden(run.t, a, times, drive, given)
+        steps, out = np.diff(times[:n]), np.empty(n)
+        limit(drive[:n], self.rate * steps, self.falling_rate * steps, out)
+        return np.asarray(out[given])
+
+    @classmethod
+    def candidates(cls, about: About) -> list[Candidate]:
+        """One rate, then one for each direction, where a limit helps."""
+        return [
+            cls._candidate(f"{STRAIGHT}, sudden steps", 1, about, beyond=STRAIGHT, grown=lambda x: x),
+            cls._candidate(
+                f"{STRAIGHT}, sudden steps, rising and falling", 2, about, beyond=STRAIGHT,
+                grown=lambda x: np.repeat(x, 2),
+            ),
+        ]  # fmt: skip
+
+
+SHAPES = (SlewLimit, SuddenSlewLimit)
 
 
 def load() -> None:
     """Have the recursions compiled, or read from the cache, on two samples."""
-    limit(np.arange(2.0), np.ones(1), np.ones(1), np.empty(2))
+    two, one = np.arange(2.0), np.ones(1)
+    limit(two, one, one, np.empty(2))
+    sudden(two, two, np.empty(6), np.empty(6), np.empty(2, dtype=np.intp))
