@@ -253,6 +253,15 @@ def rivals(best: Tried, tried: Sequence[Tried], records: Records) -> list[Tried]
     return [each for each in tried if each.name != best.name and alike(each, best, records.noise)]
 
 
+def _other_shapes(best: Tried, tried: Sequence[Tried], records: Records) -> list[Tried]:
+    """Other shapes of the accepted effect that are as good on held-out records, the best one first."""
+    return [
+        each
+        for each in tried
+        if each.name == best.name and each is not best and alike(each, best, records.noise)
+    ]
+
+
 def left_open(now: Fitted, best: Tried, tried: Sequence[Tried], records: Records) -> list[str]:
     """Names of the effects that fitted records cannot separate from the accepted one either."""
     least = best.fitted.rms
@@ -575,8 +584,14 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
     Which of several alike effects is present shows with the next one: if nothing more qualifies after the accepted one,
     or the remaining error is larger, or the same error takes more numbers, it was the wrong one. If the next effect is
     itself a rival, `_exchanged` examines what else fits beside it.
+
+    If nothing more qualifies, the accepted effect may be the right one in a wrong shape: a simpler one that is about as
+    good takes part of the place of the next effect, which then spoils the held-out records. `_exchanged` finds the
+    shape only once the next effect is in.
     """
     alike = rivals(latest.best, latest.tried, records)
+    if step.merit is None and any(_hidden(step.now, each, records) for each in step.tried):
+        alike += _other_shapes(latest.best, latest.tried, records)
     others = {each.name: each for each in reversed(alike)}  # the best one of each name
     follow = sorted(others.values(), key=lambda each: each.held_out)[: acceptance.MOST_RIVALS]
     if step.merit is not None:
@@ -592,12 +607,42 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
 
     if step.merit is None:
         enough = (1.0 - acceptance.BETTER) * records.residual(step.now)
-        return next((pair for pair in pairs() if pair[1].best.held_out <= enough), None)
+        found = next((pair for pair in pairs() if pair[1].best.held_out <= enough), None)
+        return found or _beside_another(latest, step, gap, records)
     every = [*pairs(), (latest, step)]
     enough = (1.0 + acceptance.BETTER) * min(then.best.held_out for _, then in every)
     good = [pair for pair in every if pair[1].best.held_out <= enough]
     chosen = min(good, key=lambda pair: (pair[1].best.numbers(records.held), pair[1].best.held_out))
     return None if chosen[1] is step else chosen
+
+
+def _beside_another(latest: _Step, failed: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
+    """A step to another effect that the accepted one hides, and the step from there to that one; None without such.
+
+    An effect of many numbers also follows what another one does, such as a fast state of creep plays that relax. Beside
+    it the other has nothing left to explain, while it does not follow well enough by itself. The two are tried in the
+    other order if the accepted one leaves so much that a verdict would begin with it.
+    """
+    left = records.residual(failed.now)
+    if left <= acceptance.MUCH_LEFT * records.noise:
+        return None
+    name = latest.best.option.name
+    others = {each.name: each for each in reversed(latest.tried) if each.name != latest.best.name}
+    found = []
+    for first in sorted(others.values(), key=lambda each: each.held_out)[: acceptance.MOST_RIVALS]:
+        merit = merit_of(latest.now, first, records)
+        then = None if merit is None else _step(first.fitted, gap, records, lambda option: option.name == name)
+        if then is None or then.merit is None or merit_of(failed.now, then.best, records) is None:
+            continue
+        if then.best.held_out <= (1.0 - acceptance.BETTER) * left:
+            found.append((replace(latest, best=first, merit=merit), then))
+    return min(found, key=lambda pair: pair[1].best.held_out, default=None)
+
+
+def _hidden(now: Fitted, tried: Tried, records: Records) -> bool:
+    """Whether an effect removes enough from fitted records, although not from held-out ones."""
+    _, fitted = _removed(now, tried, records)
+    return fitted.removed >= _least(now) * max(records.noise, fitted.left)
 
 
 def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step] | None:
@@ -682,13 +727,15 @@ def _exchanged(
             step = _step(fitted, 0.0, records, lambda option: option.name in names, start, acceptance.FIRST_REMOVES)
             if step is None or step.merit is None:
                 continue
-            other = _found(step, records)
-            if not _gives_way(now, old.name, step.best, records):
+            better = _that_replaces(now, old.name, step, records)
+            if better is None:
                 # otherwise the search did not find the effect again
                 if step.best.held_out <= (1.0 + acceptance.ALIKE) * records.residual(now):
+                    other = _found(step, records)
                     alike = dict.fromkeys([other.name, *other.rivals])
                     found[k] = replace(old, rivals=tuple(name for name in alike if name != old.name))
                 continue
+            step, other = better, _found(better, records)
             best = step.best.fitted
             chain = _in_place(best, [*found[:k], other, *found[k + 1 :]], found[0].before, records)
             now, found, less = _without_needless(best, chain or [*_rest(found, k, other.before), other], records)
@@ -699,14 +746,32 @@ def _exchanged(
     return now, found
 
 
+def _that_replaces(now: Fitted, name: str, step: _Step, records: Records) -> _Step | None:
+    """The step with the effect to which that of a name gives way, and to which no other one does; None without such."""
+    fitted, found = now, None
+    for each in (step.best, *(other for other in simplest_first(step.tried, records) if other is not step.best)):
+        if not _gives_way(fitted, name, each, records):
+            continue
+        merit = step.merit if each is step.best else merit_of(step.now, each, records, acceptance.FIRST_REMOVES)
+        if merit is not None:
+            fitted, name, found = each.fitted, each.name, replace(step, best=each, merit=merit)
+    return found
+
+
 def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
     """Whether an effect gives way to a better one: one with a smaller error, one with fewer numbers and no larger error
     on equal terms, or an equal one with an earlier `place`.
 
-    With no more numbers all records decide, as in `simplest_first`, if they differ and held-out ones hardly do.
+    With no more numbers all records decide, as in `simplest_first`, if they differ and held-out ones hardly do. Of two
+    effects that the records do not separate the one with fewer numbers stands, since more can follow another effect;
+    of two shapes of one effect, whose name is no question, the one with the smaller error.
     """
     held, residual = records.held, records.residual(now)
     fewer = free_numbers(now, held) - best.numbers(held)
+    if fewer != 0 and name != best.name:
+        errors = [(rms(now.errors(group)), rms(best.fitted.errors(group))) for group in (held, records.to_fit)]
+        if all(no_worse(b, a, records.noise) if fewer > 0 else no_worse(a, b, records.noise) for a, b in errors):
+            return fewer > 0
     if best.held_out <= (1.0 - acceptance.BETTER) * residual:
         return True
     if fewer >= 0 and best.held_out <= (1.0 + acceptance.BETTER) * residual:
