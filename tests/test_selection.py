@@ -202,6 +202,115 @@ def test_a_rival_that_is_the_next_effect_is_not_followed_up(second: float) -> No
     assert sorted(extended) == (["c"] if second < 1.0 else ["b", "c"])
 
 
+class Apart(Hypothesis):
+    """Leaves another share in held-out records than in fitted ones."""
+
+    def __init__(self, world: World, names: frozenset[str], fitted: float, held_out: float) -> None:
+        super().__init__(world, names, fitted)
+        self.held_out = Hypothesis(world, names, held_out)
+
+    def errors(self, items: list[int], _: Any = None) -> list[Array]:
+        fitted = super().errors(items)
+        return [
+            b if item in self.world.held else a
+            for item, a, b in zip(items, fitted, self.held_out.errors(items), strict=True)
+        ]
+
+
+def extended(world: World, now: Hypothesis, label: str, name: str, left: tuple[float, float]) -> screening.Tried:
+    """`now` with an effect in a shape, which leaves these shares in fitted and held-out records."""
+    made: Any = Apart(world, now.names | {label}, *left)
+    option: Any = SimpleNamespace(label=label, name=name)
+    errors = made.errors(list(world.held))
+    return screening.Tried(option, made, (name,), world.rms(errors), errors)
+
+
+@pytest.mark.parametrize(("left", "others"), [(0.3, ["r", "c"]), (0.07, [])])
+def test_what_the_accepted_effect_hides(left: float, others: list[str]) -> None:
+    """Beside `c` nothing is left for `r`, whose part it has taken, but beside `r` it takes only its own: asked where
+    `c` leaves more than three times the noise."""
+    world = World({}, "")
+    ways = {"": [("c", left), ("r", 0.6)], "c": [("r", 0.95 * left)], "r": [("c", 0.02)]}
+
+    def extensions(now: Hypothesis, worth: Any = None) -> list[screening.Tried]:
+        found = [extended(world, now, name, name, (share, share)) for name, share in ways["".join(now.names)]]
+        return [each for each in found if worth is None or worth(each.option)]
+
+    world.extensions = extensions  # type: ignore[assignment, method-assign]
+    now: Any = Hypothesis(world, frozenset())
+    latest = selection._step(now, world.gap(now), world.records)
+    assert latest is not None
+    step = selection._step(latest.best.fitted, world.gap(now), world.records)
+    assert step is not None
+    assert (latest.best.name, step.merit) == ("c", None)
+    pair = selection._with_rival(latest, step, world.gap(now), world.records)
+    assert [each.best.name for each in pair or ()] == others
+
+
+@pytest.mark.parametrize(("fitted", "shapes"), [(0.05, ["a", "t"]), (0.45, [])])
+def test_another_shape_of_the_first_beside_a_second_that_spoils_it(fitted: float, shapes: list[str]) -> None:
+    """The simple shape `s` of `a` is as good by itself; beside it `t` explains fitted records and spoils held-out ones.
+    The other shape is asked only if `t` explains the fitted ones."""
+    world = World({}, "")
+    ways = {
+        "": [("s", "a", 0.5, 0.5), ("a", "a", 0.49, 0.5)],
+        "s": [("t", "t", fitted, 0.6)], "a": [("t", "t", 0.03, 0.03)],
+    }  # fmt: skip
+
+    def extensions(now: Hypothesis, worth: Any = None) -> list[screening.Tried]:
+        found = [extended(world, now, label, name, (a, b)) for label, name, a, b in ways["".join(now.names)]]
+        return [each for each in found if worth is None or worth(each.option)]
+
+    world.extensions = extensions  # type: ignore[assignment, method-assign]
+    now: Any = Hypothesis(world, frozenset())
+    simple, rich = extensions(now)
+    latest = selection._Step(now, [simple, rich], simple, selection.Merit(0.5, 0.5, 0.5, 0.0))
+    step = selection._step(simple.fitted, world.gap(now), world.records)
+    assert step is not None
+    assert step.merit is None
+    pair = selection._with_rival(latest, step, world.gap(now), world.records)
+    assert [each.best.option.label for each in pair or ()] == shapes
+
+
+def made(name: str, free: int, left: tuple[float, float]) -> screening.Tried:
+    one: Any = Made(name, free, left)
+    return screening.Tried(SimpleNamespace(name=name), one, (name,), left[1], one.errors(HELD))  # type: ignore[arg-type]
+
+
+OF_MADE: Any = SimpleNamespace(
+    to_fit=TO_FIT, held=HELD, noise=NOISE, residual=lambda each: float(np.sqrt(np.mean(np.square(each.errors(HELD)))))
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "free", "left", "way"),
+    [
+        ("other", 1, (1.1, 1.1), True),  # fewer numbers, and no separation
+        ("other", 1, (1.1, 1.3), False),
+        ("other", 1, (1.3, 1.1), False),
+        ("other", 5, (0.9, 0.9), False),  # more numbers: the records have to separate it
+        ("other", 5, (0.7, 0.7), True),
+        ("one", 5, (0.9, 0.9), True),  # another shape: its name is no question
+        ("one", 1, (1.1, 1.1), False),
+    ],
+)
+def test_what_an_effect_gives_way_to(name: str, free: int, left: tuple[float, float], way: bool) -> None:
+    now = made("one", 3, (1.0, 1.0))
+    assert selection._gives_way(now.fitted, "one", made(name, free, left), OF_MADE) is way
+
+
+def test_of_those_that_it_gives_way_to_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The best shape of the effect itself has more numbers than another effect that is as good."""
+    monkeypatch.setattr(selection, "merit_of", lambda *_: selection.Merit(1.0, 1.0, 0.5, 0.0))
+    shape, other = made("one", 4, (0.8, 0.8)), made("other", 3, (0.82, 0.82))
+    step = selection._Step(None, [shape, other], shape, selection.Merit(1.0, 1.0, 0.5, 0.0))  # type: ignore[arg-type]
+    found = selection._that_replaces(made("one", 3, (1.0, 1.0)).fitted, "one", step, OF_MADE)
+    assert found is not None
+    assert found.best is other
+    step = selection._Step(None, [shape], shape, step.merit)  # type: ignore[arg-type]
+    assert selection._that_replaces(shape.fitted, "one", step, OF_MADE) is None
+
+
 @pytest.mark.parametrize(
     ("held_out", "fitted", "first"), [(0.99, 1.2, "simple"), (1.03, 1.2, "rich"), (1.03, 1.0, "simple")]
 )
