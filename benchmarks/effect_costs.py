@@ -35,6 +35,8 @@ from hystgen.plays import slots
 from hystgen.verification import comparison, emulator, sources, targets
 
 MOVED = ("dashpot", "polynomial", "centre")
+INSIDE = {"quiet": "lag", "friction": "heat"}
+"""Parts of the code that only stand beside another one."""
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 EFFECTS = {
     "creep": "name: creep, time_constants: [0.01, 0.03, 0.1, 0.3, 1, 3], "
@@ -43,6 +45,8 @@ EFFECTS = {
     "lag_exact": "name: lag, time_constant: 2.0e-4",
     "ageing": "name: ageing, loss: 0.02, travel: 50",
     "heat": "name: thermal, source: self_heating, time_constant: 60, heating: 1.0e-5, gain_per_degree: 0.001",
+    "friction": "name: thermal, source: hysteresis, time_constant: 60, heating: 1.0e-5, reach: 5, "
+    "gain_per_degree: 0.001",
     "gain": "name: thermal, gain_per_degree: 0.001",
     "clock": "name: drift, rate: 1.0e-3",
     "preview": "name: resonance, frequency: 30, damping: 0.05",
@@ -140,7 +144,7 @@ def main() -> None:
                 code, counts = measures
                 before = base if effect == "any" else moved if effect in MOVED else least
                 before = ahead if operator == "forward" else before
-                before = apart["lag"] if effect == "quiet" else before
+                before = apart[INSIDE[effect]] if effect in INSIDE else before
                 if effect == "braked":
                     before = together([apart["lag"], apart["slew"]], least)
                 apart[effect] = measures

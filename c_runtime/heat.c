@@ -10,14 +10,19 @@ static void hystgen_heat_init(hystgen_heat_t *self) {
     self->offset = 0;
 }
 
-/* The drive has moved from `before` to v. Newton steps update the reciprocal of the gain. */
-static void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *self,
-                              hystgen_real_t before, hystgen_real_t v) {
+/* How far the square of the drive, with its sign, has moved. */
+static hystgen_real_t hystgen_heat_way(hystgen_real_t before, hystgen_real_t v) {
     const hystgen_real_t way =
         (v >= 0 ? v * v : -(v * v)) - (before >= 0 ? before * before : -(before * before));
+    return way >= 0 ? way : -way;
+}
+
+/* The drive has moved, by an amount of what warms. Newton steps update the reciprocal of the
+   gain. */
+static void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *self,
+                              hystgen_real_t amount) {
     const hystgen_real_t high = self->high;
-    const hystgen_real_t change =
-        (t->per_square * (way >= 0 ? way : -way) - t->rate * high) + self->low;
+    const hystgen_real_t change = (t->per_amount * amount - t->rate * high) + self->low;
     const hystgen_real_t next = high + change;
     const hystgen_real_t rise = next > t->hottest ? t->hottest : next;
     unsigned int i;

@@ -16,12 +16,17 @@ static int64_t hystgen_heat_square(hystgen_real_t v) {
     return v >= 0 ? square : -square;
 }
 
-/* The drive has moved from `before` to v. */
-HYSTGEN_APART void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *self,
-                                     hystgen_real_t before, hystgen_real_t v) {
+/* How far the square of the drive, with its sign, has moved. */
+static int64_t hystgen_heat_way(hystgen_real_t before, hystgen_real_t v) {
     const int64_t way = hystgen_heat_square(v) - hystgen_heat_square(before);
-    const int64_t size = hystgen_nearest(way >= 0 ? way : -way, t->coarse);
-    const int64_t heat = hystgen_times(size, &t->per_square) * ((int64_t)1 << t->lift);
+    return way >= 0 ? way : -way;
+}
+
+/* The drive has moved, by an amount of what warms. */
+HYSTGEN_APART void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *self,
+                                     int64_t amount) {
+    const int64_t size = hystgen_nearest(amount, t->coarse);
+    const int64_t heat = hystgen_times(size, &t->per_amount) * ((int64_t)1 << t->lift);
     self->rise += heat - hystgen_times(self->rise >> t->drop, &t->rate);
     const int64_t warm = self->rise >> t->drop;
     const int64_t rise = warm > t->hottest ? t->hottest : warm;

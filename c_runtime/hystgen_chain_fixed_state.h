@@ -67,6 +67,14 @@ typedef struct {
 } hystgen_heat_t;
 
 typedef struct {
+    int32_t at; /* a play that rubs */
+} hystgen_friction_state_t;
+
+typedef struct {
+    bool begun; /* the plays that rub are somewhere */
+} hystgen_friction_t;
+
+typedef struct {
     int64_t whole;  /* drift, in units of signals, */
     int64_t part;   /* and the fraction below, in units of the table */
     int64_t lead;   /* samples by which the next reference is ahead */

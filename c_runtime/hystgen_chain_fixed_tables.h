@@ -97,19 +97,30 @@ typedef struct {
     uint8_t bits;  /* of a gain below a code that sets it */
 } hystgen_ageing_table_t;
 
-/* Own heat: degrees gained per change of the drive's signed square, the share lost in a step, and
-   the rise up to which gain and offset follow. */
+/* Own heat: degrees gained per amount of what warms, the share lost in a step, and the rise up to
+   which gain and offset follow. */
 typedef struct {
     hystgen_factor_t rate;
-    hystgen_factor_t per_square;
+    hystgen_factor_t per_amount;
     hystgen_factor_t per_degree;
     hystgen_factor_t offset_per_degree;
     int64_t hottest;
     uint_least16_t turns; /* Newton steps for the reciprocal of a gain that has changed */
-    uint8_t coarse;       /* bits of a square that its product leaves out, */
+    uint8_t coarse;       /* bits of an amount that its product leaves out, */
     uint8_t lift;         /* bits of the temperature that the same product leaves out, */
     uint8_t drop;         /* and bits that products of the temperature leave out */
 } hystgen_heat_table_t;
+
+/* Plays that rub, the narrowest one first. */
+typedef struct {
+    int64_t threshold;
+} hystgen_friction_play_t;
+
+typedef struct {
+    const hystgen_friction_play_t *play;
+    uint_least16_t n;
+    uint8_t bits; /* of a play below a drive code */
+} hystgen_friction_table_t;
 
 /* Drift over time: its change in the first sample, and the growth of that from sample to sample. */
 typedef struct {

@@ -65,6 +65,14 @@ typedef struct {
 } hystgen_heat_t;
 
 typedef struct {
+    hystgen_real_t at; /* a play that rubs */
+} hystgen_friction_state_t;
+
+typedef struct {
+    bool begun; /* the plays that rub are somewhere */
+} hystgen_friction_t;
+
+typedef struct {
     hystgen_real_t high; /* samples, in units of the table's carry and of one */
     hystgen_real_t low;
     hystgen_real_t lead; /* samples by which the next reference is ahead */

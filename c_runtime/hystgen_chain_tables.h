@@ -76,15 +76,25 @@ typedef struct {
     uint_least8_t turns; /* Newton steps for the reciprocal of a gain that has changed */
 } hystgen_ageing_table_t;
 
-/* Own heat: degrees per change of the drive's signed square, and the share lost in a step. */
+/* Own heat: degrees per amount of what warms, and the share lost in a step. */
 typedef struct {
     hystgen_real_t rate;
-    hystgen_real_t per_square;
+    hystgen_real_t per_amount;
     hystgen_real_t per_degree;
     hystgen_real_t offset_per_degree;
     hystgen_real_t hottest; /* rise up to which gain and offset follow */
     uint_least16_t turns;   /* Newton steps for the reciprocal of a gain that has changed */
 } hystgen_heat_table_t;
+
+/* Plays that rub, the narrowest one first. */
+typedef struct {
+    hystgen_real_t threshold;
+} hystgen_friction_play_t;
+
+typedef struct {
+    const hystgen_friction_play_t *play;
+    uint_least16_t n;
+} hystgen_friction_table_t;
 
 /* Drift over time: its rate, and half the change of the rate per second. */
 typedef struct {

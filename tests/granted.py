@@ -16,6 +16,7 @@ from hystgen.effects.creep import fixed as creep
 from hystgen.effects.lag import fixed as lag
 from hystgen.effects.resonance import fixed as resonance
 from hystgen.effects.thermal import fixed as thermal
+from hystgen.effects.thermal.compensator import FRICTION_PLAYS
 from hystgen.model import Model
 from hystgen.plays.slots import CODE_MAX, PLAY_MAX, PLAY_MIN
 
@@ -105,6 +106,8 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
 # PART, WHOLE, GAINED   the clock of a drift counts a parabola over its samples exactly: `clock`
 # RISE     own heat adds no more in a sample than the warmest temperature loses, which has RISE_BITS; a bit more is for
 #          rounding
+# RUBBED   a play that rubs stays between the drives that it has seen
+# AMOUNT   so that none goes farther than from one to the other in a step; the odd numbers up to that of the n-th are n^2
 # INVERSE  a step of Newton's from x is `x (2 - g x)`, at most 1/g, and a gain is at least 1/2; 2 are for rounding
 # PLAY     a viscous play goes towards one that its input drags along, so that it stays between the start memory and the
 #          input's ends; one that would come too near to another stops in between
@@ -150,7 +153,10 @@ STATES = [
     (r"(    const int64_t more = \(t->slope[^;]*;\n)", CLOCK + r"\1"),
     (r"(        inverse = \(inverse \* more \+ half\)[^;]*;\n)",
      r"\1        GRANTED(inverse > 0 && inverse <= INVERSE);\n"),
-    (r"(    const int64_t way = NAME_heat_square[^;]*;\n)", r"    GRANTED(self->rise >= 0 && self->rise < RISE);\n\1"),
+    (r"(    const int64_t size = NAME_nearest\(amount[^;]*;\n)",
+     r"    GRANTED(self->rise >= 0 && self->rise < RISE);\n\1"),
+    (r"(        const int64_t to = x - r > at [^;]*;\n)", r"\1        WITHIN(to, RUBBED);\n"),
+    (r"(        amount \+= [^;]*;\n)", r"\1        GRANTED(amount >= 0 && amount <= AMOUNT);\n"),
     (r"(NAME_sum_t NAME_\w+_displaced\([^{]*\{\n)", r"\1    WITHIN(y, SIGNAL);\n"),
     (r"        return \(NAME_play_t\)(\(rest < low[^;]*);",
      r"        const int64_t beside = \1;\n        WITHIN(beside, PLAY);\n        return (NAME_play_t)beside;"),
@@ -196,6 +202,8 @@ def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") ->
         "ASKED": most(t.lag.block.tolist(), lag.DROP, 50) // 3, "COARSE": lag.COARSE,
         "MODE": most(t.mode.tolist(), resonance.DROP, 50), **(clock(t.clock[0].tolist()) if len(t.clock) else {}),
         "RISE": 2 ** (thermal.RISE_BITS + 1), "INVERSE": 2 * thermal.ONE + 2, "PLAY": max(map(abs, ends)),
+        "RUBBED": int(t.limits[CODE_MAX]) * most(t.heat.number.tolist(), thermal.BITS_BELOW, 0),
+        "AMOUNT": 2 * int(t.limits[CODE_MAX]) * most(t.heat.number.tolist(), thermal.BITS_BELOW, 0) * FRICTION_PLAYS**2,
         "INPUT": int(t.moving.farthest), "LOST": 2 ** int(t.moving.yield_bits) // 2,
         "DRAWN": max(int(t.moving.farthest), *map(abs, ends)),
     }  # fmt: skip

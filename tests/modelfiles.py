@@ -97,6 +97,8 @@ CHAINS = {
                            compensate="drift"),
     "heated": chain("heated", "name: thermal, source: self_heating, time_constant: 0.5, heating: 0.05, "
                     "gain_per_degree: -0.02, offset_per_degree: 0.1", CREEP, compensate="self_heating"),
+    "rubbed": chain("rubbed", "name: thermal, source: hysteresis, time_constant: 0.5, heating: 0.02, reach: 3, "
+                    "gain_per_degree: -0.02, offset_per_degree: 0.1", compensate="self_heating"),
     "late": chain("late", "name: delay, time: 2.6e-3", "name: resonance, frequency: 30, damping: 0.05", CREEP),
     "everything": chain("everything", CREEP, "name: lag, time_constant: 0.01", "name: delay, time: 2.0e-3",
                         "name: resonance, frequency: 40, damping: 0.3", "name: saturation, level: 15",

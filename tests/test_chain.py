@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 import subprocess
@@ -30,6 +31,8 @@ from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.resonance.model import Resonance
+from hystgen.effects.thermal import compensator as thermal
+from hystgen.effects.thermal.model import HysteresisHeating
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
@@ -87,7 +90,8 @@ def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
     ("name", "arithmetic"),
     [("everything", "float32"), ("viscous", "float32"), ("aged", "float32"),
      ("drifting_late", "float32"), ("heated", "float32"), ("everything", "q15"), ("everything", "q31"),
-     ("worn", "q15"), ("quick", "q15"), ("soft_dashpot", "q31"), ("dilated", "q15"), ("heated", "q15")],
+     ("worn", "q15"), ("quick", "q15"), ("soft_dashpot", "q31"), ("dilated", "q15"), ("heated", "q15"),
+     ("rubbed", "float32"), ("rubbed", "q15")],
 )  # fmt: skip
 def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:
     cores = ["cortex-m4f", "cortex-m0plus", "cortex-m7", "cortex-m33", "rv32imac", "mips32"]
@@ -389,6 +393,60 @@ def test_own_heat_leaves_the_gain_of_one_sample() -> None:
     assert np.max(np.abs(forward - one.simulate(v, t=run.t))) < 1e-12
     exact = one.inverse().simulate(run.v, t=run.t)
     assert np.max(np.abs(one.simulate(exact, t=run.t) - run.v)) < 1e-12, "in double precision the drive is sought"
+
+
+def test_heat_of_loops_leaves_the_gain_of_one_sample_and_what_few_plays_miss() -> None:
+    """The model has all plays that rub. A drive over the whole range, then small loops in places of their own."""
+    one = model("rubbed")
+    heat = one.effects[0]
+    assert isinstance(heat, HysteresisHeating)
+    t = np.arange(N) * T
+    size = np.where(np.arange(N) % 500 < 250, 3.5, 0.8)
+    v = size * np.sin(2.0 * np.pi * 9.0 * t) * (1.0 - np.exp(-t / 0.05)) + np.sin(2.0 * np.pi * 0.8 * t) / 2.0
+    u = one.simulate(v, t=t)
+    found = answers(compiled(one, "float64"), Run(t, u, {}), True)
+    left = np.max(np.abs(one.simulate(found, t=t) - u))
+    ends, move = one.cascade.input_range, float(np.max(np.abs(np.diff(found))))
+    degrees = thermal.most_at_once(heat, ends, move, T) + thermal.coarseness(heat, ends, move, T)
+    cold = one.without([heat])
+    output = float(np.max(np.abs(cold.simulate(v) - one.cascade.output_offset)))
+    assert left <= (0.02 * output + 0.1) * degrees
+    plain = cold.inverse().simulate(u, clamp=True)
+    assert np.max(np.abs(one.simulate(plain, t=t) - u)) > 50.0 * left, "what it is worth"
+    exact = one.inverse().simulate(u, t=t)
+    assert np.max(np.abs(one.simulate(exact, t=t) - u)) < 1e-12, "in double precision the drive is sought"
+
+
+def test_few_plays_warm_like_many() -> None:
+    """Drives of all kinds, among them the loops that eight plays know least about, against 4000 plays."""
+    reach, seconds, ends, move = 3.0, T, (-4.0, 4.0), 0.25
+    heat = HysteresisHeating(name="thermal", source="hysteresis", time_constant=2.0, heating=0.05, reach=reach)
+    allowed = thermal.coarseness(heat, ends, move, seconds)
+    per = thermal.per_amount(heat, ends, seconds)
+    cell, rng, worst = reach / thermal.FRICTION_PLAYS, np.random.default_rng(3), 0.0
+    widths = [*(cell * np.array([0.25, 0.5, 0.909, 1.5, 2.7])), 3.9]
+    for wide in [*widths, *4 * [-1.0]]:
+        knots = rng.uniform(-4.0, 4.0, 40) if wide < 0.0 else np.tile([wide, -wide], math.ceil(1000.0 * move / wide))
+        knots = np.append(0.0, knots)
+        v = np.concatenate([
+            np.linspace(a, b, max(math.ceil(abs(b - a) / move), 1), endpoint=False)
+            for a, b in itertools.pairwise(knots)
+        ])  # fmt: skip
+        rises = []
+        few, many = np.array(thermal.thresholds(heat, ends)), (np.arange(4000) + 0.5) * reach / 4000
+        odd = 2.0 * np.arange(thermal.FRICTION_PLAYS) + 1.0
+        for r, weight in ((few, odd), (many, many * (reach / 4000) * heat.heating / (seconds * per))):
+            z, rise, found = np.full(len(r), v[0]), 0.0, []
+            for x in v[1:]:
+                moved = np.clip(z, x - r, x + r)
+                rise = thermal.risen(heat, rise, per * float(weight @ np.abs(moved - z)), seconds)
+                z = moved
+                found.append(rise)
+            rises.append(np.array(found))
+        worst = max(worst, float(np.max(np.abs(rises[0] - rises[1]))))
+        assert np.max(np.abs(rises[0] - rises[1])) <= allowed
+    assert worst > 0.25 * allowed
+    assert allowed < 0.01 * heat.heating * 0.5 * reach**2 * move / seconds, "of the warmest rise"
 
 
 def test_ageing_leaves_the_gain_of_one_sample() -> None:

@@ -30,6 +30,7 @@ SOME = (
     "name: slew_limit, rate: 900, falling_rate: 700", "name: ageing, loss: 0.02, travel: 50",
     "name: thermal, gain_per_degree: 0.002, offset_per_degree: 0.01", "name: drift, rate: 0.08",
     "name: thermal, source: self_heating, time_constant: 0.5, heating: 0.02, gain_per_degree: -0.01",
+    "name: thermal, source: hysteresis, time_constant: 0.5, heating: 0.01, reach: 3, gain_per_degree: -0.01",
 )  # fmt: skip
 
 

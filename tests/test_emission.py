@@ -515,7 +515,8 @@ def test_no_line_is_longer_than_100_columns(kind: str, name: str, tmp_path: Path
 
 
 EVERY_EFFECT = (
-    "everything", "worn", "dashpot", "viscous", "relaxing", "dilated", "drifting", "heated", "quick", "straight",
+    "everything", "worn", "dashpot", "viscous", "relaxing", "dilated", "drifting", "heated", "rubbed", "quick",
+    "straight",
 )  # fmt: skip
 """Chains that have each effect, and each kind of table, between them."""
 

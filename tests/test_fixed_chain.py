@@ -32,7 +32,7 @@ from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal import fixed as thermal_fixed
-from hystgen.effects.thermal.model import SelfHeating
+from hystgen.effects.thermal.model import HysteresisHeating, OwnHeat, SelfHeating
 from hystgen.emission import module
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
@@ -247,9 +247,11 @@ def test_bounds_hold_however_much_own_heat_there_is(arithmetic: str) -> None:
 
 
 @BOTH
-def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(arithmetic: str) -> None:
-    """The inverse takes the gain before the last move, which counts most where the drive turns at an end."""
-    one = model(CHAINS["heated"])
+@pytest.mark.parametrize("name", ["heated", "rubbed"])
+def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(name: str, arithmetic: str) -> None:
+    """The inverse takes the gain before the last move, which counts most where the drive turns at an end. Half of the
+    bound for the heat of loops is what few plays miss; the most of that takes nested loops in an order of their own."""
+    one = model(CHAINS[name])
     numbers, codes = compiled(one, arithmetic)
     v = swept(numbers, N)
     t, output, drive = np.arange(N) * T, float(codes.output_lsb), float(codes.drive_lsb)
@@ -259,7 +261,7 @@ def test_bounds_of_own_heat_hold_at_the_fastest_rate_and_are_reached(arithmetic:
     compensator = Compensator(one.chain, one.parameters.emit.compensation)
     wanted = compensator.drives(Run(t, u * output), range_of_drive) / drive  # type: ignore[arg-type]
     worst = float(np.max(np.abs(answers(numbers, Run(t, u), True) - wanted)))
-    assert worst <= codes.inverse_error < 4.0 * worst
+    assert worst <= codes.inverse_error < (4.0 if name == "heated" else 6.0) * worst
 
 
 @pytest.mark.parametrize("name", ["lag", "exact", "lag_and_creep"])
@@ -429,8 +431,8 @@ def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_pa
 @pytest.mark.parametrize(
     ("name", "fact"),
     [("creeping", "CREEP"), ("creeping", "SIGNAL"), ("drifting", "PART"), ("aged", "INVERSE"),
-     ("heated", "RISE"), ("relaxing", "PLAY"), ("dashpot", "LOST"), ("dashpot", "INPUT"), ("late", "MODE"),
-     ("braked", "ASKED"), ("braked", "COARSE")],
+     ("heated", "RISE"), ("rubbed", "RUBBED"), ("relaxing", "PLAY"), ("dashpot", "LOST"), ("dashpot", "INPUT"),
+     ("late", "MODE"), ("braked", "ASKED"), ("braked", "COARSE")],
 )  # fmt: skip
 def test_what_proofs_take_for_granted_is_looked_at(name: str, fact: str, tmp_path: Path) -> None:
     runs = checked(tmp_path, model(PROVED[name]), "q31", [], fact)
@@ -627,32 +629,43 @@ def test_what_a_dashpot_yields_in_fixed_point(exponent: float, ratio: float, ari
 
 
 @BOTH
+@pytest.mark.parametrize("rubs", [False, True])
 @pytest.mark.parametrize("bits", [0, 10, 28])
-def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int) -> None:
+def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int, rubs: bool) -> None:
     """Time constants up to 2^28 samples, against the same recursion in whole fractions of a degree's 2^100th."""
     about = ARITHMETICS[arithmetic]
     largest, lsb, seconds = about.code_max, 4.0 / about.code_max, 1e-3
-    effect = SelfHeating(
-        name="thermal", source="self_heating", time_constant=0.7 * seconds * 2.0**bits, heating=0.05,
-        gain_per_degree=-0.002, offset_per_degree=0.01,
+    tau, ends = 0.7 * seconds * 2.0**bits, (-4.0, 4.0)
+    effect: OwnHeat = (
+        HysteresisHeating(name="thermal", source="hysteresis", time_constant=tau, heating=0.5, reach=3.0)
+        if rubs else SelfHeating(name="thermal", source="self_heating", time_constant=tau, heating=0.05)
     )  # fmt: skip
-    row = thermal.heat_numbers(effect, 20.0, seconds)
-    one = thermal_fixed.heat(row, largest, lsb, 2.0**20)
-    t = thermal.HeatTables(np.array([one.table], dtype=np.int64), np.array([4]))
-    state = np.zeros((1, 5), dtype=np.int64)
+    effect = effect.model_copy(update={"gain_per_degree": -0.002, "offset_per_degree": 0.01})
+    row, thresholds = thermal.heat_numbers(effect, ends, 20.0, seconds), thermal.thresholds(effect, ends)
+    one = thermal_fixed.heat(row, thresholds, largest, lsb, 2.0**20, about.code_bits)
+    t = thermal.HeatTables(
+        np.array([one.table], dtype=np.int64), np.array([4]), np.array(thermal.padded([one.thresholds])),
+        np.array([len(thresholds)]),
+    )  # fmt: skip
+    state = np.zeros((1, thermal.HEAT_STATE), dtype=np.int64)
     rng = np.random.default_rng(bits)
-    v = np.cumsum(rng.integers(-largest // 50, largest // 50, 2000))
+    steps = rng.integers(-largest // 50, largest // 50, 2000)
+    v = np.cumsum(2 * np.abs(steps) if rubs else steps)  # small loops hardly rub
     v = np.abs((v + largest) % (4 * largest) - 2 * largest) - largest
     v[1000:] = v[1000]
-    rate, heated = Fraction(row[thermal.HEAT_RATE]), Fraction(row[thermal.PER_SQUARE]) * Fraction(lsb) ** 2
-    warmest = float(heated) * 2 * largest**2 / row[thermal.HEAT_RATE]
+    rate, heated = Fraction(row[thermal.HEAT_RATE]), Fraction(row[thermal.PER_AMOUNT]) * Fraction(lsb) ** (2 - rubs)
+    warmest = float(heated) * 2 * (256 * largest if rubs else largest**2) / row[thermal.HEAT_RATE]
     unit = 2.0 ** (math.ceil(math.log2(warmest)) - thermal_fixed.RISE_BITS)
     rise, before, peak, worst = 0, 0, 0, 0.0
+    r, z = np.array(thresholds) / lsb, np.zeros(len(thresholds))
     with jit.plain():
         thermal_fixed.heat_reset(t, state, 0)
         for each in v.tolist():
             thermal_fixed.heat_move(t, state, 0, np.int64(before), np.int64(each))
             way = abs(each * abs(each) - before * abs(before))
+            if rubs:
+                moved = np.clip(z, each - r, each + r)
+                way, z = Fraction(float((2 * np.arange(len(r)) + 1) @ np.abs(moved - z))), moved
             rise += round(way * heated * 2**100 - rise * rate)
             worst = max(worst, abs(int(state[0, thermal_fixed.RISE]) * unit - rise / 2**100))
             peak, before = max(peak, rise), each

@@ -126,6 +126,7 @@ EFFECTS = {
     "drifted": ("name: drift, shape: curved, rate: 0.05, change: 0.01",),
     "aged": ("name: ageing, loss: 0.02, travel: 50",),
     "heated": ("name: thermal, source: self_heating, time_constant: 0.5, heating: 0.05, gain_per_degree: -0.02",),
+    "rubbed": ("name: thermal, source: hysteresis, time_constant: 0.5, heating: 0.02, reach: 3, gain_per_degree: 0.1",),
     "viscous": ("name: rate_dependence, shape: relaxation, time_constant: 5.0e-3",),
     "dilated": ("name: rate_dependence, betas: [1.0e-4, 1.0e-4, 1.0e-4, 2.0e-4, 2.0e-4, 2.0e-4]",),
     "dashpot": ("name: rate_dependence, shape: relaxation, time_constant: 5.0e-3, exponent: 2.5",),
@@ -137,7 +138,7 @@ EFFECTS = {
 
 QUIET = "emit: {compensation: {quiet: true}}\n"
 
-COMPENSATED = {"drifted": "drift", "heated": "self_heating"}
+COMPENSATED = {"drifted": "drift", "heated": "self_heating", "rubbed": "self_heating"}
 """What of these is asked for although nothing measures it."""
 
 CODE, ANY = "any_code", {"set_travel": "any_travel"}
@@ -285,7 +286,8 @@ EFFECT_FAULTS = [
     ("crept", r"(crept_creep_1 = \{[^;]*, )\d+(, \d+, 3,)", r"\g<1>25\2", "signed overflow"),
     ("aged", r"\(travel - piece->begin\) >> piece->drop", "travel - piece->begin", "signed downcast"),
     ("drifted", r"(\(t->slope \+ self->gained\)) \* ahead", r"\1 * self->part", "signed overflow"),
-    ("heated", r"way >= 0 \? way : -way, t->coarse", "way >= 0 ? way : -way, 0", "signed downcast"),
+    ("heated", r"amount, t->coarse", "amount, 0", "signed downcast"),
+    ("rubbed", r"(2u \* i \+ 1u\)) \* way", r"\1 * way * way", "signed overflow"),
     ("viscous", r"(sum \+= t->weight\[i\] \* z);", r"\1 * r;", "signed overflow"),
     ("braked", r"\(int64_t\)(\(middle \+ margin\) \* \(middle)", r"\1", "signed overflow"),
     ("dashpot", r"\(k = 4; k > 0; --k\)( \{\s*y = piece)", r"(k = 5; k > 0; --k)\1", "out of bounds"),

@@ -66,6 +66,8 @@ UNITS = (
     ("drifting", "float32", "loop"),
     ("drifting_late", "q15", "loop"),
     ("heated", "float64", "loop"),
+    ("rubbed", "float32", "loop"),
+    ("rubbed", "q15", "loop"),
     ("heated", "q31", "loop"),
     ("calm", "float32", "loop"),
     ("calm", "q15", "loop"),

@@ -34,7 +34,7 @@ from hystgen.effects.lag.model import Lag
 from hystgen.effects.rate_dependence.compensator import Movement
 from hystgen.effects.saturation.compensator import unsaturated
 from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal.model import SelfHeating
+from hystgen.effects.thermal.model import HysteresisHeating, OwnHeat, lost_on
 from hystgen.parameters.schema import Compensation
 
 EVEN = 1e-3
@@ -163,6 +163,41 @@ class Actuator:
         return sign * max(sign * w, sign * float(inputs[k]))
 
 
+class Heating:
+    """A temperature that follows the heat of a drive of n samples, with the turning points that friction remembers."""
+
+    def __init__(self, effect: OwnHeat, n: int) -> None:
+        self.effect, self.rise = effect, 0.0
+        self.first, self.corner, self.depth, self.up = math.nan, np.empty(n), 0, True
+
+    def _heat(self, before: float, drive: float, seconds: float) -> tuple[float, int, bool]:
+        """Final rise at the heat of a move, and what friction remembers after it."""
+        effect = self.effect
+        if isinstance(effect, HysteresisHeating):
+            energy, depth, up = lost_on(before, drive, self.first, effect.reach, self.corner, self.depth, self.up)
+            return effect.heating * energy / seconds, depth, up
+        way = abs(drive * abs(drive) - before * abs(before))
+        return effect.heating * 0.25 * way / seconds, 0, True
+
+    def risen(self, before: float, drive: float, seconds: float) -> float:
+        """The rise after the drive has moved from `before`; unchanged at the first sample."""
+        if math.isnan(before) or math.isnan(drive) or seconds == 0.0:
+            return self.rise
+        return thermal.risen(self.effect, self.rise, self._heat(before, drive, seconds)[0], seconds)
+
+    def move(self, before: float, drive: float, seconds: float) -> None:
+        """The drive has moved from `before`."""
+        if math.isnan(before):
+            self.first = drive
+        elif seconds > 0.0:
+            self.rise = self.risen(before, drive, seconds)
+            _, self.depth, self.up = self._heat(before, drive, seconds)
+
+    def solve(self, y: float, rise: float) -> float:
+        """The input that gives the output y at a rise."""
+        return (y - self.effect.offset_per_degree * rise) / (1.0 + self.effect.gain_per_degree * rise)
+
+
 SWITCH = "; to have it all the same, write emit: {compensation: {compensate: [%s]}}"
 """Advice for effects that nothing measures."""
 
@@ -173,11 +208,9 @@ def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
     if effect.name == "drift":
         ask = SWITCH % "drift"
         return "" if "drift" in compensate else f"drift (a clock that runs alone; nothing says when it began{ask})"
-    if isinstance(effect, SelfHeating):
+    if isinstance(effect, OwnHeat):
         unmeasured = "thermal from the drive's own heat (the temperature is not measured, and drifts with the room's"
         return "" if "self_heating" in compensate else f"{unmeasured}{SWITCH % 'self_heating'})"
-    if effect.name == "thermal" and not effect.columns:
-        return "thermal from the heat of loops (the temperature is not measured, and drifts with the room's)"
     if effect.name not in TAKEN_IN and effect.block is None:
         return f"{effect.name} (an effect of your own, which has no compensator)"
     return ""
@@ -239,10 +272,9 @@ class Compensator:
         gains = self._gains(reference)
         targets = self._targets(reference, asked)
         ageing_effects = self._called("ageing")
-        heating = [effect for effect in self.effects if isinstance(effect, SelfHeating)]
+        heating = [Heating(effect, n) for effect in self.effects if isinstance(effect, OwnHeat)]
         v = np.empty(n)
         travelled = 0.0
-        rises = [0.0] * len(heating)
         for k in range(n):
             seconds = float(t[k] - t[k - 1]) if k else 0.0
             if k:
@@ -256,10 +288,9 @@ class Compensator:
                     break
                 last = drive
                 way = travelled + (abs(drive - before) if k else 0.0)
-                warm = self._warm(heating, rises, before, drive, seconds)
                 y = float(targets[k])
-                for effect, rise in zip(heating, warm, strict=True):
-                    y = (y - effect.offset_per_degree * rise) / (1.0 + effect.gain_per_degree * rise)
+                for each in heating:
+                    y = each.solve(y, each.risen(before, drive, seconds))
                 drive = self._solve(y, gains, k, [ageing.gain(e, way) for e in ageing_effects])
                 drive = min(max(self._slewed(drive, before, seconds), ends[0]), ends[1])
                 if drive == last or not (ageing_effects or heating):
@@ -268,7 +299,8 @@ class Compensator:
             for block in self.blocks:
                 x = block.absorb(x) if k else block.rest(x)
             travelled += abs(drive - before) if k else 0.0
-            rises = self._warm(heating, rises, before, drive, seconds)
+            for each in heating:
+                each.move(before, drive, seconds)
             v[k] = drive
         return v
 
@@ -279,16 +311,6 @@ class Compensator:
         for block in reversed(self.blocks):
             y = block.solve(y) if k else block.resting(y)
         return y
-
-    @staticmethod
-    def _warm(
-        heating: Sequence[SelfHeating], rises: list[float], before: float, drive: float, seconds: float
-    ) -> list[float]:
-        """The rise of each temperature after the drive has moved from `before`; unchanged at the first sample."""
-        if math.isnan(before) or math.isnan(drive) or seconds == 0.0:
-            return rises
-        pairs = zip(heating, rises, strict=True)
-        return [thermal.risen(effect, rise, before, drive, seconds) for effect, rise in pairs]
 
     def _slewed(self, drive: float, before: float, seconds: float) -> float:
         """The nearest drive that the amplifier can reach in this time, or one from which a lag does not overshoot."""

@@ -93,6 +93,10 @@ class Block:
         finer = f"{x} * ((hystgen_signal_t)1 << {bits}u)"
         return f"hystgen_nearest({name}({', '.join([*given, finer])}), {bits}u)"
 
+    def warming(self) -> str:
+        """What plays that rub make of a move of the drive to v."""
+        return f"hystgen_friction_move({self.table}, &self->{self.name}, self->{self.fields[1].name}, self->applied, v)"
+
     def arrays(self, prefix: str) -> list[str]:
         """Its table, behind that of its rows where it has any."""
         kind, constants, own = self.kind, self.constants, f"{prefix}_{self.name}"
@@ -300,8 +304,12 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     t = compiled.tables
     named = {op: sides(t, op) for op in operators}
     clocks = [Block(constants, "clock") for constants in blocks.clocks(t)]
+    rubbing = [
+        Block(constants, f"{constants.kind.name}_{i}") if constants else None
+        for i, constants in enumerate(blocks.rubbing(t), 1)
+    ]
     functions = [
-        line for op in operators for line in _functions(op, t, *named[op], behind, clocks)
+        line for op in operators for line in _functions(op, t, *named[op], behind, clocks, rubbing)
     ]
     heated = ["set_temperature"] * (len(t.gain) > 0)
     aged = ["set_gain", "travel", "set_travel"] * (len(t.ageing.turns) > 0)
@@ -310,7 +318,8 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "forward": every,
         "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))],
     }
-    own = {op: [*before, *after, *clocks] for op, (before, after) in named.items()}
+    beside = [*(each for each in rubbing if each), *clocks]
+    own = {op: [*before, *after, *beside] for op, (before, after) in named.items()}
     largest = max(own.values(), key=len)  # the forward operator has what the inverse has, and modes
     arrays = [text for block in largest for text in block.arrays(prefix)]
     if "forward" in operators and t.delay.samples and t.fixed:
@@ -440,6 +449,7 @@ def _functions(
     after: Sequence[Block],
     behind: Sequence[dict[str, Any]],
     clocks: Sequence[Block],
+    rubbing: Sequence[Block | None],
 ) -> Iterator[str]:
     """The functions of one operator that name the blocks."""
     inverse, ahead = op == "inverse", len(t.tap) > 0
@@ -524,6 +534,8 @@ def _functions(
     gains = [block for block in after if block.kind.name == "gain"]
     ageing = [block for block in after if block.kind.name == "ageing"]
     heat = [block for block in after if block.kind.name == "heat"]
+    rubs = [block for block in rubbing if block]
+    warming = ["hystgen_heat_way(self->applied, v)" if each is None else each.warming() for each in rubbing]
     way = "(hystgen_signal_t)v - self->applied"
     yield _function(
         "Offset and gains of the parameter file.",
@@ -535,6 +547,7 @@ def _functions(
             *(f"hystgen_clock_start(&self->{each.name});" for each in clocks),
             *(f"self->{each.name}.lead = 0;" for each in clocks),
             *(f"hystgen_heat_init(&self->{each.name});" for each in heat),
+            *(f"hystgen_friction_init(&self->{each.name});" for each in rubs),
             *(f"hystgen_gain_init(&self->{block.name});" for block in gains),
             *(f"(void)hystgen_ageing_set_travel({each.table}, &self->{each.name}, 0);" for each in ageing),
         ],
@@ -544,7 +557,10 @@ def _functions(
         f"{apart if clocks or heat or ageing else 'static'} void hystgen_{op}_travelled({self_t}, hystgen_real_t v)",
         [
             *(f"hystgen_clock_tick({each.table}, &self->{each.name});" for each in clocks),
-            *(f"hystgen_heat_move({each.table}, &self->{each.name}, self->applied, v);" for each in heat),
+            *(
+                f"hystgen_heat_move({each.table}, &self->{each.name}, {amount});"
+                for each, amount in zip(heat, warming, strict=True)
+            ),
             *(f"hystgen_ageing_move({each.table}, &self->{each.name}, {way});" for each in ageing),
             *(["(void)self;"] if not (clocks or heat or ageing) else []),
             *(["(void)v;"] if not (heat or ageing) else []),

@@ -258,7 +258,7 @@ class Compensation(_Part):
     compensate: tuple[Literal["drift", "self_heating"], ...] = Field(
         default=(),
         description="effects that are compensated although nothing measures them: a drift, counted from set_offset on, "
-        "and the drive's own heat",
+        "and the drive's own heat, or that of its loops",
     )
 
     _preview = field_validator("preview", mode="before")(_auto)

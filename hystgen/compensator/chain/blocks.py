@@ -22,7 +22,7 @@ from hystgen.effects.thermal import fixed as thermal_fixed
 
 KINDS = (
     creep.KIND, lag.KIND, lag.EXACT_KIND, lag.BRAKED_KIND, ageing.KIND, thermal.HEAT_KIND, thermal.KIND, resonance.KIND,
-    drift.KIND,
+    drift.KIND, thermal.FRICTION_KIND,
 )  # fmt: skip
 """The kinds of blocks in the catalogue, each with a file of its name in `c_runtime/`."""
 
@@ -43,8 +43,13 @@ def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constant
 
 
 def every(t: ChainTables, operator: str) -> list[Constants]:
-    """The blocks of both sides and the clock of a drift."""
-    return [*itertools.chain(*sides(t, operator)), *clocks(t)]
+    """The blocks of both sides, what rubs, and the clock of a drift."""
+    return [*itertools.chain(*sides(t, operator)), *(each for each in rubbing(t) if each), *clocks(t)]
+
+
+def rubbing(t: ChainTables) -> list[Constants | None]:
+    """The plays whose friction warms, of each block of own heat; None where the drive's square does."""
+    return list((thermal_fixed if t.fixed else thermal).friction_constants(t.heat))
 
 
 def clocks(t: ChainTables) -> list[Constants]:

@@ -128,6 +128,24 @@ def _warmed(compiled: Compiled) -> float:
     )
 
 
+def _misjudged(compiled: Compiled, u: float, emitted: bool) -> float:
+    """Change of the output by what the plays that rub are wrong about the heat at the fastest rate."""
+    ends, output, step = compiled.static.input_range, _sizes(compiled).output, compiled.largest_step
+    found = 0.0
+    for each in compiled.parts.heat:
+        rubbing = thermal.thresholds(each, ends)
+        if not rubbing:
+            continue
+        # each play stands by a rounding off, and one that stays because another one does by three
+        amount = len(rubbing) ** 2 * 4.0 * u * (max(map(abs, ends)) + rubbing[-1])
+        amount += (len(rubbing) + 3.0) * u * thermal.most_amount(each, ends, step)
+        degrees = amount * thermal.per_amount(each, ends, compiled.seconds)
+        if emitted:
+            degrees += thermal.coarseness(each, ends, step, compiled.seconds)
+        found += degrees * (abs(each.gain_per_degree) * output + abs(each.offset_per_degree))
+    return found
+
+
 def _gain_ends(compiled: Compiled) -> tuple[float, float]:
     """Least and largest product of the gains: those that are set, and those of own heat at the fastest rate."""
     set_ones = len(compiled.tables.gain) + len(compiled.tables.ageing.turns)
@@ -190,6 +208,8 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
         inverse += late / least
     if t.heat.turns.size and emitted:  # the C leaves out the heat of one sample
         inverse += _warmed(compiled) / least
+    misjudged = _misjudged(compiled, u, emitted)
+    inverse += misjudged / least
     moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.lag.block)
     moved += 4.0 * u * sizes.drive * (t.delay.samples > 0)
     moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own[: t.own.ahead])
@@ -213,7 +233,7 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
         size *= float(t.creep.block[j, creep.REST])
     for each, (there_own, _) in zip(compiled.own[t.own.ahead :], roundings, strict=True):
         forward = forward * each.forward.largest + there_own
-    forward = gain * (forward + 3.0 * u * sizes.output * gains) + TABLE_ERROR * sizes.output * (late > 0.0)
+    forward = gain * (forward + 3.0 * u * sizes.output * gains) + misjudged + TABLE_ERROR * sizes.output * (late > 0.0)
     size, ringing = gain * sizes.output + sizes.displacement, 1.0
     for mode in compiled.modes:
         forward = mode.largest * forward + resonance.rounding(mode, size, u)

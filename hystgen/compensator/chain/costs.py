@@ -10,12 +10,12 @@ from hystgen.compensator.chain.layout import ChainTables
 from hystgen.plays import slots
 
 PARTS = (
-    "any", "creep", "lag", "lag_exact", "ageing", "heat", "gain", "clock", "preview", "slew", "braked", "tanh",
-    "dead_zone", "relaxing", "dilated", "dashpot", "polynomial", "centre", "mode", "delay", "quiet",
+    "any", "creep", "lag", "lag_exact", "ageing", "heat", "friction", "gain", "clock", "preview", "slew", "braked",
+    "tanh", "dead_zone", "relaxing", "dilated", "dashpot", "polynomial", "centre", "mode", "delay", "quiet",
 )  # fmt: skip
 """Parts of the code: `any` (with engine corners `any_corners`) once for a model with effects, the others once for
-each kind of block in it; `dilated` for all plays whose input is found by a search, `braked` for a lag and a slew limit
-together, `quiet` for a drive that stands still at rest."""
+each kind of block in it; `friction` beside `heat` for the heat of plays that rub, `dilated` for all plays whose input
+is found by a search, `braked` for a lag and a slew limit together, `quiet` for a drive that stands still at rest."""
 
 OPERATORS = {"preview": "inverse", "quiet": "inverse", "mode": "forward", "delay": "forward"}
 """Parts that only one operator has, and that operator."""
@@ -27,7 +27,7 @@ def parts(t: ChainTables, operator: str) -> list[str]:
     kinds = [int(kind) for kind in (t.behind.kind if t.fixed else t.behind.stage_kind)]
     found = Counter({
         "creep": len(t.creep.block), "lag": exact.count(False), "lag_exact": exact.count(True),
-        "heat": len(t.heat.turns), "clock": len(t.clock),
+        "heat": len(t.heat.turns), "friction": t.heat.plays.any(), "clock": len(t.clock),
         "ageing": len(t.ageing.turns), "gain": len(t.gain), "preview": len(t.tap), "slew": t.slew, "braked": t.braked,
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),
         "relaxing": t.moving.scanned, "dilated": t.moving.used and not t.moving.scanned,

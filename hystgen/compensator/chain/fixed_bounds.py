@@ -55,7 +55,7 @@ from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturati
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
 from hystgen.effects.thermal.fixed import GAIN_BITS, TEMPERATURE_BITS
-from hystgen.effects.thermal.model import SelfHeating
+from hystgen.effects.thermal.model import OwnHeat
 
 DOUBLE = 2.0**-40
 """Relative error of double precision itself: a thousand roundings."""
@@ -262,7 +262,8 @@ class Bounds:
         linear = [*zip(self.parts.heat, self.heats, strict=True), *((each, DEGREES) for each in self.parts.thermal)]
         for each, wrong in linear:
             least, largest, offset, at_once = LEAST_GAIN, LARGEST_GAIN, span, 0.0
-            if isinstance(each, SelfHeating):
+            if isinstance(each, OwnHeat):
+                wrong += thermal.coarseness(each, ends, step, self.seconds)
                 at_once = thermal.most_at_once(each, ends, step, self.seconds)
                 warmest, least, largest = thermal.reached(each, ends, step, self.seconds)
                 offset = warmest * abs(each.offset_per_degree) / lsb

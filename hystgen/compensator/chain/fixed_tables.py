@@ -487,14 +487,26 @@ class _Builder:
         """Own heat, of each effect."""
         span, level = self.high - self.low, 2.0**self.bits / float(self.output_lsb)
         largest, lsb = max(map(abs, self.inner.drive)), float(self.drive_lsb)
-        rows = [thermal.heat_numbers(each, span, self.seconds) for each in self.parts.heat]
-        return [thermal_fixed.heat(row, largest, lsb, level) for row in rows]
+        ends, code_bits = self.static.input_range, self.about.code_bits
+        return [
+            thermal_fixed.heat(
+                thermal.heat_numbers(each, ends, span, self.seconds), thermal.thresholds(each, ends), largest, lsb,
+                level, code_bits,
+            )
+            for each in self.parts.heat
+        ]  # fmt: skip
 
     def _heat_tables(self) -> HeatTables:
         ends, roundoff = self.static.input_range, 2.0**-thermal_fixed.GAIN_BITS
         turns = [thermal.heat_turns(each, ends, self.seconds, roundoff) for each in self.parts.heat]
         table = np.array([one.table for one in self.heats], dtype=np.int64)
-        return HeatTables(table.reshape(-1, thermal_fixed.DROP + 1), np.array(turns, dtype=np.int64))
+        rubbing = [one.thresholds for one in self.heats]
+        return HeatTables(
+            table.reshape(-1, thermal_fixed.BITS_BELOW + 1),
+            np.array(turns, dtype=np.int64),
+            np.array(thermal.padded(rubbing), dtype=np.int64),
+            np.array([len(each) for each in rubbing], dtype=np.int64),
+        )
 
     def _gains(self) -> Any:
         span = self.high - self.low

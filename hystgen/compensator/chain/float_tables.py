@@ -104,9 +104,12 @@ def _heat(
     roundoff: float,
 ) -> HeatTables:
     """Gains over the temperature of own heat."""
+    rubbing = [thermal.thresholds(each, ends) for each in parts.heat]
     return HeatTables(
-        reals([thermal.heat_numbers(each, span, seconds) for each in parts.heat], "temperatures").reshape(-1, 7),
+        reals([thermal.heat_numbers(each, ends, span, seconds) for each in parts.heat], "temperatures").reshape(-1, 7),
         np.array([thermal.heat_turns(each, ends, seconds, roundoff) for each in parts.heat], dtype=np.int64),
+        reals(thermal.padded(rubbing), "thresholds"),
+        np.array([len(each) for each in rubbing], dtype=np.int64),
     )
 
 

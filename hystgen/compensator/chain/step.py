@@ -23,6 +23,7 @@ from hystgen.effects.ageing.compensator import AgeingState
 from hystgen.effects.creep.compensator import CreepState
 from hystgen.effects.delay.compensator import Waiting, delay_put, delay_rest
 from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.thermal.compensator import HEAT_STATE
 from hystgen.plays import loop
 from hystgen.plays.corners.corners_fixed import new_fixed_memory
 from hystgen.plays.corners.corners_float import new_memory
@@ -82,7 +83,7 @@ class ChainState(NamedTuple):
     creep: CreepState
     ageing: AgeingState
     gain: Reals  # (k, 3)
-    heat: Reals  # (k, 5), in fixed point the last one is not used
+    heat: Reals  # (k, 22), with the plays that rub; in fixed point the fifth is not used
     clock: Reals  # (k, 3), in fixed point (k, 5)
     mode: Reals  # (k, 3), of the forward operator
     waiting: Waiting  # of the forward operator
@@ -109,7 +110,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         CreepState(np.zeros((len(t.creep.block), 2), dtype), np.zeros((len(t.creep.term), 2), dtype)),
         AgeingState(np.zeros((len(t.ageing.turns), 4), dtype), np.zeros(len(t.ageing.turns), np.int64)),
         np.zeros((len(t.gain), 3), dtype),
-        np.zeros((len(t.heat.turns), 5), dtype),
+        np.zeros((len(t.heat.turns), HEAT_STATE), dtype),
         np.zeros((len(t.clock), 5 if t.fixed else 3), dtype),
         np.zeros((modes, 3), dtype),
         Waiting(np.zeros(waiting, dtype), np.zeros(1, np.int64)),

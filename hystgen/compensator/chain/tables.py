@@ -14,7 +14,7 @@ from hystgen.effects.ageing.model import SHAPES as AGEING
 from hystgen.effects.base import USER, Effect, Place
 from hystgen.effects.delay import compensator as delay
 from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal.model import SelfHeating
+from hystgen.effects.thermal.model import OwnHeat
 from hystgen.parameters.schema import Compensation
 
 STANDARD = Compensation()
@@ -60,14 +60,12 @@ def refusals(
                 "a clock that runs alone, and nothing says when it began; set_offset takes it from outside, and "
                 "emit.compensation.compensate: [drift] lets the module count from there"
             )
-        elif isinstance(effect, SelfHeating) and "self_heating" not in how.compensate:
+        elif isinstance(effect, OwnHeat) and "self_heating" not in how.compensate:
             yield effect, (
                 "the drive's own heat, open loop: its temperature drifts with the room's; measure it, or have it "
                 "followed by emit.compensation.compensate: [self_heating]"
             )
-        elif effect.name == "thermal" and not effect.columns and not isinstance(effect, SelfHeating):
-            yield effect, "the heat of loops, open loop: its temperature drifts with the room's; measure it"
-        elif isinstance(effect, SelfHeating):
+        elif isinstance(effect, OwnHeat):
             yield from ((effect, reason) for reason in thermal.heat_problems(effect, (low, high), seconds))
         elif effect.block:
             yield from ((effect, reason) for reason in own.problems(effect, seconds, ARITHMETICS[arithmetic].fixed))

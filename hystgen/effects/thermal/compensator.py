@@ -1,15 +1,18 @@
-"""A logged temperature as a block: gain and offset that the caller sets."""
+"""Temperatures as blocks: gain and offset that the caller sets, or that follow the drive's own heat."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from hystgen.basics.jit import jit
-from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.thermal.model import LoggedThermal, SelfHeating
+from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
 from hystgen.plays.slots import Counts, Reals, zero
 
 LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
@@ -111,76 +114,147 @@ def gain_absorb(s: Reals, j: int, x: Any) -> Any:
 # ---------------------------------------------------------------- heat.c
 
 HEAT_KIND = Kind(
-    "heat", ("rate", "per_square", "per_degree", "offset_per_degree", "hottest"),
+    "heat", ("rate", "per_amount", "per_degree", "offset_per_degree", "hottest"),
     ("high", "low", "gain", "inverse", "offset"), counts=("turns",), reading=(), own=("solve", "absorb"),
 )  # fmt: skip
 
-HEAT_RATE, PER_SQUARE, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, HEAT_ONE, HEAT_TWO = range(7)
-HIGH, LOW, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET = range(5)
+HEAT_RATE, PER_AMOUNT, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, HEAT_ONE, HEAT_TWO = range(7)
+HIGH, LOW, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET, BEGUN, AT = range(7)
+
+FRICTION_PLAYS = 16
+"""Plays that stand for all that rub: loops then warm as all of them do within a 1000th of the warmest rise, see
+`coarseness`. Set by: tests/test_fixed_chain.py -k fastest_rate; with 8 plays the bound was 6.7 times the error there,
+with 16 it is 5.3 times."""
+
+HEAT_STATE = AT + FRICTION_PLAYS
+"""Numbers of a block's state."""
 
 
 class HeatTables(NamedTuple):
-    """Own heat of a model: `number` (k, 7), and the number of Newton steps, `turns` (k,)."""
+    """Own heat of a model: `number` (k, 7), the number of Newton steps, `turns` (k,), and thresholds of the plays that
+    rub (k, 16), with `plays` (k,) of them: 0 where the heat is that of the drive's square."""
 
     number: Reals
     turns: Counts
+    threshold: Reals
+    plays: Counts
 
 
-def risen(effect: SelfHeating, rise: float, before: float, v: float, seconds: float) -> float:
-    """The temperature's rise after a step in which the drive has moved from `before` to v."""
-    loss = -math.expm1(-seconds / effect.time_constant)
-    heat = effect.heating * 0.25 * abs(v * abs(v) - before * abs(before)) / seconds
-    return rise + loss * (heat - rise)
+def reach(effect: HysteresisHeating, ends: tuple[float, float]) -> float:
+    """The largest threshold of plays that a drive within `ends` can move."""
+    return min(effect.reach, ends[1] - ends[0])
 
 
-def most_at_once(effect: SelfHeating, ends: tuple[float, float], move: float, seconds: float) -> float:
+def thresholds(effect: OwnHeat, ends: tuple[float, float]) -> list[float]:
+    """Of the plays that stand for all that rub, in the middles of equal parts of their reach; none without friction."""
+    if not isinstance(effect, HysteresisHeating):
+        return []
+    half = 0.5 * reach(effect, ends) / FRICTION_PLAYS
+    return [(2 * i + 1) * half for i in range(FRICTION_PLAYS)]
+
+
+def padded(rows: Sequence[Sequence[Any]]) -> NDArray[Any]:
+    """Thresholds as in `HeatTables`: as many in each row."""
+    return np.array([[*row, *[0] * (FRICTION_PLAYS - len(row))] for row in rows]).reshape(-1, FRICTION_PLAYS)
+
+
+def per_amount(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> float:
+    """Final rise by a unit of what warms in each step: the change of the drive's signed square, or the ways of the
+    plays that rub, each times the odd number that its threshold is of the first."""
+    if not isinstance(effect, HysteresisHeating):
+        return effect.heating * 0.25 / seconds
+    cell = reach(effect, ends) / FRICTION_PLAYS
+    return effect.heating * 0.5 * cell * cell / seconds
+
+
+def most_amount(effect: OwnHeat, ends: tuple[float, float], move: float) -> float:
+    """Largest amount in a step in which the drive moves by `move` within `ends`: a play with threshold r moves by no
+    more than the drive can go beyond r."""
+    if isinstance(effect, HysteresisHeating):
+        span = ends[1] - ends[0]
+        ways = (min(move, max(span - r, 0.0)) for r in thresholds(effect, ends))
+        return math.fsum((2 * i + 1) * way for i, way in enumerate(ways))
+    largest = max(map(abs, ends))
+    inward, outward = min(move, largest), min(max(move - largest, 0.0), largest)
+    return inward * (2.0 * largest - inward) + outward * outward
+
+
+def lost(effect: OwnHeat, seconds: float) -> float:
+    """Share of a rise that is lost in a step."""
+    return -math.expm1(-seconds / effect.time_constant)
+
+
+def risen(effect: OwnHeat, rise: float, heat: float, seconds: float) -> float:
+    """The temperature's rise after a step whose heat, kept up, would raise it to `heat`."""
+    return rise + lost(effect, seconds) * (heat - rise)
+
+
+def most_at_once(effect: OwnHeat, ends: tuple[float, float], move: float, seconds: float) -> float:
     """Largest rise in one step in which the drive moves by `move` within `ends`."""
-    largest = max(map(abs, ends))
-    return risen(effect, 0.0, largest - min(move, largest), largest, seconds) + (
-        risen(effect, 0.0, 0.0, min(move - largest, largest), seconds) if move > largest else 0.0
-    )
+    return risen(effect, 0.0, per_amount(effect, ends, seconds) * most_amount(effect, ends, move), seconds)
 
 
-def farthest(effect: SelfHeating, ends: tuple[float, float], span: float, seconds: float) -> float:
+def farthest(effect: OwnHeat, ends: tuple[float, float], span: float, seconds: float) -> float:
     """Largest move of the drive within `ends` that may be repeated in every step without getting hotter than what the C
-    follows: at the most the heat of a step is `heating/(4T)` of the change of `v |v|`. `span`: as of `heat_numbers`."""
-    hottest = heat_numbers(effect, span, seconds)[HOTTEST_RISE]
+    follows. `span`: as of `heat_numbers`."""
+    hottest = heat_numbers(effect, ends, span, seconds)[HOTTEST_RISE]
+    amount = hottest / per_amount(effect, ends, seconds) if effect.heating else math.inf
+    if isinstance(effect, HysteresisHeating):
+        return amount / FRICTION_PLAYS**2  # all of them follow
     largest = max(map(abs, ends))
-    change = 4.0 * seconds * hottest / effect.heating if effect.heating else math.inf
-    if change < largest * largest:
-        return change / (largest + math.sqrt(largest * largest - change))  # from the end of the range inwards
-    return largest + math.sqrt(change - largest * largest)
+    if amount < largest * largest:
+        return amount / (largest + math.sqrt(largest * largest - amount))  # from the end of the range inwards
+    return largest + math.sqrt(amount - largest * largest)
 
 
-def reached(effect: SelfHeating, ends: tuple[float, float], move: float, seconds: float) -> tuple[float, float, float]:
+def reached(effect: OwnHeat, ends: tuple[float, float], move: float, seconds: float) -> tuple[float, float, float]:
     """The warmest rise that a drive which moves by at most `move` a step within `ends` comes to, and the least and the
     largest gain on the way."""
-    warmest = most_at_once(effect, ends, move, seconds) / -math.expm1(-seconds / effect.time_constant)
+    warmest = most_at_once(effect, ends, move, seconds) / lost(effect, seconds)
     gain = min(max(1.0 + effect.gain_per_degree * warmest, LEAST_GAIN), LARGEST_GAIN)
     return warmest, min(gain, 1.0), max(gain, 1.0)
 
 
-def heat_numbers(effect: SelfHeating, span: float, seconds: float) -> tuple[float, ...]:
-    """Constants of a block behind which the output spans `span`, at steps of `seconds`."""
-    ends = [1e6]  # degrees; where a temperature does nothing
+def coarseness(effect: OwnHeat, ends: tuple[float, float], move: float, seconds: float) -> float:
+    """How far the rise can be from that by all plays that rub, degrees, if the drive moves by at most `move` a step.
+
+    At the way 2x behind a turning point the plays up to x follow. With the middles of n cells of width h in their place
+    the loss a unit of way is wrong by `g(x) = x^2/2 - h sum r_i`, which within a cell is first positive, then negative,
+    and `|integral of g from 0 to x| <= 0.0873 h^2 x`, reached at `x = (3/4)^(1/3) h`. By rainflow counting the loss of
+    any drive is that of whole runs from a turning point, with x from 0 on, but for runs that were under way when it
+    began. In each direction their x only grows from there on, so that they are wrong by at most the integral of the
+    negative parts of 2 g over the reach, `h reach^2/8 (1 + 2/(3n))`; that of the positive ones is less. The temperature
+    forgets, which gives no later loss less weight than an earlier one.
+    """
+    if not isinstance(effect, HysteresisHeating):
+        return 0.0
+    top = reach(effect, ends)
+    cell = top / FRICTION_PLAYS
+    begun = 0.25 * cell * top * top * (1.0 + 2.0 / (3.0 * FRICTION_PLAYS)) * lost(effect, seconds)
+    return effect.heating * (0.0873 * cell * cell * move + begun) / seconds
+
+
+def heat_numbers(effect: OwnHeat, ends: tuple[float, float], span: float, seconds: float) -> tuple[float, ...]:
+    """Constants of a block behind which the output spans `span`, at steps of `seconds`, of drives within `ends`."""
+    hot = [1e6]  # degrees; where a temperature does nothing
     if effect.gain_per_degree:
-        ends += [(limit - 1.0) / effect.gain_per_degree for limit in (LEAST_GAIN, LARGEST_GAIN)]
+        hot += [(limit - 1.0) / effect.gain_per_degree for limit in (LEAST_GAIN, LARGEST_GAIN)]
     if effect.offset_per_degree:
-        ends.append(span / abs(effect.offset_per_degree))
-    loss = -math.expm1(-seconds / effect.time_constant)
-    per_square = loss * effect.heating * 0.25 / seconds
-    hottest = min(end for end in ends if end > 0.0)
-    return loss, per_square, effect.gain_per_degree, effect.offset_per_degree, hottest, 1.0, 2.0
+        hot.append(span / abs(effect.offset_per_degree))
+    loss = lost(effect, seconds)
+    per = loss * per_amount(effect, ends, seconds)
+    hottest = min(end for end in hot if end > 0.0)
+    return loss, per, effect.gain_per_degree, effect.offset_per_degree, hottest, 1.0, 2.0
 
 
-def heat_problems(effect: SelfHeating, ends: tuple[float, float], seconds: float) -> Iterator[str]:
+def heat_problems(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> Iterator[str]:
     """Why the C cannot follow the gain."""
     change = abs(effect.gain_per_degree) * most_at_once(effect, ends, ends[1] - ends[0], seconds) / LEAST_GAIN
     if change > MOST_CHANGE:
         yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST_CHANGE:.0%}"
 
 
-def heat_turns(effect: SelfHeating, ends: tuple[float, float], seconds: float, roundoff: float) -> int:
+def heat_turns(effect: OwnHeat, ends: tuple[float, float], seconds: float, roundoff: float) -> int:
     """Newton steps after which the reciprocal of the gain is exact up to rounding."""
     change = abs(effect.gain_per_degree) * most_at_once(effect, ends, ends[1] - ends[0], seconds) / LEAST_GAIN
     left = max(change, 1e-9)
@@ -201,15 +275,23 @@ def heat_reset(t: HeatTables, s: Reals, j: int) -> None:
     s[j, HEAT_GAIN] = t.number[j, HEAT_ONE]
     s[j, HEAT_INVERSE] = t.number[j, HEAT_ONE]
     s[j, HEAT_OFFSET] = zero(t.number[j, HEAT_ONE])
+    s[j, BEGUN] = zero(t.number[j, HEAT_ONE])
+
+
+@jit
+def heat_way(before: Any, v: Any) -> Any:
+    """How far the square of the drive, with its sign, has moved."""
+    way = (v * v if v >= zero(v) else -(v * v)) - (before * before if before >= zero(v) else -(before * before))
+    return way if way >= zero(v) else -way
 
 
 @jit
 def heat_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> None:
     """The drive has moved to v."""
     n = t.number[j]
-    way = (v * v if v >= zero(v) else -(v * v)) - (before * before if before >= zero(v) else -(before * before))
+    amount = friction_move(t, s, j, before, v) if t.plays[j] else heat_way(before, v)
     high = s[j, HIGH]
-    change = (n[PER_SQUARE] * (way if way >= zero(v) else -way) - n[HEAT_RATE] * high) + s[j, LOW]
+    change = (n[PER_AMOUNT] * amount - n[HEAT_RATE] * high) + s[j, LOW]
     following = high + change
     s[j, HIGH] = following
     s[j, LOW] = change - (following - high)
@@ -233,3 +315,43 @@ def heat_solve(s: Reals, j: int, y: Any) -> Any:
 def heat_absorb(s: Reals, j: int, x: Any) -> Any:
     """The output for the input x."""
     return s[j, HEAT_GAIN] * x + s[j, HEAT_OFFSET]
+
+
+# ---------------------------------------------------------------- friction.c
+
+FRICTION_KIND = Kind(
+    "friction", (), (), Rows("play", ("threshold",), ("at",)), counts=("n",), flags=("begun",), reading=(), own=(),
+)  # fmt: skip
+
+
+def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
+    """The plays that rub of each block; None where none do."""
+    for row, plays in zip(t.threshold, map(int, t.plays), strict=True):
+        yield Constants(FRICTION_KIND, (), (plays, 0), row[:plays, None], (plays,)) if plays else None
+
+
+@jit
+def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
+    """The drive has moved to v; at first the plays rest at `before`. Returns the sum of their ways, each times the odd
+    number that its threshold is of the first one. Where a play stays, wider ones do."""
+    one = t.number[j, HEAT_ONE]
+    if not s[j, BEGUN]:
+        s[j, BEGUN] = one
+        for i in range(t.plays[j]):
+            s[j, AT + i] = before
+    amount = zero(v)
+    odd = one
+    for i in range(t.plays[j]):
+        r = t.threshold[j, i]
+        at = s[j, AT + i]
+        if v - r > at:
+            to = v - r
+            amount = amount + odd * (to - at)
+        elif v + r < at:
+            to = v + r
+            amount = amount + odd * (at - to)
+        else:
+            break
+        s[j, AT + i] = to
+        odd = odd + t.number[j, HEAT_TWO]
+    return amount

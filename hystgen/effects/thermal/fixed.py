@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,9 +11,11 @@ import numpy as np
 
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
-from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
+    AT,
+    BEGUN,
     GAIN,
     INVERSE,
     LARGEST_GAIN,
@@ -124,50 +126,62 @@ def gain_absorb(s: Reals, j: int, x: Any) -> Any:
 RISE_BITS = 59
 """Bits of the largest rise of the temperature that a drive can make."""
 
-SQUARE_BITS = 50
-"""Bits of a change of the drive's square, and of a temperature, in a product."""
+AMOUNT_BITS = 50
+"""Bits of what warms in a step, and of a temperature, in a product."""
 
 HEAT_KIND = Kind(
     "heat", counts=("turns", "coarse", "lift", "drop"), reading=(), own=("solve", "absorb"), letters="ffffw",
     memory="wiiw",
 )  # fmt: skip
 
-RATE, PER_SQUARE, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, COARSE, LIFT, DROP = 0, 2, 4, 6, 8, 9, 10, 11
+RATE, PER_AMOUNT, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, COARSE, LIFT, DROP, BITS_BELOW = 0, 2, 4, 6, 8, 9, 10, 11, 12
 RISE, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET = range(4)
 
 
 @dataclass(frozen=True)
 class Heat:
-    """Own heat in fixed point: its table, and how far the temperature can be from the model's, degrees."""
+    """Own heat in fixed point: its table, thresholds of plays that rub, and how far the temperature can be from that of
+    the same recursion without rounding, degrees."""
 
     table: tuple[int, ...]
+    thresholds: tuple[int, ...]
     error: float
 
 
-def heat(numbers: tuple[float, ...], largest: int, lsb: float, level: float) -> Heat:
-    """For `numbers` as `heat_numbers` has them, drives up to `largest` codes of `lsb`, and `level` signals a unit of
-    the output. Raises OverflowError."""
-    rate, per_square, per_degree, offset_per_degree, hottest, *_ = numbers
-    most = 2 * largest * largest  # change of the square, codes
-    coarse = max(0, most.bit_length() - SQUARE_BITS)
-    per_code = per_square * lsb * lsb
+def heat(
+    numbers: tuple[float, ...], thresholds: Sequence[float], largest: int, lsb: float, level: float, code_bits: int
+) -> Heat:
+    """For `numbers` as `heat_numbers` has them, `thresholds` as the function of that name, drives up to `largest` codes
+    of `lsb` and `code_bits` bits, and `level` signals a unit of the output. Raises OverflowError."""
+    rate, per_amount, per_degree, offset_per_degree, hottest, *_ = numbers
+    if thresholds:
+        bits = STATE_BITS - code_bits  # of a play below a drive code
+        unit_of_drive = lsb / 2.0**bits
+        rows = [round(r / unit_of_drive) for r in thresholds]
+        most = (2 * largest << bits) * len(rows) ** 2
+        per_code, astray = per_amount * unit_of_drive, float(len(rows) ** 2)  # a threshold is off by half a unit
+    else:
+        bits, rows, astray = 0, [], 0.0
+        most, per_code = 2 * largest * largest, per_amount * lsb * lsb  # change of the square, codes
+    coarse = max(0, most.bit_length() - AMOUNT_BITS)
     warmest = max(per_code * most / rate, 1e-300)
     unit = math.ldexp(1.0, math.ceil(math.log2(warmest)) - RISE_BITS)  # degrees
-    drop = RISE_BITS - SQUARE_BITS
+    drop = RISE_BITS - AMOUNT_BITS
     kept = unit * 2.0**drop
     heating = per_code * 2.0**coarse / unit
     lift = max(0, math.frexp(heating)[1] - 9)
-    rows = (rate * 2.0**drop, heating / 2.0**lift, per_degree * kept * ONE, offset_per_degree * kept * level)
-    factors = [part for x in rows for part in factor(x)]
-    rounding = unit * (2.0**lift + 1.0) + 0.5 * per_code * 2.0**coarse * (coarse > 0)
+    products = (rate * 2.0**drop, heating / 2.0**lift, per_degree * kept * ONE, offset_per_degree * kept * level)
+    factors = [part for x in products for part in factor(x)]
+    rounding = unit * (2.0**lift + 1.0) + per_code * (0.5 * 2.0**coarse * (coarse > 0) + astray)
     error = rounding / rate + 2.0 * kept + min(warmest, hottest) * 2.0**-29
-    return Heat((*factors, min(round(hottest / kept), 1 << SQUARE_BITS), coarse, lift, drop), error)
+    hot = min(round(hottest / kept), 1 << AMOUNT_BITS)
+    return Heat((*factors, hot, coarse, lift, drop, bits), tuple(rows), error)
 
 
 def heat_constants(t: HeatTables) -> Iterator[Constants]:
     """The numbers of each block."""
     for row, turns in zip(t.number, map(int, t.turns), strict=True):
-        counts = (turns, *map(int, row[COARSE:]))
+        counts = (turns, *map(int, row[COARSE:BITS_BELOW]))
         yield Constants(HEAT_KIND, row[:COARSE], (12 + 2 * turns, 2), counts=counts)
 
 
@@ -178,15 +192,22 @@ def heat_reset(t: HeatTables, s: Reals, j: int) -> None:  # noqa: ARG001  as in 
     s[j, HEAT_GAIN] = ONE
     s[j, HEAT_INVERSE] = ONE
     s[j, HEAT_OFFSET] = zero(s[j, RISE])
+    s[j, BEGUN] = zero(s[j, RISE])
+
+
+@jit
+def heat_way(before: Any, v: Any) -> Any:
+    """How far the square of the drive, with its sign, has moved."""
+    way = (v * v if v >= 0 else -(v * v)) - (before * before if before >= 0 else -(before * before))
+    return way if way >= 0 else -way
 
 
 @jit
 def heat_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> None:
     """The drive has moved to v."""
     n = t.number[j]
-    way = (v * v if v >= 0 else -(v * v)) - (before * before if before >= 0 else -(before * before))
-    size = nearest(way if way >= 0 else -way, n[COARSE])
-    warmer = times(size, n[PER_SQUARE], n[PER_SQUARE + 1]) << n[LIFT]
+    amount = friction_move(t, s, j, before, v) if t.plays[j] else heat_way(before, v)
+    warmer = times(nearest(amount, n[COARSE]), n[PER_AMOUNT], n[PER_AMOUNT + 1]) << n[LIFT]
     s[j, RISE] = s[j, RISE] + (warmer - times(s[j, RISE] >> n[DROP], n[RATE], n[RATE + 1]))
     warm = s[j, RISE] >> n[DROP]
     rise = n[HOTTEST_RISE] if warm > n[HOTTEST_RISE] else warm
@@ -210,3 +231,46 @@ def heat_solve(s: Reals, j: int, y: Any) -> Any:
 def heat_absorb(s: Reals, j: int, x: Any) -> Any:
     """The output for the input x."""
     return times(x, s[j, HEAT_GAIN], GAIN_BITS) + s[j, HEAT_OFFSET]
+
+
+# ---------------------------------------------------------------- friction_fixed.c
+
+STATE_BITS = 31
+"""Bits of a play that rubs, without its sign: a drive has 15 or 31 of them with it."""
+
+FRICTION_KIND = Kind(
+    "friction", (), (), Rows("play", letters="w", memory="i"), counts=("n", "bits"), flags=("begun",),
+    reading=(), own=(),
+)  # fmt: skip
+
+
+def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
+    """The plays that rub of each block; None where none do."""
+    for row, plays, numbers in zip(t.threshold, map(int, t.plays), t.number, strict=True):
+        counts = (plays, int(numbers[BITS_BELOW]))
+        yield Constants(FRICTION_KIND, (), (2 * plays, 0), row[:plays, None], counts) if plays else None
+
+
+@jit
+def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
+    """As in floating point."""
+    bits = t.number[j, BITS_BELOW]
+    if not s[j, BEGUN]:
+        s[j, BEGUN] = 1
+        for i in range(t.plays[j]):
+            s[j, AT + i] = before << bits
+    x = v << bits
+    amount = zero(x)
+    for i in range(t.plays[j]):
+        r = t.threshold[j, i]
+        at = s[j, AT + i]
+        if x - r > at:
+            to = x - r
+            amount = amount + (2 * i + 1) * (to - at)
+        elif x + r < at:
+            to = x + r
+            amount = amount + (2 * i + 1) * (at - to)
+        else:
+            break
+        s[j, AT + i] = to
+    return amount

@@ -35,39 +35,46 @@ def rubbed(way: float, reach: float) -> float:
 
 
 @jit
-def lost(v: Array, reach: float, corner: Array, out: Array) -> None:
-    """Energy that plays of all thresholds up to `reach`, equally dense and relaxed at `v[0]`, lose in each step of `v`.
+def lost_on(
+    w: float, x: float, first: float, reach: float, corner: Array, depth: int, up: bool
+) -> tuple[float, int, bool]:
+    """Energy that plays of all thresholds up to `reach`, equally dense and relaxed at `first`, lose on the way from `w`
+    to `x`, with the number of turning points and the direction after it.
 
     Behind a turning point a play follows when the way is twice its threshold. Turning points that are passed are
-    forgotten (Madelung's rules): there the way goes on from an earlier one, or on the initial curve.
+    forgotten (Madelung's rules): there the way goes on from an earlier one, or on the initial curve. `corner`: the
+    `depth` turning points of before, which stay as they are; a new one is written behind them.
     """
-    depth = 0
-    w = v[0]
-    up = True
+    energy = 0.0
+    if x == w:
+        return energy, depth, up
+    if (x > w) != up:
+        up = x > w
+        if w != first or depth > 0:
+            corner[depth] = w
+            depth += 1
+    sign = 1.0 if up else -1.0
+    while x != w:
+        if depth == 0:
+            energy += rubbed(abs(x - first), reach) - rubbed(abs(w - first), reach)
+            break
+        last = corner[depth - 1]
+        end = corner[depth - 2] if depth > 1 else 2.0 * first - last
+        ends = sign * (x - end) >= 0.0
+        to = end if ends else x
+        energy += 2.0 * (rubbed(0.5 * sign * (to - last), reach) - rubbed(0.5 * sign * (w - last), reach))
+        w = to
+        if ends:
+            depth -= min(depth, 2)
+    return energy, depth, up
+
+
+@jit
+def lost(v: Array, reach: float, corner: Array, out: Array) -> None:
+    """The energy lost in each step of `v`, as by `lost_on`, from rest at its first sample."""
+    depth, up = 0, True
     for k in range(len(v) - 1):
-        x = v[k + 1]
-        out[k] = 0.0
-        if x == w:
-            continue
-        if (x > w) != up:
-            up = x > w
-            if w != v[0] or depth > 0:
-                corner[depth] = w
-                depth += 1
-        sign = 1.0 if up else -1.0
-        while x != w:
-            if depth == 0:
-                out[k] += rubbed(abs(x - v[0]), reach) - rubbed(abs(w - v[0]), reach)
-                w = x
-                break
-            last = corner[depth - 1]
-            end = corner[depth - 2] if depth > 1 else 2.0 * v[0] - last
-            ends = sign * (x - end) >= 0.0
-            to = end if ends else x
-            out[k] += 2.0 * (rubbed(0.5 * sign * (to - last), reach) - rubbed(0.5 * sign * (w - last), reach))
-            w = to
-            if ends:
-                depth -= min(depth, 2)
+        out[k], depth, up = lost_on(v[k], v[k + 1], v[0], reach, corner, depth, up)
 
 
 class _Thermal(Effect):
@@ -128,11 +135,16 @@ class LoggedThermal(_Thermal):
         return found
 
 
-class _OwnHeat(_Thermal):
+class OwnHeat(_Thermal):
+    """Gain and offset of a temperature that the drive makes by itself: `tau T' + T = heat`, T 0 at the start."""
+
     time_constant: Positive = Field(description="tau, s", examples=[60.0])
+    heating: NotNegative
 
     compensated: ClassVar[Compensated] = "needs a sensor"
-    compensation: ClassVar[str] = "none: the temperature is not measured"
+    compensation: ClassVar[str] = (
+        "the temperature is not measured; followed open loop with emit.compensation.compensate: [self_heating]"
+    )
 
     @abstractmethod
     def heat(self, run: Run) -> Array:
@@ -150,7 +162,7 @@ class _OwnHeat(_Thermal):
         return out
 
 
-class SelfHeating(_OwnHeat):
+class SelfHeating(OwnHeat):
     """Gain and offset of self-heating: `tau T' + T = heating |v v'|/2`, T above the reference, 0 at the start.
 
     A drive of amplitude V about 0 and frequency f has `|v v'|/2 = f V^2` in the mean, the law of dielectric loss; one
@@ -159,10 +171,6 @@ class SelfHeating(_OwnHeat):
 
     source: Literal["self_heating"] = Field(description="temperature from the drive's own heat")
     heating: NotNegative = Field(description="K s/input^2: heating f V^2 is the final rise", examples=[1.0e-5])
-
-    compensation: ClassVar[str] = (
-        "the temperature is not measured; followed open loop with emit.compensation.compensate: [self_heating]"
-    )
 
     def heat(self, run: Run) -> Array:
         """`heating |v v'|/2`."""
@@ -188,7 +196,7 @@ class SelfHeating(_OwnHeat):
         return found
 
 
-class HysteresisHeating(_OwnHeat):
+class HysteresisHeating(OwnHeat):
     """Gain and offset of the heat that hysteresis itself loses: `tau T' + T = heating q`, T 0 at the start.
 
     `q` is what plays of all thresholds up to `reach`, equally dense, lose to friction, input units^3/s: `2/3 f V^3`

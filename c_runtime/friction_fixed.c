@@ -1,0 +1,44 @@
+#include "hystgen_runtime.h"
+
+/* Heat of loops, in fixed point: a few plays stand for all that rub on each other. They have as
+   many bits below a drive code as fit. */
+
+static void hystgen_friction_init(hystgen_friction_t *self) {
+    self->begun = false;
+}
+
+/* At first the plays rest where the drive is. */
+static void hystgen_friction_begin(const hystgen_friction_table_t *t, hystgen_friction_t *self,
+                                   hystgen_friction_state_t *state, hystgen_real_t v) {
+    unsigned int i;
+    for (i = 0; i < t->n; ++i) {
+        state[i].at = (int32_t)(v * ((int64_t)1 << t->bits));
+    }
+    self->begun = true;
+}
+
+/* The drive has moved from `before` to v. Returns the sum of the ways of the plays, each times the
+   odd number that its threshold is of the first one. Where a play stays, wider ones do. */
+HYSTGEN_APART int64_t hystgen_friction_move(const hystgen_friction_table_t *t,
+                                            hystgen_friction_t *self,
+                                            hystgen_friction_state_t *state, hystgen_real_t before,
+                                            hystgen_real_t v) {
+    const int64_t x = v * ((int64_t)1 << t->bits);
+    int64_t amount = 0;
+    unsigned int i;
+    if (!self->begun) {
+        hystgen_friction_begin(t, self, state, before);
+    }
+    for (i = 0; i < t->n; ++i) {
+        const int64_t r = t->play[i].threshold;
+        const int64_t at = state[i].at;
+        const int64_t to = x - r > at ? x - r : x + r < at ? x + r : at;
+        const int64_t way = to >= at ? to - at : at - to;
+        if (way == 0) {
+            break;
+        }
+        state[i].at = (int32_t)to;
+        amount += (int64_t)(2u * i + 1u) * way;
+    }
+    return amount;
+}
