@@ -49,11 +49,14 @@ static int32_t hystgen_braked_coarsely(const hystgen_lag_table_t *t, int32_t x) 
     return hystgen_braked_coarse(hystgen_braked_led(t, state));
 }
 
-/* The most by which the lead is cut: what the drive falls short of the answer now, and before. */
-HYSTGEN_APART int64_t hystgen_braked_room(const hystgen_lag_table_t *t,
-                                          const hystgen_braked_t *self, int64_t beyond) {
+/* Sets the most by which the lead is cut: what the drive falls short of the answer now, and before.
+   Returns whether that is half a code or more; no drive has less. */
+HYSTGEN_APART bool hystgen_braked_room(const hystgen_lag_table_t *t, const hystgen_braked_t *self,
+                                       hystgen_brake_t *brake, int64_t beyond) {
     const int64_t missed = self->earlier - self->lag.wanted;
-    return beyond + hystgen_braked_led(t, missed < 0 ? -missed : missed);
+    const int64_t room = beyond + hystgen_braked_led(t, missed < 0 ? -missed : missed);
+    brake->room = hystgen_braked_coarse(room);
+    return room + room >= (int64_t)1 << HYSTGEN_DRIVE_BITS;
 }
 
 /* The drive with which the lag goes on as its target does, by no more in a step than the drive
@@ -76,7 +79,7 @@ HYSTGEN_APART int64_t hystgen_braked_along(const hystgen_lag_table_t *t,
 
 /* The largest lead m, up to `lead`, with which the lag gains no more than `size` until it is there:
    (m + back/2)^2 / (2 way), where `way` is back/(1 - E). */
-static int32_t hystgen_braked_lead(int32_t size, int32_t lead, int32_t margin, int32_t way) {
+HYSTGEN_APART int32_t hystgen_braked_lead(int32_t size, int32_t lead, int32_t margin, int32_t way) {
     const int64_t limit = (int64_t)2 * size * way;
     int32_t low = size;
     int32_t high = lead;
@@ -95,18 +98,23 @@ static int32_t hystgen_braked_lead(int32_t size, int32_t lead, int32_t margin, i
     return low;
 }
 
-/* By how much `lead` exceeds the largest lead that still comes back in time, limited to `room`. */
-HYSTGEN_APART int32_t hystgen_braked_over(const hystgen_lag_table_t *t,
-                                          const hystgen_brake_t *brake, int32_t lead,
-                                          int32_t room) {
+/* The largest lead that still comes back in time. */
+HYSTGEN_APART int32_t hystgen_braked_most(const hystgen_lag_table_t *t,
+                                          const hystgen_brake_t *brake) {
     const int32_t size = brake->left < 0 ? -brake->left : brake->left;
     const int32_t margin = brake->back >> 1;
-    int32_t most = size <= margin ? hystgen_braked_coarsely(t, size) : size;
+    const int32_t most = size <= margin ? hystgen_braked_coarsely(t, size) : size;
     if (most > margin) {
-        most = hystgen_braked_lead(size, lead, margin, hystgen_braked_coarsely(t, brake->back));
+        return hystgen_braked_lead(size, brake->lead, margin,
+                                   hystgen_braked_coarsely(t, brake->back));
     }
-    const int32_t over = lead - most;
-    return over > room ? room : over < -room ? -room : over;
+    return most;
+}
+
+/* By how much the lead is cut: what it exceeds that by, within the room. */
+static int32_t hystgen_braked_over(const hystgen_lag_table_t *t, const hystgen_brake_t *brake) {
+    const int32_t over = brake->lead - hystgen_braked_most(t, brake);
+    return over > brake->room ? brake->room : over < -brake->room ? -brake->room : over;
 }
 
 /* The drive from which the lag does not overshoot. `near` is the reachable drive nearest to the
@@ -115,13 +123,12 @@ HYSTGEN_APART int32_t hystgen_braked_over(const hystgen_lag_table_t *t,
 static int64_t hystgen_braked_drive(const hystgen_lag_table_t *t, const hystgen_braked_t *self,
                                     int64_t near, int64_t beyond) {
     hystgen_brake_t brake;
-    const int64_t room = hystgen_braked_room(t, self, beyond);
-    if (room + room < (int64_t)1 << HYSTGEN_DRIVE_BITS) {
-        return near; /* less than half a code, which no drive has */
+    if (!hystgen_braked_room(t, self, &brake, beyond)) {
+        return near;
     }
     const int64_t ahead = near - hystgen_braked_along(t, self, &brake);
-    const int32_t lead = hystgen_braked_coarse(brake.left < 0 ? -ahead : ahead);
-    const int32_t over = hystgen_braked_over(t, &brake, lead, hystgen_braked_coarse(room));
-    const int64_t less = (int64_t)over * ((int64_t)1 << HYSTGEN_BRAKED_DROP);
+    brake.lead = hystgen_braked_coarse(brake.left < 0 ? -ahead : ahead);
+    const int64_t less =
+        (int64_t)hystgen_braked_over(t, &brake) * ((int64_t)1 << HYSTGEN_BRAKED_DROP);
     return brake.left < 0 ? near + less : near - less;
 }

@@ -4,28 +4,22 @@
    of play i is the value at which it would come to rest (`play`) and what it contributes there
    (`bent`). */
 
-/* The plays follow their input w. Returns their sum. */
+/* The plays move while their input goes to w. Returns their sum. */
 HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
                                                  hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
     unsigned int i;
     HYSTGEN_ROLLED
     for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_play_t z = hystgen_moved(i, play, w);
-        const hystgen_play_t rest = hystgen_left(i, z, w);
-        const hystgen_sum_t value = hystgen_contributed(i, play, bent, z);
-        sum = sum + hystgen_model_tables.weight[i] * value;
-        bent[i] = rest >= z && rest <= z ? value : hystgen_bent(i, rest);
-        hystgen_keep(i, play, w, rest);
+        const hystgen_play_t before = play[i];
+        hystgen_move(i, play, w);
+        if (play[i] < before || play[i] > before) {
+            bent[i] = hystgen_bent(i, play[i]);
+        }
+        sum = sum + hystgen_model_tables.weight[i] * bent[i];
     }
     play[0] = w;
     return sum;
-}
-
-/* Play i at rest with its input at w. */
-static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play,
-                                      hystgen_play_t w) {
-    return hystgen_drawn(play[i], w, hystgen_model_tables.threshold[i]);
 }
 
 /* The plays come to rest with their input at w. Returns their sum. */
@@ -45,14 +39,22 @@ HYSTGEN_APART hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum
 
 /* The plays follow their input w. Returns their sum. */
 static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
-    return hystgen_level(self->moving ? hystgen_moved_follow(self->play, self->bent, w)
-                                      : hystgen_moved_rest(self->play, self->bent, w));
+    if (!self->moving) {
+        return hystgen_level(hystgen_moved_rest(self->play, self->bent, w));
+    }
+    self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
+    hystgen_relax(self->play, self->bent);
+    return self->level;
 }
 
 /* The plays follow their input w. Returns their sum. */
 static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
-    return hystgen_level(self->moving ? hystgen_moved_follow(self->play, self->bent, w)
-                                      : hystgen_moved_rest(self->play, self->bent, w));
+    if (!self->moving) {
+        return hystgen_level(hystgen_moved_rest(self->play, self->bent, w));
+    }
+    self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
+    hystgen_relax(self->play, self->bent);
+    return self->level;
 }
 
 /* Sum of the plays in the start memory. */
@@ -63,25 +65,4 @@ static hystgen_signal_t hystgen_forward_started(hystgen_forward_t *self) {
 /* Sum of the plays in the start memory. */
 static hystgen_signal_t hystgen_inverse_started(hystgen_inverse_t *self) {
     return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
-}
-
-/* What the plays give once their input has gone to w, or rests there. It rises with w. */
-HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_play_t w) {
-    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
-    unsigned int i;
-    if (self->moving) {
-        for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-            const hystgen_play_t z = hystgen_moved(i, self->play, w);
-            const hystgen_sum_t value = hystgen_contributed(i, self->play, self->bent, z);
-            sum = sum + hystgen_model_tables.weight[i] * value;
-        }
-        return sum;
-    }
-    HYSTGEN_ROLLED
-    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_play_t z = hystgen_resting(i, self->play, w);
-        const hystgen_sum_t value = hystgen_contributed(i, self->play, self->bent, z);
-        sum = sum + hystgen_model_tables.weight[i] * value;
-    }
-    return sum;
 }

@@ -29,21 +29,12 @@ static int64_t hystgen_creep_solve(const hystgen_creep_table_t *t, const hystgen
     return self->before + hystgen_times(y - self->ahead, &t->inverse_slope);
 }
 
-/* The input is x at this sample. Returns the output. Two short loops keep less on the stack than a
-   long one. */
-HYSTGEN_APART int64_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystgen_creep_t *self,
-                                           hystgen_creep_state_t *state, int64_t x) {
-    const int64_t change = x - self->before;
-    int64_t now = 0;
+/* The states go on to the next sample; `ahead` is their sum at this one. Returns the output. */
+HYSTGEN_APART int64_t hystgen_creep_next(const hystgen_creep_table_t *t, hystgen_creep_t *self,
+                                         hystgen_creep_state_t *state) {
     int64_t next = 0;
     unsigned int i;
-    self->before = x;
-    for (i = 0; i < t->n; ++i) {
-        const hystgen_creep_term_t *term = &t->term[i];
-        state[i].next += hystgen_times(change, &term->late) * ((int64_t)1 << term->lift);
-        now += state[i].next;
-    }
-    now = hystgen_nearest(now, t->bits);
+    HYSTGEN_ROLLED
     for (i = 0; i < t->n; ++i) {
         const hystgen_creep_term_t *term = &t->term[i];
         const int64_t settled =
@@ -52,6 +43,25 @@ HYSTGEN_APART int64_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystg
         next += state[i].next;
     }
     const int64_t direct = hystgen_times(self->before, &t->direct);
+    const int64_t y = direct + self->ahead;
     self->ahead = direct + hystgen_nearest(next, t->bits);
-    return direct + now;
+    return y;
+}
+
+/* The input is x at this sample. Returns the output. Two short functions, the first of which ends
+   with the second, keep less on the stack than a long one. */
+HYSTGEN_APART int64_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystgen_creep_t *self,
+                                           hystgen_creep_state_t *state, int64_t x) {
+    const int64_t change = x - self->before;
+    int64_t now = 0;
+    unsigned int i;
+    self->before = x;
+    HYSTGEN_ROLLED
+    for (i = 0; i < t->n; ++i) {
+        const hystgen_creep_term_t *term = &t->term[i];
+        state[i].next += hystgen_times(change, &term->late) * ((int64_t)1 << term->lift);
+        now += state[i].next;
+    }
+    self->ahead = hystgen_nearest(now, t->bits);
+    return hystgen_creep_next(t, self, state);
 }

@@ -27,6 +27,8 @@ typedef struct {
 typedef struct {
     int32_t left; /* that the lag is to gain beyond its target's way */
     int32_t back; /* by which the lead shrinks in a step */
+    int32_t lead; /* as it would be */
+    int32_t room; /* by which it may shrink at once */
 } hystgen_brake_t;
 
 typedef struct {

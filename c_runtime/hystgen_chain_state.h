@@ -78,4 +78,12 @@ typedef struct {
     hystgen_real_t lead; /* samples by which the next reference is ahead */
 } hystgen_clock_t;
 
+/* A search for an input of the plays between two others, at which they have a sum. */
+typedef struct {
+    hystgen_real_t low;
+    hystgen_real_t high;
+    hystgen_real_t middle;
+    hystgen_real_t sum;
+} hystgen_search_t;
+
 #endif

@@ -74,6 +74,7 @@ typedef hystgen_real_t hystgen_number_t;
 #define HYSTGEN_FIXED_KERNEL
 #define HYSTGEN_APART_IN_FLOAT_CORNERS HYSTGEN_APART
 #define HYSTGEN_APART_IN_FIXED HYSTGEN_APART
+#define HYSTGEN_APART_IN_FLOAT HYSTGEN_APART
 
 #ifdef HYSTGEN_FIXED
 #include "build_fixed.h"

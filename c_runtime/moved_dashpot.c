@@ -22,23 +22,28 @@ HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_change(unsigned int i, const hystge
     return lost;
 }
 
-/* Play i once the input of the plays has gone to w. */
-static inline hystgen_play_t hystgen_moved(unsigned int i, const hystgen_play_t *play,
-                                           hystgen_play_t w) {
-    const hystgen_sum_t yield = hystgen_change(i, play, hystgen_standing(play, w));
+/* Play i once it has moved by a yield. */
+static inline hystgen_play_t hystgen_gone(unsigned int i, const hystgen_play_t *play,
+                                          hystgen_sum_t yield) {
     return (hystgen_play_t)(play[i] + hystgen_moved_by(yield));
 }
 
-/* Where play i, now at z, counts as resting: at z, since it only creeps on in the next steps. */
-static hystgen_play_t hystgen_left(unsigned int i, hystgen_play_t z, hystgen_play_t w) {
-    (void)i;
-    (void)w;
-    return z;
+/* Play i once the input of the plays has gone to w. */
+static inline hystgen_play_t hystgen_moved(unsigned int i, const hystgen_play_t *play,
+                                           hystgen_play_t w) {
+    return hystgen_gone(i, play, hystgen_change(i, play, hystgen_standing(play, w)));
 }
 
-/* Play i moves to z while the input of the plays goes to w. */
-static void hystgen_keep(unsigned int i, hystgen_play_t *play, hystgen_play_t w, hystgen_play_t z) {
+/* Where the plays are is where they rest, since they only creep on in the next steps. */
+static inline void hystgen_relax(hystgen_play_t *play, hystgen_sum_t *bent) {
+    (void)play;
+    (void)bent;
+}
+
+/* Play i moves while the input of the plays goes to w. */
+HYSTGEN_APART_IN_FLOAT void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t w) {
     const hystgen_sum_t yield = hystgen_change(i, play, hystgen_standing(play, w));
+    const hystgen_play_t z = hystgen_gone(i, play, yield);
     const hystgen_sum_t lost = yield - hystgen_yield_of((hystgen_sum_t)z - play[i]);
     play[HYSTGEN_N_PLAYS + i] = (hystgen_play_t)lost;
     play[i] = z;

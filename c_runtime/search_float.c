@@ -1,24 +1,42 @@
 #include "hystgen_runtime.h"
 
+/* What the plays give once their input has gone to w, or rests there. It rises with w. */
+static hystgen_real_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_real_t w) {
+    hystgen_real_t sum = hystgen_model_tables.weight[0] * w;
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        const hystgen_real_t value = hystgen_inverse_value(self, i, w);
+        sum = sum + hystgen_model_tables.weight[i] * value;
+    }
+    return sum;
+}
+
+/* The sum of the plays in the middle of a search, which becomes one of its ends. What a search
+   knows is in memory, where it takes half of what a register takes that is kept over a call. */
+HYSTGEN_APART hystgen_real_t hystgen_inverse_halve(const hystgen_inverse_t *self,
+                                                   hystgen_search_t *search) {
+    const hystgen_real_t sum = hystgen_inverse_sum(self, search->middle);
+    if (sum < search->sum) {
+        search->low = search->middle;
+    } else {
+        search->high = search->middle;
+    }
+    search->middle = search->low + (search->high - search->low) / 2;
+    return sum;
+}
+
 /* Input of the plays at which their sum is h, by bisection between the present input and the
    farthest one. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self,
                                                    hystgen_real_t h) {
-    const hystgen_real_t here = self->play[0];
-    const hystgen_real_t sum = hystgen_inverse_sum(self, here);
-    hystgen_real_t low = sum < h ? here : HYSTGEN_LEAST_INPUT;
-    hystgen_real_t high = sum < h ? HYSTGEN_LARGEST_INPUT : here;
+    hystgen_search_t search = {HYSTGEN_LEAST_INPUT, HYSTGEN_LARGEST_INPUT, self->play[0], h};
+    const hystgen_real_t here = hystgen_inverse_halve(self, &search);
     unsigned int i;
-    if (sum >= h && sum <= h) {
-        return here;
-    }
-    for (i = 0; i < HYSTGEN_HALVES; ++i) {
-        const hystgen_real_t w = low + (high - low) / 2;
-        if (hystgen_inverse_sum(self, w) < h) {
-            low = w;
-        } else {
-            high = w;
+    if (here < search.sum || here > search.sum) {
+        for (i = 0; i < HYSTGEN_HALVES; ++i) {
+            (void)hystgen_inverse_halve(self, &search);
         }
     }
-    return high;
+    return search.high;
 }

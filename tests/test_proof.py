@@ -202,9 +202,10 @@ def alarms(source: Path, machine: str) -> list[str]:
     plays = int(re.search(r"_N_PLAYS (\d+)", source.with_suffix(".h").read_text())[1])  # type: ignore[index]
     apart = {  # how many states are kept apart: play by play, coefficient by coefficient, not all in one
         "loop_rest": 2 * plays + 20, "loop_start": 2 * plays + 20, "loop_solve": 2 * plays + 20,
-        **dict.fromkeys(("relaxing_follow", "moved_sum", "moved_follow", "resting_sum", "moved_rest"), 2 * plays + 20),
+        **dict.fromkeys(("relaxing_follow", "moved_follow", "relax", "moved_rest"), 2 * plays + 20),
         "start": 300, "find": 1000, "curve": 300, "delay_rest": 30,
-        "preview_put": 30, "creep_rest": 100, "creep_absorb": 100, "ageing_gain": 1000, "yield": 1000,
+        "preview_put": 30, "creep_rest": 100, "creep_absorb": 100, "creep_next": 100, "ageing_gain": 1000,
+        "yield": 1000,
     }  # fmt: skip
     visits = [f"{name}_{what}:{states}" for what, states in apart.items() if f"{name}_{what}(" in text]
     # half words are put together, curves measure arguments, the corner engine measures ways

@@ -353,7 +353,7 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
     moved, kept = {
         moving.DILATED: ((share, 3 + t.fixed), (0, 0)),
         moving.RELAXING: ((share, 2 + t.fixed), (share, 2 + t.fixed)),
-        moving.DASHPOT: ((share + 3 + t.fixed, yields), (share + 3 + t.fixed, yields)),
+        moving.DASHPOT: ((share + 3 + t.fixed, yields), (0, 0)),
     }.get(m.moves, ((0, 2), (0, 0)))
     bent, looked = 0, 0
     if m.bends != moving.STRAIGHT and t.fixed:

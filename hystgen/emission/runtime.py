@@ -242,8 +242,8 @@ class Variant:
             before = {"relaxing": ("stretch.c",), "dashpot": (f"yield_{kind}.c",)}.get(self.moves, ())
             kept = () if self.moves == "dashpot" else ("moved_kept.c",)
             bent = "bent_fixed.c" if self.fixed and self.bends != "none" else f"bent_{self.bends}.c"
-            known = () if self.bends == "none" else ("bent_known.c",)
-            moved = (*before, f"moved_{self.moves}.c", *kept, bent, *known)
+            known = "bent_itself.c" if self.bends == "none" else "bent_known.c"
+            moved = (*before, bent, f"moved_{self.moves}.c", "moved_rest.c", *kept, known)
             plays = (*moved, "chain_moving.c", f"search_{kind}.c")
         finer = ("chain_finer.c" if loops else "chain_corners_finer.c") if self.finer else "chain_whole.c"
         plays = (*plays, finer) if loops else (finer, *plays)
@@ -451,6 +451,7 @@ def render_operators(
     apart = corners > 0 and not family.fixed
     text = text.replace("HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART " if apart else "static ")
     text = text.replace("HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART " if family.fixed else "static ")
+    text = text.replace("HYSTGEN_APART_IN_FLOAT ", "static " if family.fixed else "HYSTGEN_APART ")
     known = frozenset(piece.name for piece in carried)
     return _named(text.replace("HYSTGEN_CORNERS", str(corners)), prefix, family, name, known)
 

@@ -32,8 +32,8 @@ class Kind(NamedTuple):
     search: Callable[[Function], Function]  # of a function that gives the sum at an input: that finds the input
 
 
-def movement(kind: Kind) -> tuple[Function, Function, Function, Function]:
-    """`moved`, `left`, `keep` and `put` of single plays, as in `c_runtime/moved_*.c`."""
+def movement(kind: Kind) -> tuple[Function, Function, Function]:
+    """`moved`, `move` and `put` of single plays, as in `c_runtime/moved_*.c`."""
     share_of, yields, seen, moved_by, yield_of = kind.share_of, kind.yields, kind.seen, kind.moved_by, kind.yield_of
 
     @jit
@@ -66,18 +66,15 @@ def movement(kind: Kind) -> tuple[Function, Function, Function, Function]:
         return low if upper < low else upper
 
     @jit
-    def left(m: Any, r: Reals, i: int, z: Any, w: Any) -> Any:
-        """Where play i, now at z, would come to rest with its input held at w, as seen one step later."""
-        if m.moves == RELAXING:
-            return z + share_of(m.second, i, stretch(w - z, r[i]))
-        return z
-
-    @jit
-    def keep(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any, z: Any) -> None:
-        """Play i moves while the input of the plays goes to w, and comes to rest at z."""
+    def move(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> None:
+        """Play i moves while the input of the plays goes to w."""
         if m.moves == DASHPOT:
-            lost[i] = change(m, r, i, s, lost, w) - yield_of(m, z - s.play[i])
-        s.play[i] = z
+            gained = change(m, r, i, s, lost, w)
+            z = s.play[i] + moved_by(m, gained)
+            lost[i] = gained - yield_of(m, z - s.play[i])
+            s.play[i] = z
+        else:
+            s.play[i] = moved(m, r, i, s, lost, w)
 
     @jit
     def put(m: Any, i: int, s: State, lost: Reals, z: Any) -> None:
@@ -86,7 +83,7 @@ def movement(kind: Kind) -> tuple[Function, Function, Function, Function]:
             lost[i] = zero(lost[i])
         s.play[i] = z
 
-    return moved, left, keep, put
+    return moved, move, put
 
 
 def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
@@ -94,7 +91,8 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     number."""
     level, asked, solve, bent = kind.level, kind.asked, kind.solve, kind.bent
     relaxing_follow, relaxing_input = kind.relaxing_follow, kind.relaxing_input
-    moved, left, keep, put = movement(kind)
+    share_of = kind.share_of
+    moved, move, put = movement(kind)
 
     @jit
     def moved_sum(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
@@ -108,18 +106,28 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def moved_follow(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
-        """The plays follow their input w. Returns their sum."""
+        """The plays move while their input goes to w. Returns their sum."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         for i in range(1, len(r)):
-            z = moved(m, r, i, s, lost, w)
-            rest = left(m, r, i, z, w)
-            value = values[i] if z == s.play[i] else bent(m, plays, i, z)
-            total = total + p[i] * value
-            values[i] = value if rest == z else bent(m, plays, i, rest)
-            keep(m, r, i, s, lost, w, rest)
+            before = s.play[i]
+            move(m, r, i, s, lost, w)
+            if s.play[i] != before:
+                values[i] = bent(m, plays, i, s.play[i])
+            total = total + p[i] * values[i]
         s.play[0] = w
         return total
+
+    @jit
+    def relax(m: Any, plays: Any, s: State, values: Reals) -> None:
+        """The plays go on to where they would come to rest with their input held, as seen one step later."""
+        if m.moves != RELAXING:
+            return
+        for i in range(1, len(plays.threshold)):
+            rest = s.play[i] + share_of(m.second, i, stretch(s.play[0] - s.play[i], plays.threshold[i]))
+            if rest != s.play[i]:
+                s.play[i] = rest
+                values[i] = bent(m, plays, i, rest)
 
     @jit
     def resting(r: Reals, s: State, i: int, w: Any) -> Any:
@@ -177,7 +185,9 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
             loop_absorb(t.plays, s.plays, w)
             return level(t, loop_output(t.plays, s.plays))
         if s.flags[MOVING]:
-            return level(t, moved_follow(m, t.plays, s.plays, s.lost, s.bent, w))
+            total = moved_follow(m, t.plays, s.plays, s.lost, s.bent, w)
+            relax(m, t.plays, s.plays, s.bent)
+            return level(t, total)
         return level(t, moved_rest(m, t.plays, s.plays, s.lost, s.bent, w))
 
     @jit
