@@ -13,7 +13,7 @@ from typing import Any
 
 import jinja2
 import numpy as np
-from modelfiles import CHAINS, FILES, LED
+from modelfiles import CHAINS, FILES, LED, NOTCHED
 
 import hystgen
 from hystgen.arithmetic import ARITHMETICS
@@ -145,8 +145,9 @@ def build(
     assert clang, "clang is not installed"
     real = ARITHMETICS[arithmetic].number
     fixed = real.kind == "i"
-    chain = name in {**CHAINS, **LED}
-    text = {**FILES, **CHAINS, **LED}[name]
+    effects = {**CHAINS, **LED, **NOTCHED}
+    chain = name in effects
+    text = {**FILES, **effects}[name]
     text += "emit: {compensation: {noise_gain: 1.0e+9}}\n" * (chain and "emit:" not in text)
     model = Model(parse_parameters(text, f"{name}.yaml"))
     hystgen.emit(model, folder, operator="both", arithmetic=arithmetic, engine=engine)

@@ -118,4 +118,10 @@ CALM = chain(
 ) + "emit: {compensation: {quiet: true, noise_gain: 1000}}\n"
 """A drive that stands still at rest, behind a brake and a preview."""
 
+NOTCHED = {
+    "notched": chain("notched", "name: resonance, frequency: 60, damping: 0.05", "name: lag, time_constant: 0.01")
+    + "emit: {compensation: {resonance: notch, noise_gain: 20}}\n"
+}
+"""A notch and averages that hold the noise gain, all of references that are past."""
+
 INVERSE_ALONE = ("viscous_twin",)

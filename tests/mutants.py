@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modelfiles import FILES, PLAYS, head
+from modelfiles import CHAINS, FILES, LED, PLAYS, head
 
 STEP = "c_runtime/loop_float.c"
 LOOP = "c_runtime/loop.c"
@@ -20,6 +20,9 @@ FLOAT = "c_runtime/corners_float.c"
 INVERSE = "c_runtime/inverse.c"
 FLOAT_FRONT = "c_runtime/inverse_front.c"
 CURVE = "c_runtime/curve.c"
+CHAIN = "c_runtime/chain_corners_fixed.c"
+CHAIN_FINER = "c_runtime/chain_corners_finer.c"
+CHAIN_FLOAT = "c_runtime/chain_corners_float.c"
 
 ROUND = """
   pi:
@@ -35,6 +38,8 @@ FLAT = PLAYS + "    initial_state: {}\n  memoryless: {{kind: tanh, ascending: {{
 
 MODELS = {
     **FILES,
+    **LED,
+    "creeping": CHAINS["creeping"],
     # the plays that start lowest begin to follow right at the limit
     "edge": head("edge", 1, 6) + PLAYS + "    initial_state: [0, 1.45, 1.9, 1.9, 1.9, 1.9, 1.9]\n",
     # from plays at 0, after a reset, all follow right at the limit
@@ -229,6 +234,31 @@ KILLED = (
     Mutant(
         "rounding below is limited", CURVE, "*limited = w < e->least && w < e->envelope_least;",
         "*limited = w < e->envelope_least;", "flat_low", "q15",
+    ),
+    Mutant(
+        "with effects, plays go on from a kink that was not sought", CHAIN,
+        "if (!self->sought || !hystgen_inverse_moved(self, w)) {", "if (!hystgen_inverse_moved(self, w)) {",
+        "led", "q31",
+    ),
+    Mutant(
+        "with effects, a kink counts as sought for good", CHAIN,
+        "    self->sought = false;\n    return hystgen_inverse_started(self);",
+        "    return hystgen_inverse_started(self);",
+        "led", "q31",
+    ),
+    Mutant(
+        "a finer solution takes the slope behind the kink", CHAIN_FINER,
+        "x - 1, false, &self->kink",
+        "x, false, &self->kink",
+        "led", "q31",
+    ),
+    Mutant(
+        "what was solved for is not taken back", CHAIN_FLOAT, "hystgen_copy_place(&m->here, &self->undo);\n", "",
+        "creeping", "float32",
+    ),
+    Mutant(
+        "a line that was taken back leads on", CHAIN_FLOAT, "        hystgen_forget_line(m);\n", "",
+        "creeping", "float32",
     ),
 )  # fmt: skip
 

@@ -66,7 +66,8 @@ def test_fuzzing_finds_nothing(name: str, arithmetic: str, engine: str, tmp_path
     [("creeping", "q31", "corners"), ("lagging", "q15", "corners"), ("quick", "q31", "corners"),
      ("warm", "q15", "corners"), ("worn", "q31", "corners"), ("late", "q15", "corners"), ("relaxing", "q31", "loop"),
      ("wider", "q15", "loop"), ("drifting", "q31", "loop"), ("drifting_late", "q15", "corners"),
-     ("everything", "q15", "corners"), ("led", "q31", "corners"), ("creeping", "float32", "corners")],
+     ("everything", "q15", "corners"), ("led", "q31", "corners"), ("creeping", "float32", "corners"),
+     ("notched", "q15", "corners")],
 )  # fmt: skip
 def test_fuzzing_finds_nothing_in_models_with_effects(
     name: str, arithmetic: str, engine: str, tmp_path: Path
