@@ -5,11 +5,3 @@ static hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *p
                                          const hystgen_sum_t *bent, hystgen_play_t z) {
     return z >= play[i] && z <= play[i] ? bent[i] : hystgen_bent(i, z);
 }
-
-/* What play i contributes once the input of the plays has gone to w, or rests there. */
-HYSTGEN_APART_IN_FLOAT hystgen_sum_t hystgen_inverse_value(const hystgen_inverse_t *self,
-                                                           unsigned int i, hystgen_play_t w) {
-    const hystgen_play_t z =
-        self->moving ? hystgen_moved(i, self->play, w) : hystgen_resting(i, self->play, w);
-    return hystgen_contributed(i, self->play, self->bent, z);
-}

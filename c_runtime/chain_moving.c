@@ -66,3 +66,24 @@ static hystgen_signal_t hystgen_forward_started(hystgen_forward_t *self) {
 static hystgen_signal_t hystgen_inverse_started(hystgen_inverse_t *self) {
     return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
 }
+
+/* What the plays give once their input has gone to w, or rests there. It rises with w. */
+HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self,
+                                                         hystgen_play_t w) {
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+    unsigned int i;
+    if (self->moving) {
+        for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+            const hystgen_sum_t value = hystgen_value(i, self->play, self->bent, w);
+            sum = sum + hystgen_model_tables.weight[i] * value;
+        }
+        return sum;
+    }
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        const hystgen_play_t z = hystgen_resting(i, self->play, w);
+        const hystgen_sum_t value = hystgen_contributed(i, self->play, self->bent, z);
+        sum = sum + hystgen_model_tables.weight[i] * value;
+    }
+    return sum;
+}

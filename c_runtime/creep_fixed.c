@@ -34,7 +34,6 @@ HYSTGEN_APART int64_t hystgen_creep_next(const hystgen_creep_table_t *t, hystgen
                                          hystgen_creep_state_t *state) {
     int64_t next = 0;
     unsigned int i;
-    HYSTGEN_ROLLED
     for (i = 0; i < t->n; ++i) {
         const hystgen_creep_term_t *term = &t->term[i];
         const int64_t settled =
@@ -56,7 +55,6 @@ HYSTGEN_APART int64_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystg
     int64_t now = 0;
     unsigned int i;
     self->before = x;
-    HYSTGEN_ROLLED
     for (i = 0; i < t->n; ++i) {
         const hystgen_creep_term_t *term = &t->term[i];
         state[i].next += hystgen_times(change, &term->late) * ((int64_t)1 << term->lift);

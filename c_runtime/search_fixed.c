@@ -1,26 +1,5 @@
 #include "hystgen_runtime.h"
 
-/* What the plays give once their input has gone to w, or rests there. It rises with w. */
-HYSTGEN_APART hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_play_t w) {
-    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
-    unsigned int i;
-    if (self->moving) {
-        for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-            const hystgen_play_t z = hystgen_moved(i, self->play, w);
-            const hystgen_sum_t value = hystgen_contributed(i, self->play, self->bent, z);
-            sum = sum + hystgen_model_tables.weight[i] * value;
-        }
-        return sum;
-    }
-    HYSTGEN_ROLLED
-    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_play_t z = hystgen_resting(i, self->play, w);
-        const hystgen_sum_t value = hystgen_contributed(i, self->play, self->bent, z);
-        sum = sum + hystgen_model_tables.weight[i] * value;
-    }
-    return sum;
-}
-
 /* Which of `low` and the input beside it is nearer to where the sum of the plays is `sum`; one
    beyond them where they are the farthest and not far enough. */
 HYSTGEN_APART hystgen_reach_t hystgen_inverse_nearer(const hystgen_inverse_t *self,

@@ -1,17 +1,5 @@
 #include "hystgen_runtime.h"
 
-/* What the plays give once their input has gone to w, or rests there. It rises with w. */
-static hystgen_real_t hystgen_inverse_sum(const hystgen_inverse_t *self, hystgen_real_t w) {
-    hystgen_real_t sum = hystgen_model_tables.weight[0] * w;
-    unsigned int i;
-    HYSTGEN_ROLLED
-    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
-        const hystgen_real_t value = hystgen_inverse_value(self, i, w);
-        sum = sum + hystgen_model_tables.weight[i] * value;
-    }
-    return sum;
-}
-
 /* The sum of the plays in the middle of a search, which becomes one of its ends. What a search
    knows is in memory, where it takes half of what a register takes that is kept over a call. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_halve(const hystgen_inverse_t *self,

@@ -243,7 +243,10 @@ class Variant:
             kept = () if self.moves == "dashpot" else ("moved_kept.c",)
             bent = "bent_fixed.c" if self.fixed and self.bends != "none" else f"bent_{self.bends}.c"
             known = "bent_itself.c" if self.bends == "none" else "bent_known.c"
-            moved = (*before, bent, f"moved_{self.moves}.c", "moved_rest.c", *kept, known)
+            apart = self.fixed and self.bends != "none" and self.moves in ("relaxing", "dilated")
+            reached = "reached_apart.c" if apart else "reached.c"
+            value = "value_apart.c" if self.bends == "centre" and not self.fixed else "value.c"
+            moved = (*before, bent, f"moved_{self.moves}.c", reached, "moved_rest.c", *kept, known, value)
             plays = (*moved, "chain_moving.c", f"search_{kind}.c")
         finer = ("chain_finer.c" if loops else "chain_corners_finer.c") if self.finer else "chain_whole.c"
         plays = (*plays, finer) if loops else (finer, *plays)
