@@ -63,6 +63,7 @@ UNITS = (
     ("viscous_twin", "q15", "loop"),
     ("bumpy", "q15", "loop"),
     ("soft_dashpot", "q31", "loop"),
+    ("dilated", "q15", "loop"),
     ("drifting", "float32", "loop"),
     ("drifting_late", "q15", "loop"),
     ("heated", "float64", "loop"),
