@@ -402,7 +402,7 @@ def _followed(screen: Sequence[tuple[float, float]], joint: Sequence[float]) -> 
         def each(self, tasks: Sequence[Any], _: Any) -> Any:
             for task in tasks:
                 steps[task.k].append(task.steps)
-                yield task, screening._Numbers(np.zeros(0), np.zeros(0), 2.0, joint[task.k])
+                yield task, screening._Numbers(np.zeros(0), np.zeros(0), 2.0, joint[task.k], ())
 
     option: Any = SimpleNamespace(
         joined=lambda *_: np.zeros(0), structure=SimpleNamespace(start=()), alone=SimpleNamespace(start=()), starts=()
@@ -413,7 +413,7 @@ def _followed(screen: Sequence[tuple[float, float]], joint: Sequence[float]) -> 
     ]
     pairs = [screening._Pair(option, option) for _ in screen]
     now: Any = SimpleNamespace(rms=1.0, weights=None)
-    records: Any = SimpleNamespace(tick=None, held=[], restarted=lambda fitted: fitted)
+    records: Any = SimpleNamespace(tick=None, held=[], to_fit=[])
     searches = screening._Searches(now, now, pairs, records)
     screening._followed_up(searches, kept_ones, Pool())  # type: ignore[arg-type]
     return steps

@@ -216,12 +216,12 @@ def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> F
     the plays have to explain, so that their weights are known in the search for a memory (`start.of_model`). The
     numbers are then fitted anew to `quick`, and so on until the error no longer falls by `BETTER`.
     """
-    if all(item.history is not None or item.turns is None for item in items):
+    if not any(map(restarts, items)):
         return fitted
     for _ in range(RESTARTS):
         found = dict(fitted.structure.starts)
         for item in items:
-            if item.history is None and item.turns is not None:
+            if item.turns is not None and restarts(item):
                 found[item.turns] = _turns(fitted, item) or found.get(item.turns, item.turns)
         structure = replace(fitted.structure, starts=tuple(found.items()))
         if structure.starts == fitted.structure.starts:
@@ -231,6 +231,11 @@ def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> F
             break
         fitted = other
     return fitted
+
+
+def restarts(item: Item) -> bool:
+    """Whether a record's start memory was found without a history, and may change with the effects beside it."""
+    return item.history is None and item.turns is not None
 
 
 def _turns(fitted: Fitted, item: Item) -> Turns | None:

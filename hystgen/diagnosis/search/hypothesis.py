@@ -30,6 +30,7 @@ from hystgen.records import Record
 
 Array = NDArray[np.float64]
 Turns = tuple[float, ...]
+Starts = tuple[tuple[Turns, Turns], ...]
 
 
 # The forward model: plays behind a front, effects around them, free start states -----------------------------
@@ -61,7 +62,7 @@ class Actuator:
         default_factory=dict, compare=False, repr=False
     )
     """Gain and offset over a run, kept with the effect and the run, since the `id` of a deleted one may be reused."""
-    starts: tuple[tuple[Turns, Turns], ...] = ()
+    starts: Starts = ()
     """Start memories found beside the effects: the turns of an item, and those that replace them."""
 
     def at(self, place: Place) -> Sequence[Effect]:
@@ -382,7 +383,7 @@ class Structure:
     thresholds: Array
     front: Front
     parts: tuple[Part, ...] = ()
-    starts: tuple[tuple[Turns, Turns], ...] = ()
+    starts: Starts = ()
 
     @property
     def start(self) -> Array:

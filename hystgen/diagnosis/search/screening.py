@@ -17,7 +17,7 @@ from hystgen.diagnosis.data import signals
 from hystgen.diagnosis.data.items import Item, compared, everything, needed, rms, thinned
 from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search.fits import Fitted, Search
-from hystgen.diagnosis.search.hypothesis import Part, Structure
+from hystgen.diagnosis.search.hypothesis import Part, Starts, Structure
 from hystgen.effects.base import USER, About, Effect
 from hystgen.identification import joint
 from hystgen.identification.joint import Bent, DeadZones, Ends, Front, Tanh, even_breaks
@@ -299,8 +299,9 @@ class _Screened:
     residual: float
 
 
-_SCREEN, _JOIN, _POLISH = range(3)
-"""Stages of a search: a few steps of only the option, a few of the whole hypothesis, and the rest to its end."""
+_SCREEN, _JOIN, _POLISH, _RESTART = range(4)
+"""Stages of a search: a few steps of only the option, a few of the whole hypothesis, the rest to its end, and start
+memories found anew."""
 
 
 class _Task(NamedTuple):
@@ -312,15 +313,22 @@ class _Task(NamedTuple):
     weights: Array | None = None
     """weights close to those of the start"""
     steps: int = 0
+    rms: float = math.nan
+    """error at the start, if it is known"""
 
 
 class _Numbers(NamedTuple):
-    """Numbers found by a search, and its held-out rms, which a process can send, unlike the candidates themselves."""
+    """Numbers found by a search, its held-out rms and start memories: a process can send them, unlike candidates."""
 
     shape: Array
     weights: Array
     rms: float
     residual: float
+    starts: Starts
+
+    def of(self, structure: Structure) -> Fitted:
+        """The fit of a structure with these numbers."""
+        return Fitted(replace(structure, starts=self.starts), *self[:3])
 
 
 @dataclass(frozen=True)
@@ -337,10 +345,12 @@ class _Searches:
         pair, records = self.found[task.k], self.records
         if task.what == _SCREEN:
             fitted, held = self._screen(pair.rough, task), records.thin_held
+        elif task.what == _RESTART:
+            fitted, held = self._restarted(pair.option, task), records.held
         else:
             fitted, held = self._join(pair.option, task), records.held
         residual = rms(fitted.errors(held)) if math.isfinite(fitted.rms) else math.inf
-        return _Numbers(fitted.shape, fitted.weights, fitted.rms, residual)
+        return _Numbers(fitted.shape, fitted.weights, fitted.rms, residual, fitted.structure.starts)
 
     def _screen(self, option: Option, task: _Task) -> Fitted:
         """A few steps from each start on thinned records, and a few more from the best of them."""
@@ -380,6 +390,12 @@ class _Searches:
             search = _while_falling(search, task.steps)
         return search.found(task.weights)
 
+    def _restarted(self, option: Option, task: _Task) -> Fitted:
+        """The fit of a task with start memories found beside its effects."""
+        assert task.shape is not None
+        assert task.weights is not None
+        return self.records.restarted(Fitted(option.structure, task.shape, task.weights, task.rms))
+
 
 def _while_falling(search: Search, steps: int) -> Search:
     """The search after `steps` steps, and as many again for as long as they lower the error by enough (`FALLING`)."""
@@ -407,7 +423,7 @@ def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
         return each.fitted.rms < share * fit or each.residual < share * held_out
 
     def screened(k: int, numbers: _Numbers) -> _Screened:
-        return _Screened(k, found[k], Fitted(found[k].alone, *numbers[:3]), numbers.residual)
+        return _Screened(k, found[k], numbers.of(found[k].alone), numbers.residual)
 
     def containing(option: Option) -> list[int]:
         return [k for k, other in enumerate(found) if other.beyond == option.label]
@@ -484,11 +500,13 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) ->
     hopeful = acceptance.HOPEFUL * min((numbers.residual for numbers in done.values()), default=0.0)
     going_on = {k: numbers for k, numbers in done.items() if not numbers.residual > hopeful}
     done |= all_of([_Task(_POLISH, k, *numbers[:2], joint.MOST_STEPS) for k, numbers in going_on.items()])
+    if any(map(fits.restarts, (*records.to_fit, *records.held))):
+        done = all_of([_Task(_RESTART, k, *numbers[:2], rms=numbers.rms) for k, numbers in done.items()])
     tried = []
     for k, option in found.items():
-        fitted = records.restarted(Fitted(option.structure, *done[k][:3]))
-        if fitted.rms >= now.rms:
+        if done[k].rms >= now.rms:
             continue
+        fitted = done[k].of(option.structure)
         errors = fitted.errors(records.held)
         names: tuple[str, ...] = (option.name,)
         if option.front:
