@@ -1,14 +1,14 @@
 """Runs that set numbers which no test of a model can set: what each would cost or spoil with another value.
 
     python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths] [visits]
-        [quiet] [averages] [shifts]
+        [quiet] [averages] [shifts] [branches]
 
 lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.thermal.compensator.MOST_CHANGE`; decades:
 `effects.ageing.compensator.DECADES`; sweeps: `emission.worth.SWEEPS`; unknown: `tracking.MOST_UNKNOWN`; exact:
 `diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`; visits: `chain.chain.VISIT_SAMPLES`;
 quiet: `compensator.chain.layout.QUIET`; averages: `compensator.chain.noise.MOST_TIMES`; shifts: the bounds of
-`compensator.chain.moving.found_shifted`. All of them take some seconds, shifts a minute; what is random has fixed
-seeds.
+`compensator.chain.moving.found_shifted`; branches: `effects.lag.compensator.MOST_LED`. All of them
+take some seconds, shifts a minute; what is random has fixed seeds.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from hystgen.diagnosis.findings import content
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.model import LogarithmicAgeing
 from hystgen.effects.base import Run
+from hystgen.effects.lag import compensator as led
 from hystgen.effects.lag.compensator import LagBlock
 from hystgen.parameters.files import parse_parameters
 from hystgen.parameters.schema import Compensation
@@ -305,6 +306,27 @@ def _reached(p: NDArray[np.float64], steps: Sequence[NDArray[np.float64]]) -> fl
     return total
 
 
+def branches() -> None:
+    """A lag in front of two branches 0.01 V apart, by how many times the move before is led at most: the error on sines
+    of 100 and 400 samples from rest, and how far a step of 0.2 um out of a slow ramp goes beyond its end."""
+    print("branches: times the move before, rms and largest error on sines of 100 and 400 samples, um, overshoot, um")
+    curve = "a0: 6, a1: 0.4, a2: 0.1, a3:"
+    front = f"  memoryless: {{kind: tanh, ascending: {{{curve} 0.2}}, descending: {{{curve} 0.21}}}}\n  effects:"
+    text = WITH_EFFECT.format(effect="name: lag, time_constant: 0.01").replace("  effects:", front)
+    model = hystgen.Model(parse_parameters(text, "stage_x.yaml"))
+    step = np.concatenate([np.linspace(-2.0, -1.9, 50), np.full(50, -1.7)])
+
+    def error(u: NDArray[np.float64]) -> NDArray[np.float64]:
+        t = np.arange(len(u)) * 1e-3
+        return np.asarray(model.simulate(model.inverse().simulate(u, t=t, clamp=True), t=t) - u)
+
+    for times in (1.0, 2.0, 4.0, 1e9):
+        with mock.patch.object(led, "MOST_LED", times):
+            sines = [error(-3.0 * np.cos(2.0 * np.pi * np.arange(2 * n) / n)) for n in (100, 400)]
+            found = [x for each in sines for x in (math.sqrt(float(np.mean(each**2))), float(np.max(np.abs(each))))]
+            print(f"  {times:6.3g}", *(f"{x:8.4f}" for x in [*found, float(np.max(error(step)[50:]))]))
+
+
 def _lost(response: NDArray[np.complex128]) -> float:
     """Rms of what a response changes, %."""
     return 100.0 * math.sqrt(float(np.mean(np.abs(response - 1.0) ** 2)))
@@ -312,7 +334,7 @@ def _lost(response: NDArray[np.complex128]) -> float:
 
 RUNS: dict[str, Callable[[], None]] = {
     each.__name__: each
-    for each in (lag, newton, decades, sweeps, unknown, exact, lengths, visits, quiet, averages, shifts)
+    for each in (lag, newton, decades, sweeps, unknown, exact, lengths, visits, quiet, averages, shifts, branches)
 }
 
 

@@ -32,6 +32,12 @@ typedef struct {
 } hystgen_brake_t;
 
 typedef struct {
+    int64_t way;   /* of what the lag is led to, in this sample, */
+    int64_t moved; /* and in the one before */
+    bool rises;    /* it arrives from below */
+} hystgen_steady_t;
+
+typedef struct {
     int64_t next;   /* output at the next sample for an unchanged input */
     int64_t before; /* input of the last sample */
 } hystgen_lag_exact_t;

@@ -26,6 +26,12 @@ typedef struct {
 } hystgen_braked_t;
 
 typedef struct {
+    hystgen_real_t way;   /* of what the lag is led to, in this sample, */
+    hystgen_real_t moved; /* and in the one before */
+    bool rises;           /* it arrives from below */
+} hystgen_steady_t;
+
+typedef struct {
     hystgen_real_t reached;
     hystgen_real_t before; /* input of the last sample */
 } hystgen_lag_exact_t;

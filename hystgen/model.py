@@ -147,8 +147,9 @@ class Model:
             self._check_noise_gain(arithmetic)
             if self.parameters.emit.compensation.quiet and self.cascade.branches_differ:
                 raise UnsupportedEffectsError(
-                    "emit.compensation.quiet: with effects, a memoryless part with two branches goes from one to the "
-                    "other at rest; give both branches the same numbers, or leave out quiet"
+                    "emit.compensation.quiet: with effects, a drive in front of a memoryless part with two branches "
+                    "cannot be kept near what is sought; give both branches the same numbers, or leave out quiet: "
+                    "behind one lag the drive comes to rest by itself"
                 )
 
     def _check_noise_gain(self, arithmetic: str) -> None:

@@ -115,6 +115,7 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
 # DRAWN    a play that its input draws along, at once or by a dashpot, ends between where it was and that input, and so
 #          does an input that counts as standing still on its way
 # ASKED    what is asked of a lag, a third of the size that its states were given room for at most
+# MOVED    what is asked of a lag in front of two branches moves from end to end of the drives at most
 # COARSE   numbers that a lead is searched with are cut off there, and the search begins with a size and a lead above it
 # LOST     what rounding to whole numbers leaves
 CLOCK = (
@@ -142,6 +143,10 @@ STATES = [
     (r"((?:bool|int64_t) NAME_braked_(?:room|along)\([^{]*\{\n)",
      r"\1    WITHIN(self->earlier, ASKED);\n    WITHIN(self->lag.asked, ASKED);\n    WITHIN(self->lag.wanted, LAG);\n"
      r"    WITHIN(self->lag.high, LAG);\n"),
+    (r"(int64_t NAME_steady_(?:solve|kept)\([^{]*\{\n)",
+     r"\1    WITHIN(lag->asked, ASKED);\n    WITHIN(lag->high, LAG);\n    WITHIN(self->moved, MOVED);\n"),
+    (r"(int64_t NAME_steady_braked\([^{]*\{\n)",
+     r"\1    WITHIN(braked->earlier, ASKED);\n    WITHIN(braked->lag.wanted, LAG);\n"),
     (r"(        const int32_t middle = low \+ [^;]*;\n)",
      r"        GRANTED(low >= 0 && low <= high && high <= COARSE);\n\1        GRANTED(middle <= COARSE);\n"),
     (r"(int64_t NAME_mode_absorb\([^{]*\{\n)",
@@ -196,11 +201,12 @@ def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") ->
         return 2 ** (bits + max((int(row[place]) for row in rows), default=0))
 
     ends = [*t.plays.limits[[PLAY_MIN, PLAY_MAX]].tolist(), *t.plays.start.tolist()]
+    drive = max(map(abs, t.plays.limits[:2].tolist())) * 2 ** int(t.number[ARRIVING_BITS])
     numbers = {
         "SIGNAL": codes.largest, "CODE": int(t.limits[CODE_MAX]),
-        "DRIVE": max(map(abs, t.plays.limits[:2].tolist())) * 2 ** int(t.number[ARRIVING_BITS]),
+        "DRIVE": drive,
         "CREEP": most(t.creep.block.tolist(), creep.DROP, 50) - 1, "LAG": most(t.lag.block.tolist(), lag.DROP, 50),
-        "ASKED": most(t.lag.block.tolist(), lag.DROP, 50) // 3, "COARSE": lag.COARSE,
+        "ASKED": most(t.lag.block.tolist(), lag.DROP, 50) // 3, "COARSE": lag.COARSE, "MOVED": 2 * drive + 2,
         "MODE": most(t.mode.tolist(), resonance.DROP, 50), **(clock(t.clock[0].tolist()) if len(t.clock) else {}),
         "RISE": 2 ** (thermal.RISE_BITS + 1), "INVERSE": 2 * thermal.ONE + 2, "PLAY": max(map(abs, ends)),
         "RUBBED": int(t.limits[CODE_MAX]) * most(t.heat.number.tolist(), thermal.BITS_BELOW, 0),

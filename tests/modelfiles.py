@@ -113,6 +113,10 @@ LED = {"led": chain("led", "name: lag, time_constant: 0.01", "name: creep, time_
 BRAKED = chain("braked", "name: lag, time_constant: 0.01", "name: slew_limit, rate: 500, falling_rate: 300")
 """A lag behind a slew limit, kept from overshooting."""
 
+STEADY = chain("steady", "name: lag, time_constant: 0.01", "name: slew_limit, rate: 500, falling_rate: 300",
+               front=BRANCHES)  # fmt: skip
+"""The same in front of two branches, from which its lag never goes back."""
+
 CALM = chain(
     "calm", CREEP, "name: lag, time_constant: 0.01", "name: slew_limit, rate: 3000", "name: delay, time: 2.0e-3"
 ) + "emit: {compensation: {quiet: true, noise_gain: 1000}}\n"

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import BRANCHES, CALM, CHAINS, CREEP, FILES, INVERSE_ALONE, TANH, chain
+from modelfiles import BRANCHES, CALM, CHAINS, CREEP, FILES, INVERSE_ALONE, STEADY, TANH, chain
 from scipy import signal
 from scipy.integrate import solve_ivp
 
@@ -100,20 +100,26 @@ def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:
     assert report.ok, report.table()
 
 
-@pytest.mark.parametrize("arithmetic", ["float32", "q15"])
-def test_c_of_a_quiet_drive_gives_the_bits_of_the_reference(arithmetic: str) -> None:
-    report = hystgen.verify(model("calm", CALM), arithmetic, "inverse", compiler=["gcc"], length=1500)
+AT_REST = {"calm": CALM, "steady": STEADY}
+"""Models whose drive comes to rest in a way of its own."""
+
+
+@pytest.mark.parametrize(("name", "arithmetic"), [("calm", "float32"), ("calm", "q15"), ("steady", "q31")])
+def test_c_of_a_drive_at_rest_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
+    report = hystgen.verify(model(name, AT_REST[name]), arithmetic, "inverse", compiler=["gcc"], length=1500)
     assert report.ok, report.table()
 
 
 @pytest.mark.slow(one_in=2)
 @pytest.mark.thorough
+@pytest.mark.parametrize("name", AT_REST)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
-def test_cores_give_the_bits_of_a_quiet_drive(arithmetic: str) -> None:
+def test_cores_give_the_bits_of_a_drive_at_rest(name: str, arithmetic: str) -> None:
     cores = ["host", "cortex-m4f", "cortex-m0plus"]
     report = hystgen.verify(
-        model("calm", CALM), arithmetic, "inverse", compiler=["gcc"], length=1500, targets=cores, target_length=150
-    )
+        model(name, AT_REST[name]), arithmetic, "inverse", compiler=["gcc"], length=1500, targets=cores,
+        target_length=150,
+    )  # fmt: skip
     assert report.ok, report.table()
 
 
@@ -209,7 +215,7 @@ def test_a_quiet_drive_knows_the_step_of_a_converter(lsb: float | None, changes:
 
 def test_two_branches_are_not_quiet() -> None:
     one = model("lagging", CHAINS["lagging"] + "emit: {compensation: {quiet: true}}\n")
-    with pytest.raises(UnsupportedEffectsError, match="two branches goes from one to the other at rest"):
+    with pytest.raises(UnsupportedEffectsError, match="behind one lag the drive comes to rest by itself"):
         emitted_files(one)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from granted import clock, granted_states
-from modelfiles import BRAKED, CALM, CHAINS, INVERSE_ALONE, TANH, chain
+from modelfiles import BRAKED, CALM, CHAINS, INVERSE_ALONE, STEADY, TANH, chain
 
 from hystgen.arithmetic import ARITHMETICS, factors
 from hystgen.basics import jit
@@ -407,7 +407,7 @@ def checked(
         yield op, call, x, subprocess.run([folder / op, str(n)], input=given, capture_output=True, check=False)
 
 
-PROVED = CHAINS | {"braked": BRAKED, "calm": CALM}
+PROVED = CHAINS | {"braked": BRAKED, "calm": CALM, "steady": STEADY}
 
 
 @pytest.mark.slow(one_in=2)
@@ -432,7 +432,7 @@ def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_pa
     ("name", "fact"),
     [("creeping", "CREEP"), ("creeping", "SIGNAL"), ("drifting", "PART"), ("aged", "INVERSE"),
      ("heated", "RISE"), ("rubbed", "RUBBED"), ("relaxing", "PLAY"), ("dashpot", "LOST"), ("dashpot", "INPUT"),
-     ("late", "MODE"), ("braked", "ASKED"), ("braked", "COARSE")],
+     ("late", "MODE"), ("braked", "ASKED"), ("braked", "COARSE"), ("steady", "MOVED")],
 )  # fmt: skip
 def test_what_proofs_take_for_granted_is_looked_at(name: str, fact: str, tmp_path: Path) -> None:
     runs = checked(tmp_path, model(PROVED[name]), "q31", [], fact)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from modelfiles import CREEP, PLAYS, head
+from modelfiles import BRANCHES, CREEP, PLAYS, head
 
 import hystgen
 from hystgen.basics import jit
@@ -100,6 +100,14 @@ def test_the_inverse_composes_with_the_forward_model(tmp_path: Path, even: bool)
     if even:
         with jit.plain():
             assert np.max(np.abs(one.inverse().simulate(u, "float64") - v)) < 1e-11
+
+
+def test_a_drive_that_may_not_come_to_rest_is_warned_of(tmp_path: Path) -> None:
+    """Between two branches, which only the catalogue's lag arrives at from one side."""
+    path = written(tmp_path, FOLLOWER)
+    path.write_text(path.read_text().replace("  output_offset", BRANCHES + "  output_offset"))
+    with pytest.warns(UserWarning, match=r"go to and fro at rest, by up to [0-9.]+ V; make the effect a lag"):
+        emitted_files(hystgen.load(path, [outside(tmp_path)]))
 
 
 def test_c_gives_the_bits_of_the_reference(tmp_path: Path) -> None:

@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 from granted import STATES, granted, granted_states
 from mains import c_main
-from modelfiles import CREEP, FILES, chain, head
+from modelfiles import BRANCHES, CREEP, FILES, chain, head
 
 import hystgen
 from hystgen.arithmetic import ARITHMETICS
@@ -120,6 +120,7 @@ EFFECTS = {
     "delayed": ("name: delay, time: 2.6e-3",),
     "lagged": ("name: lag, time_constant: 0.01",),
     "braked": ("name: lag, time_constant: 0.01", "name: slew_limit, rate: 500, falling_rate: 300"),
+    "steady": ("name: lag, time_constant: 0.01", "name: slew_limit, rate: 500, falling_rate: 300"),
     "calmed": ("name: lag, time_constant: 0.01",),
     "prompt": ("name: lag, time_constant: 4.0e-4",),
     "rung": ("name: resonance, frequency: 30, damping: 0.05",),
@@ -135,6 +136,8 @@ EFFECTS = {
 }
 """Models with one effect, every block and every kind of plays. What `granted_states` lists is looked at in runs of
 `test_fixed_chain`; instances are static there."""
+
+FRONTS = {"steady": BRANCHES}
 
 QUIET = "emit: {compensation: {quiet: true}}\n"
 
@@ -173,7 +176,10 @@ def frama_c() -> str:
 
 
 def model(name: str) -> Model:
-    chains = {own: chain(own, *effects, compensate=COMPENSATED.get(own, "")) for own, effects in EFFECTS.items()}
+    chains = {
+        own: chain(own, *effects, front=FRONTS.get(own, ""), compensate=COMPENSATED.get(own, ""))
+        for own, effects in EFFECTS.items()
+    }
     chains["calmed"] += QUIET
     return Model(parse_parameters({**FILES, **chains, "many": MANY, "sixteen": SIXTEEN}[name], f"{name}.yaml"))
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from pathlib import Path
 from types import SimpleNamespace
 
-from modelfiles import CALM, CHAINS, LED
+from modelfiles import BRAKED, CALM, CHAINS, LED, STEADY
 from mutants import MODELS
 
 from hystgen.emission import module, runtime
@@ -72,6 +72,9 @@ UNITS = (
     ("heated", "q31", "loop"),
     ("calm", "float32", "loop"),
     ("calm", "q15", "loop"),
+    ("braked", "q31", "loop"),
+    ("steady", "float32", "loop"),
+    ("steady", "q15", "loop"),
     ("creeping", "float32", "corners"),
     ("led", "q31", "corners"),
 )
@@ -80,7 +83,7 @@ UNITS = (
 
 def model(name: str) -> Model:
     """The model of a parameter file under the name of the run time."""
-    text = {**MODELS, **CHAINS, **LED, "calm": CALM}[name]
+    text = {**MODELS, **CHAINS, **LED, "calm": CALM, "braked": BRAKED, "steady": STEADY}[name]
     return Model(parse_parameters(text, f"{name}.yaml").model_copy(update={"name": "hystgen"}))
 
 
@@ -103,13 +106,16 @@ def _states(values: SimpleNamespace) -> list[str]:
 
 
 def _blocks(values: SimpleNamespace) -> list[str]:
-    """The files of blocks, without those of a preview, a delay and a quiet drive where there are none."""
+    """The files of blocks, without those of a preview, a delay, a quiet drive and two branches where there are none."""
     if not values.variant.chain:
         return []
     blocks = runtime.FIXED_CHAIN_BLOCKS if values.fixed else runtime.CHAIN_BLOCKS
     t = values.numbers
-    missing = {"preview": not len(t.tap), "delay": not t.delay.samples, "quiet": not t.quiet}
-    return [file for file in blocks if not missing.get(file.split(".")[0].split("_")[0])]
+    missing = {
+        "preview": not len(t.tap), "delay": not t.delay.samples, "quiet": not t.quiet, "lag_steady": not t.turning,
+    }  # fmt: skip
+    left_out = tuple(name for name, absent in missing.items() if absent)
+    return [file for file in blocks if not file.startswith(left_out)]
 
 
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:

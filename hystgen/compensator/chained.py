@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from hystgen.basics import extras
 from hystgen.basics.problems import EffectsError, NotInvertibleError, UnsupportedEffectsError
 from hystgen.chain.blocks import Block
-from hystgen.chain.chain import Chain
+from hystgen.chain.chain import Chain, arriving_slack
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import noise, preview
 from hystgen.compensator.chain.layout import Read, read
@@ -65,9 +65,12 @@ def _brentq() -> Any:
 
 
 class Actuator:
-    """The memoryless front and the plays as one block: the drive behind a lag in, the weighted sum out."""
+    """The memoryless front and the plays as one block: the drive behind a lag in, the weighted sum out.
 
-    def __init__(self, static: StaticModel, effects: Sequence[Effect]) -> None:
+    A move back by no more than `slack` is none.
+    """
+
+    def __init__(self, static: StaticModel, effects: Sequence[Effect], slack: float) -> None:
         pi = static.pi
         self.static, self.bends = static, [effect for effect in effects if effect.bends_plays()]
         self.r, self.p = np.array(pi.thresholds), np.array(pi.weights)
@@ -75,12 +78,14 @@ class Actuator:
         mover = next((effect for effect in effects if effect.moves_plays()), None)
         self.movement = None if mover is None else Movement(mover, self.r, self.p)  # type: ignore[arg-type]
         self.start = np.array(pi.start)
+        self.slack = slack
+        self.led_by: lag.LagBlock | None = None
         self.start_over()
 
     def start_over(self) -> None:
         """Back to the start memory."""
         self.plays = self.start.copy()
-        self.ascending = True
+        self.ascending = self.rises = True
         at = float(self.start[0])
         self.drive = float(self.static.front_inverse(at)) if self.static.start_is_defined else 0.0
         self.advance(math.inf)
@@ -111,27 +116,38 @@ class Actuator:
         return self.absorb(x)
 
     def solve(self, y: float) -> float:
-        """The drive on the branch of its own move: tries the branch of the output's move, then the other one; if
-        neither fits, the drive holds."""
+        """The drive on the branch of its own move: stays on the branch that it is on, moving on or holding, and turns
+        only to go back by more than rounding, or than what a lag in front misses in the first sample of the turn.
+
+        That is `theta` of the way to the other branch. What holding misses is then never more than what turning at once
+        would have missed; no other share of the way misses less than `1 + theta` times what is missed by a drive that
+        knows how far the reference will go back. `rises` says which way the drive is to go.
+        """
         w = self._input(y)
         if not self.static.branches_differ:
             return float(self.static.front_inverse(w))
-        change = y - self.total(self.plays)
-        up = self.ascending if abs(change) <= ROUNDING * float(np.abs(self.p) @ np.abs(self.plays)) else change > 0.0
-        for ascending in (up, not up):
-            v = float(self.static.front_inverse(w, ascending))
-            back = abs(v - self.drive) <= ROUNDING * self.static.slope_ratio * max(abs(v), abs(self.drive))
-            if (v > self.drive) == ascending and not back:
-                return v
-            if back and ascending == self.ascending:  # moves back only by rounding, or not at all
-                return self.drive
-        return self.drive
+        self.rises = self.ascending
+        v = float(self.static.front_inverse(w, self.ascending))
+        back = self.drive - v if self.ascending else v - self.drive
+        if back <= 0.0:
+            return v
+        other = float(self.static.front_inverse(w, not self.ascending))
+        rounding = self.slack + ROUNDING * self.static.slope_ratio * max(abs(v), abs(self.drive))
+        patience = self.led_by.theta if self.led_by else 0.0
+        if back <= rounding + patience * abs(other - v):
+            return self.drive
+        if other == self.drive or (other > self.drive) == self.ascending:  # the branches meet here
+            return self.drive
+        self.rises = not self.ascending
+        return other
 
     def absorb(self, x: float) -> float:
         """The plays follow; the direction of the move picks the branch."""
-        if x != self.drive:
-            self.ascending = x > self.drive
-        self.drive = x
+        back = self.drive - x if self.ascending else x - self.drive
+        if back > self.slack:
+            self.ascending = not self.ascending
+        if back > self.slack or back < 0.0:
+            self.drive = x
         self.plays = self.moved(float(self.static.front(x, self.ascending)))
         return self.total(self.plays)
 
@@ -248,12 +264,15 @@ class Compensator:
             [block for effect in effects if effect.place is place and (block := filter_block(effect))]
             for place in (Place.DRIVE, Place.LINEAR)
         )
-        self.actuator = Actuator(static, plays)
+        self.actuator = Actuator(static, plays, arriving_slack(static, effects))
         self.blocks: list[Block] = [*drives, self.actuator, *outputs]
         self.slew = self._called("slew_limit")
         lags = [block for block in drives if isinstance(block, lag.LagBlock)]
         self.braked = lags[0] if self.slew and len(lags) == 1 else None
         self.parts = Parts.of(effects)
+        if self.parts.turning(static.branches_differ):
+            lags[0].turn_with(self.actuator)
+            self.actuator.led_by = lags[0]
 
     def _called(self, name: str) -> list[Any]:
         return [effect for effect in self.effects if effect.name == name]
@@ -320,7 +339,7 @@ class Compensator:
         rising: float = min(effect.rate for effect in self.slew) * seconds
         near = min(max(drive, before - falling), before + rising)
         if self.braked is not None and not self.braked.exact:
-            near = self.braked.braked(near, abs(drive - near), falling, rising)
+            near = self.braked.steady(self.braked.braked(near, abs(drive - near), falling, rising))
         return min(max(near, before - falling), before + rising)
 
     def _gains(self, reference: Run) -> list[tuple[Array, Array]]:

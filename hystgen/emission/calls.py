@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from hystgen.basics import arguments, writing
 from hystgen.compensator import engines
+from hystgen.compensator.chain.bounds import swing
+from hystgen.compensator.chain.parts import Parts
 from hystgen.emission import module, worth
 from hystgen.emission.options import LAYOUTS, OPERATORS, Options
 from hystgen.model import Model, ModelSource, as_model, check_arithmetic
@@ -82,7 +84,8 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
 
 
 def doubts(model: Model) -> list[str]:
-    """Possible faults of the inverse of a model whose diagnosis could not separate the stage from its sensor."""
+    """Possible faults of an inverse: of a model whose diagnosis could not separate the stage from its sensor, or whose
+    drive may not come to rest."""
     named, advice = model.parameters.not_separable, "Record wide and nested loops, or with another sensor"
     found = []
     if ("asymmetry", "sensor_nonlinearity") in named and model.cascade.stages:
@@ -94,6 +97,13 @@ def doubts(model: Model) -> list[str]:
         found.append(
             "the sensor was diagnosed as curved, and the records could not tell that from an asymmetry of the stage; "
             f"if it is the stage's, the inverse leaves it as it is. {advice}, and diagnose again"
+        )
+    seconds = model.parameters.sample_time
+    if seconds and (reach := swing(model.cascade, Parts.of(model.effects), seconds)):
+        found.append(
+            "an effect of your own leads the drive in front of two branches of the memoryless part, between which it "
+            f"may then go to and fro at rest, by up to {reach:.3g} {model.parameters.units.input}".rstrip()
+            + "; make the effect a lag, or give both branches the same numbers"
         )
     return found
 

@@ -400,6 +400,7 @@ def instance(op: str, t: ChainTables, blocks: Sequence[Block], plays: int, kept:
         Field("signal", "offset", "set beside that of the model"),
         *(field for block in blocks for field in block.fields),
         *([Field("quiet", "quiet", members="wwi" if t.fixed else "rri")] if inverse and t.quiet else []),
+        *([Field("steady", "steady", members="ww" if t.fixed else "rr", flags=1)] if inverse and t.turning else []),
         *([Field("signal", "line", "references, the newest one last", taps)] if inverse and taps else []),
         *([Field("real", "waiting", "drives", waiting), Field("status", "oldest", "of them")] if waiting else []),
         Field("flag", "ascending", "direction of the drive's last move"),
@@ -457,9 +458,10 @@ def _functions(
     apart = "HYSTGEN_APART" if t.fixed else "static"  # its products of 64 bits stay off the stack of what calls it
 
     def through(
-        blocks: Sequence[Block], verb: str, x: str, side: str, comment: str, more: Sequence[str] = ()
+        blocks: Sequence[Block], verb: str, x: str, side: str, comment: str, more: Sequence[str] = (),
+        first: Sequence[str] = (),
     ) -> str:
-        lines = [*(f"{x} = {block.call(verb, x)};" for block in blocks), *more] or ["(void)self;"]
+        lines = [*first, *(f"{x} = {block.call(verb, x)};" for block in blocks), *more] or ["(void)self;"]
         if verb == "resting" and not any("self" in line for line in lines):
             lines = ["(void)self;", *lines]
         head = f"static hystgen_signal_t hystgen_{op}_{side}_{verb}({self_t}, hystgen_signal_t {x})"
@@ -467,16 +469,39 @@ def _functions(
 
     quiet = inverse and bool(t.quiet)
     rest, absorb = (["hystgen_quiet_rest(&self->quiet, v);"], ["self->quiet.arrived = v;"]) if quiet else ([], [])
+    turning = inverse and bool(t.turning)
+    place = f"self->{before[0].name}{'.lag' * t.braked}" if turning else ""
+    first: list[str] = []
+    if turning:
+        rest = ["hystgen_steady_rest(&self->steady);"]
+        first = [] if t.fixed else [f"const hystgen_signal_t before = {place}.high;"]
+        absorb = [f"hystgen_steady_absorb(&self->steady{'' if t.fixed else f', &{place}, before'});"]
     yield through(before, "rest", "v", "drive_side", "Settles at drive v. Returns what is in front of the plays.", rest)
     yield through(
-        before, "absorb", "v", "drive_side", "Drive v at this sample. Returns what is in front of the plays.", absorb
-    )
+        before, "absorb", "v", "drive_side", "Drive v at this sample. Returns what is in front of the plays.", absorb,
+        first,
+    )  # fmt: skip
     yield through(after, "rest", "h", "output_side", "Settles at the sum h of the plays. Returns the output.")
     yield through(after, "absorb", "h", "output_side", "The sum of the plays is h at this sample. Returns the output.")
     if inverse:
         back = list(reversed(before)), list(reversed(after))
         leads = "The drive that leads to a in front of the plays."
-        if quiet:
+        if turning:
+            (block,) = before
+            yield _function(
+                "What the lag misses of a way in front of the plays in its first sample.",
+                "static hystgen_signal_t hystgen_inverse_missed(hystgen_signal_t way)",
+                [f"return hystgen_steady_missed({block.table}, way);"],
+            )
+            lines = [
+                "const bool rises = a > self->drive ? true : a < self->drive ? false : self->ascending;",
+                f"return hystgen_steady_{'braked' if t.braked else 'solve'}(&self->steady, {block.table}, "
+                f"&self->{block.name}, a, rises,",
+                "    hystgen_entered_drive(self->applied), HYSTGEN_DITHER);",
+            ]
+            head = f"HYSTGEN_APART hystgen_signal_t hystgen_inverse_drive_side_solve({self_t}, hystgen_signal_t a)"
+            yield _function(f"{leads} The lag arrives from the side of its branch.", head, lines)
+        elif quiet:
             lines = ["hystgen_signal_t v = a;", *(f"v = {block.call('solve', 'v')};" for block in back[0])]
             lines.append("return hystgen_quiet_drive(&self->quiet, a, v, self->applied);")
             head = f"static hystgen_signal_t hystgen_inverse_drive_side_solve({self_t}, hystgen_signal_t a)"

@@ -235,10 +235,10 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     absorbed, solved = (sum(each.products[way] for each in inverse) for way in (0, 1))
     if t.fixed:
         stages = 2 * (len(kinds) - envelopes) + envelopes * t.behind.bends.coefficient.shape[1]
-        braked = t.braked * (13 + lag.HALVES)
+        braked = t.braked * (13 + lag.HALVES) + 2 * t.turning
         return {"forward": forward + stages, "inverse": absorbed + solved + braked + stages + 2 * len(t.tap)}
     stages = len(kinds) + envelopes
-    braked = t.braked * (7 + 2 * lag.HALVES)
+    braked = t.braked * (7 + 2 * lag.HALVES) + t.turning
     return {"forward": forward + stages, "inverse": absorbed + solved + braked + stages + len(t.tap)}
 
 

@@ -19,7 +19,7 @@ from hystgen.basics.version import __version__
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import tables as chain_tables
-from hystgen.compensator.chain.bounds import UNSLEWED, together
+from hystgen.compensator.chain.bounds import UNSLEWED, kept_branch, together
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, LEAST_LATE, SHARE_BITS, Compiled
 from hystgen.effects import own as own_effects
@@ -234,12 +234,14 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         options.engine, values.fixed, values.fronts, values.branches, values.finer, values.saturates, values.start_list,
         compiled is not None, compiled is not None and bool(compiled.tables.slew),
         compiled is not None and bool(compiled.tables.braked), compiled is not None and bool(compiled.tables.quiet),
+        compiled is not None and bool(compiled.tables.turning),
         compiled is not None and compiled.tables.delay.samples > 0,
         compiled is not None and bool(compiled.parts.ageing), *(chain.plays(compiled.tables) if compiled else ()),
     )  # fmt: skip
     glue: chain.Glue | None = getattr(values, "glue", None)
     values.timing = _timing(parameters, compiled) if compiled else []
-    values.reading = [*_reading(compiled), *_quiet(values)] if compiled and options.inverse else []
+    reading = [*_reading(compiled), *_branches(compiled, parameters), *_quiet(values)] if compiled else []
+    values.reading = reading if options.inverse else []
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
     values.corners = (max(n, 1) if values.fixed else n + 1) if corners else 0
     front = render("front.c.j2", values) if values.stages else ""
@@ -356,6 +358,17 @@ def _reading(compiled: Compiled) -> list[str]:
             f"{missed:.2g} % of its size"
         )
     return found
+
+
+def _branches(compiled: Compiled, parameters: Parameters) -> list[str]:
+    """What a drive that comes to rest in front of two branches leaves."""
+    if not compiled.tables.turning:
+        return []
+    most = f"{kept_branch(compiled):.3g} {comment_text(parameters.units.output)}".rstrip()
+    return [
+        "Branches: the drive turns to the other branch only if staying on its own would miss more than a turn does at "
+        f"first; that leaves at most {most} of a reference at rest"
+    ]
 
 
 def _settings(compiled: Compiled) -> list[tuple[str, str, str]]:

@@ -32,13 +32,14 @@ FLOAT_KERNELS = (
 CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
 CHAIN_BLOCKS = (
     *(kind.file for kind in KINDS), "delay.c", "delay_float.c", "preview.c", "preview_float.c", "entered_float.c",
-    "quiet.c", "product_float.c",
+    "quiet.c", "product_float.c", "lag_steady.c",
 )  # fmt: skip
 FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
 FIXED_CHAIN_BLOCKS = (
     "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "braked_fixed.c", "gain_fixed.c", "ageing_fixed.c",
     "friction_fixed.c", "heat_fixed.c", "mode_fixed.c", "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c",
     "preview_fixed.c", "entered_fixed.c", "quiet.c", "bend.c", "stops.c", "product_fixed.c",
+    "lag_steady_fixed.c",
 )  # fmt: skip
 """Files that models with effects carry themselves, even with a shared run time."""
 
@@ -178,7 +179,8 @@ class Variant:
     `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
     drive code, or with effects what arrives there has bits below them; `saturates`: output codes are limited;
     `start_list`: each play starts at its own value; `chain`: it has effects, `slew`: one of them keeps the drive within
-    a rate, `braked`: and a lag behind that from overshooting, `quiet`: the drive stands still at rest, `waits`: it does
+    a rate, `braked`: and a lag behind that from overshooting, `quiet`: the drive stands still at rest, `turning`:
+    a lag arrives at two branches, `waits`: it does
     not act at once, `ages`: one is a gain that follows the travel, `moves` and `bends`: how plays move and are bent
     where that is not as in engine loop.
     """
@@ -194,6 +196,7 @@ class Variant:
     slew: bool = False
     braked: bool = False
     quiet: bool = False
+    turning: bool = False
     waits: bool = False
     ages: bool = False
     moves: str = ""
@@ -215,7 +218,9 @@ class Variant:
         if self.fronts:
             if self.fixed:
                 files.append("front_two_curves.c" if self.branches else "front_curve.c")
-            files.append("inverse_two_branches.c" if self.branches else "inverse_one_branch.c")
+            turn = f"chain_turn{'_late' * self.turning}.c"
+            two = (turn, "chain_two_branches.c") if self.chain else ("inverse_two_branches.c",)
+            files += two if self.branches else ("inverse_one_branch.c",)
         elif self.fixed or self.chain or self.engine == "loop":
             files.append("front_finer.c" if self.finer and not self.chain else "front_none.c")
         own = self._chain() if self.chain else self._loop() if self.engine == "loop" else self._corners()
@@ -232,7 +237,8 @@ class Variant:
         kind, loops = "fixed" if self.fixed else "float", self.engine == "loop"
         slew = ("chain_slew.c",) if self.braked else ("chain_slew.c", "chain_unbraked.c")
         slew = slew if self.slew else ("chain_free.c",)
-        brake = ("chain_within.c", f"chain_braked{'_quiet' * self.quiet}.c") if self.braked else ()
+        braked = f"chain_braked{'_quiet' * self.quiet}{'_steady' * self.turning}.c"
+        brake = ("chain_within.c", braked) if self.braked else ()
         delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
         if not self.moves:
             plays: tuple[str, ...] = ("chain_plays.c" if loops else f"chain_corners_{kind}.c",)
@@ -260,6 +266,7 @@ class Variant:
         return (
             self._start,
             f"loop_{front}.c",
+            *(["loop_branches_drive.c"] if self.branches else []),
             f"loop_output_{kind}.c",
             "loop.c",
             f"loop_{kind}.c",
@@ -455,6 +462,8 @@ def render_operators(
     text = text.replace("HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART " if apart else "static ")
     text = text.replace("HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART " if family.fixed else "static ")
     text = text.replace("HYSTGEN_APART_IN_FLOAT ", "static " if family.fixed else "HYSTGEN_APART ")
+    loop = corners == 0 and not family.fixed
+    text = text.replace("HYSTGEN_APART_BUT_IN_FLOAT_LOOP ", "static " if loop else "HYSTGEN_APART ")
     known = frozenset(piece.name for piece in carried)
     return _named(text.replace("HYSTGEN_CORNERS", str(corners)), prefix, family, name, known)
 

@@ -20,14 +20,17 @@ that they add up to a few units of the state, however slow it is, and those of t
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 
 import numpy as np
 
+from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, LoopRoundings, error_bounds
-from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.layout import DITHER, Compiled
+from hystgen.compensator.chain import moving, own
+from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, lead
+from hystgen.compensator.chain.parts import Parts
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import TABLE_ERROR
 from hystgen.effects.creep import compensator as creep
@@ -247,7 +250,7 @@ def _lags(compiled: Compiled, error: float, u: float, same: bool) -> float:
     States that have seen the same drives pass on `goal/rate`, and the target before, which follows from earlier
     targets, `W = theta^2 e + theta (1 - theta) W`.
     """
-    drive = _sizes(compiled).drive
+    drive, turning = _sizes(compiled).drive, bool(compiled.tables.turning)
     for each in reversed(compiled.own[: compiled.tables.own.ahead]):
         error = each.passed(error) + each.rounding(drive, u)[1]
     for exact, row in zip(compiled.tables.lag.exact, compiled.tables.lag.block.astype(float), strict=True):
@@ -258,10 +261,10 @@ def _lags(compiled: Compiled, error: float, u: float, same: bool) -> float:
         theta = float(row[lag.THETA])
         states = u * drive * (5.0 + u / rate)
         farthest = (1.0 + 2.0 * theta) / (1.0 - theta)
-        before = lag.shifted(theta) if same else farthest
+        before = lag.shifted(theta, turning) if same else farthest
         goal = before * error + farthest * states + 6.0 * u * drive
         error = (goal + states) * (1.0 if same else 2.0 - rate) / rate + u * drive * (2.0 + 6.0 / rate)
-    return error
+    return error + _kept(compiled) * turning
 
 
 def _seen(compiled: Compiled) -> float:
@@ -276,8 +279,54 @@ def _seen(compiled: Compiled) -> float:
 
 
 def _kept(compiled: Compiled) -> float:
-    """How far the input of the plays can be from the one that is sought while the drive stands still."""
+    """How far the input of the plays can be from the one that is sought while the drive stands still, and a drive that
+    keeps a lag on its branch from the state of that lag, with which the model in double precision keeps it."""
     return 2.0 * float(compiled.tables.number[DITHER])
+
+
+CELLS = 4096
+"""[parts of the drive's range] On which the miss of a kept branch is bounded; each adds at most its width, 2e-4 of the
+range, to the way that is kept."""
+
+
+def kept_branch(compiled: Compiled) -> float:
+    """Largest distance of the displacement at rest from its reference, in output units, because a drive in front of two
+    branches keeps its own.
+
+    It holds up to a lag's share theta of the way to the other branch, and what rounding may take back, `limits[HOLD]`,
+    beyond a target that has half of that rounding itself. Between neighbours in a grid of drives both branches rise, so
+    that their values there bound those in between.
+    """
+    static, seconds, t = compiled.static, compiled.seconds, compiled.tables
+    theta = lag.numbers(compiled.parts.lags[0], seconds, True)[1][lag.THETA] if t.turning else 0.0
+    unit = 1.0
+    if compiled.codes is not None:
+        unit = float(compiled.codes.drive_lsb) / 2.0 ** float(t.number[DRIVE_BITS])
+    more = 1.5 * float(t.plays.limits[slots.HOLD]) * unit
+    low, high = static.input_range
+    drives = [low + (high - low) * i / CELLS for i in range(CELLS + 1)]
+    worst = 0.0
+    for up, (at, end) in itertools.product((True, False), itertools.pairwise(drives)):
+        first, last = (at, end) if up else (end, at)  # towards the end of a move on this branch
+        begin = float(static.front(first, up))
+        other = min(max(float(static.front_inverse(begin, not up)), low), high)
+        far = last + theta * (last - other) + math.copysign(more, last - first)
+        worst = max(worst, abs(float(static.front(far, up)) - begin))
+    steep = 1.0 + abs(moving.steepest_bend(static, compiled.parts.plays))
+    rest = math.prod(creep.numbers(each, seconds).rest for each in compiled.parts.creeps)
+    rest *= math.prod(each.forward.largest for each in compiled.own[t.own.ahead :])
+    return worst * static.pi.slopes[-1] * steep * rest * _gain_ends(compiled)[1]
+
+
+def swing(static: StaticModel, parts: Parts, seconds: float) -> float:
+    """How far a drive may go to and fro at rest because blocks of the user's own lead it from one of two branches to
+    the other, in drive units; 0 where it comes to rest."""
+    if not static.branches_differ or not parts.own_drives:
+        return 0.0
+    lags = [lag.numbers(each, seconds) for each in parts.lags]
+    gain = lead(lags, [own.linear(each, seconds) for each in parts.own_drives])
+    low, high = static.input_range
+    return min(gain * static.branch_gap / static.front_slopes[0], high - low)
 
 
 def condition(compiled: Compiled) -> str:
@@ -287,7 +336,8 @@ def condition(compiled: Compiled) -> str:
     for; their memory then differs between two drives, and the lead amplifies that. So does a block of the user's own in
     front while the drive is limited: what it keeps of an earlier difference moves plays that the same drive would have
     moved alike. Thresholds that grow with the rate amplify an earlier difference of the drives. A lag that is braked
-    behind a slew limit gives up more of its lead than the limit cuts off.
+    behind a slew limit gives up more of its lead than the limit cuts off. In front of two branches a lag stays where it
+    is rather than turn, which depends on the drives that it has seen.
     """
     still = STILL * (compiled.tables.quiet > 0)
     if compiled.tables.braked:
@@ -295,7 +345,7 @@ def condition(compiled: Compiled) -> str:
     missed = not all(compiled.tables.lag.exact) or compiled.tables.own.ahead > 0
     remembered = compiled.static.pi.n > 0 or len(compiled.tables.creep.block) > 0
     dilated = compiled.tables.moving.moves == moving.DILATED
-    return together(SAME, still) if dilated or (missed and remembered) else ""
+    return together(SAME, still) if dilated or compiled.tables.turning or (missed and remembered) else ""
 
 
 def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:

@@ -217,7 +217,7 @@ class Bounds:
         exact, (rate, second, late, inverse) = self.lags[j]
         bits, drop = (int(x) for x in self.tables.lag.block[j, [lag_fixed.BITS, lag_fixed.DROP]])
         state, scale = 2.0**-bits, 2.0**drop
-        sizes = lag_fixed.Sizes(exact, rate, late, given, asked)
+        sizes = lag_fixed.Sizes(exact, rate, late, given, asked, bool(self.tables.turning))
         kept = state * (0.5 / rate + scale) + 2.0 * given * missed(rate * scale) / scale / rate
         if exact:
             kept += (0.5 * state + 2.0 * given * missed(late * 2.0**bits) / 2.0**bits) / rate
@@ -238,7 +238,8 @@ class Bounds:
         found = []
         for exact, numbers in reversed(self.lags):
             found.append((given, asked))
-            asked = lag_fixed.Sizes(exact, numbers[lag.RATE], numbers[lag.LATE], given, asked).answer
+            turning = bool(self.tables.turning)
+            asked = lag_fixed.Sizes(exact, numbers[lag.RATE], numbers[lag.LATE], given, asked, turning).answer
         return found[::-1]
 
     def _passed(self, each: Formats, error: float, own: float) -> float:
@@ -464,13 +465,13 @@ class Bounds:
         solved += steep * (code[0] if self.condition else sum(code) + short + slowed)  # both have seen it, or not
         return self._gain() * self._residual(way, solved) / self._arriving
 
-    def _found_error(self) -> float:
+    def _found_error(self, way: float) -> float:
         """The same of the inverse's answer, with what it undoes, or under its `condition`: plays then hold the same,
         and what it finds is off by its own rounding."""
         if not self.condition:
-            undone = self._moved(self._way)[1] * float(self.inner.output_lsb)
-            return self._arriving_error(self._way) - self._gain() * undone / self._arriving
-        seen = self._residual(self._way, self.static.front_slopes[1] * self._arrival()[0])
+            undone = self._moved(way)[1] * float(self.inner.output_lsb)
+            return self._arriving_error(way) - self._gain() * undone / self._arriving
+        seen = self._residual(way, self.static.front_slopes[1] * self._arrival()[0])
         own = self._solution() / self.static.front_slopes[0] + float(self.inner.back())
         return self._gain_at_once() * seen / self._arriving + own
 
@@ -507,8 +508,9 @@ class Bounds:
             _, kept, answer = self._lag(j, *self._lag_sizes()[j])
             code = 0.5 * 2.0**self._fine if j == 0 else 0.5
             if not exact:  # its states have seen the same drives
-                goal = lag.shifted(second) * error + (1.0 + 2.0 * second) / (1.0 - second) * kept
-                error = (goal + kept) / rate + answer + code
+                turning = bool(self.tables.turning)
+                goal = lag.shifted(second, turning) * error + (1.0 + 2.0 * second) / (1.0 - second) * kept
+                error = (goal + kept) / rate + answer + code + 2.0 * float(self.tables.number[DITHER]) * turning
             elif self.condition:
                 error = (error + kept) / late + answer + code
             else:
@@ -525,7 +527,8 @@ class Bounds:
         """Steps back of the drive that come only from rounding, at most this long, in units of signals."""
         if not self.static.branches_differ or not self.inner.invertible:
             return 0
-        return math.floor(2.0 * self._arriving_error(self.largest_step))  # on one branch, which is no way by itself
+        # contacts within a step move drives, but do not turn them
+        return math.floor(2.0 * (self._found_error(0.0) if self.condition else self._arriving_error(0.0)))
 
     @property
     def condition(self) -> str:
@@ -541,7 +544,7 @@ class Bounds:
 
     def rounding(self) -> float:
         """Bound of the inverse on the same branch and under its `condition`, in drive codes."""
-        own = self._codes(self._found_error())
+        own = self._codes(self._found_error(self._way))
         return max(own, self._limits_off()) if self.condition else own
 
     def _limits_off(self) -> float:
@@ -559,4 +562,4 @@ class Bounds:
             return self.rounding()
         gap = self.static.branch_gap
         other = self._gain() * self.static.pi.slopes[-1] * gap + gap / self.static.front_slopes[0]
-        return self._codes(self._found_error() + 1.001 * other / self._arriving)
+        return self._codes(self._found_error(self._way) + 1.001 * other / self._arriving)

@@ -43,6 +43,7 @@ from hystgen.compensator.chain.layout import (
     OwnChainTables,
     braked,
     fastest,
+    hold,
     lead,
     output_range,
     quiet,
@@ -131,7 +132,8 @@ class _Builder:
         self.taps = self.reading.taps
         self.creeps = [creep.numbers(each, seconds) for each in self.parts.creeps]
         self.modes = [resonance.numbers(each, seconds) for each in self.parts.modes]
-        self.lags = [lag.numbers(each, seconds) for each in self.parts.lags]
+        self.turning = self.parts.turning(self.static.branches_differ)
+        self.lags = [lag.numbers(each, seconds, self.turning) for each in self.parts.lags]
         self.own_drives, self.own_outputs = (
             [own.linear(each, seconds) for each in side] for side in (self.parts.own_drives, self.parts.own_outputs)
         )
@@ -179,6 +181,7 @@ class _Builder:
             int(bool(self.parts.slew)),
             braked(self.parts, [exact for exact, _ in self.lags]),
             quiet(self.how, self.taps),
+            int(self.turning),
         )
         if self.parts.own_drives or self.parts.own_outputs:
             tables = OwnChainTables(*tables)
@@ -192,7 +195,8 @@ class _Builder:
             self.bends, (self.low, self.high), slowed, self.reached, self._largest_step(), self.finer,
             self.seconds, self.bumps, [one.error for one in self.heats],
         )  # fmt: skip
-        plays.limits[slots.HOLD] = bounds.hold()
+        if static.branches_differ:
+            plays.limits[slots.HOLD] = hold(bounds.hold(), tables.number[DITHER], self.turning)
         codes = Codes(
             self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
             bounds.condition, math.ceil(self.sizes.largest * 2**self.bits),
@@ -437,7 +441,7 @@ class _Builder:
             self.ahead.insert(0, own_fixed.formats(one, given, asked, 0))
             asked = own_fixed.asked_of_input(one, given, asked) + 1.0
         for exact, numbers in reversed(self.lags):
-            sizes = lag_fixed.Sizes(exact, numbers[lag.RATE], numbers[lag.LATE], given, asked)
+            sizes = lag_fixed.Sizes(exact, numbers[lag.RATE], numbers[lag.LATE], given, asked, self.turning)
             rows.append((exact, numbers, sizes))
             asked = sizes.answer
             if asked > 2.0**60:

@@ -22,6 +22,7 @@ from hystgen.compensator.chain.layout import (
     Stages,
     braked,
     fastest,
+    hold,
     lead,
     output_range,
     quiet,
@@ -141,7 +142,8 @@ def build(
 
     creeps = [creep.numbers(each, seconds) for each in parts.creeps]
     rows = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in creeps]
-    lags = [lag.numbers(each, seconds) for each in parts.lags]
+    turning = parts.turning(static.branches_differ)
+    lags = [lag.numbers(each, seconds, turning) for each in parts.lags]
     span, drive_span = float(high) - float(low), static.input_range[1] - static.input_range[0]
     reading = read(static, parts, seconds, how)
     taps, ahead = reading.taps, reading.ahead(how.preview)
@@ -159,6 +161,8 @@ def build(
     max_rate = fastest(static, parts, seconds, how)
     rounded = ROUNDINGS * float(np.finfo(dtype).eps) / 2 * max(map(abs, static.input_range))
     dither = max(rounded * max(lead(lags, drives), 1.0), drive_lsb or 0.0)
+    if static.branches_differ:
+        plays.limits[slots.HOLD] = hold(plays.limits[slots.HOLD], dither, turning)
     tables = ChainTables(
         plays,
         plays.limits,
@@ -185,6 +189,7 @@ def build(
         int(bool(rates)),
         braked(parts, [exact for exact, _ in lags]),
         quiet(how, taps),
+        int(turning),
     )
     if drives or outputs:
         tables = OwnChainTables(*tables)

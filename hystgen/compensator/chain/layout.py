@@ -95,6 +95,7 @@ class ChainTables(NamedTuple):
     slew: int  # 1 if the rate of the drive is limited
     braked: int  # 1 if a lag behind that limit is kept from overshooting
     quiet: int  # equal references after which the drive stands still, 0 if it never has to
+    turning: int  # 1 if a lag must not arrive at two branches from the wrong side
 
     @property
     def fixed(self) -> bool:
@@ -216,6 +217,17 @@ def lead(lags: Sequence[tuple[bool, tuple[float, float, float, float]]], ahead: 
 def braked(parts: Parts, exact: Sequence[bool]) -> int:
     """1 where a slew limit has one lag behind it that is led; `exact`: whether each lag is inverted exactly."""
     return int(bool(parts.slew) and list(exact) == [False])
+
+
+HELD_CODES = 3
+"""[times DITHER] How far rounding alone takes a lag beyond its target in front of two branches: a drive is kept ahead
+of it by up to two, and rounding that drive to a code adds half of one."""
+
+
+def hold(rounded: Any, dither: Any, turning: bool) -> Any:
+    """Moves back of the drive in front of two branches that are none: those of `rounded` computation, and of drives
+    that are not the ones asked for."""
+    return rounded + (HELD_CODES if turning else 1) * dither
 
 
 def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> float:

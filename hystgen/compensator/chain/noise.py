@@ -82,8 +82,9 @@ class Gain:
         z = np.exp(-1j * at)
         led = np.polynomial.polynomial.polyval(z, self.taps.weights[::-1].astype(complex))
         arriving = np.ones_like(z)
+        turning = self.parts.turning(self.static.branches_differ)
         for each in self.parts.lags:
-            exact, (rate, second, late, _) = lag.numbers(each, self.seconds)
+            exact, (rate, second, late, _) = lag.numbers(each, self.seconds, turning)
             if exact:
                 led = led * (1.0 - (1.0 - rate) * z) / (late + second * z)
             else:

@@ -46,3 +46,7 @@ class Parts:
             [effect for effect in effects if effect.block and effect.place is Place.DRIVE],
             [effect for effect in effects if effect.block and effect.place is not Place.DRIVE],
         )  # fmt: skip
+
+    def turning(self, branches: bool) -> bool:
+        """Whether a lag alone is in front of a memoryless part that has two `branches`."""
+        return branches and len(self.lags) == 1 and not self.own_drives

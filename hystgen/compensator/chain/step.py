@@ -23,12 +23,14 @@ from hystgen.effects.ageing.compensator import AgeingState
 from hystgen.effects.creep.compensator import CreepState
 from hystgen.effects.delay.compensator import Waiting, delay_put, delay_rest
 from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.lag.compensator import HIGH as LAG_HIGH
 from hystgen.effects.thermal.compensator import HEAT_STATE
 from hystgen.plays import loop
 from hystgen.plays.corners.corners_fixed import new_fixed_memory
 from hystgen.plays.corners.corners_float import new_memory
 from hystgen.plays.loop import (
     ANSWER,
+    ASCENDING,
     BITS,
     DRIVE,
     HAS_PENDING,
@@ -43,6 +45,7 @@ from hystgen.plays.slots import (
     CORNERS,
     DOMAIN,
     HELD,
+    HOLD,
     INPUT_CLAMPED,
     LIMITED_SETTING,
     OP_COMMIT,
@@ -66,15 +69,16 @@ from hystgen.plays.slots import (
     Reals,
 )
 
-SET, OUTPUT, APPLIED, REACHED, ARRIVED, REFERENCE = range(6)
-MOVING, OPERATOR, EQUAL = range(3)
+SET, OUTPUT, APPLIED, REACHED, ARRIVED, REFERENCE, WAY, MOVED = range(8)
+MOVING, OPERATOR, EQUAL, RISES = range(4)
 
 
 class ChainState(NamedTuple):
     """One instance. `real`: the offset set from outside, the last result of the output side, the last applied drive,
-    the drive behind a slew limit of the forward operator, and of a quiet drive what arrived in front of the plays and
-    the last reference; `flags`: whether any drive has been applied yet, 1 for the inverse operator, and the number of
-    equal references; `corners`: the plays of engine corners, `()` in engine loop, which has them in `plays`."""
+    the drive behind a slew limit of the forward operator, of a quiet drive what arrived in front of the plays and the
+    last reference, and in front of two branches the last moves of what a lag is led to; `flags`: whether any drive has
+    been applied yet, 1 for the inverse operator, the number of equal references, and whether a lag arrives at two
+    branches from below; `corners`: the plays of engine corners, `()` in engine loop, which has them in `plays`."""
 
     plays: State
     lost: Reals  # (n + 1,), what rounding took from each play that a nonlinear dashpot moves
@@ -116,8 +120,8 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         Waiting(np.zeros(waiting, dtype), np.zeros(1, np.int64)),
         np.zeros(t.own.place[-1], dtype),
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
-        np.zeros(6, dtype),
-        np.array([0, int(inverse), 0], np.int64),
+        np.zeros(8, dtype),
+        np.array([0, int(inverse), 0, 1], np.int64),
         memory(len(t.threshold) - 1, dtype) if corners else (),
         np.zeros(4 * corners, dtype),
     )
@@ -153,6 +157,8 @@ def made_of(
     front_forward, front_inverse = blocks.front
     start, follow, started, inverse_input = blocks.plays
     finer, braked = blocks.finer, blocks.braked
+    steady_solve, steady_kept, steady_absorb = blocks.lag.steady_solve, blocks.lag.steady_kept, blocks.lag.steady_absorb
+    steady_missed = blocks.lag.steady_missed
     finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared = codes
     plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
 
@@ -211,6 +217,66 @@ def made_of(
         for j in range(len(t.ageing.turns)):
             ageing_move(t.ageing, s.ageing, j, v - s.real[APPLIED])
 
+    # ---------------------------------------------------------------- chain_turn.c, chain_turn_late.c
+
+    @jit(inline=True)
+    def turns(t: ChainTables, back: Any, way: Any) -> bool:
+        """Whether a drive that should go back by `back` goes to the other branch, `way` from there. Behind a lag only
+        if holding misses more than what the lag misses of that way in the first sample of a turn."""
+        missed = back - t.plays.limits[HOLD]
+        if not t.turning:
+            return bool(missed > 0)
+        return bool(missed > steady_missed(t.lag, -way if way < 0 else way))
+
+    # ---------------------------------------------------------------- chain_two_branches.c
+
+    @jit
+    def branch_drive(t: ChainTables, s: ChainState, h: Any, w: Any) -> Any:
+        """The drive that gives w on the branch of its own move: stays on the branch that it is on, where it moves on or
+        holds, and turns only for what is more than rounding."""
+        if not t.plays.branches:
+            return inverse_drive(t.plays, s.plays, h, w)
+        up, drive = s.plays.counts[ASCENDING], s.plays.real[DRIVE]
+        v, limited = front_inverse(t.plays, w, up)
+        inside = clamp_drive(t.plays, v)
+        back = drive - inside if up else inside - drive
+        if back > 0:
+            v, limited = front_inverse(t.plays, w, 1 - up)
+            other = clamp_drive(t.plays, v)
+            fits = other < drive if up else other > drive
+            if not (fits and turns(t, back, other - inside)):
+                v = drive
+        if limited:
+            s.plays.counts[BITS] |= DOMAIN
+        return v
+
+    # ---------------------------------------------------------------- lag_steady.c, lag_steady_fixed.c
+
+    @jit
+    def steady_rest(t: ChainTables, s: ChainState) -> None:
+        """Everything has settled."""
+        s.real[WAY] = t.limits[ZERO]
+        s.real[MOVED] = t.limits[ZERO]
+        s.flags[RISES] = 1
+
+    @jit
+    def steady_drive(t: ChainTables, s: ChainState, a: Any) -> Any:
+        """The drive that leads to a in front of two branches, by way of a lag that arrives from the side of its
+        branch."""
+        s.flags[RISES] = s.plays.counts[ASCENDING]
+        if a > s.plays.real[DRIVE]:
+            s.flags[RISES] = 1
+        elif a < s.plays.real[DRIVE]:
+            s.flags[RISES] = 0
+        last = entered_drive(t, s.real[APPLIED])
+        v, s.real[WAY] = steady_solve(t.lag, s.lag, a, s.real[MOVED], s.flags[RISES], last, t.number[DITHER])
+        return v
+
+    @jit
+    def steady_hold(t: ChainTables, s: ChainState, v: Any) -> Any:
+        """The drive v, or one that does not take the lag back from its branch."""
+        return steady_kept(t.lag, s.lag, v, s.flags[RISES], entered_drive(t, s.real[APPLIED]), t.number[DITHER])
+
     # ---------------------------------------------------------------- quiet.c
 
     @jit
@@ -265,6 +331,8 @@ def made_of(
         s.plays.real[DRIVE] = arriving(t, entered_drive(t, drive))
         s.real[APPLIED] = drive
         a = drive_side_rest(t, s, entered_drive(t, drive))
+        if t.turning:
+            steady_rest(t, s)
         if t.quiet:
             quiet_rest(t, s, a)
         s.plays.real[LEVEL] = started(t, s)
@@ -297,7 +365,15 @@ def made_of(
         if moving:
             travelled(t, s, v)
         x = entered_drive(t, reached)
+        steady = t.turning and s.flags[OPERATOR]
+        before = s.lag[0, LAG_HIGH] if steady else t.limits[ZERO]
         a = drive_side_absorb(t, s, x) if moving else drive_side_rest(t, s, x)
+        if steady and moving:
+            steady_absorb(s.lag, before)
+            s.real[MOVED] = s.real[WAY]
+            s.real[WAY] = t.limits[ZERO]
+        elif steady:
+            steady_rest(t, s)
         if t.quiet:
             s.real[ARRIVED] = a
             if not moving:
@@ -325,7 +401,10 @@ def made_of(
         near = slewed(t, s, s.real[APPLIED], v)
         if not t.braked or not s.flags[MOVING] or (t.quiet and s.flags[EQUAL] >= t.quiet):
             return near
-        return slewed(t, s, s.real[APPLIED], braked(t, s, v, near))
+        drive = braked(t, s, v, near)
+        if t.turning:
+            drive = drive_code(t, steady_hold(t, s, entered_drive(t, drive)))
+        return slewed(t, s, s.real[APPLIED], drive)
 
     @jit
     def forward_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
@@ -425,10 +504,10 @@ def made_of(
         h = output_side_solve(t, s, y) if moving else output_side_resting(t, s, y)
         s.plays.counts[BITS] = 0
         w = inverse_input(t, s, h)
-        a = finer(t, s, h, w, inverse_drive(t.plays, s.plays, h, w))
+        a = finer(t, s, h, w, branch_drive(t, s, h, w))
         v = a
         if moving:
-            v = drive_side_solve(t, s, a)
+            v = steady_drive(t, s, a) if t.turning else drive_side_solve(t, s, a)
             if t.quiet:
                 v = quiet_drive(t, s, a, v)
         v = drive_code(t, v)

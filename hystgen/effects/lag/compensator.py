@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -21,6 +21,21 @@ and with steps half as long it would be 13. The lead leaves 0.3 % of a sine of 4
 benchmarks/chosen_numbers.py lag."""
 
 
+MOST_LED = 2.0
+"""[times the move before] Largest move of a target that is led in full in front of two branches, so that a step is not
+led beyond its end, from where there is no way back but a turn. A step of 0.2 um out of a slow ramp goes 0.002 um beyond
+its end, without a limit 0.1. A sine of 100 samples from rest is missed by 0.0032 um rms with 2 and with any more, by
+0.0045 with 1. Set by: benchmarks/chosen_numbers.py branches."""
+
+
+class Branched(Protocol):
+    """What is behind a lag, and differs with the direction in which it arrives: `ascending` as it moved last, `rises`
+    as it is to move now."""
+
+    ascending: bool
+    rises: bool
+
+
 class LagBlock:
     """`a_k = E a_(k-1) + b0 v_(k-1) + b1 v_k`, led by way of the state of a lag on held drives.
 
@@ -32,14 +47,19 @@ class LagBlock:
 
     def __init__(self, time_constant: float) -> None:
         self.time_constant = time_constant
+        self.branched: Branched | None = None
         self.rest(0.0)
         self.advance(0.0)
 
     def advance(self, seconds: float) -> None:
         """The factors of this step."""
         self.decay, self.early, self.late = (float(x[0]) for x in decays(np.array([seconds]), self.time_constant))
-        self.exact = seconds >= LONG_STEP * self.time_constant
+        self.exact = seconds >= LONG_STEP * self.time_constant and self.branched is None
         self.theta = self.early / (1.0 - self.decay) if self.decay < 1.0 else 0.5
+
+    def turn_with(self, branched: Branched) -> None:
+        """Arrive from one side at what follows, which differs with the direction."""
+        self.branched = branched
 
     def resting(self, y: float) -> float:
         """The drive itself."""
@@ -48,10 +68,31 @@ class LagBlock:
     def rest(self, x: float) -> float:
         """Settle."""
         self.state = self.reached = self.before = self.wanted = self._asked = self._earlier = self.answer = x
+        self._target, self._moved, self._missed = x, 0.0, 0.0
         return x
 
     def solve(self, y: float) -> float:
         """The drive that leads to `y`."""
+        if self.branched is None:
+            return self._led(y)
+        way = y - self._target
+        if way * self._moved <= 0.0:
+            way = 0.0
+        elif abs(way) > MOST_LED * abs(self._moved):
+            way = MOST_LED * self._moved
+        self.wanted = self._earlier = y - way
+        v = self._led(y)
+        self.wanted -= self._missed
+        self.answer = self.steady(v)
+        return self.answer
+
+    def steady(self, v: float) -> float:
+        """The drive nearest to v that does not take the lag back from the direction in which it is to arrive."""
+        if self.branched is None:
+            return v
+        return max(v, self.state) if self.branched.rises else min(v, self.state)
+
+    def _led(self, y: float) -> float:
         if self.exact:
             self.answer = (y - self.decay * self.reached - self.early * self.before) / self.late
         else:
@@ -89,7 +130,9 @@ class LagBlock:
         self.state = self.state + (1.0 - self.decay) * (x - self.state)
         self.wanted = self._asked + self.late * (x - self.answer)
         self.before = x
+        self._target, self._moved = self._asked, self._asked - self._target
         self._earlier = self._asked
+        self._missed = self._earlier - self.wanted
         return self.reached
 
 
@@ -98,21 +141,27 @@ def block(effect: Lag) -> LagBlock | None:
     return LagBlock(effect.time_constant) if effect.time_constant > 0.0 else None
 
 
-def numbers(effect: Lag, seconds: float) -> tuple[bool, tuple[float, float, float, float]]:
-    """Whether the inverse is exact, and its constants: `1 - E`, then b0, b1, `1/b1`, or else theta, b1, `1/(1 - E)`."""
+def numbers(effect: Lag, seconds: float, turning: bool = False) -> tuple[bool, tuple[float, float, float, float]]:
+    """Whether the inverse is exact, and its constants: `1 - E`, then b0, b1, `1/b1`, or else theta, b1, `1/(1 - E)`.
+
+    `turning`: what follows differs with the direction in which the lag arrives, so that it is led in any case.
+    """
     one = LagBlock(effect.time_constant)
     one.advance(seconds)
     rate = -float(np.expm1(-seconds / effect.time_constant))
-    if one.exact:
+    if one.exact and not turning:
         return True, (rate, one.early, one.late, 1.0 / one.late)
     return False, (rate, one.early / rate, one.late, 1.0 / rate)
 
 
-def shifted(theta: float) -> float:
+def shifted(theta: float, turning: bool = False) -> float:
     """Largest error of what a lag is led to, for errors up to 1 of what is asked, if it has seen the same drives.
 
-    The target before is what its drive led to: it keeps `W = theta^2 + theta (1 - theta) W` of the errors before.
+    The target before is what its drive led to: it keeps `W = theta^2 + theta (1 - theta) W` of the errors before. In
+    front of two branches (`turning`) the move that is led is off by what two targets are, or `MOST_LED` times that.
     """
+    if turning:
+        return 1.0 + 2.0 * MOST_LED * theta
     return 1.0 + theta + theta**3 / (1.0 - theta + theta * theta)
 
 
@@ -196,6 +245,65 @@ def lag_absorb(t: LagTables, s: Reals, j: int, x: Any) -> Any:
     s[j, WANTED] = s[j, ASKED] + n[LATE] * (x - s[j, ANSWER])
     s[j, EARLIER] = s[j, ASKED]
     return following - n[THETA] * (following - state)
+
+
+# ---------------------------------------------------------------- lag_steady.c
+
+
+@jit
+def steady_missed(t: LagTables, way: Any) -> Any:
+    """What the only lag of a model misses of a way in its first sample."""
+    return t.block[0, THETA] * way
+
+
+@jit
+def steady_led(way: Any, moved: Any) -> Any:
+    """The part of a target's move that is led, `MOST_LED` times the one before at most."""
+    most = moved + moved
+    least = most - most
+    if most < 0:
+        least, most = most, least
+    return least if way < least else most if way > most else way
+
+
+@jit
+def steady_solve(
+    t: LagTables, s: Reals, y: Any, moved: Any, rises: int, applied: Any, little: Any
+) -> tuple[Any, Any]:
+    """The input that leads the only lag of a model to the output y without taking it back from the direction `rises`,
+    and the way there from the output asked for before, to which it had `moved`. A brake sees the part of that way which
+    is led, and what the input before was short of."""
+    way = y - s[0, ASKED]
+    missed = s[0, EARLIER] - s[0, WANTED]
+    s[0, WANTED] = y - steady_led(way, moved)
+    s[0, EARLIER] = s[0, WANTED]
+    v = steady_kept(t, s, lag_solve(t, s, 0, y), rises, applied, little)
+    s[0, ANSWER] = v
+    s[0, WANTED] = s[0, WANTED] - missed
+    return v, way
+
+
+@jit
+def steady_kept(t: LagTables, s: Reals, v: Any, rises: int, applied: Any, little: Any) -> Any:  # noqa: ARG001  as in fixed point
+    """The input v if it is ahead of x by `little` or more, in the direction `rises`. Else one with which x comes to
+    rest without going back: the last one, `applied`, or one ahead of x by `little`."""
+    x = s[0, HIGH]
+    ahead, kept = (v - x, applied - x) if rises else (x - v, x - applied)
+    if ahead >= little:
+        return v
+    if kept >= 0 and kept <= little + little:
+        return applied
+    return x + little if rises else x - little
+
+
+@jit
+def steady_absorb(s: Reals, before: Any) -> None:
+    """The lag has followed from x = `before`. What rounding took from a sum is known exactly unless x has moved by more
+    than its own size, and could then take x back."""
+    x = s[0, HIGH]
+    way = x - before
+    if (-way if way < 0 else way) >= (-before if before < 0 else before):
+        s[0, LOW] = zero(x)
 
 
 # ---------------------------------------------------------------- braked.c

@@ -17,7 +17,7 @@ from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag import compensator as floating
-from hystgen.effects.lag.compensator import HALVES, LagTables
+from hystgen.effects.lag.compensator import HALVES, LagTables, steady_led
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
@@ -36,16 +36,20 @@ def constants(t: LagTables, braked: bool) -> Iterator[Constants]:
 
 
 class Sizes:
-    """Largest sizes of a lag's signals: its input, the output asked of it, its states, the answer of its inverse."""
+    """Largest sizes of a lag's signals: its input, the output asked of it, its states, the answer of its inverse;
+    `turning`: in front of two branches."""
 
-    def __init__(self, exact: bool, rate: float, late: float, given: float, asked: float) -> None:
+    def __init__(
+        self, exact: bool, rate: float, late: float, given: float, asked: float, turning: bool = False
+    ) -> None:
         self.given, self.asked = given, asked
         if exact:
             self.state = given + asked
             self.answer = given + self.state / late
         else:
-            # |wanted| <= theta^2 asked + (1 - theta)(theta |wanted| + given), theta at most 1/2
-            self.state = 3.0 * (given + asked)
+            # |wanted| <= theta^2 asked + (1 - theta)(theta |wanted| + given), theta at most 1/2; or with two branches
+            # asked and a move that is led, 2 asked, less what the input was short of, (1 - theta)(2 asked + 3 given)
+            self.state = 3.0 * (given + (2.0 if turning else 1.0) * asked)
             self.answer = given + self.state / rate
 
 
@@ -130,6 +134,54 @@ def lag_absorb(t: LagTables, s: Reals, j: int, x: Any) -> Any:
     s[j, LEAD] = s[j, LEAD] - scaled(t, j, change, RATE)
     s[j, EARLIER] = s[j, ASKED]
     return nearest(s[j, HIGH] - scaled(t, j, change, SECOND), t.block[j, BITS])
+
+
+# ---------------------------------------------------------------- lag_steady_fixed.c
+
+
+@jit
+def steady_missed(t: LagTables, way: Any) -> Any:
+    """What the only lag of a model misses of a way in its first sample."""
+    bits = t.block[0, BITS]
+    return nearest(scaled(t, 0, way << bits, SECOND), bits)
+
+
+@jit
+def steady_solve(
+    t: LagTables, s: Reals, y: Any, moved: Any, rises: int, applied: Any, little: Any
+) -> tuple[Any, Any]:
+    """As in floating point; an input that is kept leads nowhere."""
+    bits = t.block[0, BITS]
+    way = y - (s[0, ASKED] >> bits)
+    missed = s[0, EARLIER] - s[0, WANTED]
+    s[0, WANTED] = (y - steady_led(way, moved)) << bits
+    s[0, EARLIER] = s[0, WANTED]
+    led = lag_solve(t, s, 0, y)
+    v = steady_kept(t, s, led, rises, applied, little)
+    if v != led:
+        s[0, LEAD] = zero(v)
+    s[0, WANTED] = s[0, WANTED] - missed
+    return v, way
+
+
+@jit
+def steady_kept(t: LagTables, s: Reals, v: Any, rises: int, applied: Any, little: Any) -> Any:
+    """As in floating point; `little` is at least a drive code, so that rounding to a code leaves the drive ahead."""
+    bits = t.block[0, BITS]
+    x = nearest(s[0, HIGH], bits)
+    ahead, kept = v - x, (applied << bits) - s[0, HIGH]
+    if not rises:
+        ahead, kept = -ahead, -kept
+    if ahead >= little:
+        return v
+    if kept >= 0 and kept <= (little + little) << bits:
+        return applied
+    return x + little if rises else x - little
+
+
+@jit
+def steady_absorb(s: Reals, before: Any) -> None:
+    """The lag has followed; nothing is lost to rounding that could take it back."""
 
 
 # ---------------------------------------------------------------- braked_fixed.c

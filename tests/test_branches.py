@@ -1,0 +1,214 @@
+"""A drive in front of two branches of the memoryless part comes to rest with its reference.
+
+What the drive moves is the forward model in double precision, which finds the branches by itself from all samples.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from modelfiles import chain
+from numpy.typing import NDArray
+
+from hystgen.basics import jit
+from hystgen.compensator import reference
+from hystgen.compensator.chain import bounds, tables
+from hystgen.compensator.chain.layout import Compiled
+from hystgen.compensator.chain.step import RISES
+from hystgen.compensator.chained import Compensator
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+from hystgen.plays import slots
+
+Array = NDArray[np.float64]
+T, HELD = 1e-3, 300
+LAG = "name: lag, time_constant: %g"
+FAST = "name: creep, time_constants: [0.004, 0.015, 0.03], weights: [0.02, 0.03, 0.05]"
+RELAXING = "name: rate_dependence, shape: relaxation, time_constant: 3.0e-3"
+EFFECTS = {
+    "lag": (LAG % 0.01,), "short_lag": (LAG % 3e-4,), "lag_and_creep": (LAG % 0.01, FAST), "relaxing": (RELAXING,),
+    "lag_and_relaxing": (LAG % 0.02, RELAXING),
+    "limited": (LAG % 0.01, "name: slew_limit, rate: 700, falling_rate: 400"),
+    "delayed": (LAG % 0.01, "name: delay, time: 2.6e-3"),
+    "ringing": (LAG % 0.01, "name: resonance, frequency: 40, damping: 0.3"),
+    "worn": (LAG % 0.02, FAST, "name: slew_limit, rate: 700", "name: ageing, loss: 0.01, travel: 100"),
+}  # fmt: skip
+CREEPING = ("lag_and_creep", "worn")
+
+
+@cache
+def model(name: str, gap: float) -> Model:
+    """Branches `gap` V apart at the input of the plays."""
+    branches = "".join(
+        f"    {branch}: {{a0: 6, a1: 0.4, a2: 0.1, a3: {a3}}}\n"
+        for branch, a3 in (("ascending", 0.2), ("descending", 0.2 + gap))
+    )
+    front = f"  memoryless:\n    kind: tanh\n{branches}"
+    return Model(parse_parameters(chain(name, *EFFECTS[name], front=front), "branches.yaml"))
+
+
+@cache
+def built(name: str, gap: float, arithmetic: str) -> Compiled:
+    one = model(name, gap)
+    return tables.build(one.chain, arithmetic, T, one.parameters.emit.compensation)
+
+
+def units(numbers: Compiled) -> tuple[float, float]:
+    """Drive and output units of a number."""
+    return (float(numbers.codes.drive_lsb), float(numbers.codes.output_lsb)) if numbers.codes else (1.0, 1.0)
+
+
+def stops(seed: int, held: int = HELD) -> Array:
+    """Ramps and smooth moves over 8 um, each of which ends in a plateau, the last move by as little as 0.05 um."""
+    rng = np.random.default_rng(seed)
+    ends = rng.uniform(-4.0, 4.0, 3)
+    parts = [np.full(5, ends[0])]
+    for begin, end in zip(ends, [*ends[1:], ends[2] + 0.05 * rng.choice([-1.0, 1.0])], strict=True):
+        way = np.linspace(0.0, 1.0, int(rng.integers(2, 100)))[1:]
+        way = 0.5 - 0.5 * np.cos(np.pi * way) if rng.random() < 0.5 else way
+        parts += [begin + (end - begin) * way, np.full(held, end)]
+    return np.concatenate(parts)
+
+
+def plateaus(u: Array) -> list[slice]:
+    """80 samples at the end of each plateau, before the next move is seen in a preview."""
+    moved = np.flatnonzero(np.diff(u)) + 1
+    ends = [*moved[np.diff(moved, prepend=0) >= HELD].tolist(), len(u)]
+    return [slice(end - 84, end - 4) for end in ends]
+
+
+def turns(v: Array, least: float) -> int:
+    """How often the drive changes its direction, in moves larger than `least`."""
+    ways = np.diff(v)
+    ways = np.sign(ways[np.abs(ways) > least])
+    return int(np.count_nonzero(np.diff(ways)))
+
+
+def held(gap: float) -> float:
+    """Most that the sum of the plays misses while a drive holds for half the way to the other branch, by trial: a lag
+    of many samples is half way in the first of a turn."""
+    static = model("lag", gap).cascade
+    v = np.linspace(*static.input_range, 2001)
+    found = []
+    for up, way in ((True, 1.0), (False, -1.0)):
+        w = static.front(v, up)
+        apart = np.abs(v - static.front_inverse(w, not up))
+        found.append(float(np.max(np.abs(static.front(v + 0.5 * way * apart, up) - w))))
+    return float(np.sum(static.pi.weights)) * max(found)
+
+
+@pytest.mark.parametrize("gap", [0.27, 0.01])
+@pytest.mark.parametrize("name", EFFECTS)
+def test_a_drive_in_double_precision_comes_to_rest(name: str, gap: float) -> None:
+    """Without creep it stands still; what is left is at most what holding for half a turn misses."""
+    one = model(name, gap)
+    u = stops(len(name))
+    t = np.arange(len(u)) * T
+    v = one.inverse().simulate(u, t=t, clamp=True)
+    error = np.abs(one.simulate(v, t=t) - u)
+    for still in plateaus(u):
+        assert np.ptp(v[still]) < (1e-4 if name in CREEPING else 1e-9)
+        assert turns(v[still], 1e-10) == 0
+        assert np.max(error[still]) <= (1.1 if name in CREEPING else 1.0) * held(gap)
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
+@pytest.mark.parametrize("name", [name for name in EFFECTS if name not in ("delayed", "ringing")])
+def test_a_drive_of_the_reference_comes_to_rest(name: str, arithmetic: str) -> None:
+    """Only creep moves it, and what is left is no more than is printed, which is not far from what holding misses."""
+    one, numbers = model(name, 0.27), built(name, 0.27, arithmetic)
+    drive, output = units(numbers)
+    u = stops(10 + len(name))
+    x = np.rint(u / output) if numbers.codes else np.float32(u)
+    v, _ = reference.answers(numbers.tables, True, np.full(len(u), slots.OP_STEP, np.uint8), x, compiled=False)
+    v = v.astype(float) * drive
+    error = np.abs(one.simulate(v, t=np.arange(len(u)) * T) - x.astype(float) * output)
+    most = bounds.kept_branch(numbers)
+    for still in plateaus(u):
+        assert np.ptp(v[still]) <= (1e-4 + 2.0 * drive * bool(numbers.codes) if name in CREEPING else 0.0)
+        assert np.max(error[still]) <= most
+    assert name == "worn" or most <= 1.5 * held(0.27), "it is not far from that, but for gains that may be set"
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q15"])
+def test_every_level_is_reached_and_kept(arithmetic: str) -> None:
+    """Steps to levels all over the range and by a few codes, up and down: within what is printed, at rest."""
+    one, numbers = model("lag", 0.05), built("lag", 0.05, arithmetic)
+    drive, output = units(numbers)
+    rng = np.random.default_rng(1)
+    levels = np.cumsum(np.concatenate([[-3.5], rng.uniform(0.0, 0.7, 10), -rng.uniform(0.0, 0.7, 10)]))
+    levels = np.concatenate([levels, levels[-1] + np.cumsum(rng.uniform(-3e-3, 3e-3, 10))])
+    u = np.repeat(levels, 60)
+    x = np.rint(u / output) if numbers.codes else np.float32(u)
+    v, _ = reference.answers(numbers.tables, True, np.full(len(u), slots.OP_STEP, np.uint8), x, compiled=False)
+    v = v.astype(float) * drive
+    error = one.simulate(v, t=np.arange(len(u)) * T) - x.astype(float) * output
+    ends = np.arange(len(levels))[:, None] * 60 + np.arange(40, 60)
+    assert np.max(np.ptp(v[ends], axis=1)) == 0.0
+    assert np.max(np.abs(error[ends])) <= bounds.kept_branch(numbers)
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
+@pytest.mark.parametrize("name", ["lag", "short_lag", "lag_and_creep", "lag_and_relaxing"])
+def test_answers_are_within_the_bound_of_blocks_that_saw_the_same_drives(name: str, arithmetic: str) -> None:
+    """While both take the same branch, and have done so for the two samples that a lead depends on: blocks in double
+    precision, which absorb the drives that were sent. One may turn a sample later, within rounding."""
+    one, numbers = model(name, 0.27), built(name, 0.27, arithmetic)
+    drive, output = units(numbers)
+    bound = bounds.chain_bounds(numbers, arithmetic).rounding if not numbers.codes else numbers.codes.inverse_rounding
+    assert numbers.codes is None or numbers.codes.condition
+    u = stops(20, held=30)
+    x = np.rint(u / output) if numbers.codes else np.float32(u)
+    code, state = reference.operations(numbers.tables), reference.new_state(numbers.tables, True)
+    compensator = Compensator(one.chain)
+    low, high = one.cascade.input_range
+    apart, same = [], np.ones(len(x) + 2, dtype=bool)
+    with jit.plain():
+        code.init(numbers.tables, state, 1)
+        for k, each in enumerate(x):
+            y = float(each) * output - one.cascade.output_offset
+            for block in reversed(compensator.blocks):
+                block.advance(T)
+                y = block.solve(y) if k else block.resting(y)
+            sent = float(code.inverse_step(numbers.tables, state, numbers.tables.threshold.dtype.type(each))) * drive
+            apart.append(abs(min(max(y, low), high) - sent))
+            same[k + 2] = k == 0 or bool(state.flags[RISES]) == compensator.actuator.rises
+            for block in compensator.blocks:
+                sent = block.absorb(sent) if k else block.rest(sent)
+    near = same[2:] & same[1:-1] & same[:-2]
+    assert np.max(np.array(apart)[near]) <= float(bound) * drive
+    assert np.mean(near) >= 0.95
+
+
+def test_a_drive_with_a_limited_rate_does_not_overshoot() -> None:
+    """A brake takes the lead off in time, and leaves the drive on its branch: steps either way, each on its own."""
+    one = model("limited", 0.27)
+    for begin, end in ((-3.0, 3.0), (3.0, -3.0), (-1.0, 2.0), (0.0, 0.5)):
+        u = np.concatenate([np.full(5, begin), np.full(95, end)])
+        t = np.arange(len(u)) * T
+        y = one.simulate(one.inverse().simulate(u, t=t, clamp=True), t=t)
+        beyond = (y[5:] - end) * np.sign(end - begin)
+        assert np.max(beyond) <= 1e-3 * abs(end - begin)
+        assert np.max(np.abs(beyond[40:])) <= 1e-3 * abs(end - begin)
+
+
+def test_turns_are_no_more_than_the_reference_makes() -> None:
+    """A sine: the drive goes over to the other branch at each turn, once, and is smooth in between."""
+    one = model("lag", 0.27)
+    u = 3.0 * np.sin(2.0 * np.pi * np.arange(1600) / 400)
+    t = np.arange(len(u)) * T
+    v = one.inverse().simulate(u, t=t, clamp=True)
+    assert np.count_nonzero(np.abs(np.diff(v)) > 0.2) <= 4 * 8, "four samples at each of eight turns"
+    error = np.abs(one.simulate(v, t=t) - u)[10:]
+    assert np.quantile(error, 0.8) < 1e-3, "a seventh of the samples hold or turn"
+    assert np.max(error) <= one.cascade.pi.slopes[-1] * one.cascade.branch_gap
+
+
+def test_a_second_run_begins_at_the_start_memory_too() -> None:
+    one = model("relaxing", 0.27)
+    u = stops(3)
+    t = np.arange(len(u)) * T
+    inverse = one.inverse()
+    assert np.array_equal(inverse.simulate(u, t=t), inverse.simulate(u, t=t))
