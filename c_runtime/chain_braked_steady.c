@@ -1,5 +1,13 @@
 #include "hystgen_runtime.h"
 
+/* The drive v, or one that keeps the lag on its branch. */
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_kept(const hystgen_inverse_t *self,
+                                                            hystgen_reach_t v) {
+    return hystgen_drive_code(hystgen_steady_kept(
+        &self->steady, &hystgen_braked_1, &self->braked_1.lag, hystgen_entered_drive(v),
+        hystgen_entered_drive(self->applied), HYSTGEN_DITHER));
+}
+
 /* The drive nearest to v that the amplifier reaches in one step, or from which the lag behind it
    neither overshoots nor leaves its branch; v itself in the first one. */
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(const hystgen_inverse_t *self,
@@ -11,9 +19,5 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(const hystgen_inve
     const hystgen_signal_t drive =
         hystgen_braked_drive(&hystgen_braked_1, &self->braked_1, hystgen_entered_drive(near),
                              hystgen_entered_drive(v > near ? v - near : near - v));
-    const hystgen_signal_t kept = hystgen_steady_kept(
-        &self->steady, &hystgen_braked_1, &self->braked_1.lag,
-        hystgen_entered_drive(hystgen_drive_code(drive)), hystgen_entered_drive(self->applied),
-        HYSTGEN_DITHER);
-    return hystgen_inverse_within(self, hystgen_drive_code(kept));
+    return hystgen_inverse_within(self, hystgen_inverse_kept(self, hystgen_drive_code(drive)));
 }
