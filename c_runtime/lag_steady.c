@@ -49,8 +49,7 @@ static hystgen_real_t hystgen_steady_solve(hystgen_steady_t *self, const hystgen
     self->rises = rises;
     self->way = y - lag->asked;
     lag->wanted = y - hystgen_steady_led(self->way, self->moved);
-    lag->answer =
-        hystgen_steady_kept(self, t, lag, hystgen_lag_solve(t, lag, y), applied, little);
+    lag->answer = hystgen_steady_kept(self, t, lag, hystgen_lag_solve(t, lag, y), applied, little);
     return lag->answer;
 }
 
@@ -60,8 +59,7 @@ static hystgen_real_t hystgen_steady_braked(hystgen_steady_t *self, const hystge
                                             hystgen_braked_t *braked, hystgen_real_t y, bool rises,
                                             hystgen_real_t applied, hystgen_real_t little) {
     const hystgen_real_t missed = braked->earlier - braked->lag.wanted;
-    const hystgen_real_t v =
-        hystgen_steady_solve(self, t, &braked->lag, y, rises, applied, little);
+    const hystgen_real_t v = hystgen_steady_solve(self, t, &braked->lag, y, rises, applied, little);
     braked->earlier = braked->lag.wanted;
     braked->lag.wanted -= missed;
     return v;

@@ -26,9 +26,9 @@ static int64_t hystgen_steady_led(int64_t way, int64_t moved) {
 
 /* The input v if it is ahead of x by `little` or more. Else one with which x comes to rest without
    going back: the last one, `applied`, or one ahead of x by `little`. */
-static int64_t hystgen_steady_kept(const hystgen_steady_t *self,
-                                          const hystgen_lag_table_t *t, const hystgen_lag_t *lag,
-                                          int64_t v, int64_t applied, int64_t little) {
+static int64_t hystgen_steady_kept(const hystgen_steady_t *self, const hystgen_lag_table_t *t,
+                                   const hystgen_lag_t *lag, int64_t v, int64_t applied,
+                                   int64_t little) {
     const bool rises = self->rises;
     const int64_t x = hystgen_nearest(lag->high, t->bits);
     const int64_t left = applied * ((int64_t)1 << t->bits) - lag->high;
@@ -44,8 +44,8 @@ static int64_t hystgen_steady_kept(const hystgen_steady_t *self,
 
 /* The input that leads to the output y without taking x back from the direction `rises`. */
 static int64_t hystgen_steady_solve(hystgen_steady_t *self, const hystgen_lag_table_t *t,
-                                           hystgen_lag_t *lag, int64_t y, bool rises,
-                                           int64_t applied, int64_t little) {
+                                    hystgen_lag_t *lag, int64_t y, bool rises, int64_t applied,
+                                    int64_t little) {
     const int64_t unit = (int64_t)1 << t->bits;
     self->rises = rises;
     self->way = y - (lag->asked >> t->bits);

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modelfiles import CHAINS, FILES, LED, PLAYS, head
+from modelfiles import CHAINS, FILES, LED, PLAYS, STEADY, head
 
 STEP = "c_runtime/loop_float.c"
 LOOP = "c_runtime/loop.c"
@@ -23,6 +23,8 @@ CURVE = "c_runtime/curve.c"
 CHAIN = "c_runtime/chain_corners_fixed.c"
 CHAIN_FINER = "c_runtime/chain_corners_finer.c"
 CHAIN_FLOAT = "c_runtime/chain_corners_float.c"
+TURN = "c_runtime/chain_turn_late.c"
+LAG = "c_runtime/lag_steady.c"
 
 ROUND = """
   pi:
@@ -40,6 +42,7 @@ MODELS = {
     **FILES,
     **LED,
     "creeping": CHAINS["creeping"],
+    "steady": STEADY,
     # the plays that start lowest begin to follow right at the limit
     "edge": head("edge", 1, 6) + PLAYS + "    initial_state: [0, 1.45, 1.9, 1.9, 1.9, 1.9, 1.9]\n",
     # from plays at 0, after a reset, all follow right at the limit
@@ -230,6 +233,20 @@ KILLED = (
     Mutant(
         "what lies below the drives is all limited", CURVE, "*limited = w < e->least && w < e->envelope_least;",
         "*limited = w < e->least;", "two_branches", "q15",
+    ),
+    Mutant(
+        "a drive behind a lag turns at once", TURN,
+        "return back - HYSTGEN_HOLD > hystgen_inverse_missed(way < 0 ? -way : way);",
+        "return back > HYSTGEN_HOLD + hystgen_inverse_missed(way - way);",
+        "steady", "float32", "loop",
+    ),
+    Mutant(
+        "a step is led in full", LAG, "way < least ? least : way > most ? most : way;",
+        "way < least ? least : way;", "steady", "float32", "loop",
+    ),
+    Mutant(
+        "a brake forgets what the drive before was short of", LAG, "    braked->lag.wanted -= missed;\n",
+        "    (void)missed;\n", "steady", "float32", "loop",
     ),
     Mutant(
         "rounding below is limited", CURVE, "*limited = w < e->least && w < e->envelope_least;",

@@ -150,6 +150,24 @@ def test_every_level_is_reached_and_kept(arithmetic: str) -> None:
     assert np.max(np.abs(error[ends])) <= bounds.kept_branch(numbers)
 
 
+def test_the_drive_of_a_converter_comes_to_rest() -> None:
+    """Which commits the code that it makes of each answer; `drive_lsb` says how far these lie apart."""
+    one, lsb = model("lag", 0.05), 8.0 / 4096
+    numbers = tables.build(one.chain, "float32", T, one.parameters.emit.compensation, (lsb, None))
+    u = np.repeat(np.random.default_rng(5).uniform(-4.0, 4.0, 8), 100)
+    code, state = reference.operations(numbers.tables), reference.new_state(numbers.tables, True)
+    sent, commit = np.zeros(len(u), np.float32), np.array([slots.OP_COMMIT], np.uint8)
+    with jit.plain():
+        code.init(numbers.tables, state, 1)
+        for k, each in enumerate(np.float32(u)):
+            sent[k] = np.rint(code.inverse_step(numbers.tables, state, each) / lsb) * lsb
+            code.run(numbers.tables, state, 1, commit, sent[k : k + 1], np.zeros(1, np.float32), np.zeros(1, np.uint8))
+    error = one.simulate(sent, t=np.arange(len(u)) * T) - u
+    ends = np.arange(8)[:, None] * 100 + np.arange(70, 100)
+    assert np.max(np.ptp(sent[ends], axis=1)) == 0.0
+    assert np.max(np.abs(error[ends])) <= bounds.kept_branch(numbers)
+
+
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["lag", "short_lag", "lag_and_creep", "lag_and_relaxing"])
 def test_answers_are_within_the_bound_of_blocks_that_saw_the_same_drives(name: str, arithmetic: str) -> None:
