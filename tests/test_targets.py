@@ -219,10 +219,11 @@ def test_models_with_effects_need_at_most_128_bytes_of_stack(name: str, arithmet
 
 CORNER_STACK = {
     ("creeping", "q31"): 136, ("creeping", "q15"): 132, ("everything", "q31"): 152, ("everything", "q15"): 148,
-    ("led", "q31"): 152, ("led", "q15"): 132,
+    ("led", "q31"): 152, ("led", "q15"): 132, ("everything", "float32"): 144,
 }  # fmt: skip
 """The same of engine corners, with zig; with gcc these take 8 to 24 bytes less. In fixed point a search for a kink
-takes 64 bytes, below those of a step, of what absorbs a drive, and of the plays that follow it."""
+takes 64 bytes, below those of a step, of what absorbs a drive, and of the plays that follow it; in floating point the
+drive in front of two branches takes 72, below those of a step."""
 
 
 @pytest.mark.slow(one_in=3)
