@@ -107,7 +107,7 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
 # RISE     own heat adds no more in a sample than the warmest temperature loses, which has RISE_BITS; a bit more is for
 #          rounding
 # RUBBED   a play that rubs stays between the drives that it has seen
-# AMOUNT   so that none goes farther than from one to the other in a step; the odd numbers up to that of the n-th are n^2
+# AMOUNT   so that none goes farther than from one to the other in a step; the first n odd numbers are n^2 in all
 # INVERSE  a step of Newton's from x is `x (2 - g x)`, at most 1/g, and a gain is at least 1/2; 2 are for rounding
 # PLAY     a viscous play goes towards one that its input drags along, so that it stays between the start memory and the
 #          input's ends; one that would come too near to another stops in between

@@ -241,8 +241,8 @@ KILLED = (
         "steady", "float32", "loop",
     ),
     Mutant(
-        "a step is led in full", LAG, "way < least ? least : way > most ? most : way;",
-        "way < least ? least : way;", "steady", "float32", "loop",
+        "a step is led in full", LAG, "twice < 0 ? 0 : twice;", "way > twice ? way : twice;",
+        "steady", "float32", "loop",
     ),
     Mutant(
         "a brake forgets what the drive before was short of", LAG, "    braked->lag.wanted -= missed;\n",
