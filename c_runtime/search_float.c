@@ -20,8 +20,8 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_input(const hystgen_inverse_t *self
                                                    hystgen_real_t h) {
     hystgen_search_t search = {HYSTGEN_LEAST_INPUT, HYSTGEN_LARGEST_INPUT, self->play[0], h};
     const hystgen_real_t here = hystgen_inverse_halve(self, &search);
-    unsigned int i;
     if (here < search.sum || here > search.sum) {
+        unsigned int i;
         for (i = 0; i < HYSTGEN_HALVES; ++i) {
             (void)hystgen_inverse_halve(self, &search);
         }
