@@ -37,8 +37,8 @@ CODE_PLAYS = 10  # plays where code is measured; with 64 at most 16 bytes more o
 KINDS = ("pi", "gpi", "effects", "gpi_effects")
 GAIN = "  effects: [{name: thermal, gain_per_degree: 0.001}]\nsample_time: 1.0e-3\n"
 EFFECT_PLAYS = (1, 4, 16)
-"""Plays with effects. Three do: from 1 to 16 corners grow by 3 % (float32 inverse, M0+), and loop by 1240 to 1364
-instructions a play."""
+"""Plays of models with effects; the row at or below a model's number counts. Three do: from 1 to 16 corners grow by 3 %
+and loop by 1240 to 1364 instructions a play (float32, inverse, M0+; rows `effects` that this program writes)."""
 DEAD_ZONE = "{kind: dead_zone, thresholds: [-5, 0, 5], weights: [-0.2, 1.2, 0.2]}"
 TANH = "{kind: tanh, ascending: {a0: 15, a1: 0.1, a2: 0.1, a3: 0.2}}"
 BRANCHES = TANH[:-1] + ", descending: {a0: 15, a1: 0.1, a2: 0.1, a3: 0.5}}"
