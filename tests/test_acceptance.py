@@ -308,7 +308,7 @@ class TestForwardSelection:
 
 
 class Path:
-    """A search whose error is known after every step."""
+    """A search whose error is known after every step; steps that fail leave it where it was."""
 
     def __init__(self, errors: Sequence[float], at: int = 0, log: list[tuple[int, float]] | None = None) -> None:
         self.errors, self.at, self.log = errors, at, [] if log is None else log
@@ -316,7 +316,10 @@ class Path:
 
     def further(self, steps: int, little: float) -> Path:
         self.log.append((steps, little))
-        return Path(self.errors, self.at + steps, self.log)
+        found = Path(self.errors, self.at + steps, self.log)
+        if found.now.rms == self.now.rms:
+            found.now = self.now
+        return found
 
     def found(self, _: Any) -> float:
         return float(self.now.rms)
@@ -340,6 +343,10 @@ class TestScreening:
         screened(monkeypatch, path)
         assert len(path.log) == calls
         assert sum(steps for steps, _ in path.log) == 2 * calls
+
+    def test_a_search_whose_steps_fail_goes_on(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Each failure damps the next step more: far from straight, a cubic sensor takes its fifth or sixth."""
+        assert screened(monkeypatch, Path([0.5] * 5 + [0.1] * 10)) == 0.1
 
     @pytest.mark.parametrize(("factor", "calls"), [(0.75, 4), (0.85, 1)])
     def test_a_joint_search_that_falls_goes_on(

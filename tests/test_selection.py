@@ -307,6 +307,16 @@ def test_of_those_that_it_gives_way_to_the_last(monkeypatch: pytest.MonkeyPatch)
     found = selection._that_replaces(made("one", 3, (1.0, 1.0)).fitted, "one", step, OF_MADE)
     assert found is not None
     assert found.best is other
+    simple = made("one", 3, (0.81, 0.81))  # a shape of its own that needs as few numbers, and leaves less
+    step = selection._Step(None, [shape, simple, other], shape, step.merit)  # type: ignore[arg-type]
+    found = selection._that_replaces(made("one", 3, (1.0, 1.0)).fitted, "one", step, OF_MADE)
+    assert found is not None
+    assert found.best.name == "one"
+    equal = made("equal", 4, (0.7, 0.7))  # a smaller error with no fewer numbers would have been the best of the step
+    step = selection._Step(None, [shape, equal], shape, step.merit)  # type: ignore[arg-type]
+    found = selection._that_replaces(made("one", 3, (1.0, 1.0)).fitted, "one", step, OF_MADE)
+    assert found is not None
+    assert found.best is shape
     step = selection._Step(None, [shape], shape, step.merit)  # type: ignore[arg-type]
     assert selection._that_replaces(shape.fitted, "one", step, OF_MADE) is None
 

@@ -398,10 +398,14 @@ class _Searches:
 
 
 def _while_falling(search: Search, steps: int) -> Search:
-    """The search after `steps` steps, and as many again for as long as they lower the error by enough (`FALLING`)."""
+    """The search after `steps` steps, and as many again for as long as they lower the error by enough (`FALLING`).
+
+    Steps that all fail are not the end: each damps the next one more, and one that is short enough lowers the error. A
+    cubic sensor far from straight was judged where its search began.
+    """
     for _ in range(acceptance.LONGER):
-        before, search = search.now.rms, search.further(steps, COARSE)
-        if search.now.rms >= acceptance.FALLING * before:
+        before, search = search.now, search.further(steps, COARSE)
+        if search.now is not before and search.now.rms >= acceptance.FALLING * before.rms:
             break
     return search
 

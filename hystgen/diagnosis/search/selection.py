@@ -747,9 +747,20 @@ def _exchanged(
 
 
 def _that_replaces(now: Fitted, name: str, step: _Step, records: Records) -> _Step | None:
-    """The step with the effect to which that of a name gives way, and to which no other one does; None without such."""
+    """The step with the effect to which that of a name gives way, or None: its best, or one of fewer numbers, as good.
+
+    The best of a step is chosen by errors that differ by a few per cent, which no records bear out near the noise. A
+    shape of the effect itself with as few numbers as another effect stands, unless that one leaves less.
+    """
+    every = [*records.to_fit, *records.held]
     fitted, found = now, None
     for each in (step.best, *(other for other in simplest_first(step.tried, records) if other is not step.best)):
+        numbers = each.numbers(records.held)
+        if each is not step.best:
+            own = (one for one in step.tried if one.name == name and one.numbers(records.held) <= numbers)
+            least = min((rms(one.fitted.errors(every)) for one in own), default=math.inf)
+            if numbers >= free_numbers(fitted, records.held) or rms(each.fitted.errors(every)) > least:
+                continue
         if not _gives_way(fitted, name, each, records):
             continue
         merit = step.merit if each is step.best else merit_of(step.now, each, records, acceptance.FIRST_REMOVES)
