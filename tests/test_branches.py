@@ -180,7 +180,7 @@ def test_answers_are_within_the_bound_of_blocks_that_saw_the_same_drives(name: s
     u = stops(20, held=30)
     x = np.rint(u / output) if numbers.codes else np.float32(u)
     code, state = reference.operations(numbers.tables), reference.new_state(numbers.tables, True)
-    compensator = Compensator(one.chain)
+    compensator = Compensator(one.chain, as_emitted=True)
     low, high = one.cascade.input_range
     apart, same = [], np.ones(len(x) + 2, dtype=bool)
     with jit.plain():

@@ -133,7 +133,7 @@ class Actuator:
             return v
         other = float(self.static.front_inverse(w, not self.ascending))
         rounding = self.slack + ROUNDING * self.static.slope_ratio * max(abs(v), abs(self.drive))
-        patience = self.led_by.theta if self.led_by else 0.0
+        patience = self.led_by.theta if self.led_by and not self.led_by.exact else 0.0
         if back <= rounding + patience * abs(other - v):
             return self.drive
         if other == self.drive or (other > self.drive) == self.ascending:  # the branches meet here
@@ -245,11 +245,12 @@ class Compensator:
     """Drives for a reference; leaves out a sensor's own nonlinearity, since the reference is the true displacement.
 
     `how`: how the reference is read, in samples of the record, and what is compensated although nothing measures it:
-    `drift`, which begins at t = 0, and `self_heating`. Raises NotInvertibleError and UnsupportedEffectsError with all
+    `drift`, which begins at t = 0, and `self_heating`. `as_emitted`: a lag in front of two branches is led however
+    short it is, as by the C, whose drives are rounded. Raises NotInvertibleError and UnsupportedEffectsError with all
     reasons.
     """
 
-    def __init__(self, chain: Chain, how: Compensation = STANDARD) -> None:
+    def __init__(self, chain: Chain, how: Compensation = STANDARD, as_emitted: bool = False) -> None:
         static, effects = chain.cascade, chain.effects
         creeping = [effect for effect in effects if isinstance(effect, creep.EFFECTS)]
         missing = [*(reason for each in creeping for reason in creep.problems(each)), *static.inverse_problems()]
@@ -271,7 +272,7 @@ class Compensator:
         self.braked = lags[0] if self.slew and len(lags) == 1 else None
         self.parts = Parts.of(effects)
         if self.parts.turning(static.branches_differ):
-            lags[0].turn_with(self.actuator)
+            lags[0].turn_with(self.actuator, as_emitted)
             self.actuator.led_by = lags[0]
 
     def _called(self, name: str) -> list[Any]:

@@ -48,18 +48,22 @@ class LagBlock:
     def __init__(self, time_constant: float) -> None:
         self.time_constant = time_constant
         self.branched: Branched | None = None
+        self.always_led = False
         self.rest(0.0)
         self.advance(0.0)
 
     def advance(self, seconds: float) -> None:
         """The factors of this step."""
         self.decay, self.early, self.late = (float(x[0]) for x in decays(np.array([seconds]), self.time_constant))
-        self.exact = seconds >= LONG_STEP * self.time_constant and self.branched is None
+        self.exact = seconds >= LONG_STEP * self.time_constant and not self.always_led
         self.theta = self.early / (1.0 - self.decay) if self.decay < 1.0 else 0.5
 
-    def turn_with(self, branched: Branched) -> None:
-        """Arrive from one side at what follows, which differs with the direction."""
-        self.branched = branched
+    def turn_with(self, branched: Branched, always_led: bool) -> None:
+        """Arrive from one side at what follows, which differs with the direction, unless the inverse is exact.
+
+        `always_led`: it never is, since a drive that is rounded does not arrive exactly.
+        """
+        self.branched, self.always_led = branched, always_led
 
     def resting(self, y: float) -> float:
         """The drive itself."""
@@ -73,7 +77,7 @@ class LagBlock:
 
     def solve(self, y: float) -> float:
         """The drive that leads to `y`."""
-        if self.branched is None:
+        if self.branched is None or self.exact:
             return self._led(y)
         way = y - self._target
         if way * self._moved <= 0.0:
@@ -88,7 +92,7 @@ class LagBlock:
 
     def steady(self, v: float) -> float:
         """The drive nearest to v that does not take the lag back from the direction in which it is to arrive."""
-        if self.branched is None:
+        if self.branched is None or self.exact:
             return v
         return max(v, self.state) if self.branched.rises else min(v, self.state)
 
