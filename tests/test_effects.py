@@ -469,13 +469,32 @@ def test_sudden_edges_against_a_generator_that_steps(where: float) -> None:
     assert early["straight"] > 0.4 * rate / samples
 
 
+@pytest.mark.parametrize("edge", [0.0, 0.3, 1.0])
+def test_edges_are_where_a_converter_takes_its_commands(edge: float) -> None:
+    """Commands, and outputs at their times; the converter takes each one a part of a sample after the one before."""
+    per, rate, samples = 1000, 7.0, 60
+    t = np.arange(samples) / samples
+    v = np.repeat([0.0, 1.0, 0.4], samples // 3)
+    at = np.arange((samples - 1) * per + 1) / per  # in samples; a command is there from its time on
+    fine = v[np.minimum(np.ceil(at - edge), samples - 1).astype(int).clip(0)]
+    most = rate / samples / per
+    a, expected = 0.0, []
+    for k, each in enumerate(fine.tolist()):
+        if k % per == 0:
+            expected.append(a)
+        a += min(max(each - a, -most), most)
+    got = make("slew_limit", shape="sudden", rate=rate, edge=edge).drive(v, Run(t, v))
+    assert np.max(np.abs(got - np.array(expected))) < 2.0 * most
+
+
 def test_sudden_edges_leave_other_drives_alone() -> None:
     """Ramps, sines, corners, one sample aside, and edges that last three samples are straight between samples."""
     t = np.arange(200.0)
     corners = np.interp(t, [0, 20, 50, 120, 199], [0.0, 1.0, -1.0, 2.0, 2.0])
     for v in (t, np.sin(0.9 * t), corners, np.where(t == 90, 1.0, 0.0), np.clip((t - 60.0) / 3.0, 0.0, 1.0)):
-        both = [make("slew_limit", shape=shape, rate=0.2).drive(v, Run(t, v)) for shape in ("straight", "sudden")]
-        assert np.array_equal(*both)
+        straight = make("slew_limit", rate=0.2).drive(v, Run(t, v))
+        for edge in (0.0, 0.5, 1.0):
+            assert np.array_equal(make("slew_limit", shape="sudden", rate=0.2, edge=edge).drive(v, Run(t, v)), straight)
 
 
 # Creep ----------------------------------------------------------------------------------------------------

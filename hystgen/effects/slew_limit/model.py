@@ -20,6 +20,9 @@ BESIDE = 10.0
 Steps between levels at rest are far beyond it, up to the noise of the converter. Changed by:
 test_effects::test_sudden_edges_leave_other_drives_alone."""
 
+MIDDLE = 0.5
+"""[samples] Place of a step between two samples of a drive that was measured by averages over each of them."""
+
 LEAST = 3.0
 """The same of the least rate: a step from sample to sample is faster than all else by a hundred times and more."""
 
@@ -47,13 +50,13 @@ def limit(u: Array, up: Array, down: Array, out: Array) -> None:
 
 
 @jit
-def sudden(t: Array, u: Array, times: Array, drive: Array, given: NDArray[np.intp]) -> int:
+def sudden(t: Array, u: Array, edge: float, times: Array, drive: Array, given: NDArray[np.intp]) -> int:
     """Write the drive with sudden edges into `times` and `drive`, and the place of each sample; returns its length.
 
-    An edge is a change within one sample or two, `BESIDE` times as fast as those beside it. It happens at the mean
-    time of the change: halfway between two samples, or, where a converter that averages shows a sample on the way, as
-    long before that sample's time is over as it is far on the way. A linear filter tells it from a straight edge only
-    by second differences.
+    An edge is a change within one sample or two, `BESIDE` times as fast as those beside it. With `edge` 1/2 it happens
+    at the mean time of the change: halfway between two samples, or, where a converter that averages shows a sample on
+    the way, as long before that sample's time is over as it is far on the way. With another `edge` it happens as much
+    earlier or later as between two samples. A linear filter tells it from a straight edge only by second differences.
     """
     times[0], drive[0], given[0] = t[0], u[0], 0
     n, k, last = 1, 0, len(u) - 1
@@ -73,6 +76,7 @@ def sudden(t: Array, u: Array, times: Array, drive: Array, given: NDArray[np.int
         ends = k + width
         first, second = u[k + 1] - u[k], u[ends] - u[k + 1]
         late = 0.5 * (first * (t[k] + t[k + 1]) + second * (t[k + 1] + t[ends])) / (first + second)
+        late = min(max(late + (edge - MIDDLE) * (t[k + 1] - t[k]), t[k]), t[ends])
         behind = width == 2 and late < t[k + 1]
         if width == 2 and not behind:
             times[n], drive[n], given[k + 1] = t[k + 1], u[k], n
@@ -107,21 +111,27 @@ class _SlewLimit(Effect):
         return self
 
     @classmethod
-    def _candidate(cls, label: str, n: int, about: About, **more: Any) -> Candidate:
-        """One rate, or one for each direction, up to the fastest recorded one."""
+    def _candidate(cls, label: str, n: int, about: About, anywhere: bool = False, **more: Any) -> Candidate:
+        """One rate, or one for each direction, up to the fastest recorded one; `anywhere`: also the place of edges."""
         fastest = np.log10(max(about.fastest, 1e-12))
         shape = cls.model_fields["shape"].annotation.__args__[0]  # type: ignore[union-attr]
 
         def build(x: Array) -> Effect:
-            rates = {"rate": 10.0 ** float(x[0]), "falling_rate": 10.0 ** float(x[-1])}
-            return cls(name="slew_limit", shape=shape, **rates)  # type: ignore[call-arg]
+            numbers = {"rate": 10.0 ** float(x[0]), "falling_rate": 10.0 ** float(x[n - 1])}
+            if anywhere:
+                numbers["edge"] = min(float(x[n]), 1.0)  # a derivative looks a little beyond
+            return cls(name="slew_limit", shape=shape, **numbers)  # type: ignore[call-arg]
+
+        def beside(rates: Array, edge: float) -> Array:
+            return np.append(rates, edge) if anywhere else rates
 
         none = np.full(n, fastest)
-        start, *others = (none - below for below in BELOW)
-        return Candidate(label, none - LEAST, none, start, build, none, tuple(others), **more)
+        start, *others = (beside(none - below, MIDDLE) for below in BELOW)
+        low, high = beside(none - LEAST, 0.0), beside(none, 1.0)
+        return Candidate(label, low, high, start, build, beside(none, MIDDLE), tuple(others), **more)
 
 
-STRAIGHT = "slew limit"
+STRAIGHT, SUDDEN = "slew limit", "slew limit, sudden steps"
 
 
 class SlewLimit(_SlewLimit):
@@ -155,27 +165,40 @@ class SuddenSlewLimit(_SlewLimit):
     """The same limit behind a drive whose steps take no time (`sudden`); elsewhere it is straight between samples.
 
     A generator steps where the record has a change within a sample or two. Taken as straight, the limited edge begins
-    up to a sample early, and everything until it arrives is early by as much.
+    up to a sample early, and everything until it arrives is early by as much. When in that time the drive steps depends
+    on how it was recorded: halfway in averages over each sample, at the later sample if a command was recorded as the
+    converter took it, at the earlier one if the converter had been given it by then.
     """
 
     shape: Literal["sudden"] = Field(description="steps of the drive within one or two samples take no time")
+    edge: float = Field(
+        default=MIDDLE, ge=0.0, le=1.0,
+        description="when such a step happens: 0 at the earlier of two samples, 1 at the later one",
+    )  # fmt: skip
+
+    later: ClassVar[tuple[str, ...]] = ("shape", "edge")
 
     def drive(self, a: Array, run: Run) -> Array:
         """The drive as fast as it may be."""
         times, drive, given = np.empty(3 * len(a)), np.empty(3 * len(a)), np.empty(len(a), dtype=np.intp)
-        n = sudden(run.t, a, times, drive, given)
+        n = sudden(run.t, a, self.edge, times, drive, given)
         steps, out = np.diff(times[:n]), np.empty(n)
         limit(drive[:n], self.rate * steps, self.falling_rate * steps, out)
         return np.asarray(out[given])
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """One rate, then one for each direction, where a limit helps."""
+        """Where a limit helps: one rate, one for each direction, and either with another time of the steps."""
+        both = "rising and falling"
         return [
-            cls._candidate(f"{STRAIGHT}, sudden steps", 1, about, beyond=STRAIGHT, grown=lambda x: x),
+            cls._candidate(SUDDEN, 1, about, beyond=STRAIGHT, grown=lambda x: x),
+            cls._candidate(f"{SUDDEN}, {both}", 2, about, beyond=STRAIGHT, grown=lambda x: np.repeat(x, 2)),
             cls._candidate(
-                f"{STRAIGHT}, sudden steps, rising and falling", 2, about, beyond=STRAIGHT,
-                grown=lambda x: np.repeat(x, 2),
+                f"{SUDDEN} anywhere", 1, about, True, beyond=STRAIGHT, grown=lambda x: np.append(x, MIDDLE)
+            ),
+            cls._candidate(
+                f"{SUDDEN} anywhere, {both}", 2, about, True, beyond=STRAIGHT,
+                grown=lambda x: np.append(np.repeat(x, 2), MIDDLE),
             ),
         ]  # fmt: skip
 
@@ -187,4 +210,4 @@ def load() -> None:
     """Have the recursions compiled, or read from the cache, on two samples."""
     two, one = np.arange(2.0), np.ones(1)
     limit(two, one, one, np.empty(2))
-    sudden(two, two, np.empty(6), np.empty(6), np.empty(2, dtype=np.intp))
+    sudden(two, two, MIDDLE, np.empty(6), np.empty(6), np.empty(2, dtype=np.intp))
