@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.search import acceptance
-from hystgen.diagnosis.search.hypothesis import Actuator, NotFiniteError, Structure, Sums, Turns
+from hystgen.diagnosis.search.hypothesis import RANK, Actuator, NotFiniteError, Structure, Sums, Turns
 from hystgen.effects.base import Effect
 from hystgen.identification import joint, pi, reduction, stage_content, start
 from hystgen.identification.joint import DIFFERENCE, Shaped
@@ -27,6 +27,7 @@ from hystgen.identification.reduction import Reduced
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 POLISHED = 1e-5
 """A search ends after a step that lowers the error by a smaller share: far below any difference that decides."""
@@ -39,37 +40,46 @@ follow, so that this bounds the time alone."""
 class _Block:
     """A record's part of the system linearised about a shape and weights: plays and measured output, then derivatives.
 
-    The reflections of the reduction are kept, so that the derivatives can be reduced later by themselves.
+    The factors of the free components are between the limits of `Actuator.largest`, which are a share `most` of the sum
+    of the weights. A component that would exceed them is written as `side most (sum p - slack)` with `slack >= 0`, so
+    that the limit follows the weights in the same linear system. The reflections of the reduction are kept, so that the
+    derivatives can be reduced later by themselves.
     """
 
     def __init__(self, here: Actuator, item: Item, p: Array) -> None:
-        self._item, self._p = item, p
+        self._here, self._item, self._p = here, item, p
         self._level = np.zeros(1)
-        offset = None
+        self._offset = None
         rows, constant = here.columns(item)
         h = operators.weighted_sum(p, rows) + constant
         measured = item.y[item.compared]
         if here.bends:
-            self._level, moved = here.level(h, item)
-            offset = here.compared(moved, item)
+            self._level, moved, begun = here.level(h, item, p)
+            self._offset = here.compared(moved, item)
             bent = here.mapped(h, self._level, item)
             step = item.step(h)
             slope = (here.mapped(h + step, self._level, item) - bent) / step
             rows = here.compared(rows * slope, item)
             h = here.compared(bent, item)
-            target = measured - h + p @ rows
+            target = measured - h + p @ rows + begun
         else:
             target = measured - constant
         added = here.added(item)
         self._sum = h + added
         self.samples = len(h)
-        free = here.nuisances(item, offset)
+        free = here.nuisances(item, self._offset)
         self._free = len(free)
+        most = here.largest(item, np.ones(1))
+        self._limited = np.isfinite(most)
+        self._most = np.where(self._limited, most, 0.0)
+        self._factors, self._side = np.zeros(len(free)), np.zeros(len(free))
+        self.held = self.slack = np.zeros(len(free), dtype=bool)
         table = np.empty((len(free) + len(rows) + 1, len(h))).T
         table[:, : len(free)] = free.T
         table[:, len(free) : -1] = rows.T
         table[:, -1] = target - added
         self._reduced = [reduction.reflected(part) for part in self._cut(table)]
+        self._whole = _stacked([part.triangle for part in self._reduced])
 
     def _cut(self, table: Array) -> list[Array]:
         """Chunks of a few thousand samples, which stay in the cache while they are reduced."""
@@ -80,13 +90,16 @@ class _Block:
     def system(self, varied: Sequence[Actuator] = ()) -> Array:
         """The triangle of plays, measured output and derivatives, without the free components of the record."""
         if not varied:
-            return self._without_free([part.triangle for part in self._reduced])
+            return self._behind(self._whole, self.held)
         table = np.empty((len(varied), self.samples)).T
         sums: Sums = {}
+        starting, begun = self._here.starting(self._item), self._begun(self._here)
         for j, other in enumerate(varied):
             table[:, j] = (self._of(other, sums) - self._sum) / DIFFERENCE
+            if other.starting(self._item) != starting:
+                table[:, j] += (self._begun(other) - begun) / DIFFERENCE
         parts = zip(self._reduced, self._cut(table), strict=True)
-        return self._without_free([part.extended(columns) for part, columns in parts])
+        return self._behind(_stacked([part.extended(columns) for part, columns in parts]), self.held)
 
     def _of(self, other: Actuator, sums: Sums) -> Array:
         """The prediction of other numbers with the same weights and offset."""
@@ -96,9 +109,89 @@ class _Block:
             moved = other.compared(other.mapped(moved, self._level, self._item), self._item)
         return np.asarray(moved + other.added(self._item))
 
-    def _without_free(self, triangles: Sequence[Array]) -> Array:
-        whole = triangles[0] if len(triangles) == 1 else reduction.triangle(*triangles)
-        return whole[self._free :, self._free :]
+    def _begun(self, other: Actuator) -> Array:
+        """The response to the start state with other numbers: a factor at its limit follows it, the others stay."""
+        free = other.nuisances(self._item, self._offset)
+        if len(free) != self._free:  # a spectrum with another number of states
+            return self._begun(self._here)
+        held, factors = self.held, self._factors.copy()
+        factors[held] = self._side[held] * other.largest(self._item, self._p)[held]
+        return np.asarray(factors[1:] @ free[1:])
+
+    def opened(self) -> Array:
+        """The triangle of plays, slacks and measured output: a component beyond its limit is free up to that limit."""
+        slack = np.flatnonzero(self.slack)
+        columns = self._whole[:, slack] * -(self._side * self._most)[slack]
+        at = self._free + len(self._p)
+        whole = np.concatenate([self._whole[:, :at], columns, self._whole[:, at:]], axis=1)
+        return self._behind(whole, self._side != 0.0)
+
+    def limit(self, p: Array, slacks: Array) -> bool:
+        """Take the weights and slacks of `opened` as solved; whether that leaves a component beyond its limits."""
+        if self._free == 1:  # an offset, which has no limit
+            return False
+        total, first = float(np.sum(p)), self._whole[: self._free]
+        slack = np.zeros(self._free)
+        slack[self.slack] = slacks
+        self.held = (self._side != 0.0) & (slack == 0.0)
+        self._factors = self._side * self._most * (total - slack)
+        free = np.flatnonzero(self._side == 0.0)
+        rest = first[:, -1] - first[:, self._free : -1] @ p - first[:, : self._free] @ self._factors
+        self._factors[free] = np.linalg.lstsq(first[:, free], rest, rcond=RANK)[0]
+        beyond = self._limited & (self._side == 0.0) & (np.abs(self._factors) > self._most * total)
+        opposite = slack > 2.0 * total
+        self._side = np.where(beyond, np.sign(self._factors), np.where(opposite, -self._side, self._side))
+        self.slack = (self.slack | beyond) & ~opposite
+        return bool(np.any(beyond | opposite))
+
+    def _behind(self, whole: Array, limited: Bools) -> Array:
+        """The triangle behind the components that are free; the plays carry the others, which follow their weights."""
+        n = self._free
+        if limited.any():
+            carried = whole[:, :n][:, limited] @ (self._side * self._most)[limited]
+            plays = whole[:, n : n + len(self._p)] + carried[:, None]
+            rest = whole[:, n + len(self._p) :]
+            whole = reduction.triangle(np.concatenate([whole[:, :n][:, ~limited], plays, rest], axis=1))
+            n -= int(np.count_nonzero(limited))
+        return whole[n:, n:]
+
+
+def _stacked(triangles: Sequence[Array]) -> Array:
+    return triangles[0] if len(triangles) == 1 else reduction.triangle(*triangles)
+
+
+def _solved(blocks: Sequence[_Block], plays: int) -> tuple[Array, Array]:
+    """The system of all records and its best weights, with the free components of each record within their limits.
+
+    Components that are found beyond a limit get a slack from it, which is solved for with the weights (nnls). This is
+    repeated until none is beyond: a component gets a slack once, and stays at the opposite limit if it comes to that.
+    """
+    whole = reduction.triangle(*(block.system() for block in blocks))
+    solution = pi.non_negative(whole, np.arange(plays))
+    while np.isfinite(whole).all():
+        ends = plays + np.cumsum([0, *(int(np.count_nonzero(block.slack)) for block in blocks)])
+        slacks = [solution[ends[k] : ends[k + 1]] for k in range(len(blocks))]
+        beyond = [block.limit(solution[:plays], slack) for block, slack in zip(blocks, slacks, strict=True)]
+        if not any(beyond):
+            break
+        solution = _open(blocks, plays)
+    if any(block.held.any() for block in blocks):
+        whole = reduction.triangle(*(block.system() for block in blocks))
+    return whole, solution[:plays]
+
+
+def _open(blocks: Sequence[_Block], plays: int) -> Array:
+    """The best weights, and behind them the slacks of one record after the other."""
+    opened = [block.opened() for block in blocks]
+    last, parts = plays + sum(each.shape[1] - plays - 1 for each in opened), []
+    at = plays
+    for each in opened:
+        slacks = each.shape[1] - plays - 1
+        part = np.zeros((len(each), last + 1))
+        part[:, [*range(plays), *range(at, at + slacks), last]] = each
+        parts.append(part)
+        at += slacks
+    return pi.non_negative(reduction.triangle(*parts), np.arange(last))
 
 
 def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) -> Shaped:
@@ -117,12 +210,10 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
         measured_last = [*range(n1), *range(n1 + 1, whole.shape[1]), n1]
         return Reduced(structure.thresholds, whole[:, measured_last], (), (samples,))
 
-    whole = reduction.triangle(*(block.system() for block in blocks))
+    whole, best = _solved(blocks, n1)
     if not np.isfinite(whole).all():  # the numbers are far from reasonable
         return Shaped(shape, p, math.inf, p, samples, derived)
-    columns = np.arange(n1)
-    best = pi.non_negative(whole, columns)
-    return Shaped(shape, p, root_mean_square(pi.residual(whole, columns, best), samples), best, samples, derived)
+    return Shaped(shape, p, root_mean_square(pi.residual(whole, np.arange(n1), best), samples), best, samples, derived)
 
 
 @dataclass(frozen=True)
@@ -257,7 +348,7 @@ def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fit
     if len(p) < 2 or p[0] >= floor * float(np.sum(p)):
         return fitted, kept
     blocks = [_Block(here, item, p) for item in items if item.known.any()]
-    whole = reduction.triangle(*(block.system() for block in blocks))
+    whole, _ = _solved(blocks, len(p))
     samples = sum(block.samples for block in blocks)
     system = Reduced(fitted.structure.thresholds, whole, (), (samples,))
     made = pi.fit_weights(system, np.arange(len(p)), floor)

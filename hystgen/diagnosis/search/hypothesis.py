@@ -47,6 +47,10 @@ LEVEL_STEPS = 3
 """Most Newton steps for the offset in front of a map, whose curvature is a few per cent: each squares the error."""
 
 
+RANK = 1e-10
+"""Singular values below this share of the largest are zero but for rounding: two responses of nearly the same shape."""
+
+
 class NotFiniteError(ArithmeticError):
     """An output map has no finite values at its input."""
 
@@ -227,15 +231,16 @@ class Actuator:
                 h = effect.mapped(h, item.run)
         return h
 
-    def level(self, h: Array, item: Item, largest: Array | None = None) -> tuple[Array, Array]:
+    def level(self, h: Array, item: Item, p: Array) -> tuple[Array, Array, Array]:
         """The best offset (N,) in front of a sensor and behind a limit, and the change of the output with it (N,).
 
         It includes the responses to an unknown start state, which a sensor also sees, but not drift added behind the
-        sensor: about the wrong offset its curve would be a different one. `largest`: limits of the responses' factors.
+        sensor: about the wrong offset its curve would be a different one. Also returns the responses' part of the
+        output (at the compared samples), to first order; their factors are within the limits of `largest`.
         """
         y = item.y[item.compared] - self.added(item)
         free = self._free(item) if self._needed == _MAPPED else self.nuisances(item)
-        limits = np.full(len(free), np.inf) if largest is None else largest
+        limits = self.largest(item, p)
         factors = np.zeros(len(free))
         level = np.full(len(h), float(np.mean(y - self.compared(h, item))))
         step = item.step(h)
@@ -255,7 +260,7 @@ class Actuator:
             level = level + shift
             if np.max(np.abs(shift)) < step:
                 break
-        return level, moved
+        return level, moved, factors[1:] @ self.nuisances(item, self.compared(moved, item))[1:]
 
     def added(self, item: Item) -> Array:
         """Sum of the terms added at the end of the chain, at the compared samples."""
@@ -281,16 +286,17 @@ class Actuator:
     def _free(self, item: Item) -> Array:
         """The free components at all samples."""
         free = [np.ones((1, len(item.run.t)))]
-        free += [found for effect in self._starting(item) if len(found := effect.transients(item.run))]
+        free += [found for effect in self.starting(item) if len(found := effect.transients(item.run))]
         return np.concatenate(free)
 
-    def _starting(self, item: Item) -> list[Effect]:
+    def starting(self, item: Item) -> list[Effect]:
+        """The effects whose start state over a record is unknown."""
         return [effect for effect in self.effects if item.history is None or not effect.fades]
 
     def largest(self, item: Item, p: Array) -> Array:
         """(k,) largest factors of `nuisances`: an effect with a small weight has a small start response."""
         span = acceptance.START_SPAN * float(np.sum(p)) * (item.session or item.run).drive_range
-        found = np.concatenate([[np.inf], *(effect.largest(item.run) for effect in self._starting(item))])
+        found = np.concatenate([[np.inf], *(effect.largest(item.run) for effect in self.starting(item))])
         limited = np.isfinite(found)
         return np.where(limited, span * np.where(limited, found, 0.0), np.inf)  # inf even for a span of 0
 
@@ -331,10 +337,11 @@ class Actuator:
         if found is None:
             rows, constant = self.columns(item, p)
             h, moved = rows[0] + constant, np.ones(rows.shape[1])
+            begun: Array | float = 0.0
             if self.bends:
-                level, moved = self.level(h, item, self.largest(item, p))
+                level, moved, begun = self.level(h, item, p)
                 h = self.mapped(h, level, item)
-            residuals = item.y[item.compared] - self.compared(h, item) - self.added(item)
+            residuals = item.y[item.compared] - self.compared(h, item) - self.added(item) + begun
             found = np.stack([residuals, self.compared(moved, item)])
             item.residuals.remember(by, found)
         return found
@@ -345,7 +352,7 @@ def _within(columns: Array, y: Array, low: Array, high: Array) -> Array:
     table = np.empty((len(columns) + 1, len(y))).T
     table[:, :-1], table[:, -1] = columns.T, y
     triangle = reduction.reflected(table).triangle
-    solution, *_ = np.linalg.lstsq(triangle[:, :-1], triangle[:, -1], rcond=1e-10)
+    solution, *_ = np.linalg.lstsq(triangle[:, :-1], triangle[:, -1], rcond=RANK)
     if np.all((low <= solution) & (solution <= high)):
         return np.asarray(solution)
     from scipy.optimize import lsq_linear
