@@ -116,6 +116,22 @@ def test_weights_beside_limited_start_responses_are_the_best(strength: float, be
     assert found.best == pytest.approx(p, abs=1e-4)
 
 
+@pytest.mark.parametrize("seed", [9, 268, 274, 1, 2])
+def test_nearly_equal_responses(seed: int) -> None:
+    """Two responses that are nearly the same have large factors of either sign; the first ones go from side to side."""
+    rng = np.random.default_rng(seed)
+    places = rng.uniform(-1.5, 0.5) + np.array([0.0, rng.uniform(0.02, 0.3)])
+    shape = np.array([*places, *10.0 ** rng.uniform(-3.0, -1.0, 2)])
+    with jit.plain():
+        records = [
+            replace(item, y=item.y + rng.normal(0.0, 3.0) * np.exp(-item.run.t / 10.0 ** rng.uniform(-2.0, 1.0)))
+            for item in items(rng.uniform(0.0, 6.0), seed)
+        ]
+        found = fits.linear(STRUCTURE, records, shape, np.array([1.0, 0.5, 0.3]))
+        _, e = dense(records, _creep(shape))
+    assert found.rms == pytest.approx(np.sqrt(np.mean(e**2)), rel=1e-6)
+
+
 def test_derivatives_follow_the_limits() -> None:
     """The gradient of the least error is that of the best weights and factors: by differences of whole fits."""
     shape = CREEP.candidate.start
