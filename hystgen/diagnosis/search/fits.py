@@ -100,10 +100,12 @@ class _Block:
             return self._behind(self._whole, self.held)
         table = np.empty((len(varied), self.samples)).T
         sums: Sums = {}
-        starting, begun = self._here.starting(self._item), self._begun(self._here)
+        starting = self._here.starting(self._item)
+        others = [other.starting(self._item) != starting for other in varied]
+        begun = self._begun(self._here) if any(others) else 0.0
         for j, other in enumerate(varied):
             table[:, j] = (self._of(other, sums) - self._sum) / DIFFERENCE
-            if other.starting(self._item) != starting:
+            if others[j]:
                 table[:, j] += (self._begun(other) - begun) / DIFFERENCE
         parts = zip(self._reduced, self._cut(table), strict=True)
         return self._behind(_stacked([part.extended(columns) for part, columns in parts]), self.held)
