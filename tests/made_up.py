@@ -33,7 +33,7 @@ class Hypothesis:
         self.world, self.names = world, names
         self.left = world.left.get(names, 1.0) if left is None else left
         self.shape, self.weights = np.zeros(len(names)), np.zeros(0)
-        self.structure = SimpleNamespace(bounds=(self.shape - 1.0, self.shape + 1.0))
+        self.structure = SimpleNamespace(bounds=(self.shape - 1.0, self.shape + 1.0), parts=(), front=None)
         self.bare = not names
         self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((1, 1)))
 
@@ -95,14 +95,25 @@ TO_FIT, HELD = (0, 1, 2, 3), (4, 5, 6)
 
 class Made:
     """What an option leaves of records to fit and of held-out ones; `on_equal_terms`: of these with what is free in
-    the other option's."""
+    the other option's; `most`: whether its amount is the largest that is tried."""
 
     def __init__(
-        self, name: str, free: int, left: tuple[float, float], on_equal_terms: tuple[float, float] | None = None
+        self,
+        name: str,
+        free: int,
+        left: tuple[float, float],
+        on_equal_terms: tuple[float, float] | None = None,
+        most: bool = False,
     ) -> None:
         self.name, self.left, self.on_equal_terms, self.shape = name, left, on_equal_terms or left, np.zeros(2)
         self.rms = left[0]
-        self.structure = SimpleNamespace(bounds=(np.full(2, -1.0), np.full(2, 1.0)))
+        amount = SimpleNamespace(high=np.full(2, 0.0 if most else 1.0), amounts=(1,))
+        self.structure = SimpleNamespace(
+            bounds=(np.full(2, -1.0), np.full(2, 1.0)),
+            parts=(SimpleNamespace(candidate=amount),),
+            front=None,
+            pieces=lambda shape: (np.empty(0), [shape]),
+        )
         self.bare = True
         self.actuator = SimpleNamespace(nuisances=lambda _: np.ones((free, 1)))
 

@@ -38,7 +38,7 @@ from hystgen.effects.base import Run
 from hystgen.effects.creep.model import ExponentialCreep
 from hystgen.effects.resonance.model import Resonance
 from hystgen.front.dead_zone.model import DeadZone
-from hystgen.identification.joint import Kept
+from hystgen.identification.joint import Ends, Kept
 from hystgen.identification.quality import correlation_time
 from hystgen.identification.reduction import Course, settled
 from hystgen.records import Record
@@ -158,6 +158,19 @@ def test_what_chance_does_not_explain(left: float, named: bool, monkeypatch: pyt
     assert (selection.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(("low", "high", "named"), [(0.004, 0.001, False), (0.008, 0.001, True), (0.001, 0.008, True)])
+def test_a_limit_at_the_very_end_of_the_drive(low: float, high: float, named: bool) -> None:
+    """Flat ends of these shares of the range, which take 40 % of the error away."""
+    limit = Made("saturation", 1, (0.6, 0.6))
+    limit.shape, limit.structure.front = np.array([low, high, -3.0]), Ends((0.0, 100.0))
+    option: Any = SimpleNamespace(name="saturation", front=True)
+    best = screening.Tried(option, limit, ("saturation",), 0.6, limit.errors(HELD))  # type: ignore[arg-type]
+    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
+    found = selection.judged(Made("now", 1, (1.0, 1.0)), best, records)  # type: ignore[arg-type]
+    assert isinstance(found, selection.Merit) is named
+    assert named or found == selection.Refusal("end", low, acceptance.FLAT_END)
+
+
 @pytest.mark.parametrize("of_fitted", [False, True])
 @pytest.mark.parametrize(("little", "named"), [(0.98, False), (0.95, True)])
 def test_an_effect_has_to_show_in_both(of_fitted: bool, little: float, named: bool) -> None:
@@ -229,6 +242,12 @@ def test_blocks_are_longer_than_errors_remember(memory: int) -> None:
 def test_equal_effects_come_in_the_order_of_the_catalogue(more: float, first: str) -> None:
     """Over all records one leaves 0.3 or 0.9 % more."""
     assert first_of(Made("delay", 1, (1.0, 1.0)), Made("lag", 1, (more, 1.0))) == first
+
+
+@pytest.mark.parametrize(("most", "more", "first"), [(True, 1.2, "lag"), (True, 1.3, "creep"), (False, 1.2, "creep")])
+def test_an_unlikely_amount_comes_behind_fewer_numbers_that_are_alike(most: bool, more: float, first: str) -> None:
+    """Of held-out records the other leaves 20 or 30 % more."""
+    assert first_of(Made("creep", 3, (1.0, 1.0), most=most), Made("lag", 1, (1.0, more))) == first
 
 
 @pytest.mark.parametrize("name", ["lag", "delay", "resonance"])

@@ -180,6 +180,10 @@ class Ends:
         """Every piece rises."""
         return np.empty(0)
 
+    def widest(self, shape: Array) -> float:
+        """The wider of both flat ends, as a share of the range."""
+        return float(np.max(shape[:2]))
+
     def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
         """The dead-zone sum."""
         low, high = self.drive

@@ -162,6 +162,12 @@ FEW_COMPARED = 0.25
 without a known history at least 0.5 are compared, of a test whose amplitude grows to its end 0.02 to 0.06. Set by:
 blind, all kinds, first 71000, and second_plants. Changed by: acceptance::test_what_a_verdict_says_first."""
 
+FLAT_END = 0.005
+"""[share of the drive range] A limit that begins closer to both ends than this is no name: it is met where the drive
+rests at its end, and a few samples elsewhere, so that it is another offset of those rests, which what is left of creep
+asks for. Wrong ones began at 0.0016 of the range, right ones at 0.0128 and more. Set by: second_plants single 9100 and
+9165, blind pair and poor first 97000. Changed by: acceptance::test_a_limit_at_the_very_end_of_the_drive."""
+
 MOST_EFFECTS = 5
 """[effects] The search adds at most this many: no case of any block has more than two. Changed by: run time of
 blind."""

@@ -24,7 +24,7 @@ from hystgen.diagnosis.search.hypothesis import Structure
 from hystgen.diagnosis.search.screening import Option, Records, Tried, free_numbers
 from hystgen.effects.base import Effect
 from hystgen.identification import joint
-from hystgen.identification.joint import Kept
+from hystgen.identification.joint import Ends, Kept
 from hystgen.identification.pi import Weights
 from hystgen.identification.quality import correlation_time
 
@@ -62,8 +62,8 @@ class Refusal:
     """Why an effect that was tried has no name: a number, and the limit that it missed.
 
     `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
-    fitted ones], `small` [share of the gap], `most` [rms left], `given` [rms left], `few` [share of samples], `other`:
-    another shape was chosen.
+    fitted ones], `small` [share of the gap], `most` [rms left], `given` [rms left], `few` [share of samples], `end`
+    [share of the drive range], `other`: another shape was chosen.
     """
 
     why: str
@@ -81,8 +81,9 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
     """Merit of a tried effect, or why it has none.
 
     It has none if chance explains the difference, if it removes too little to stand out of the noise, if it hardly
-    shows in the held-out or in the fitted records, or if records of only one loop do not support a name. Chance does
-    not halve an error to which nothing was fitted, however few the events in which that shows.
+    shows in the held-out or in the fitted records, if records of only one loop do not support a name, or if it is a
+    limit that hardly more than the very end of the drive meets. Chance does not halve an error to which nothing was
+    fitted, however few the events in which that shows.
 
     `least`: the rms to be removed, as a multiple of the remaining error or the noise; by default the threshold for a
     first or a further effect.
@@ -91,6 +92,11 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
         gap = apart(records.residual(now), records.noise)
         left = apart(best.held_out, records.noise)
         return Refusal("one_loop", left / gap if gap > 0.0 else math.inf, acceptance.MOST_OF_GAP)
+    front = best.fitted.structure.front
+    if isinstance(front, Ends) and best.option.front:
+        width = front.widest(best.fitted.shape)
+        if width < acceptance.FLAT_END:
+            return Refusal("end", width, acceptance.FLAT_END)
     held, fitted = _removed(now, best, records)
     needed = _least(now) if least is None else least
     if not _enough(held, fitted, needed, records.noise):
@@ -168,7 +174,8 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     A candidate is about as good in two cases. With the same start states free, its held-out error is no larger, however
     much better the best one fits (two shapes of one effect each have their own free states, which are part of the
     effect). Or its held-out error is within a few per cent, and its fitted error is no larger, or larger by chance, or,
-    if a number of the best is at an end of its range, larger by less than an effect is worth.
+    if a number of the best is at an end of its range, larger by less than an effect is worth. Where an amount of the
+    best is the largest that is tried, all that are alike are about as good: so much creep can follow a lag as well.
     With equal numbers of parameters all records decide, or their `place` if they hardly differ: a lag, which every
     amplifier has, before a delay. A candidate with a far larger fitted error than another is not the best because of a
     small lead on held-out records, which may consist mostly of yet another effect.
@@ -181,7 +188,8 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     of_best = rms(best.fitted.errors(to_fit, closest.fitted))
     if rms(closest.fitted.errors(to_fit)) <= acceptance.FAR_LESS * of_best:
         best = closest
-    enough, fitted = (1.0 + acceptance.BETTER) * best.held_out, best.fitted.errors(to_fit)
+    within = acceptance.ALIKE if _at_most(best.fitted) else acceptance.BETTER
+    enough, fitted = (1.0 + within) * best.held_out, best.fitted.errors(to_fit)
     less = rms(fitted)
 
     def as_good(errors: list[Array], more: float) -> bool:
@@ -230,6 +238,14 @@ def _at_an_end(fitted: Fitted) -> bool:
     """Whether any number is at an end of its range."""
     low, high = fitted.structure.bounds
     return bool(np.any((fitted.shape <= low) | (fitted.shape >= high)))
+
+
+def _at_most(fitted: Fitted) -> bool:
+    """Whether an amount of the last effect is the largest that is tried."""
+    if not fitted.structure.parts:
+        return False
+    last, numbers = fitted.structure.parts[-1].candidate, fitted.structure.pieces(fitted.shape)[1][-1]
+    return any(numbers[k] >= last.high[k] for k in last.amounts)
 
 
 def _everywhere(each: Tried, best: Tried, records: Records) -> float:
