@@ -452,7 +452,9 @@ def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
     tried = [each for each in tried if math.isfinite(each.residual)]
     kept = _kept(tried, [each for each in tried if helps(each, *without)])
     contained = [simpler[each.option.beyond] for each in kept if each.option.beyond]
-    return list(dict.fromkeys([*kept, *contained]))  # the joint fit shows whether further numbers help
+    labels = {each.option.label for each in kept}
+    richer = [each for each in tried if each.option.beyond in labels]
+    return list(dict.fromkeys([*kept, *contained, *richer]))  # the joint fit shows whether further numbers help
 
 
 def _cost(structure: Structure, option: Option) -> int:
