@@ -86,11 +86,16 @@ class World:
         return SimpleNamespace(
             to_fit=self.to_fit, held=self.held, noise=NOISE, gap=HIDDEN / np.sqrt(2.0), extensions=self.extensions,
             residual=self.gap, quick=self.to_fit, full=self.to_fit, one_loop=self.one_loop, one_speed=self.one_speed,
-            compared=1.0,
+            compared=1.0, terms=lambda now, _: [now],
         )  # fmt: skip
 
 
 TO_FIT, HELD = (0, 1, 2, 3), (4, 5, 6)
+
+RECORDS: Any = SimpleNamespace(
+    to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False, compared=1.0, terms=lambda now, _: [now]
+)
+"""Of which nothing is known but who left what."""
 
 
 class Made:
@@ -129,8 +134,7 @@ def first_of(best: Made, other: Made, effect: str | None = None) -> str:
         screening.Tried(SimpleNamespace(name=made.name), made, (effect or made.name,), made.left[1], made.errors(HELD))  # type: ignore[arg-type]
         for made in (best, other)
     ]
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    first: Any = selection.simplest_first(tried, records)[0].fitted
+    first: Any = selection.simplest_first(tried, RECORDS)[0].fitted
     return str(first.name)
 
 

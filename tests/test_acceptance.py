@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 import threshold_mutants
-from made_up import HELD, NOISE, STRUCTURE, TO_FIT, Hypothesis, Made, World, first_of, result, sweep
+from made_up import HELD, NOISE, RECORDS, STRUCTURE, Hypothesis, Made, World, first_of, result, sweep
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.stats import wilcoxon
@@ -135,12 +135,11 @@ def test_noise(error: float, share: float, noise: bool) -> None:
     [(0.0015, 0.5, False), (0.0007, 0.5, True), (0.07, 1e-6, False), (0.04, 1e-6, True), (0.04, 0.0015, False)],
 )
 def test_chance(held_out: float, fitted: float, named: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The p-value of held-out records, or a larger one beside a small one of the fitted records."""
+    """The p-value of held-out RECORDS, or a larger one beside a small one of the fitted records."""
     better = Made("better", 1, (0.6, 0.6))
     best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
     monkeypatch.setattr(selection, "difference", lambda _, after: held_out if after is best.errors else fitted)
-    assert (selection.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
+    assert (selection.merit_of(Made("now", 1, (1.0, 1.0)), best, RECORDS) is not None) is named  # type: ignore[arg-type]
     for p_value, open_ in ((0.015, True), (0.007, False)):
         monkeypatch.setattr(selection, "difference", lambda *_, p_value=p_value: p_value)
         other: Any = SimpleNamespace(held_out=1.2, errors=[])
@@ -152,10 +151,9 @@ def test_what_chance_does_not_explain(left: float, named: bool, monkeypatch: pyt
     """It does not halve an error to which nothing was fitted, even if few blocks show it."""
     better = Made("better", 1, (left, left))
     best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), left, better.errors(HELD))  # type: ignore[arg-type]
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
     values = iter((0.1, 1e-6))
     monkeypatch.setattr(selection, "difference", lambda *_: next(values))
-    assert (selection.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
+    assert (selection.merit_of(Made("now", 1, (1.0, 1.0)), best, RECORDS) is not None) is named  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("low", "high", "named"), [(0.004, 0.001, False), (0.008, 0.001, True), (0.001, 0.008, True)])
@@ -165,8 +163,7 @@ def test_a_limit_at_the_very_end_of_the_drive(low: float, high: float, named: bo
     limit.shape, limit.structure.front = np.array([low, high, -3.0]), Ends((0.0, 100.0))
     option: Any = SimpleNamespace(name="saturation", front=True)
     best = screening.Tried(option, limit, ("saturation",), 0.6, limit.errors(HELD))  # type: ignore[arg-type]
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    found = selection.judged(Made("now", 1, (1.0, 1.0)), best, records)  # type: ignore[arg-type]
+    found = selection.judged(Made("now", 1, (1.0, 1.0)), best, RECORDS)  # type: ignore[arg-type]
     assert isinstance(found, selection.Merit) is named
     assert named or found == selection.Refusal("end", low, acceptance.FLAT_END)
 
@@ -179,8 +176,7 @@ def test_an_effect_has_to_show_in_both(of_fitted: bool, little: float, named: bo
     best = screening.Tried(
         SimpleNamespace(name="better"), better, ("better",), better.left[1], better.errors(HELD)  # type: ignore[arg-type]
     )
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    assert (selection.merit_of(Made("now", 1, (1.0, 1.0)), best, records) is not None) is named  # type: ignore[arg-type]
+    assert (selection.merit_of(Made("now", 1, (1.0, 1.0)), best, RECORDS) is not None) is named  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -189,24 +185,21 @@ def test_an_effect_has_to_show_in_both(of_fitted: bool, little: float, named: bo
 )
 def test_names_explain_most(fitted: float, held: float, stand: bool) -> None:
     """Far above the noise they leave this of the errors: 0.25 or 0.42 of the variance."""
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False, compared=1.0)
     now, none = Made("now", 1, (fitted, held)), Made("none", 1, (1.0, 1.0))
-    assert (selection.borne_out(now, none, records) is None) is stand  # type: ignore[arg-type]
+    assert (selection.borne_out(now, none, RECORDS) is None) is stand  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("left", "gap", "stand"), [(2.5, 4.2, True), (2.9, 3.7, False)])
 def test_names_near_the_noise_explain_half(left: float, gap: float, stand: bool) -> None:
     """As multiples of the noise: 0.32 or 0.58 of the variance above it."""
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False, compared=1.0)
     now, none = Made("now", 1, (left * NOISE, left * NOISE)), Made("none", 1, (gap * NOISE, gap * NOISE))
-    assert (selection.borne_out(now, none, records) is None) is stand  # type: ignore[arg-type]
+    assert (selection.borne_out(now, none, RECORDS) is None) is stand  # type: ignore[arg-type]
 
 
 def test_names_explain_most_without_the_free_start_states() -> None:
     """On equal terms there was little to explain."""
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False, compared=1.0)
     now, none = Made("now", 1, (0.3, 0.3)), Made("none", 1, (1.0, 1.0), on_equal_terms=(0.33, 0.33))
-    assert selection.borne_out(now, none, records) is not None  # type: ignore[arg-type]
+    assert selection.borne_out(now, none, RECORDS) is not None  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from made_up import HELD, NOISE, TO_FIT, Hypothesis, Made, World, first_of
+from made_up import HELD, NOISE, RECORDS, TO_FIT, Hypothesis, Made, World, first_of
 from numpy.typing import NDArray
 
 from hystgen.diagnosis import run
@@ -413,11 +413,10 @@ def test_a_further_effect_removes_more_than_it_leaves(left: float, first: bool, 
     """Of 1 it removes 0.8, 0.6 and 0.44, which are 1.33, 0.75 and 0.48 times what it leaves."""
     better = Made("better", 1, (left, left))
     best = screening.Tried(SimpleNamespace(name="better"), better, ("better",), left, better.errors(HELD))  # type: ignore[arg-type]
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
     for bare, accepted in ((True, first), (False, further)):
         now: Any = Made("now", 1, (1.0, 1.0))
         now.bare = bare
-        assert (selection.merit_of(now, best, records) is not None) is accepted
+        assert (selection.merit_of(now, best, RECORDS) is not None) is accepted
 
 
 @pytest.mark.parametrize(("fitted", "accepted"), [(0.9, True), (0.999, False)])
@@ -426,8 +425,7 @@ def test_what_only_others_show_is_no_merit(fitted: float, accepted: bool) -> Non
     now, better = Made("now", 1, (1.0, 1.0)), Made("better", 1, (fitted, 0.5))
     option: Any = SimpleNamespace(name="better")
     best = screening.Tried(option, better, ("better",), 0.5, better.errors(HELD))  # type: ignore[arg-type]
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    assert (selection.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]
+    assert (selection.merit_of(now, best, RECORDS) is not None) is accepted  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("own", "accepted"), [(1.0, True), (0.5, False)])
@@ -436,8 +434,7 @@ def test_what_is_less_free_in_a_record_is_no_merit(own: float, accepted: bool) -
     now, better = Made("now", 5, (own, own), (1.0, 1.0)), Made("better", 5, (0.6, 0.6))
     option: Any = SimpleNamespace(name="better")
     best = screening.Tried(option, better, ("better",), 0.6, better.errors(HELD))  # type: ignore[arg-type]
-    records: Any = SimpleNamespace(to_fit=TO_FIT, held=HELD, noise=NOISE, one_loop=False)
-    assert (selection.merit_of(now, best, records) is not None) is accepted  # type: ignore[arg-type]
+    assert (selection.merit_of(now, best, RECORDS) is not None) is accepted  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(

@@ -59,8 +59,8 @@ def items(strength: float, seed: int) -> list[Item]:
     return found
 
 
-def dense(records: list[Item], effect: ExponentialCreep) -> tuple[Array, Array]:
-    """Weights and errors of the same problem by another formulation.
+def dense(records: list[Item], effect: ExponentialCreep, present: bool = True) -> tuple[Array, Array]:
+    """Weights and errors of the same problem by another formulation; `present`: the effect itself, not its start alone.
 
     `|f_i| <= k_i sum p` with `p >= 0` is a cone, whose edges have one play and every `f_i` at one of its limits: the
     solution is a non-negative sum of them, and of offsets of both signs.
@@ -69,7 +69,8 @@ def dense(records: list[Item], effect: ExponentialCreep) -> tuple[Array, Array]:
     blocks, responses, limits = [], [], []
     for item in records:
         alone = [np.eye(n1)[j] for j in range(n1)]
-        blocks.append(np.stack([_played(item.run.v, item.run.t, p, effect) for p in alone], axis=1))
+        shown = effect if present else effect.model_copy(update={"weights": (0.0,) * len(taus)})
+        blocks.append(np.stack([_played(item.run.v, item.run.t, p, shown) for p in alone], axis=1))
         responses.append(np.exp(-item.run.t[:, None] / taus))
         limits.append(SPAN * np.ptp(item.run.v) * np.array(effect.weights))
     ends = np.cumsum([0, *(len(item.y) for item in records)])
@@ -130,6 +131,25 @@ def test_nearly_equal_responses(seed: int) -> None:
         found = fits.linear(STRUCTURE, records, shape, np.array([1.0, 0.5, 0.3]))
         _, e = dense(records, _creep(shape))
     assert found.rms == pytest.approx(np.sqrt(np.mean(e**2)), rel=1e-6)
+
+
+@pytest.mark.parametrize("strength", [0.5, 5.0])
+def test_weights_that_suit_the_start_of_another_model(strength: float) -> None:
+    """Plays without creep, with the responses to a start that creep leaves free: the least error there is."""
+    shape = CREEP.candidate.start
+    with jit.plain():
+        records = items(strength, 5)
+        creeping = Fitted(STRUCTURE, shape, fits.linear(STRUCTURE, records, shape, np.array([1.0, 0.5, 0.3])).best, 0.0)
+        alone = fits.fit(replace(STRUCTURE, parts=()), records, np.empty(0), np.array([1.0, 0.5, 0.3]))
+        found = fits.on_equal_terms(alone, creeping, records)
+        _, e = dense(records, _creep(shape), present=False)
+        blocks = [fits._Block(alone.actuator, item, alone.weights, creeping.actuator) for item in records]
+        whole, best = fits._solved(blocks, 3)
+    residual = whole[:, -1] - whole[:, :-1] @ best
+    assert found.weights == pytest.approx(best)
+    assert residual @ residual == pytest.approx(e @ e, rel=1e-6)
+    before, after = (rms(each.errors(records, creeping)) for each in (alone, found))
+    assert after < before
 
 
 def test_derivatives_follow_the_limits() -> None:

@@ -49,10 +49,10 @@ class _Block:
     The factors of the free components are between the limits of `Actuator.largest`, which are a share `most` of the sum
     of the weights. A component that would exceed them is written as `side most (sum p - slack)` with `slack >= 0`, so
     that the limit follows the weights in the same linear system. The reflections of the reduction are kept, so that the
-    derivatives can be reduced later by themselves.
+    derivatives can be reduced later by themselves. `like`: the actuator whose components are free, if not `here`.
     """
 
-    def __init__(self, here: Actuator, item: Item, p: Array) -> None:
+    def __init__(self, here: Actuator, item: Item, p: Array, like: Actuator | None = None) -> None:
         self._here, self._item, self._p = here, item, p
         self._level = np.zeros(1)
         self._offset = None
@@ -73,9 +73,9 @@ class _Block:
         added = here.added(item)
         self._sum = h + added
         self.samples = len(h)
-        free = here.nuisances(item, self._offset)
+        free = (like or here).nuisances(item, self._offset)
         self._free = len(free)
-        most = here.largest(item, np.ones(1))
+        most = (like or here).largest(item, np.ones(1))
         self._limited = np.isfinite(most)
         self._most = np.where(self._limited, most, 0.0)
         self._factors, self._side = np.zeros(len(free)), np.zeros(len(free))
@@ -305,6 +305,14 @@ def begun(structure: Structure, items: Sequence[Item], start: Array, p: Array) -
 def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> Fitted:
     """The end of a search from a start; `p`: weights close to the best ones."""
     return begun(structure, items, start, p).further().found(p)
+
+
+def on_equal_terms(fitted: Fitted, other: Fitted, items: Sequence[Item]) -> Fitted:
+    """A fit whose weights are found anew with the start states free that another one leaves free."""
+    here, like = fitted.actuator, other.actuator
+    blocks = [_Block(here, item, fitted.weights, like) for item in items if item.known.any()]
+    whole, best = _solved(blocks, len(fitted.weights))
+    return replace(fitted, weights=best) if np.isfinite(whole).all() else fitted
 
 
 # Start memories beside the effects ---------------------------------------------------------------------------

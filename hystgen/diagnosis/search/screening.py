@@ -241,6 +241,16 @@ class Records:
             signals.one_loop([*to_fit, *held]), signals.one_speed(to_fit), taking_part / recorded,
         )  # fmt: skip
 
+    def terms(self, now: Fitted, other: Fitted) -> list[Fitted]:
+        """A hypothesis, and the same with the weights that suit the start states which another one leaves free.
+
+        Those of an effect that is slow against the records follow whatever is slow. If the weights had to follow it
+        alone, they would be worse than with free states, and the difference would count for the effect.
+        """
+        if all(len(other.actuator.nuisances(item)) == 1 for item in self.quick):
+            return [now]
+        return [now, fits.on_equal_terms(now, other, self.quick)]
+
     def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
         """The hypothesis with one more effect, the best shapes first; `worth`: selects the options to try."""
         rings = signals.ringing(self.to_fit, now.errors(self.to_fit), acceptance.RINGING_STARTS)

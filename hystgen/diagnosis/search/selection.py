@@ -130,9 +130,10 @@ class _Removed:
 
 def _removed(now: Fitted, best: Tried, records: Records) -> tuple[_Removed, _Removed]:
     """Errors without and with an effect, for held-out and for fitted records."""
+    terms = records.terms(now, best.fitted)
     return (
-        _Removed(_without_merit(now, best, records.held), best.errors),
-        _Removed(_without_merit(now, best, records.to_fit), best.fitted.errors(records.to_fit)),
+        _Removed(_without_merit(terms, best, records.held), best.errors),
+        _Removed(_without_merit(terms, best, records.to_fit), best.fitted.errors(records.to_fit)),
     )
 
 
@@ -160,12 +161,13 @@ def leaves_enough(now: Fitted, records: Records) -> bool:
     return most > acceptance.above_noise(_least(now)) * records.noise
 
 
-def _without_merit(now: Fitted, best: Tried, items: Sequence[Item]) -> list[Array]:
+def _without_merit(terms: Sequence[Fitted], best: Tried, items: Sequence[Item]) -> list[Array]:
     """Errors of a hypothesis with the start states and offset that an effect leaves free, which are not its merit.
 
-    Or with those that the hypothesis itself leaves free, if the error is then smaller.
+    Or with those that the hypothesis itself leaves free, if the error is then smaller. `terms` as of `Records.terms`.
     """
-    return min(now.errors(items, best.fitted), now.errors(items), key=rms)
+    now = terms[0]
+    return min(now.errors(items), *(each.errors(items, best.fitted) for each in terms), key=rms)
 
 
 def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
