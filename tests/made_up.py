@@ -112,7 +112,7 @@ class Made:
     ) -> None:
         self.name, self.left, self.on_equal_terms, self.shape = name, left, on_equal_terms or left, np.zeros(2)
         self.rms = left[0]
-        amount = SimpleNamespace(high=np.full(2, 0.0 if most else 1.0), amounts=(1,))
+        amount = SimpleNamespace(low=np.full(2, -1.0), high=np.full(2, 0.0 if most else 1.0), amounts=(1,))
         self.structure = SimpleNamespace(
             bounds=(np.full(2, -1.0), np.full(2, 1.0)),
             parts=(SimpleNamespace(candidate=amount),),

@@ -105,6 +105,7 @@ REFUSALS = {
     "given": "the effects found leave {value:.3g}{unit} rms, and the model as given {limit:.3g}{unit}",
     "few": "{value:.0%} of the samples were compared, and a name needs {limit:.0%}",
     "end": "it acts on {value:.1%} of the drive range at an end, and a limit needs {limit:.1%}",
+    "range": "with a number at an end of its range it leaves {value:.3g}{unit} rms, more than {limit:.3g}{unit}",
     "other": "another shape does better, or as well with fewer numbers",
 }
 """Why an effect that was tried has no name, in words."""

@@ -263,8 +263,11 @@ def at_an_end(fitted: Fitted, name: str, later: int) -> bool:
     A least value of 0 does not count as an end: one of several parts may be absent.
     """
     k = place(fitted, name, later)
-    if k is None:
-        return False
+    return k is not None and part_at_an_end(fitted, k)
+
+
+def part_at_an_end(fitted: Fitted, k: int) -> bool:
+    """Whether a number of a part is at an end of its range, as in `at_an_end`."""
     numbers, found = fitted.structure.pieces(fitted.shape)[1][k], fitted.structure.parts[k].candidate
     none = found.low == 0.0
     return bool(np.any(((numbers <= found.low) & ~none) | (numbers >= found.high)))

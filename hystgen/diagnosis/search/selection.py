@@ -63,7 +63,7 @@ class Refusal:
 
     `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
     fitted ones], `small` [share of the gap], `most` [rms left], `given` [rms left], `few` [share of samples], `end`
-    [share of the drive range], `other`: another shape was chosen.
+    [share of the drive range], `range` [rms left], `other`: another shape was chosen.
     """
 
     why: str
@@ -316,7 +316,8 @@ def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
     Both for held-out and for fitted records, with the start states and offsets free that the effects leave free; noise
     counts as explained. Many effects can remove a part of a disturbance; the remaining error distinguishes it from a
     real effect. Records of one loop support no name if more than noise remains, and too few compared samples none at
-    all.
+    all. Where much remains, no number of an effect may be at an end of its range: so strong, slow or fast an effect
+    follows some of anything.
     """
     if records.compared < acceptance.FEW_COMPARED:
         return Refusal("few", records.compared, acceptance.FEW_COMPARED)
@@ -326,6 +327,8 @@ def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
             return Refusal("most", after, acceptance.FAR_ABOVE_NOISE * records.noise)
         left, gap = apart(after, records.noise), apart(before, records.noise)
         far = after > acceptance.MUCH_LEFT * records.noise
+        if far and any(fits.part_at_an_end(now, k) for k in range(len(now.structure.parts))):
+            return Refusal("range", after, acceptance.MUCH_LEFT * records.noise)
         most = acceptance.MOSTLY_EXPLAINED if far else acceptance.LEAST_EXPLAINED
         if not is_noise(after, records.noise) and left**2 > most * gap**2:
             return Refusal("most", after, before)
