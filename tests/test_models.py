@@ -124,8 +124,17 @@ EXAMPLES = {
 
 
 def tolerance(model: Cascade, u: np.ndarray) -> float:
-    """1e-12 of the peak to peak of u up to a slope ratio of 1e3, beyond that 1e-15 times the ratio."""
-    return float(np.ptp(u)) * max(1e-12, 1e-15 * model.slope_ratio)
+    """1e-12 of the peak to peak of u up to a slope ratio of 1e3, beyond that 1e-15 times the ratio.
+
+    And a rounding for each product and sum of either way, where plays that start far away are large beside that.
+    """
+    inputs = np.array(model.input_range)
+    for stage in model.stages:
+        inputs = np.concatenate([np.atleast_1d(stage.forward(inputs, up)) for up in (True, False)])
+    farthest = max(float(np.max(np.abs(model.pi.initial_state))), float(np.max(np.abs(inputs))))
+    level = float(np.sum(model.pi.weights)) * farthest + abs(model.output_offset)
+    roundings = 4 * (model.pi.n + 1) * 2.0**-53 * level
+    return float(np.ptp(u)) * max(1e-12, 1e-15 * model.slope_ratio) + roundings
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
