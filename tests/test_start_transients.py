@@ -24,9 +24,13 @@ from hystgen.identification.joint import Kept
 Array = NDArray[np.float64]
 
 THRESHOLDS = np.array([0.0, 10.0, 25.0])
+"""[V] of plays that move in a drive of 100 V"""
+
 TAUS, SHARES = (0.1, 0.7), (0.03, 0.02)
+"""[s] and [of the play sum], of creep: records of 2 s show both time constants, and shares as stages have them."""
+
 NOISE = 0.2
-"""[output units] of the records"""
+"""[output units] of the records, a fifth of a per cent of their range: limits that are missed cost far more."""
 
 SPAN = 2.0
 """[times the drive range] Where the start state may come from, as `START_SPAN` has it."""
