@@ -50,7 +50,7 @@ LEVEL_STEPS = 3
 RANK = 1e-10
 """[share of the largest singular value] Smaller ones are zero but for rounding: two responses of nearly the same shape.
 A reduction keeps them to 2e-16 of the largest, so that one of this size still has six digits. Set by:
-`test_start_transients::test_nearly_equal_responses`, seeds 0 to 39, where 1e-8 and 1e-12 give the same errors to 4e-14."""
+`test_start_transients::test_nearly_equal_responses`, seeds 0 to 39: 1e-8 and 1e-12 give the same errors to 4e-14."""
 
 
 class NotFiniteError(ArithmeticError):

@@ -21,8 +21,8 @@ Steps between levels at rest are far beyond it, up to the noise of the converter
 test_effects::test_sudden_edges_leave_other_drives_alone."""
 
 MIDDLE = 0.5
-"""[samples] Place of a step between two samples of a drive that was measured by averages over each of them. Derived: the
-averages change from one to the next where one ends, halfway between the times of both."""
+"""[samples] Place of a step between two samples of a drive that was measured by averages over each of them. Derived:
+one average ends and the next begins halfway between the times of both."""
 
 LEAST = 3.0
 """The same of the least rate: a step from sample to sample is faster than all else by a hundred times and more."""
