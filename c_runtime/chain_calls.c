@@ -94,12 +94,13 @@ void hystgen_inverse_set_temperature(hystgen_inverse_t *self, hystgen_real_t tem
 }
 
 HYSTGEN_ALONE hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
-    if (!hystgen_finite(v)) {
-        self->status |= HYSTGEN_STATUS_HELD;
-        return self->answer;
-    }
-    const hystgen_real_t inside = hystgen_clamp_drive(v);
-    if (inside < v || inside > v) {
+    hystgen_real_t inside = v;
+    if (!hystgen_is_drive(v)) {
+        if (!hystgen_finite(v)) {
+            self->status |= HYSTGEN_STATUS_HELD;
+            return self->answer;
+        }
+        inside = hystgen_clamp_drive(v);
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
     hystgen_forward_absorb(self, inside);
@@ -108,14 +109,33 @@ HYSTGEN_ALONE hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystg
     return self->answer;
 }
 
-/* Takes the next reference. Returns the output that the output side has to reach at this sample. */
-HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self,
-                                                            hystgen_real_t u) {
-    bool limited = false;
-    const hystgen_real_t level = hystgen_inverse_clamp(u);
-    if (level < u || level > u) {
-        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+/* Limits a reference that is out of its range. */
+HYSTGEN_APART hystgen_real_t hystgen_inverse_outside(hystgen_inverse_t *self, hystgen_real_t u) {
+    self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    return hystgen_inverse_clamp(u);
+}
+
+/* Limits reference u to its range. Returns false where it is no number: the newest one stands once
+   more. */
+static bool hystgen_inverse_entered(hystgen_inverse_t *self, hystgen_real_t u,
+                                    hystgen_real_t *level) {
+    *level = u;
+    if (!hystgen_is_reference(u)) {
+        if (!hystgen_finite(u)) {
+            self->status |= HYSTGEN_STATUS_HELD;
+            hystgen_inverse_repeat(self);
+            return false;
+        }
+        *level = hystgen_inverse_outside(self, u);
     }
+    return true;
+}
+
+/* Takes the next reference, which lies within its range. Returns the output that the output side
+   has to reach at this sample. */
+HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self,
+                                                            hystgen_real_t level) {
+    bool limited = false;
     const hystgen_signal_t wanted =
         hystgen_inverse_undisplaced(self, hystgen_entered_level(level), &limited);
     if (limited) {
@@ -125,11 +145,9 @@ HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *s
 }
 
 void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u) {
-    if (hystgen_finite(u)) {
-        (void)hystgen_inverse_put(self, u);
-    } else {
-        self->status |= HYSTGEN_STATUS_HELD;
-        hystgen_inverse_repeat(self);
+    hystgen_real_t level = u;
+    if (hystgen_inverse_entered(self, u, &level)) {
+        (void)hystgen_inverse_put(self, level);
     }
 }
 
@@ -164,13 +182,12 @@ static hystgen_real_t hystgen_inverse_limited(hystgen_inverse_t *self, hystgen_r
 }
 
 HYSTGEN_ALONE hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
+    hystgen_real_t level = u;
     hystgen_inverse_take(self);
-    if (!hystgen_finite(u)) {
-        self->status |= HYSTGEN_STATUS_HELD;
-        hystgen_inverse_repeat(self);
+    if (!hystgen_inverse_entered(self, u, &level)) {
         return hystgen_inverse_answer(self, self->stepped ? self->answer : self->applied);
     }
-    const hystgen_signal_t h = hystgen_inverse_wanted(self, hystgen_inverse_put(self, u));
+    const hystgen_signal_t h = hystgen_inverse_wanted(self, hystgen_inverse_put(self, level));
     const hystgen_reach_t w = hystgen_inverse_input(self, h);
     const hystgen_reach_t v = hystgen_inverse_sought(self, h, w);
     return hystgen_inverse_answer(self, hystgen_inverse_limited(self, v));

@@ -25,6 +25,14 @@ static hystgen_reach_t hystgen_drive_code(hystgen_signal_t v) {
                                                          : code);
 }
 
+static inline bool hystgen_is_drive(hystgen_real_t v) {
+    return hystgen_clamp_drive(v) == v;
+}
+
+static inline bool hystgen_is_reference(hystgen_real_t u) {
+    return hystgen_inverse_clamp(u) == u;
+}
+
 /* An applied drive, limited to its range. */
 static inline hystgen_real_t hystgen_applied_drive(hystgen_real_t v) {
     return hystgen_clamp_drive(v);

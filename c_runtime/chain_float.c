@@ -18,6 +18,14 @@ static inline hystgen_reach_t hystgen_drive_code(hystgen_signal_t v) {
     return v;
 }
 
+static inline bool hystgen_is_drive(hystgen_real_t v) {
+    return v >= HYSTGEN_DRIVE_MIN && v <= HYSTGEN_DRIVE_MAX; /* false for NaN */
+}
+
+static inline bool hystgen_is_reference(hystgen_real_t u) {
+    return u >= HYSTGEN_OUTPUT_MIN && u <= HYSTGEN_OUTPUT_MAX;
+}
+
 /* An applied drive, limited to its range; never -0. */
 static inline hystgen_real_t hystgen_applied_drive(hystgen_real_t v) {
     return hystgen_clamp_drive(v) + 0;

@@ -29,5 +29,5 @@ HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t
 /* Input of the plays at which their sum is h. */
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *self,
                                                              hystgen_signal_t h) {
-    return hystgen_loop_solve(&hystgen_model_tables, self->play, hystgen_asked(h));
+    return hystgen_input_of(self->play, self->level, h);
 }

@@ -36,7 +36,6 @@ HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t
 /* Input of the plays at which their sum is h. */
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self,
                                                              hystgen_signal_t h) {
-    const hystgen_sum_t sum = hystgen_asked(h);
-    return self->moving ? hystgen_relaxing_input(self->play, sum)
-                        : hystgen_loop_solve(&hystgen_model_tables, self->play, sum);
+    return self->moving ? hystgen_relaxing_input(self->play, hystgen_asked(h))
+                        : hystgen_input_of(self->play, self->level, h);
 }

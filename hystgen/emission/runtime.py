@@ -240,10 +240,11 @@ class Variant:
         braked = f"chain_braked{'_quiet' * self.quiet}{'_steady' * self.turning}.c"
         brake = ("chain_within.c", braked) if self.braked else ()
         delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
+        solve = f"chain_solve_{kind}.c"
         if not self.moves:
-            plays: tuple[str, ...] = ("chain_plays.c" if loops else f"chain_corners_{kind}.c",)
+            plays: tuple[str, ...] = (solve, "chain_plays.c") if loops else (f"chain_corners_{kind}.c",)
         elif not self.bends:
-            plays = ("stretch.c", f"relaxing_{kind}.c", "chain_relaxing.c")
+            plays = ("stretch.c", f"relaxing_{kind}.c", solve, "chain_relaxing.c")
         else:
             before = {"relaxing": ("stretch.c",), "dashpot": (f"yield_{kind}.c",)}.get(self.moves, ())
             kept = () if self.moves == "dashpot" else ("moved_kept.c",)

@@ -1,0 +1,27 @@
+#include "hystgen_runtime.h"
+
+/* Operators of a model with effects: plays solved for their input, in floating point. */
+
+/* Input of the plays at which their sum is h; now it is `level`, which tells the direction. Found as
+   by hystgen_loop_solve, which forms that sum once more. */
+static hystgen_reach_t hystgen_input_of(const hystgen_play_t *play, hystgen_signal_t level,
+                                        hystgen_signal_t h) {
+    const hystgen_tables_t *t = &hystgen_model_tables;
+    const bool rising = h >= level;
+    hystgen_sum_t tail = 0;
+    hystgen_play_t next = 0; /* input at which play k would start to follow */
+    unsigned int k;
+    for (k = t->n + 1u; k > 0; --k) {
+        const unsigned int last = k - 1u;
+        const hystgen_play_t first =
+            rising ? play[last] + t->threshold[last] : play[last] - t->threshold[last];
+        const hystgen_reach_t w =
+            (h - (rising ? tail - t->lift[k] : tail + t->lift[k])) * t->inverse_slope[k];
+        if (rising ? w >= first : w <= first) {
+            return k <= t->n && (rising ? w > next : w < next) ? next : w;
+        }
+        tail = tail + t->weight[last] * play[last];
+        next = first;
+    }
+    return play[0]; /* h differs from the present sum only by rounding */
+}
