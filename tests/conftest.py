@@ -67,8 +67,16 @@ def pytest_configure(config: pytest.Config) -> None:
         raise pytest.UsageError(f"HYSTGEN_REQUIRE_DATA is set, but there is no folder {MEASURED}; set HYSTGEN_DATA")
 
 
+@pytest.hookimpl(tryfirst=True)  # before -m looks at the marks
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Deselect what cannot run without the measured records, and part of what is slow: neither passed nor skipped."""
+    """Deselect what cannot run without the measured records, and part of what is slow: neither passed nor skipped.
+
+    Of a test marked `thorough(but_one_in=n)` one case in so many loses that mark."""
+    for item in items:
+        thorough = item.get_closest_marker("thorough")
+        cases = thorough.kwargs.get("but_one_in") if thorough is not None else None
+        if cases is not None and place(item) % cases == 0:
+            item.own_markers = [each for each in item.own_markers if each != thorough]
     for reason, runs in (
         (NO_DATA, lambda item: MEASURED.is_dir() or item.get_closest_marker("data") is None),
         (SHORTENED, lambda item: WHOLE or in_short_form(item)),
@@ -80,23 +88,25 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def in_short_form(item: pytest.Item) -> bool:
-    """Whether a test runs without HYSTGEN_WHOLE: of a slow one a case in `one_in`, and none without that number.
-
-    Which ones, the places of its parameters in their lists decide by their sum: where there are several lists, each
-    value of the one comes up with every n-th value of another.
-    """
+    """Whether a test runs without HYSTGEN_WHOLE: of a slow one a case in `one_in`, and none without that number."""
     slow = item.get_closest_marker("slow")
     if slow is None:
         return True
-    if "one_in" not in slow.kwargs:
-        return False
+    return "one_in" in slow.kwargs and place(item) % slow.kwargs["one_in"] == 0
+
+
+def place(item: pytest.Item) -> int:
+    """The sum of the places of a case's parameters in their lists.
+
+    Where there are several lists, a case in n by this sum has each value of the one with every n-th value of another.
+    """
     assert isinstance(item, pytest.Function)
     places = 0
     for mark in item.iter_markers("parametrize"):
         names, values = mark.args
         case = item.callspec.params[names] if isinstance(names, str) else tuple(map(item.callspec.params.get, names))
         places += list(values).index(case)
-    return places % slow.kwargs["one_in"] == 0
+    return places
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -47,11 +47,6 @@ def model(name: str, text: str | None = None) -> Model:
     return Model(parse_parameters(text or CHAINS[name], f"{name}.yaml"))
 
 
-EVERY = [(name, arithmetic) for name in CHAINS for arithmetic in ("float32", "float64")] + [
-    (name, arithmetic) for name in CHAINS for arithmetic in ("q31", "q15")
-]
-
-
 def noisy(name: str) -> Model:
     """A model of which fixed point may make any noise."""
     return with_options(name, noise_gain=1e9)
@@ -77,7 +72,9 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
 
 
 @pytest.mark.slow(one_in=2)
-@pytest.mark.parametrize(("name", "arithmetic"), EVERY)
+@pytest.mark.thorough(but_one_in=4)
+@pytest.mark.parametrize("name", CHAINS)
+@pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
     report = hystgen.verify(noisy(name), arithmetic, operator(name), "loop", compiler=["gcc"], length=1500)
     assert report.ok, report.table()
@@ -766,6 +763,7 @@ def test_a_mode_that_is_not_as_identified_rings(by: preview.By, left: float) -> 
     assert rings[1] <= rings[0]
 
 
+@pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize("by", ["shaper", "notch"])
 def test_what_shapes_is_emitted_with_the_bits_of_the_reference(by: str) -> None:
     one = with_options("late", resonance=by)
@@ -866,7 +864,9 @@ def test_only_what_the_model_has_is_emitted() -> None:
 
 
 @pytest.mark.slow(one_in=3)
-@pytest.mark.parametrize(("name", "arithmetic"), [pair for pair in EVERY if pair[1] != "float64"])
+@pytest.mark.thorough(but_one_in=6)
+@pytest.mark.parametrize("name", CHAINS)
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 def test_memory_in_the_banner_is_that_of_the_compiler(name: str, arithmetic: str, tmp_path: Path) -> None:
     """With the engine that is cheaper, then with engine loop."""
     one = noisy(name)

@@ -167,11 +167,12 @@ def test_composes_with_the_forward_model_in_spite_of_commits_and_holds(seed: int
     assert np.max(np.abs(y - run.v)[free]) <= 1e-12 * span
 
 
-BITS = [("creeping", "q31"), ("creeping", "float32"), ("everything", "q15"), ("everything", "float32"),
+BITS = [("creeping", "float32"), ("creeping", "q31"), ("everything", "float32"), ("everything", "q15"),
         ("aged", "float64"), ("warm", "q15"), ("led", "q31"), ("drifting_late", "float32")]  # fmt: skip
 
 
 @pytest.mark.slow(one_in=3)
+@pytest.mark.thorough(but_one_in=6)
 @pytest.mark.parametrize(("name", "arithmetic"), BITS)
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
     one = model({**CHAINS, **LED}[name])

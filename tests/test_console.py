@@ -66,6 +66,7 @@ COMMANDS = (
 
 
 @pytest.mark.slow(one_in=2)
+@pytest.mark.thorough(but_one_in=4)
 @pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
 @pytest.mark.parametrize("unbuffered", ["", "1"])
 def test_a_full_disk_behind_standard_output_is_one_message(words: Sequence[str], unbuffered: str) -> None:
@@ -311,6 +312,7 @@ def test_a_home_folder_that_cannot_be_written_to_makes_no_noise() -> None:
     assert Path("a.png").exists()
 
 
+@pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize("home", ["/dev/null/home", "/proc/none"])
 def test_zig_builds_without_a_home_folder(home: str) -> None:
     """For one that cannot be made under /proc zig would wait for ever."""

@@ -923,6 +923,7 @@ class TestOwnEffects:
 
         return five_records(output)
 
+    @pytest.mark.thorough(but_one_in=2)
     @pytest.mark.parametrize(("amplitude", "period"), [(2.0, 3.3), (-6.0, 11.0)])
     def test_it_is_found_named_and_added(self, tmp_path: Path, run: Call, amplitude: float, period: float) -> None:
         """With an amount of either sign, larger than where a search starts."""
@@ -956,6 +957,7 @@ class TestOwnEffects:
         again = hystgen.load(tmp_path / "out" / "params.yaml", effects=[own])
         assert [each.name for each in again.effects] == ["user:neighbour"]
 
+    @pytest.mark.thorough
     def test_numbers_that_make_nothing_end_its_search(self, tmp_path: Path) -> None:
         """Right beside the start the output is not a number."""
 
@@ -979,6 +981,7 @@ class TestOwnEffects:
         content = hystgen.diagnose(_model(tmp_path), records[:3], effects=[Cliff], **given).content
         assert "user:cliff" not in [effect["name"] for effect in content["effects"]]
 
+    @pytest.mark.thorough
     def test_it_sees_all_samples(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         """Others do with fewer while they are tried; its code may count on even steps."""
         monkeypatch.setattr(acceptance, "SCREENED", 500)

@@ -150,6 +150,7 @@ def differing(one: Model, calls: signals.Calls, folder: Path) -> list[tuple[str,
     return [(row.build, row.samples, row.different) for row in rows]
 
 
+@pytest.mark.thorough(but_one_in=3)
 @pytest.mark.parametrize("name", TIES)
 def test_bits_equal_where_rounding_once_decided_otherwise(name: str, tmp_path: Path) -> None:
     ends, thresholds, weights, more, words = TIES[name]
@@ -182,6 +183,7 @@ def of_round_numbers(rng: np.random.Generator) -> Model:
 ONCE = (16, 50, 72, 84, 85, 95, 112, 116, 127, 136)  # seeds of models that had other bits once
 
 
+@pytest.mark.thorough(but_one_in=7)
 @pytest.mark.parametrize("seed", [*range(4), *ONCE])
 def test_bits_equal_in_models_of_round_numbers(seed: int) -> None:
     """Ties of all kinds: of 232 such models 18 had other bits once, each in a few of 10^6 samples."""
@@ -217,6 +219,7 @@ def beside_limits(one: Model, length: int) -> signals.Calls:
     return "beside limits", op.astype(np.uint8), x.astype(np.float64)
 
 
+@pytest.mark.thorough(but_one_in=3)
 @pytest.mark.parametrize("ends", [(0, 20), (-20, 0), (-10, 10), (-3, 13), (2.5, 20), (1e-3, 9)])
 def test_bits_equal_where_rounding_decides_on_a_limit(ends: tuple[float, float], tmp_path: Path) -> None:
     thresholds = np.linspace(0, 9, 17)
@@ -237,6 +240,7 @@ def test_bits_equal_in_other_layouts(name: str, arithmetic: str, layout: str) ->
 
 
 @pytest.mark.slow(one_in=3)
+@pytest.mark.thorough(but_one_in=6)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", FILES)

@@ -97,6 +97,7 @@ BRANCHED = ("lagging", "aged", "everything", "relaxing")
 """Chains with two branches of the memoryless part: now and then fixed point takes the other one for a sample."""
 
 
+@pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize("name", CHAINS)
 @BOTH
 @pytest.mark.parametrize(("seed", "share"), [(11, 1.0), (12, 0.5)])
@@ -411,6 +412,7 @@ PROVED = CHAINS | {"braked": BRAKED, "calm": CALM, "steady": STEADY}
 
 
 @pytest.mark.slow(one_in=2)
+@pytest.mark.thorough(but_one_in=4)
 @pytest.mark.parametrize("name", PROVED)
 @BOTH
 def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_path: Path) -> None:

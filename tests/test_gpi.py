@@ -232,6 +232,7 @@ KERNELS = (
 """Processors of different years, as the linear algebra library and numpy choose their loops by."""
 
 
+@pytest.mark.thorough
 def test_the_same_bytes_on_another_processor(tmp_path: Path) -> None:
     """Searches with a front, and for effects, end in the same numbers although the last bits of sums differ."""
     if platform.machine() not in ("x86_64", "AMD64"):

@@ -20,7 +20,7 @@ ONE_PROCESS_AND_XDIST = pytest.mark.parametrize("options", [(), ("-n", "1")], id
 def call(folder: Path, tests: str, *options: str, **environment: str) -> tuple[int, str]:
     """Run these tests under the settings of the suite: exit code and what was printed."""
     (folder / "conftest.py").write_text(CONFTEST.read_text())
-    (folder / "pytest.ini").write_text("[pytest]\nmarkers =\n  data: needs records\n  slow: long\n")
+    (folder / "pytest.ini").write_text("[pytest]\nmarkers =\n  data: needs records\n  slow: long\n  thorough: deep\n")
     (folder / "test_few.py").write_text(tests)
     kept = {k: x for k, x in os.environ.items() if k not in OWN}
     command = [sys.executable, "-m", "pytest", "-v", "-p", "no:cacheprovider", *options, str(folder)]
@@ -90,3 +90,28 @@ class TestSlow:
         assert code == 0, text
         assert "13 passed" in text
         assert "deselected" not in text
+
+
+class TestThorough:
+    TESTS = (
+        "import pytest\n"
+        "@pytest.mark.slow(one_in=2)\n@pytest.mark.thorough(but_one_in=4)\n"
+        "@pytest.mark.parametrize('k', [0, 1, 2, 3])\n@pytest.mark.parametrize('name', ['a', 'b'])\n"
+        "def test_two_lists(name, k):\n    pass\n"
+        "@pytest.mark.thorough\ndef test_deep():\n    pass\n"
+        "def test_plain():\n    pass\n"
+    )
+
+    @ONE_PROCESS_AND_XDIST
+    def test_some_cases_stand_for_all(self, options: tuple[str, ...], tmp_path: Path) -> None:
+        code, text = call(tmp_path, self.TESTS, *options, "-m", "not thorough", HYSTGEN_DATA=str(tmp_path))
+        assert code == 0, text
+        some = {"test_two_lists[a-0]", "test_two_lists[b-3]", "test_plain"}
+        assert set(re.findall(r"::(test_\w+(?:\[.*?\])?)", text)) == some
+        assert "4 tests deselected: marked slow" in text
+
+    @ONE_PROCESS_AND_XDIST
+    def test_all_run_where_nothing_is_left_out(self, options: tuple[str, ...], tmp_path: Path) -> None:
+        code, text = call(tmp_path, self.TESTS, *options, HYSTGEN_DATA=str(tmp_path))
+        assert code == 0, text
+        assert "6 passed" in text
