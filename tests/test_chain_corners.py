@@ -188,7 +188,8 @@ def test_a_shared_run_time_keeps_searches_to_itself(arithmetic: str) -> None:
     """The module carries what it needs of them."""
     one = model(LED["led"])
     how = {"engine": "corners", "layout": "shared-runtime"}
-    report = hystgen.verify(one, arithmetic, "both", **how, compiler=["gcc"], length=400)
+    with jit.plain():
+        report = hystgen.verify(one, arithmetic, "both", **how, compiler=["gcc"], length=100)
     assert report.ok, report.table()
 
 
