@@ -34,9 +34,9 @@ demo: $(VENV)/demo
 	@echo examples/out/stage.png
 	@echo examples/out/report/report.html
 
-# Every feature once, without what is marked thorough; one process a file, so that the first run compiles nothing twice
+# Every feature once, without what is marked thorough
 test: $(VENV)/ready lint
-	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough"
+	$(BIN)/python -m pytest -n 2 -m "not thorough"
 
 # All that CI runs
 check: $(VENV)/ready lint

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -59,6 +60,17 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]
         return int(stopped.value.code or 0), out, "\n".join(printed)
 
     return call
+
+
+@pytest.fixture
+def brief(request: pytest.FixtureRequest) -> Iterator[bool]:
+    """Whether `make test` runs; models with effects are then computed in Python, which for short records takes less
+    than to compile their functions."""
+    from hystgen.basics import jit
+
+    briefly = request.config.option.markexpr == "not thorough"
+    with jit.plain() if briefly else contextlib.nullcontext():
+        yield briefly
 
 
 def pytest_configure(config: pytest.Config) -> None:

@@ -43,6 +43,9 @@ from hystgen.plays import slots
 T, N = 1e-3, 1500
 
 
+pytestmark = pytest.mark.usefixtures("brief")
+
+
 def model(name: str, text: str | None = None) -> Model:
     return Model(parse_parameters(text or CHAINS[name], f"{name}.yaml"))
 
@@ -75,8 +78,9 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
 @pytest.mark.thorough(but_one_in=4)
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
-def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
-    report = hystgen.verify(noisy(name), arithmetic, operator(name), "loop", compiler=["gcc"], length=1500)
+def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bool) -> None:
+    how = {"compiler": ["gcc"], "length": 60 if brief else 1500}
+    report = hystgen.verify(noisy(name), arithmetic, operator(name), "loop", **how)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} >= ({"inverse"} if operator(name) == "inverse" else {"forward"})
 
@@ -102,8 +106,9 @@ AT_REST = {"calm": CALM, "steady": STEADY}
 
 
 @pytest.mark.parametrize(("name", "arithmetic"), [("calm", "float32"), ("calm", "q15"), ("steady", "q31")])
-def test_c_of_a_drive_at_rest_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
-    report = hystgen.verify(model(name, AT_REST[name]), arithmetic, "inverse", compiler=["gcc"], length=1500)
+def test_c_of_a_drive_at_rest_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bool) -> None:
+    how = {"compiler": ["gcc"], "length": 60 if brief else 1500}
+    report = hystgen.verify(model(name, AT_REST[name]), arithmetic, "inverse", **how)
     assert report.ok, report.table()
 
 
@@ -223,6 +228,7 @@ EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "b
 standing still, which matters where plays catch up within one."""
 
 
+@pytest.mark.thorough(but_one_in=3)
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("seed", range(3))
 def test_composes_with_the_forward_model_that_shares_no_code(name: str, seed: int) -> None:
@@ -464,6 +470,7 @@ def test_ageing_leaves_the_gain_of_one_sample() -> None:
 
 
 @pytest.mark.slow(one_in=2)
+@pytest.mark.thorough(but_one_in=4)
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("seed", [11, 12])
 def test_stays_within_its_bounds(name: str, seed: int) -> None:
@@ -508,6 +515,7 @@ def test_answers_like_double_precision_that_saw_the_same_drives(name: str) -> No
     assert bound.rounding < 0.1 * np.ptp(one.cascade.input_range), "it says more than the range"
 
 
+@pytest.mark.thorough
 def test_slow_states_neither_stall_nor_drift() -> None:
     """tau/T of 2^28: after a step of the drive the state goes where it would go without rounding."""
     seconds, tau = 1e-3, 2.0**28 * 1e-3
@@ -525,6 +533,7 @@ def test_slow_states_neither_stall_nor_drift() -> None:
     assert abs((float(y[-1]) - float(y[1])) - moved) <= 0.02 * abs(moved) + 2 * float(np.spacing(np.float32(y[-1])))
 
 
+@pytest.mark.thorough
 def test_a_play_with_a_dashpot_creeps_on_to_where_it_would_go_without_rounding() -> None:
     """In single precision its last moves are 1e-4 of its last bit: the drive stands still for 1e6 samples."""
     one = model("dashpot")
@@ -954,6 +963,7 @@ def test_simulate_in_an_arithmetic_takes_even_times() -> None:
         one.inverse().simulate(u, "float32", t=np.arange(300) * 2e-3)
 
 
+@pytest.mark.thorough
 def test_a_constant_reference_stays_within_the_bound() -> None:
     """10^6 samples at rest after a move, the slowest state a third of a second of them."""
     one = model("creeping")

@@ -45,6 +45,9 @@ T, N = 1e-3, 1500
 BOTH = pytest.mark.parametrize("arithmetic", ["q31", "q15"])
 
 
+pytestmark = pytest.mark.usefixtures("brief")
+
+
 def model(text: str) -> Model:
     one = parse_parameters(text, "fixed.yaml")
     how = one.emit.compensation.model_copy(update={"noise_gain": 1e9})
@@ -97,7 +100,7 @@ BRANCHED = ("lagging", "aged", "everything", "relaxing")
 """Chains with two branches of the memoryless part: now and then fixed point takes the other one for a sample."""
 
 
-@pytest.mark.thorough(but_one_in=2)
+@pytest.mark.thorough(but_one_in=4)
 @pytest.mark.parametrize("name", CHAINS)
 @BOTH
 @pytest.mark.parametrize(("seed", "share"), [(11, 1.0), (12, 0.5)])
@@ -287,6 +290,7 @@ def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
         assert np.max(np.abs(v - wanted)) <= codes.inverse_rounding < 1e-2 * numbers.tables.limits[slots.DRIVE_MAX]
 
 
+@pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize("name", [name for name in CHAINS if name not in BRANCHED])
 @BOTH
 def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arithmetic: str) -> None:
@@ -412,7 +416,7 @@ PROVED = CHAINS | {"braked": BRAKED, "calm": CALM, "steady": STEADY}
 
 
 @pytest.mark.slow(one_in=2)
-@pytest.mark.thorough(but_one_in=4)
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", PROVED)
 @BOTH
 def test_nothing_overflows_whatever_is_called(name: str, arithmetic: str, tmp_path: Path) -> None:
@@ -466,6 +470,7 @@ def test_products_get_numbers_of_their_size(name: str, arithmetic: str, monkeypa
     assert 2**30 < largest < factors.LARGEST
 
 
+@pytest.mark.thorough
 @BOTH
 @pytest.mark.parametrize("bits", [20, 28])
 def test_slow_states_neither_stall_nor_drift(arithmetic: str, bits: int) -> None:
