@@ -35,7 +35,7 @@ demo: $(VENV)/demo
 	@echo examples/out/report/report.html
 
 # Every feature once, without what is marked thorough
-test: $(VENV)/ready lint
+test: $(VENV)/ready
 	$(BIN)/python -m pytest -n 2 -m "not thorough"
 
 # All that CI runs

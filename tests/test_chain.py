@@ -79,7 +79,7 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bool) -> None:
-    how = {"compiler": ["gcc"], "length": 60 if brief else 1500}
+    how = {"compiler": ["gcc"], "length": 30 if brief else 1500}
     report = hystgen.verify(noisy(name), arithmetic, operator(name), "loop", **how)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} >= ({"inverse"} if operator(name) == "inverse" else {"forward"})
@@ -107,7 +107,7 @@ AT_REST = {"calm": CALM, "steady": STEADY}
 
 @pytest.mark.parametrize(("name", "arithmetic"), [("calm", "float32"), ("calm", "q15"), ("steady", "q31")])
 def test_c_of_a_drive_at_rest_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bool) -> None:
-    how = {"compiler": ["gcc"], "length": 60 if brief else 1500}
+    how = {"compiler": ["gcc"], "length": 30 if brief else 1500}
     report = hystgen.verify(model(name, AT_REST[name]), arithmetic, "inverse", **how)
     assert report.ok, report.table()
 
@@ -697,6 +697,7 @@ def test_five_references_leave_less_of_a_mode_than_three() -> None:
     assert left[1] < 0.3 * left[0] < 1e-3, "what is left are the corners where plays turn"
 
 
+@pytest.mark.thorough
 def test_preview_hold_corner_and_rate_are_options() -> None:
     assert header(with_options("late"), "PREVIEW") == "4"
     assert header(with_options("late", preview=1), "PREVIEW") == "1"

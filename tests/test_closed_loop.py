@@ -337,6 +337,7 @@ def test_figure_16_is_what_the_model_page_says() -> None:
         assert round(response.max_error(start=1.0), 3) == expected, name
 
 
+@pytest.mark.thorough
 def test_the_uncompensated_loop_rings_where_its_slope_is_beyond_the_stability_limit() -> None:
     """With a slope m of the actuator, s den + m (kp s + ki) num has its roots on the left up to m = 1.28."""
 
@@ -427,6 +428,7 @@ def test_with_the_exact_inverse_the_hysteresis_is_gone() -> None:
     assert np.max(np.abs(response.drive - response.control)) > 1.0
 
 
+@pytest.mark.thorough
 def test_generalized_models_stand_in_a_loop() -> None:
     bent = Cascade(STAGE, (DeadZone([-1.0, -0.4, 0, 0.4, 1.0], [-1.1, -0.9, 4.8, -1.1, -1.1]),), 0.0, (-3.0, 3.0))
     loop = Loop((NUMERATOR, DENOMINATOR), GAINS, T, bent, bent.inverse())
@@ -504,6 +506,7 @@ def test_a_coarser_arithmetic_moves_the_drive_by_no_more_than_its_header_states(
     assert 0.0 < worst <= bound + 2.0 / P[0] * half
 
 
+@pytest.mark.thorough
 def test_codes_are_the_nearest_and_saturate() -> None:
     coarse = "  pi: {thresholds: [0, 1], weights: [1, 2]}\nemit: {drive_lsb: 0.25, output_lsb: 0.5}\n"
     stage = model("hystgen: 1\nname: coarse\ninput_range: [-6, 6]\nmodel:\n" + coarse)

@@ -75,6 +75,7 @@ def test_a_full_disk_behind_standard_output_is_one_message(words: Sequence[str],
     assert (done.returncode, said(done)) == (2, FULL)
 
 
+@pytest.mark.thorough(but_one_in=3)
 @pytest.mark.parametrize("words", [("show", "stage.yaml"), ("schema",), ("simulate", "stage.yaml", "record.csv")])
 def test_a_reader_that_leaves_is_no_word(words: Sequence[str]) -> None:
     reading, writing = os.pipe()
@@ -84,6 +85,7 @@ def test_a_reader_that_leaves_is_no_word(words: Sequence[str]) -> None:
     assert (done.returncode, said(done)) == (1, "")
 
 
+@pytest.mark.thorough(but_one_in=3)
 @pytest.mark.parametrize(
     ("words", "code"),
     [(("show", "none.yaml"), 2), (("show",), 2), (("identify", "record.csv", "-o", "new.yaml"), 0)],
@@ -115,6 +117,7 @@ def test_any_code_page_takes_every_result(page: str) -> None:
     assert Path("fit.svg").exists()
 
 
+@pytest.mark.thorough(but_one_in=3)
 @pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("page", PAGES)
 def test_data_on_standard_output_are_utf_8_in_any_code_page(page: str) -> None:

@@ -169,6 +169,7 @@ class TestSeveralProcesses:
         (case, _), = made(tmp_path, "single", 1)
         return case
 
+    @pytest.mark.thorough
     def test_they_find_the_same(self, case: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(screening, "WORTH_PROCESSES", 0)
         found = []
@@ -610,6 +611,7 @@ def _bent(folder: Path, codes: float, metres: float) -> dict[str, Any]:
     return content
 
 
+@pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize(("codes", "metres"), [(436.9, 1e-6), (1e-6, 1e6)])
 def test_units_do_not_matter(codes: float, metres: float, tmp_path: Path) -> None:
     """A drive in codes of a converter and an output in metres hide nothing that V and um show."""
@@ -1172,6 +1174,7 @@ def test_ends_of_fitted_records_judge_too() -> None:
     assert preparing.with_ends(more) is None
 
 
+@pytest.mark.thorough
 def test_what_only_the_fitted_records_show_is_no_noise(tmp_path: Path) -> None:
     """Another axis moves slowly while they are taken, and not while the held-out one is, which hardly moves itself."""
     records = []

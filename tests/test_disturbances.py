@@ -572,6 +572,7 @@ def _late(v: Array, samples: float) -> Array:
     return np.asarray(lfilter(*_smooth(100.0 * samples), fine, zi=[np.exp(-0.01 / samples) * v[0]])[0][::100])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("lagging", [False, True])
 def test_a_ripple_is_told_and_hides_nothing(tmp_path: Path, lagging: bool) -> None:
     """So large that the output turns round, and beside a lag only seen once that is found: neither an effect nor

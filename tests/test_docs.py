@@ -259,7 +259,17 @@ def start(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("name", [name for name, path in PAGES.items() if blocks(path.read_text(encoding="utf-8"))])
+LONG = {"docs/effects.md"}  # takes as long as three others
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.thorough if name in LONG else ())
+        for name, path in PAGES.items()
+        if blocks(path.read_text(encoding="utf-8"))
+    ],
+)
 def test_every_block_of_a_page_runs(
     name: str, start: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -240,7 +240,7 @@ def test_bits_equal_in_other_layouts(name: str, arithmetic: str, layout: str) ->
 
 
 @pytest.mark.slow(one_in=3)
-@pytest.mark.thorough(but_one_in=6)
+@pytest.mark.thorough(but_one_in=12)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", FILES)

@@ -100,7 +100,7 @@ BRANCHED = ("lagging", "aged", "everything", "relaxing")
 """Chains with two branches of the memoryless part: now and then fixed point takes the other one for a sample."""
 
 
-@pytest.mark.thorough(but_one_in=4)
+@pytest.mark.thorough(but_one_in=8)
 @pytest.mark.parametrize("name", CHAINS)
 @BOTH
 @pytest.mark.parametrize(("seed", "share"), [(11, 1.0), (12, 0.5)])
@@ -145,6 +145,7 @@ def wrong(one: Model, arithmetic: str, numbers: Compiled, v: Array) -> tuple[flo
     return float(np.max(np.abs(left))), bound
 
 
+@pytest.mark.thorough(but_one_in=4)
 @pytest.mark.parametrize("arithmetic", ["float32", "q15"])
 @pytest.mark.parametrize(
     ("name", "n", "rate"),
@@ -164,6 +165,7 @@ LINEAR = "name: rate_dependence, shape: relaxation, time_constant: 0.02"
 SOFT = "name: rate_dependence, shape: relaxation, time_constant: 2.0e-3, exponent: 0.5"
 
 
+@pytest.mark.thorough(but_one_in=4)
 @pytest.mark.parametrize("arithmetic", ["float32", "q15"])
 @pytest.mark.parametrize(
     "text", [CHAINS["viscous"], chain("linear", LINEAR), chain("soft", SOFT)], ids=["viscous", "linear", "soft"]
@@ -217,6 +219,7 @@ def test_the_inverse_undoes_shifts_of_the_plays_input() -> None:
             assert abs(e) <= bound
 
 
+@pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize("arithmetic", ["float32", "q15"])
 def test_bounds_of_dashpots_are_those_of_a_step_whatever_the_law(arithmetic: str) -> None:
     """From laws that give way within a step to those that hardly yield in a record."""
@@ -290,7 +293,7 @@ def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
         assert np.max(np.abs(v - wanted)) <= codes.inverse_rounding < 1e-2 * numbers.tables.limits[slots.DRIVE_MAX]
 
 
-@pytest.mark.thorough(but_one_in=2)
+@pytest.mark.thorough(but_one_in=4)
 @pytest.mark.parametrize("name", [name for name in CHAINS if name not in BRANCHED])
 @BOTH
 def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arithmetic: str) -> None:
@@ -488,6 +491,7 @@ def test_slow_states_neither_stall_nor_drift(arithmetic: str, bits: int) -> None
     assert abs((float(y[-1]) - float(y[1])) - moved) <= 1.0 + 2e-6 * moved
 
 
+@pytest.mark.thorough(but_one_in=4)
 @BOTH
 @pytest.mark.parametrize("name", STILL)
 def test_a_constant_reference_comes_to_rest(name: str, arithmetic: str) -> None:

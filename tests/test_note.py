@@ -95,6 +95,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.thorough
 class TestGallery:
     def test_figures_are_those_of_the_page(self, folder: Path) -> None:
         named = set(re.findall(r"`(figure_\d\d|density)`", PAGE.read_text(encoding="utf-8")))

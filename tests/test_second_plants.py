@@ -51,6 +51,7 @@ def test_a_mode_and_a_lag_answer_a_step_as_known() -> None:
     assert rings[1:] == pytest.approx(expected, abs=1e-9)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("kind", ["single", "foreign"])
 def test_a_case_is_the_same_every_time(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With its label beside it, and the effect or disturbance as large as the label says."""
