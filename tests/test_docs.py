@@ -270,9 +270,7 @@ LONG = {"docs/effects.md"}  # takes as long as three others
         if blocks(path.read_text(encoding="utf-8"))
     ],
 )
-def test_every_block_of_a_page_runs(
-    name: str, start: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_every_block_of_a_page_runs(name: str, start: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "page"
     shutil.copytree(start, folder)
     if name in BARE:
