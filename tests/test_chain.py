@@ -75,7 +75,7 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
 
 
 @pytest.mark.slow(one_in=2)
-@pytest.mark.thorough(but_one_in=4)
+@pytest.mark.thorough(but_one_in=8)
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bool) -> None:
@@ -874,7 +874,7 @@ def test_only_what_the_model_has_is_emitted() -> None:
 
 
 @pytest.mark.slow(one_in=3)
-@pytest.mark.thorough(but_one_in=6)
+@pytest.mark.thorough(but_one_in=12)
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 def test_memory_in_the_banner_is_that_of_the_compiler(name: str, arithmetic: str, tmp_path: Path) -> None:

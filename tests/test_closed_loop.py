@@ -323,6 +323,7 @@ def test_a_discrete_system_is_a_controller() -> None:
 # ---------------------------------------------------------------- with hysteresis
 
 
+@pytest.mark.thorough
 def test_figure_16_is_what_the_model_page_says() -> None:
     """Second period; the note claims that either inverse is greatly better than none, which does not come out."""
     cases = {

@@ -271,6 +271,7 @@ def test_the_sentence_is_about_what_is_most_of_the_error(
     assert "a line at 50 Hz" in said
 
 
+@pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize(("bent", "names"), [(2e-4, 1), (2e-3, 0)])
 def test_one_loop_supports_one_name(bent: float, names: int, tmp_path: Path) -> None:
     """A lag and a bent sensor behind one sine, again and again: one is named, unless the other leaves so much that it
@@ -1071,6 +1072,7 @@ def _slewed(v: Array, rate: float, step: float) -> Array:
     return np.asarray(out[::50])
 
 
+@pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize(("name", "key", "value"), [("slew_limit", "rate", 150.0), ("delay", "time", 0.06)])
 def test_numbers_far_from_where_drives_are_fast_are_found(tmp_path: Path, name: str, key: str, value: float) -> None:
     """Steps from sample to sample are a hundred times as fast as the limit; sines have turned round by the delay."""

@@ -598,6 +598,7 @@ def test_a_ripple_is_told_and_hides_nothing(tmp_path: Path, lagging: bool) -> No
     assert note.endswith("taken out of the records before effects were sought")
 
 
+@pytest.mark.thorough(but_one_in=3)
 @pytest.mark.parametrize("frequency", [50.0, 180.0])
 def test_hum_hides_nothing(tmp_path: Path, frequency: float) -> None:
     """A drift of 2.5 times the noise beside hum of 14 times as much."""

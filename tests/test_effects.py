@@ -843,6 +843,7 @@ def test_logged_temperature() -> None:
         Chain(CASCADE, [effect]).simulate([Run(t, v)])
 
 
+@pytest.mark.thorough
 def test_self_heating_against_an_ode_solver() -> None:
     tau, heating = 0.3, 0.7
     t, v = drive(1500)

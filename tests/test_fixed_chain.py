@@ -165,7 +165,7 @@ LINEAR = "name: rate_dependence, shape: relaxation, time_constant: 0.02"
 SOFT = "name: rate_dependence, shape: relaxation, time_constant: 2.0e-3, exponent: 0.5"
 
 
-@pytest.mark.thorough(but_one_in=4)
+@pytest.mark.thorough
 @pytest.mark.parametrize("arithmetic", ["float32", "q15"])
 @pytest.mark.parametrize(
     "text", [CHAINS["viscous"], chain("linear", LINEAR), chain("soft", SOFT)], ids=["viscous", "linear", "soft"]
