@@ -59,8 +59,8 @@ HYSTGEN_APART bool hystgen_braked_room(const hystgen_lag_table_t *t, const hystg
     return room + room >= (int64_t)1 << HYSTGEN_DRIVE_BITS;
 }
 
-/* The drive with which the lag goes on as its target does, by no more in a step than the drive
-   reaches; sets what the lag is to gain beyond that, and what its lead may shrink in a step. */
+/* How far its target moves the lag in this step, a state, by no more than the drive reaches; sets
+   what the lag is to gain beyond that, and what its lead may shrink in a step. */
 HYSTGEN_APART int64_t hystgen_braked_along(const hystgen_lag_table_t *t,
                                            const hystgen_braked_t *self, hystgen_brake_t *brake) {
     const int64_t rising = (int64_t)HYSTGEN_SLEW_RISING * ((int64_t)1 << HYSTGEN_DRIVE_BITS);
@@ -74,7 +74,7 @@ HYSTGEN_APART int64_t hystgen_braked_along(const hystgen_lag_table_t *t,
     const int64_t down = hystgen_nearest(way, t->bits) + falling;
     brake->left = hystgen_braked_coarse(hystgen_nearest(left, t->bits));
     brake->back = hystgen_braked_coarse(left < 0 ? rising + falling - down : down);
-    return hystgen_nearest(self->lag.high, t->bits) + hystgen_braked_led(t, way);
+    return way;
 }
 
 /* The largest lead m, up to `lead`, with which the lag gains no more than `size` until it is there:
@@ -126,7 +126,8 @@ static int64_t hystgen_braked_drive(const hystgen_lag_table_t *t, const hystgen_
     if (!hystgen_braked_room(t, self, &brake, beyond)) {
         return near;
     }
-    const int64_t ahead = near - hystgen_braked_along(t, self, &brake);
+    const int64_t along = hystgen_braked_led(t, hystgen_braked_along(t, self, &brake));
+    const int64_t ahead = near - hystgen_nearest(self->lag.high, t->bits) - along;
     brake.lead = hystgen_braked_coarse(brake.left < 0 ? -ahead : ahead);
     const int64_t less =
         (int64_t)hystgen_braked_over(t, &brake) * ((int64_t)1 << HYSTGEN_BRAKED_DROP);

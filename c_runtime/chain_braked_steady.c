@@ -16,8 +16,5 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(const hystgen_inve
     if (!self->moving) {
         return v;
     }
-    const hystgen_signal_t drive =
-        hystgen_braked_drive(&hystgen_braked_1, &self->braked_1, hystgen_entered_drive(near),
-                             hystgen_entered_drive(v > near ? v - near : near - v));
-    return hystgen_inverse_within(self, hystgen_inverse_kept(self, hystgen_drive_code(drive)));
+    return hystgen_inverse_within(self, hystgen_inverse_kept(self, hystgen_inverse_braked(self, v, near)));
 }

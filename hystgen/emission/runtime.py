@@ -238,7 +238,7 @@ class Variant:
         slew = ("chain_slew.c",) if self.braked else ("chain_slew.c", "chain_unbraked.c")
         slew = slew if self.slew else ("chain_free.c",)
         braked = f"chain_braked{'_quiet' * self.quiet}{'_steady' * self.turning}.c"
-        brake = ("chain_within.c", braked) if self.braked else ()
+        brake = ("chain_within.c", "chain_brake.c", braked) if self.braked else ()
         delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
         solve = f"chain_solve_{kind}.c"
         if not self.moves:
