@@ -28,8 +28,8 @@ static hystgen_signal_t hystgen_inside_offset(hystgen_signal_t d) {
                                           : d;
 }
 
-/* Drive v has passed through the drive side and moved the plays. Returns their sum. */
-static hystgen_signal_t hystgen_forward_played(hystgen_forward_t *self, hystgen_real_t v) {
+/* Drive v has passed through the drive side and moved the plays. */
+static void hystgen_forward_played(hystgen_forward_t *self, hystgen_real_t v) {
     const hystgen_reach_t late = hystgen_forward_waited(self, v);
     const hystgen_reach_t reached = hystgen_forward_slewed(self, late);
     if (reached < late || reached > late) {
@@ -39,7 +39,13 @@ static hystgen_signal_t hystgen_forward_played(hystgen_forward_t *self, hystgen_
     const hystgen_signal_t a = self->moving ? hystgen_forward_drive_side_absorb(self, x)
                                             : hystgen_forward_drive_side_rest(self, x);
     self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, hystgen_arriving(a)));
-    return self->level;
+}
+
+/* The plays have moved. */
+HYSTGEN_APART_IN_FIXED void hystgen_forward_passed_on(hystgen_forward_t *self) {
+    self->output = self->moving ? hystgen_forward_output_side_absorb(self, self->level)
+                                : hystgen_forward_output_side_rest(self, self->level);
+    self->moving = true;
 }
 
 /* The actuator has seen drive v. */
@@ -48,19 +54,23 @@ HYSTGEN_APART_IN_FIXED void hystgen_forward_absorb(hystgen_forward_t *self, hyst
         hystgen_forward_travelled(self, v);
     }
     self->applied = v;
-    const hystgen_signal_t h = hystgen_forward_played(self, v);
-    self->output = self->moving ? hystgen_forward_output_side_absorb(self, h)
-                                : hystgen_forward_output_side_rest(self, h);
-    self->moving = true;
+    hystgen_forward_played(self, v);
+    hystgen_forward_passed_on(self);
 }
 
-/* Drive v has passed through the drive side and moved the plays. Returns their sum. */
-static hystgen_signal_t hystgen_inverse_played(hystgen_inverse_t *self, hystgen_real_t v) {
+/* Drive v has passed through the drive side and moved the plays. */
+static void hystgen_inverse_played(hystgen_inverse_t *self, hystgen_real_t v) {
     const hystgen_signal_t x = hystgen_entered_drive(v);
     const hystgen_signal_t a = self->moving ? hystgen_inverse_drive_side_absorb(self, x)
                                             : hystgen_inverse_drive_side_rest(self, x);
     self->level = hystgen_inverse_follow(self, hystgen_inverse_arrive(self, hystgen_arriving(a)));
-    return self->level;
+}
+
+/* The plays have moved. */
+HYSTGEN_APART_IN_FIXED void hystgen_inverse_passed_on(hystgen_inverse_t *self) {
+    self->output = self->moving ? hystgen_inverse_output_side_absorb(self, self->level)
+                                : hystgen_inverse_output_side_rest(self, self->level);
+    self->moving = true;
 }
 
 /* The actuator has seen drive v. */
@@ -69,10 +79,8 @@ HYSTGEN_APART_IN_FIXED void hystgen_inverse_absorb(hystgen_inverse_t *self, hyst
         hystgen_inverse_travelled(self, v);
     }
     self->applied = v;
-    const hystgen_signal_t h = hystgen_inverse_played(self, v);
-    self->output = self->moving ? hystgen_inverse_output_side_absorb(self, h)
-                                : hystgen_inverse_output_side_rest(self, h);
-    self->moving = true;
+    hystgen_inverse_played(self, v);
+    hystgen_inverse_passed_on(self);
 }
 
 /* The actuator has seen the pending drive. */

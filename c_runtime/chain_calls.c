@@ -18,8 +18,8 @@ void hystgen_forward_settle(hystgen_forward_t *self, hystgen_real_t v) {
     hystgen_forward_absorb(self, inside);
 }
 
-void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v) {
-    hystgen_inverse_take(self);
+/* The actuator has settled at drive v; the memory is up to date. */
+HYSTGEN_APART_IN_FIXED void hystgen_inverse_settled(hystgen_inverse_t *self, hystgen_real_t v) {
     if (!hystgen_finite(v)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return;
@@ -33,6 +33,11 @@ void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v) {
     }
     self->moving = false;
     hystgen_inverse_absorb(self, inside);
+}
+
+void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v) {
+    hystgen_inverse_take(self);
+    hystgen_inverse_settled(self, v);
 }
 
 /* Sets the offset, within its limits. */
@@ -181,9 +186,10 @@ static hystgen_real_t hystgen_inverse_limited(hystgen_inverse_t *self, hystgen_r
     return inside;
 }
 
-HYSTGEN_ALONE hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
+/* The next drive, for reference u; the memory is up to date. */
+HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_next(hystgen_inverse_t *self,
+                                                          hystgen_real_t u) {
     hystgen_real_t level = u;
-    hystgen_inverse_take(self);
     if (!hystgen_inverse_entered(self, u, &level)) {
         return hystgen_inverse_answer(self, self->stepped ? self->answer : self->applied);
     }
@@ -191,6 +197,11 @@ HYSTGEN_ALONE hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystg
     const hystgen_reach_t w = hystgen_inverse_input(self, h);
     const hystgen_reach_t v = hystgen_inverse_sought(self, h, w);
     return hystgen_inverse_answer(self, hystgen_inverse_limited(self, v));
+}
+
+HYSTGEN_ALONE hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
+    hystgen_inverse_take(self);
+    return hystgen_inverse_next(self, u);
 }
 
 void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {

@@ -4,10 +4,11 @@
    chain_finer.c, where the plays are those of engine corners. */
 
 /* The kink before a solution w, which it refines: plays that begin to follow at w do not count. */
-static void hystgen_inverse_seen(hystgen_inverse_t *self, hystgen_reach_t w) {
+HYSTGEN_APART void hystgen_inverse_seen(hystgen_inverse_t *self, hystgen_reach_t w) {
     const int64_t x = hystgen_along(&self->here, w);
     if (x > hystgen_along(&self->here, self->here.input)) {
-        hystgen_find(&hystgen_model_curve, &self->here, self->corner, x - 1, false, &self->kink);
+        self->kink.output = x - 1;
+        hystgen_find(&hystgen_model_curve, &self->here, self->corner, &self->kink, false);
     }
 }
 

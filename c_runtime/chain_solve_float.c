@@ -2,8 +2,10 @@
 
 /* Operators of a model with effects: plays solved for their input, in floating point. */
 
-/* Input of the plays at which their sum is h; now it is `level`, which tells the direction. Found as
-   by hystgen_loop_solve, which forms that sum once more. */
+/* Input of the plays at which their sum is h; now it is `level`, which tells the direction. Assumes
+   first that every play follows, then drops the largest thresholds one by one until the solution
+   reaches the last play that is left, and goes no further than where the play dropped last would
+   follow. */
 static hystgen_reach_t hystgen_input_of(const hystgen_play_t *play, hystgen_signal_t level,
                                         hystgen_signal_t h) {
     const hystgen_tables_t *t = &hystgen_model_tables;

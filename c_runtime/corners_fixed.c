@@ -44,21 +44,20 @@ HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *co
     here->rising = !here->rising;
 }
 
-/* The last kink before `to`, an output or input along the move: where another play begins to
-   follow, or here. */
+/* The last kink before an output or input along the move, which kink->output gives: where another
+   play begins to follow, or here. */
 HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here,
-                                const hystgen_corner_t *corner, int64_t to, bool by_output,
-                                hystgen_kink_t *kink) {
+                                const hystgen_corner_t *corner, hystgen_kink_t *kink,
+                                bool by_output) {
     const hystgen_corner_t *c = NULL; /* the corner that held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
-    kink->input = hystgen_along(here, here->input);
-    kink->output = hystgen_along(here, here->output);
     while (low < left) { /* corner `left` is passed, those below `low` are not */
         const unsigned int middle = (low + left) / 2;
         const hystgen_corner_t *at = &corner[middle];
-        const bool passed = to >= hystgen_begins(here, at, &t->segment[at->top], by_output);
+        const bool passed =
+            kink->output >= hystgen_begins(here, at, &t->segment[at->top], by_output);
         left = passed ? middle : left;
         low = passed ? low : middle + 1u;
     }
@@ -68,7 +67,7 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     }
     if (left > 0 && corner[left - 1u].rose != here->rising) {
         const hystgen_corner_t *top = &corner[left - 1u];
-        const int64_t on = to - hystgen_begins(here, top, t->segment, by_output);
+        const int64_t on = kink->output - hystgen_begins(here, top, t->segment, by_output);
         const unsigned int before = k;
         unsigned int last = top->top - 1u;
         while (k < last) { /* play k follows, those above `last` do not */
@@ -82,6 +81,8 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     }
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
+    kink->input = hystgen_along(here, here->input);
+    kink->output = hystgen_along(here, here->output);
     if (c != NULL) {
         kink->input = hystgen_begins(here, c, &t->segment[k], false);
         kink->output = hystgen_begins(here, c, &t->segment[k], true);
@@ -94,7 +95,8 @@ static inline void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t 
     if (here->rising ? to < here->input : to > here->input) {
         hystgen_turn_back(here, corner);
     }
-    hystgen_find(t, here, corner, hystgen_along(here, to), false, kink);
+    kink->output = hystgen_along(here, to);
+    hystgen_find(t, here, corner, kink, false);
 }
 
 /* Moves the plays to an input short of the next kink; `moved` is the output since the last one. */
@@ -178,7 +180,8 @@ HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *her
         kink->k = here->k;
         kink->depth = here->depth;
     } else {
-        hystgen_find(t, here, corner, to, true, kink);
+        kink->output = to;
+        hystgen_find(t, here, corner, kink, true);
     }
     return hystgen_solved(t, here, kink, to);
 }
