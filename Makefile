@@ -36,7 +36,7 @@ demo: $(VENV)/demo
 
 # Every feature once, without what is marked thorough
 test: $(VENV)/ready
-	$(BIN)/python -m pytest -n 2 -m "not thorough"
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not thorough"
 
 # All that CI runs
 check: $(VENV)/ready lint

@@ -315,7 +315,7 @@ def test_a_home_folder_that_cannot_be_written_to_makes_no_noise() -> None:
     assert Path("a.png").exists()
 
 
-@pytest.mark.thorough(but_one_in=2)
+@pytest.mark.thorough
 @pytest.mark.parametrize("home", ["/dev/null/home", "/proc/none"])
 def test_zig_builds_without_a_home_folder(home: str) -> None:
     """For one that cannot be made under /proc zig would wait for ever."""

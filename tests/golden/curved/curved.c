@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 0d0034c58a64629a910f26e59a0addeaf9556a0860e31734f210e42db22e9bb7, without this line
+ * Text: sha256 5108803a14e1f3e7b9ad260f0756947f05adb7bf175f0b5ecc525b5650b9f2c1, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -131,21 +131,19 @@ CURVED_APART void curved_turn_back(curved_place_t *here, curved_corner_t *corner
     here->rising = !here->rising;
 }
 
-/* The last kink before `to`, an output or input along the move: where another play begins to
-   follow, or here. */
+/* The last kink before an output or input along the move, which kink->output gives: where another
+   play begins to follow, or here. */
 CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *here,
-                              const curved_corner_t *corner, int64_t to, bool by_output,
-                              curved_kink_t *kink) {
+                              const curved_corner_t *corner, curved_kink_t *kink, bool by_output) {
     const curved_corner_t *c = NULL; /* the corner that held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
     unsigned int k = here->k;
-    kink->input = curved_along(here, here->input);
-    kink->output = curved_along(here, here->output);
     while (low < left) { /* corner `left` is passed, those below `low` are not */
         const unsigned int middle = (low + left) / 2;
         const curved_corner_t *at = &corner[middle];
-        const bool passed = to >= curved_begins(here, at, &t->segment[at->top], by_output);
+        const bool passed =
+            kink->output >= curved_begins(here, at, &t->segment[at->top], by_output);
         left = passed ? middle : left;
         low = passed ? low : middle + 1u;
     }
@@ -155,7 +153,7 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
     }
     if (left > 0 && corner[left - 1u].rose != here->rising) {
         const curved_corner_t *top = &corner[left - 1u];
-        const int64_t on = to - curved_begins(here, top, t->segment, by_output);
+        const int64_t on = kink->output - curved_begins(here, top, t->segment, by_output);
         const unsigned int before = k;
         unsigned int last = top->top - 1u;
         while (k < last) { /* play k follows, those above `last` do not */
@@ -169,6 +167,8 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
     }
     kink->k = (uint_least16_t)k;
     kink->depth = (uint_least16_t)left;
+    kink->input = curved_along(here, here->input);
+    kink->output = curved_along(here, here->output);
     if (c != NULL) {
         kink->input = curved_begins(here, c, &t->segment[k], false);
         kink->output = curved_begins(here, c, &t->segment[k], true);
@@ -181,7 +181,8 @@ static inline void curved_find_input(const curved_curve_t *t, curved_place_t *he
     if (here->rising ? to < here->input : to > here->input) {
         curved_turn_back(here, corner);
     }
-    curved_find(t, here, corner, curved_along(here, to), false, kink);
+    kink->output = curved_along(here, to);
+    curved_find(t, here, corner, kink, false);
 }
 
 /* Moves the plays to an input short of the next kink; `moved` is the output since the last one. */
@@ -233,7 +234,8 @@ static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curve
         kink->k = here->k;
         kink->depth = here->depth;
     } else {
-        curved_find(t, here, corner, to, true, kink);
+        kink->output = to;
+        curved_find(t, here, corner, kink, true);
     }
     return curved_solved(t, here, kink, to);
 }
