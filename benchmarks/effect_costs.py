@@ -155,7 +155,9 @@ def main() -> None:
     own, docs = (given.output or SHIPPED), (given.output or DOCS)
     if set(cores) >= set(engines.CORES):
         with (own / "effect_sizes.csv").open("w", encoding="ascii", newline="") as file:
-            csv.writer(file, lineterminator="\n").writerows([("part", "arithmetic", *cores), *sizes])
+            shipped = [0, 1, *(2 + cores.index(core) for core in engines.CORES)]
+            rows = [("part", "arithmetic", *cores), *sizes]
+            csv.writer(file, lineterminator="\n").writerows([row[k] for k in shipped] for row in rows)
     with (docs / "effects.csv").open("w", encoding="ascii", newline="") as file:
         heads = ("part", "arithmetic", "core", "bytes of code", "instructions of a sample")
         csv.writer(file, lineterminator="\n").writerows([heads, *costs])

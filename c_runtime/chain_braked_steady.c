@@ -16,5 +16,6 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(const hystgen_inve
     if (!self->moving) {
         return v;
     }
-    return hystgen_inverse_within(self, hystgen_inverse_kept(self, hystgen_inverse_braked(self, v, near)));
+    return hystgen_inverse_within(
+        self, hystgen_inverse_kept(self, hystgen_inverse_braked(self, v, near)));
 }

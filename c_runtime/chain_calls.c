@@ -188,7 +188,7 @@ static hystgen_real_t hystgen_inverse_limited(hystgen_inverse_t *self, hystgen_r
 
 /* The next drive, for reference u; the memory is up to date. */
 HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_next(hystgen_inverse_t *self,
-                                                          hystgen_real_t u) {
+                                                           hystgen_real_t u) {
     hystgen_real_t level = u;
     if (!hystgen_inverse_entered(self, u, &level)) {
         return hystgen_inverse_answer(self, self->stepped ? self->answer : self->applied);
