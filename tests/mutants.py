@@ -265,8 +265,8 @@ KILLED = (
     ),
     Mutant(
         "a finer solution takes the slope behind the kink", CHAIN_FINER,
-        "x - 1, false, &self->kink",
-        "x, false, &self->kink",
+        "self->kink.output = x - 1;",
+        "self->kink.output = x;",
         "led", "q31",
     ),
     Mutant(
