@@ -41,7 +41,7 @@ static void hystgen_forward_played(hystgen_forward_t *self, hystgen_real_t v) {
     self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, hystgen_arriving(a)));
 }
 
-/* The plays have moved. */
+/* The plays have moved: their sum passes through the output side. */
 HYSTGEN_APART_IN_FIXED void hystgen_forward_passed_on(hystgen_forward_t *self) {
     self->output = self->moving ? hystgen_forward_output_side_absorb(self, self->level)
                                 : hystgen_forward_output_side_rest(self, self->level);
@@ -66,7 +66,7 @@ static void hystgen_inverse_played(hystgen_inverse_t *self, hystgen_real_t v) {
     self->level = hystgen_inverse_follow(self, hystgen_inverse_arrive(self, hystgen_arriving(a)));
 }
 
-/* The plays have moved. */
+/* The plays have moved: their sum passes through the output side. */
 HYSTGEN_APART_IN_FIXED void hystgen_inverse_passed_on(hystgen_inverse_t *self) {
     self->output = self->moving ? hystgen_inverse_output_side_absorb(self, self->level)
                                 : hystgen_inverse_output_side_rest(self, self->level);

@@ -83,7 +83,7 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Deselect what cannot run without the measured records, and part of what is slow: neither passed nor skipped.
 
-    Of a test marked `thorough(but_one_in=n)` one case in so many loses that mark."""
+    One case in n of a test marked `thorough(but_one_in=n)` loses that mark, so that `make test` runs it."""
     for item in items:
         thorough = item.get_closest_marker("thorough")
         cases = thorough.kwargs.get("but_one_in") if thorough is not None else None
@@ -110,7 +110,7 @@ def in_short_form(item: pytest.Item) -> bool:
 def place(item: pytest.Item) -> int:
     """The sum of the places of a case's parameters in their lists.
 
-    Where there are several lists, a case in n by this sum has each value of the one with every n-th value of another.
+    Taking every n-th sum pairs each value of one list with every n-th value of another.
     """
     assert isinstance(item, pytest.Function)
     places = 0

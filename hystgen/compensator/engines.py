@@ -32,9 +32,9 @@ def choose(
 
     `optimize` speed: fewer instructions, as a geometric mean over both cores. size: less code on both cores. auto: the
     smaller share of a small controller's flash plus its time; the break-even is `FLASH / CYCLES`, 6.8 bytes of code for
-    one instruction per sample. For both operators the instructions add up. With effects in fixed point only speed may
-    be `corners`: looking for a drive in finer units takes up to 136 bytes of stack behind a chain's frames, and an
-    interrupt handler is promised 128. Raises ValueError for other words.
+    one instruction per sample. For both operators the instructions add up. With effects in fixed point only speed
+    chooses `corners`, whose search takes up to 136 bytes of stack in a chain: an interrupt handler is promised 128.
+    Raises ValueError for other words.
     """
     for what, value, known in (("engine", engine, ("auto", *ENGINES)), ("optimize", optimize, OPTIMIZE)):
         if value not in known:
