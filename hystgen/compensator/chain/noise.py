@@ -111,12 +111,11 @@ class Gain:
 
     def _plays(self, z: NDArray[np.complex128]) -> Iterator[tuple[float, NDArray[np.complex128], float]]:
         """For each number of plays that follow their slope at rest, their response, and what of it comes at once."""
-        p = np.array(self.static.pi.weights)
         moving_plays = [each for each in self.parts.plays if isinstance(each, RelaxingPlays | ThresholdRate)]
         if not moving_plays:
             yield 1.0, np.ones_like(z), 1.0
         for effect in moving_plays:
-            p[1:] *= 1.0 + moving.steepest_bend(self.static, self.parts.plays)
+            p = self._steepest
             if dashpot.nonlinear(effect):  # some stretch is so slow that its play does not follow
                 yield float(np.sum(p)), np.full_like(z, p[0]), float(p[0])
                 continue
@@ -130,6 +129,13 @@ class Gain:
                     followed = (first + early * z) / (1.0 - decay * z)
                 slope, response, at_once = slope + weight, response + weight * followed, at_once + weight * first
                 yield slope, response, at_once
+
+    @cached_property
+    def _steepest(self) -> Array:
+        """Weights of the plays where bent ones are steepest."""
+        p = np.array(self.static.pi.weights)
+        p[1:] *= 1.0 + moving.steepest_bend(self.static, self.parts.plays)
+        return p
 
     @cached_property
     def near(self) -> Array:
