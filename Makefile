@@ -34,9 +34,9 @@ demo: $(VENV)/demo
 	@echo examples/out/stage.png
 	@echo examples/out/report/report.html
 
-# Every feature once, without what is marked thorough
+# Every feature once, without what is marked thorough; each file in one process, which compiles its functions once
 test: $(VENV)/ready
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not thorough"
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough"
 
 # All that CI runs
 check: $(VENV)/ready lint

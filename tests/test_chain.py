@@ -228,7 +228,7 @@ EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "b
 standing still, which matters where plays catch up within one."""
 
 
-@pytest.mark.thorough(but_one_in=3)
+@pytest.mark.thorough(but_one_in=6)
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("seed", range(3))
 def test_composes_with_the_forward_model_that_shares_no_code(name: str, seed: int) -> None:

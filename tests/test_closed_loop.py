@@ -677,6 +677,7 @@ def test_the_example_of_the_page_runs(capsys: pytest.CaptureFixture[str], monkey
     assert capsys.readouterr().out.split() == shown
 
 
+@pytest.mark.thorough
 def test_the_example_of_the_note_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -117,7 +117,7 @@ def test_any_code_page_takes_every_result(page: str) -> None:
     assert Path("fit.svg").exists()
 
 
-@pytest.mark.thorough(but_one_in=3)
+@pytest.mark.thorough(but_one_in=5)
 @pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("page", PAGES)
 def test_data_on_standard_output_are_utf_8_in_any_code_page(page: str) -> None:

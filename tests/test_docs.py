@@ -259,7 +259,7 @@ def start(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-LONG = {"docs/effects.md", "docs/tutorials/name-what-is-missing.md"}
+LONG = {"docs/effects.md", "docs/tutorials/name-what-is-missing.md", "docs/howto/diagnose.md", "docs/plants.md"}
 """Pages that take as long as three others; `make test` has others of their kind."""
 
 
@@ -353,6 +353,7 @@ def broken(*pages: Path) -> list[str]:
     return sorted(f"{Path(page).name}: {link['url']}" for page, links in found["error_map"].items() for link in links)
 
 
+@pytest.mark.thorough
 def test_links_of_the_site_lead_somewhere(site: Path) -> None:
     assert broken(site) == []
     pages = {path.relative_to(DOCS).with_suffix(".html").as_posix() for path in DOCS.rglob("*.md")}
@@ -373,6 +374,7 @@ def test_a_broken_link_is_noticed(tmp_path: Path) -> None:
     assert broken(tmp_path) == places
 
 
+@pytest.mark.thorough
 def test_no_page_loads_anything_from_elsewhere(site: Path) -> None:
     for path in site.rglob("*.html"):
         text = path.read_text(encoding="utf-8")
@@ -380,6 +382,7 @@ def test_no_page_loads_anything_from_elsewhere(site: Path) -> None:
         assert [link for pair in loaded for link in pair if re.match("(?:https?:)?//", link)] == [], path.name
 
 
+@pytest.mark.thorough
 def test_the_references_are_of_the_program(site: Path) -> None:
     """A sample of each page that is generated."""
     for page, words in {
@@ -396,6 +399,7 @@ def test_the_references_are_of_the_program(site: Path) -> None:
         assert [word for word in words if word not in text] == [], page
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("width", [390, 1280])
 def test_pages_fit_a_phone_and_a_desk(width: int, site: Path, chromium: str, tmp_path: Path) -> None:
     """In a browser: nothing sticks out, every picture is drawn, nothing is complained of."""

@@ -240,7 +240,7 @@ def test_bits_equal_in_other_layouts(name: str, arithmetic: str, layout: str) ->
 
 
 @pytest.mark.slow(one_in=3)
-@pytest.mark.thorough(but_one_in=12)
+@pytest.mark.thorough(but_one_in=24)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", FILES)
@@ -697,6 +697,7 @@ def test_same_bytes_from_any_directory(tmp_path: Path, monkeypatch: pytest.Monke
     assert [p.split(" ")[1] for p in hystgen.differences("p.yaml", "b")] == ["is", "has"]
 
 
+@pytest.mark.thorough(but_one_in=3)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64"])
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("name", FILES)

@@ -491,7 +491,7 @@ def test_slow_states_neither_stall_nor_drift(arithmetic: str, bits: int) -> None
     assert abs((float(y[-1]) - float(y[1])) - moved) <= 1.0 + 2e-6 * moved
 
 
-@pytest.mark.thorough(but_one_in=4)
+@pytest.mark.thorough(but_one_in=8)
 @BOTH
 @pytest.mark.parametrize("name", STILL)
 def test_a_constant_reference_comes_to_rest(name: str, arithmetic: str) -> None:

@@ -77,6 +77,7 @@ def test_one_changed_table_entry_is_found(digit: str, changed_c: Callable[..., N
     assert any(row.different for row in report.rows)
 
 
+@pytest.mark.thorough(but_one_in=2)
 @pytest.mark.parametrize("curve", ["front", "back"])
 def test_a_changed_entry_that_a_single_code_reads_is_found(curve: str, changed_c: Callable[..., None]) -> None:
     """Beside a break of a dead zone a piece of a curve is one code long, which no random record comes to."""

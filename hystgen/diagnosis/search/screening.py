@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -215,6 +215,8 @@ class Records:
     """whether the fitted ones pass their loops in the same time"""
     compared: float
     """share of the recorded samples that are compared"""
+    on_terms: dict[tuple[Fitted, Fitted], Fitted] = field(default_factory=dict)
+    """what `terms` has found: a candidate is judged several times"""
 
     @classmethod
     def of(
@@ -249,7 +251,9 @@ class Records:
         """
         if all(len(other.actuator.nuisances(item)) == 1 for item in self.quick):
             return [now]
-        return [now, fits.on_equal_terms(now, other, self.quick)]
+        if (now, other) not in self.on_terms:
+            self.on_terms[now, other] = fits.on_equal_terms(now, other, self.quick)
+        return [now, self.on_terms[now, other]]
 
     def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
         """The hypothesis with one more effect, the best shapes first; `worth`: selects the options to try."""
