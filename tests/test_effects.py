@@ -132,6 +132,7 @@ def test_the_catalogue_is_complete() -> None:
         assert (type(effect).__doc__ or "").strip()
 
 
+@pytest.mark.usefixtures("brief")
 def test_without_effects_the_chain_is_the_model() -> None:
     t, v = drive()
     fronts = (DeadZone([-1, 0, 0.4], [0.3, 1.2, -0.2]), TanhEnvelope((6, 0.4, 0.1, 0.2), (6, 0.4, 0.1, 0.5)))

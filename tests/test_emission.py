@@ -150,7 +150,7 @@ def differing(one: Model, calls: signals.Calls, folder: Path) -> list[tuple[str,
     return [(row.build, row.samples, row.different) for row in rows]
 
 
-@pytest.mark.thorough(but_one_in=3)
+@pytest.mark.thorough(but_one_in=6)
 @pytest.mark.parametrize("name", TIES)
 def test_bits_equal_where_rounding_once_decided_otherwise(name: str, tmp_path: Path) -> None:
     ends, thresholds, weights, more, words = TIES[name]
@@ -441,6 +441,7 @@ model:
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("arithmetic", "lines", "code"), [
     ("float32", 400, 3600), ("q31", 450, 3500), ("q15", 450, 3500),
 ])  # fmt: skip
@@ -471,6 +472,7 @@ def test_ten_plays_are_read_and_stored_easily(arithmetic: str, lines: int, code:
         assert taken["both", number] <= 1.6 * alone
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("arithmetic", ARITHMETICS)
 @pytest.mark.parametrize("name", ["plain", "two_branches"])
 def test_nothing_is_copied_by_a_function_of_the_library(name: str, arithmetic: str, tmp_path: Path) -> None:
@@ -532,6 +534,7 @@ def test_every_effect_is_among_them() -> None:
     assert effects(EVERY_EFFECT) == effects(CHAINS)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("arithmetic", ["float64", "q31"])
 @pytest.mark.parametrize("chain", EVERY_EFFECT)
 def test_no_line_of_an_effect_is_longer_than_100_columns(chain: str, arithmetic: str) -> None:

@@ -145,7 +145,7 @@ def wrong(one: Model, arithmetic: str, numbers: Compiled, v: Array) -> tuple[flo
     return float(np.max(np.abs(left))), bound
 
 
-@pytest.mark.thorough(but_one_in=4)
+@pytest.mark.thorough
 @pytest.mark.parametrize("arithmetic", ["float32", "q15"])
 @pytest.mark.parametrize(
     ("name", "n", "rate"),
@@ -293,7 +293,7 @@ def test_leads_as_double_precision_does(name: str, arithmetic: str) -> None:
         assert np.max(np.abs(v - wanted)) <= codes.inverse_rounding < 1e-2 * numbers.tables.limits[slots.DRIVE_MAX]
 
 
-@pytest.mark.thorough(but_one_in=4)
+@pytest.mark.thorough(but_one_in=8)
 @pytest.mark.parametrize("name", [name for name in CHAINS if name not in BRANCHED])
 @BOTH
 def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arithmetic: str) -> None:

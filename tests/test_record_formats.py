@@ -1053,6 +1053,7 @@ def test_every_format_counts_the_bytes_it_reads(
     assert len(ticks) >= 3
 
 
+@pytest.mark.thorough
 def test_a_bar_while_reading_on_a_terminal(tmp_path: Path) -> None:
     file = "a.csv"
     write_csv(tmp_path / file, {"t": T, "v": V, "y": Y})

@@ -75,6 +75,7 @@ class TestMemory:
         expected = np.sqrt(np.nansum((errors - np.nanmean(errors)) ** 2))
         assert start._System.of(course, r).left(slopes, np.array(WEIGHTS)) == pytest.approx(expected, rel=1e-12)
 
+    @pytest.mark.thorough(but_one_in=3)
     @pytest.mark.parametrize("before", [(), (100.0,), (110.0, -5.0), (-20.0, 75.0, 30.0)])
     @pytest.mark.parametrize("drive", [growing, never_twice])
     def test_costs_no_more_than_a_tenth(self, drive: object, before: tuple[float, ...]) -> None:
@@ -97,6 +98,7 @@ class TestMemory:
         off = np.array(WEIGHTS) @ (brute_plays([*found.turns, v[0]], PLACES, 0.0)[-1] - memory)
         assert abs(off) < max(5.0 * found.uncertainty, 1.0)
 
+    @pytest.mark.thorough(but_one_in=2)
     @pytest.mark.parametrize("drive", ["one way", "never twice"])
     def test_costs_no_more_than_a_tenth_of_other_hysteresis(self, drive: str, bench: ModuleType) -> None:
         """Plants that are no play sums; held-out loops stay inside the fitted range, or take all of it.
