@@ -175,7 +175,7 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
 
     A candidate is about as good in two cases. With the same start states free, its held-out error is no larger, however
     much better the best one fits (two shapes of one effect each have their own free states, which are part of the
-    effect). Or its held-out error is within a few per cent, and its fitted error is no larger, or larger by chance, or,
+    effect). Or its held-out error is within a few per cent, and its fitted error is equal, or larger by chance, or,
     if a number of the best is at an end of its range, larger by less than an effect is worth. Where an amount of the
     best is the largest that is tried, all that are alike are about as good: so much creep can follow a lag as well.
     With equal numbers of parameters all records decide, or their `place` if they hardly differ: a lag, which every
@@ -196,7 +196,7 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
 
     def as_good(errors: list[Array], more: float) -> bool:
         return (
-            more <= less
+            more <= (1.0 + acceptance.EQUAL) * less
             or difference(errors, fitted) > acceptance.P_SURE
             or (_at_an_end(best.fitted) and no_worse(more, less, records.noise))
         )
@@ -225,9 +225,9 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     return [*(each for *_, each in sorted(near, key=order)), *others]
 
 
-ORDER = "creep", "resonance", "lag", "delay", "rate_dependence"
+ORDER = "creep", "resonance", "lag", "delay", "rate_dependence", "asymmetry"
 """The first of equal effects, in their order. What every amplifier or converter has, a lag or a delay, comes before
-plays that are late."""
+plays that are late, and a bend of the actuator before one of its sensor."""
 
 
 def place(name: str) -> int:
@@ -808,7 +808,8 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
         return True
     if fewer >= 0 and best.held_out <= (1.0 + acceptance.BETTER) * residual:
         every = [*records.to_fit, *held]
-        if better(best.fitted, now, every):
+        less = acceptance.EQUAL if fewer == 0 and name != best.name else acceptance.BETTER
+        if rms(best.fitted.errors(every)) < (1.0 - less) * rms(now.errors(every)):
             return True
     if fewer == 0:
         return best.held_out <= (1.0 + acceptance.EQUAL) * residual and place(best.name) < place(name)
