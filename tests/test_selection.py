@@ -290,7 +290,11 @@ OF_MADE: Any = SimpleNamespace(
         ("other", 1, (1.3, 1.1), False),
         ("other", 5, (0.9, 0.9), False),  # more numbers: the records have to separate it
         ("other", 5, (0.7, 0.7), True),
+        ("other", 3, (0.98, 0.98), True),  # as many numbers: the smaller error
+        ("other", 3, (0.998, 0.998), False),
+        ("other", 3, (0.98, 1.06), False),  # but held-out records separate them
         ("one", 5, (0.9, 0.9), True),  # another shape: its name is no question
+        ("one", 3, (0.98, 0.98), False),
         ("one", 1, (1.1, 1.1), False),
     ],
 )
@@ -347,6 +351,17 @@ def test_a_number_at_its_end_is_none_of_its_own(fitted: float, first: str) -> No
 def test_all_records_decide_between_equal_numbers(held_out: float, fitted: float, first: str) -> None:
     """Held-out ones alone only where they tell the two apart."""
     assert first_of(Made("best", 1, (1.0, 1.0)), Made("other", 1, (fitted, held_out))) == first
+
+
+@pytest.mark.parametrize(("fitted", "first"), [(1.004, "simple"), (1.006, "rich")])
+def test_errors_that_hardly_differ_are_equal_however_certain_the_difference_is(fitted: float, first: str) -> None:
+    """In each block the simpler one leaves a little more, which no chance explains."""
+    assert first_of(Made("rich", 2, (1.0, 1.0)), Made("simple", 1, (fitted, 1.03))) == first
+
+
+@pytest.mark.parametrize("others", ["saturation", "sensor_nonlinearity", "noncongruent", "thermal"])
+def test_of_equal_curves_that_of_the_actuator_comes_first(others: str) -> None:
+    assert first_of(Made(others, 1, (1.0, 1.0)), Made("asymmetry", 1, (1.003, 1.003))) == "asymmetry"
 
 
 @pytest.mark.parametrize(
