@@ -413,7 +413,7 @@ class TestScreening:
     def test_a_twin_follows(self, apart: float, follows: bool) -> None:
         def one(name: str, error: float) -> Any:
             option = SimpleNamespace(name=name, label=name)
-            return SimpleNamespace(option=option, residual=error, fitted=SimpleNamespace(rms=error))
+            return SimpleNamespace(option=option, residual=error, fitted=SimpleNamespace(rms=error), numbers=1)
 
         tried = [one(name, 1.0) for name in "abcdefg"] + [one("twin", 1.0 + apart)]
         names = [each.option.name for each in screening._kept(tried, tried)]

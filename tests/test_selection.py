@@ -380,7 +380,7 @@ def test_a_twin_of_what_is_followed_up_is_not_cut_off(left: float, fitted: float
 
     def screened(name: str, left: float, fitted: float = 0.6) -> Any:
         option = SimpleNamespace(name=name, label=name)
-        return SimpleNamespace(option=option, residual=left, fitted=SimpleNamespace(rms=fitted))
+        return SimpleNamespace(option=option, residual=left, fitted=SimpleNamespace(rms=fitted), numbers=1)
 
     others = [screened(name, 0.1 + 0.02 * k) for k, name in enumerate("abcd")]
     delay, lag = screened("delay", 0.303, 0.5), screened("lag", left, fitted)
@@ -388,6 +388,21 @@ def test_a_twin_of_what_is_followed_up_is_not_cut_off(left: float, fitted: float
     tried = [*others, lag, delay, *best_fits]
     assert [each.option.name for each in screening._kept(tried, tried)] == [*"abcd", "delay", *"ef"] + ["lag"] * follows
     assert lag not in screening._kept(tried, others)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "left", "follows"), [(1, 0.101, True), (1, 0.104, False), (2, 0.101, False), (3, 0.101, False)]
+)
+def test_a_simpler_shape_that_is_as_good_is_not_cut_off(numbers: int, left: float, follows: bool) -> None:
+    """Two richer shapes of the front leave a little less of the thinned records."""
+
+    def screened(label: str, numbers: int, left: float) -> Any:
+        option = SimpleNamespace(name="asymmetry", label=label)
+        return SimpleNamespace(option=option, residual=left, fitted=SimpleNamespace(rms=left), numbers=numbers)
+
+    tried = [screened("both ways", 2, 0.1), screened("dead zones", 8, 0.1), screened("one way", numbers, left)]
+    labels = [each.option.label for each in screening._kept(tried, tried)]
+    assert labels == ["both ways", "dead zones"] + ["one way"] * follows
 
 
 def test_what_fitted_records_tell_apart_is_not_left_open(monkeypatch: pytest.MonkeyPatch) -> None:

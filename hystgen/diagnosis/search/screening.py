@@ -312,6 +312,11 @@ class _Screened:
     fitted: Fitted
     residual: float
 
+    @property
+    def numbers(self) -> int:
+        """Number of its numbers."""
+        return len(self.option.alone.start)
+
 
 _SCREEN, _JOIN, _POLISH, _RESTART = range(4)
 """Stages of a search: a few steps of only the option, a few of the whole hypothesis, the rest to its end, and start
@@ -477,7 +482,10 @@ def _cost(structure: Structure, option: Option) -> int:
 
 
 def _kept(tried: Sequence[_Screened], helpful: Sequence[_Screened]) -> list[_Screened]:
-    """The best on held-out records, the best of the others on fitted ones, and helpful ones that are twins of these."""
+    """The best on held-out records, the best of the others on fitted ones, and helpful ones that are twins of these.
+
+    Of an effect that is kept already, the twin with the fewest numbers if those that are kept have more.
+    """
     kept: list[_Screened] = []
     by_held_out, by_fit = sorted(tried, key=lambda one: one.residual), sorted(tried, key=lambda one: one.fitted.rms)
     for order, most in ((by_held_out, acceptance.KEPT), (by_fit, acceptance.KEPT + acceptance.ALSO_KEPT)):
@@ -488,8 +496,9 @@ def _kept(tried: Sequence[_Screened], helpful: Sequence[_Screened]) -> list[_Scr
             if of_one < acceptance.SHAPES_OF_ONE and each not in kept:
                 kept.append(each)
     twins: dict[str, _Screened] = {}
-    for each in sorted(helpful, key=lambda one: one.residual):
-        if all(other.option.name != each.option.name for other in kept) and any(_twins(each, k) for k in kept):
+    for each in sorted(helpful, key=lambda one: (one.numbers, one.residual)):
+        own = [other.numbers for other in kept if other.option.name == each.option.name]
+        if each.numbers < min(own, default=math.inf) and any(_twins(each, other) for other in kept):
             twins.setdefault(each.option.name, each)
     return [*kept, *twins.values()]
 
