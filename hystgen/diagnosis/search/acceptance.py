@@ -130,8 +130,8 @@ acceptance::test_equal_effects_come_in_the_order_of_the_catalogue,
 acceptance::test_what_chance_does_not_explain."""
 
 EQUAL = 0.005
-"""[share of an error] Errors that differ by less than this are equal, and `selection.place` decides. The last steps of
-a search change an error by far less. Changed by:
+"""[share of an error] Errors that differ by less than this are equal, however certain the difference is, and
+`selection.place` decides. The last steps of a search change an error by far less. Changed by:
 acceptance::test_equal_effects_come_in_the_order_of_the_catalogue."""
 
 MOST_OF_GAP = 0.5
@@ -237,8 +237,9 @@ by: blind single."""
 
 TWIN = 0.02
 """[share of the errors] An effect whose fitted and held-out errors are within this of a kept one's is followed up too;
-otherwise chance would decide whether a lag or a delay is dropped. Changed by:
-acceptance::TestScreening::test_a_twin_follows."""
+otherwise chance would decide whether a lag or a delay is dropped. So is a shape with fewer numbers than those of its
+effect that are kept: a front that bends one way left 1 % more than one that bends both ways, and was dropped for it.
+Set by (the latter): second_plants single 8001. Changed by: acceptance::TestScreening::test_a_twin_follows."""
 
 PROMISING = 2.0
 """[times the error of the best shape] A shape with larger fitted and held-out errors is not searched jointly. Changed
