@@ -175,12 +175,12 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
 
     A candidate is about as good in two cases. With the same start states free, its held-out error is no larger, however
     much better the best one fits (two shapes of one effect each have their own free states, which are part of the
-    effect). Or its held-out error is within a few per cent, and its fitted error is equal, or larger by chance, or,
-    if a number of the best is at an end of its range, larger by less than an effect is worth. Where an amount of the
-    best is the largest that is tried, all that are alike are about as good: so much creep can follow a lag as well.
-    With equal numbers of parameters all records decide, or their `place` if they hardly differ: a lag, which every
-    amplifier has, before a delay. A candidate with a far larger fitted error than another is not the best because of a
-    small lead on held-out records, which may consist mostly of yet another effect.
+    effect). Or its held-out error is within a few per cent, and its fitted error is equal, or larger by chance, or, if
+    a number of the best is at an end of its range, larger by less than an effect is worth. Where an amount of the best
+    is the largest that is tried, all that are alike are about as good: so much creep can follow a lag as well. With
+    equal numbers of parameters all records decide, held-out ones if those hardly differ, or else their `place`: a lag,
+    which every amplifier has, before a delay. A candidate with a far larger fitted error than another is not the best
+    because of a small lead on held-out records, which may consist mostly of yet another effect.
     """
     if not tried:
         return []
@@ -201,7 +201,7 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
             or (_at_an_end(best.fitted) and no_worse(more, less, records.noise))
         )
 
-    near, others = [(best.numbers(held), _everywhere(best, best, records), best)], []
+    near, others = [(best.numbers(held), _everywhere(best, best, records), best.held_out, best)], []
     for each in tried:
         if each is best:
             continue
@@ -213,14 +213,19 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
         errors = each.fitted.errors(to_fit, like)
         more = rms(errors)
         if less > acceptance.FAR_LESS * more and (residual <= best.held_out or as_good(errors, more)):
-            near.append((each.numbers(held), _everywhere(each, best, records), each))
+            near.append((each.numbers(held), _everywhere(each, best, records), residual, each))
         else:
             others.append(each)
-    least = {n: min(everywhere for number, everywhere, _ in near if number == n) for n, *_ in near}
+    equal = 1.0 + acceptance.EQUAL
+    least = {n: min(everywhere for number, everywhere, *_ in near if number == n) for n, *_ in near}
+    held_out = {
+        n: min(residual for number, everywhere, residual, _ in near if number == n and everywhere <= equal * least[n])
+        for n in least
+    }
 
-    def order(one: tuple[int, float, Tried]) -> tuple[int, float, int]:
-        number, everywhere, each = one
-        return number, max(everywhere, (1.0 + acceptance.EQUAL) * least[number]), place(each.name)
+    def order(one: tuple[int, float, float, Tried]) -> tuple[int, float, float, int]:
+        n, everywhere, residual, each = one
+        return n, max(everywhere, equal * least[n]), max(residual, equal * held_out[n]), place(each.name)
 
     return [*(each for *_, each in sorted(near, key=order)), *others]
 
@@ -794,9 +799,10 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
     """Whether an effect gives way to a better one: one with a smaller error, one with fewer numbers and no larger error
     on equal terms, or an equal one with an earlier `place`.
 
-    With no more numbers all records decide, as in `simplest_first`, if they differ and held-out ones hardly do. Of two
-    effects that the records do not separate the one with fewer numbers stands, since more can follow another effect;
-    of two shapes of one effect, whose name is no question, the one with the smaller error.
+    With no more numbers all records decide, as in `simplest_first`, if they differ and held-out ones hardly do; between
+    two effects with as many numbers any difference will do that held-out records do not contradict. Of two effects that
+    the records do not separate the one with fewer numbers stands, since more can follow another effect; of two shapes
+    of one effect, whose name is no question, the one with the smaller error.
     """
     held, residual = records.held, records.residual(now)
     fewer = free_numbers(now, held) - best.numbers(held)
@@ -806,10 +812,10 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
             return fewer > 0
     if best.held_out <= (1.0 - acceptance.BETTER) * residual:
         return True
-    if fewer >= 0 and best.held_out <= (1.0 + acceptance.BETTER) * residual:
+    share = acceptance.EQUAL if fewer == 0 and name != best.name else acceptance.BETTER
+    if fewer >= 0 and best.held_out <= (1.0 + share) * residual:
         every = [*records.to_fit, *held]
-        less = acceptance.EQUAL if fewer == 0 and name != best.name else acceptance.BETTER
-        if rms(best.fitted.errors(every)) < (1.0 - less) * rms(now.errors(every)):
+        if rms(best.fitted.errors(every)) < (1.0 - share) * rms(now.errors(every)):
             return True
     if fewer == 0:
         return best.held_out <= (1.0 + acceptance.EQUAL) * residual and place(best.name) < place(name)
