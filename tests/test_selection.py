@@ -292,7 +292,9 @@ OF_MADE: Any = SimpleNamespace(
         ("other", 5, (0.7, 0.7), True),
         ("other", 3, (0.98, 0.98), True),  # as many numbers: the smaller error
         ("other", 3, (0.998, 0.998), False),
-        ("other", 3, (0.98, 1.02), False),  # unless held-out records contradict it
+        ("other", 3, (1.02, 0.97), True),  # those of all records are equal: that of held-out ones
+        ("other", 3, (0.98, 1.02), False),
+        ("other", 3, (0.9, 1.06), False),  # but those separate the two
         ("one", 5, (0.9, 0.9), True),  # another shape: its name is no question
         ("one", 3, (0.98, 0.98), False),
         ("one", 1, (1.1, 1.1), False),
@@ -362,6 +364,7 @@ def test_errors_that_hardly_differ_are_equal_however_certain_the_difference_is(f
 @pytest.mark.parametrize("others", ["saturation", "sensor_nonlinearity", "noncongruent", "thermal"])
 def test_of_equal_curves_that_of_the_actuator_comes_first(others: str) -> None:
     assert first_of(Made(others, 1, (1.0, 1.0)), Made("asymmetry", 1, (1.003, 1.003))) == "asymmetry"
+    assert first_of(Made(others, 1, (1.0, 1.0)), Made("asymmetry", 1, (0.99, 1.015))) == others, "held-out ones differ"
 
 
 @pytest.mark.parametrize(

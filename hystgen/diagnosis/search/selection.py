@@ -799,10 +799,10 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
     """Whether an effect gives way to a better one: one with a smaller error, one with fewer numbers and no larger error
     on equal terms, or an equal one with an earlier `place`.
 
-    With no more numbers all records decide, as in `simplest_first`, if they differ and held-out ones hardly do; between
-    two effects with as many numbers any difference will do that held-out records do not contradict. Of two effects that
-    the records do not separate the one with fewer numbers stands, since more can follow another effect; of two shapes
-    of one effect, whose name is no question, the one with the smaller error.
+    With no more numbers all records decide if they differ and held-out ones hardly do; between two effects with as many
+    numbers the order is that of `simplest_first`. Of two effects that the records do not separate the one with fewer
+    numbers stands, since more can follow another effect; of two shapes of one effect, whose name is no question, the
+    one with the smaller error.
     """
     held, residual = records.held, records.residual(now)
     fewer = free_numbers(now, held) - best.numbers(held)
@@ -812,13 +812,16 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
             return fewer > 0
     if best.held_out <= (1.0 - acceptance.BETTER) * residual:
         return True
-    share = acceptance.EQUAL if fewer == 0 and name != best.name else acceptance.BETTER
-    if fewer >= 0 and best.held_out <= (1.0 + share) * residual:
+    if fewer >= 0 and best.held_out <= (1.0 + acceptance.BETTER) * residual:
         every = [*records.to_fit, *held]
-        if rms(best.fitted.errors(every)) < (1.0 - share) * rms(now.errors(every)):
-            return True
-    if fewer == 0:
-        return best.held_out <= (1.0 + acceptance.EQUAL) * residual and place(best.name) < place(name)
+        if fewer > 0 or name == best.name:
+            if better(best.fitted, now, every):
+                return True
+        else:
+            for after, before in ((rms(best.fitted.errors(every)), rms(now.errors(every))), (best.held_out, residual)):
+                if abs(after - before) > acceptance.EQUAL * before:
+                    return after < before
+            return place(best.name) < place(name)
     return fewer > 0 and rms(best.fitted.errors(held, now)) <= residual
 
 
