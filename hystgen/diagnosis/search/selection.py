@@ -812,16 +812,13 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
             return fewer > 0
     if best.held_out <= (1.0 - acceptance.BETTER) * residual:
         return True
-    if fewer >= 0 and best.held_out <= (1.0 + acceptance.BETTER) * residual:
-        every = [*records.to_fit, *held]
-        if fewer > 0 or name == best.name:
-            if better(best.fitted, now, every):
-                return True
-        else:
-            for after, before in ((rms(best.fitted.errors(every)), rms(now.errors(every))), (best.held_out, residual)):
-                if abs(after - before) > acceptance.EQUAL * before:
-                    return after < before
-            return place(best.name) < place(name)
+    every, near = [*records.to_fit, *held], best.held_out <= (1.0 + acceptance.BETTER) * residual
+    if near and fewer == 0 and name != best.name:
+        both = (rms(best.fitted.errors(every)), rms(now.errors(every))), (best.held_out, residual)
+        smaller = [after < before for after, before in both if abs(after - before) > acceptance.EQUAL * before]
+        return smaller[0] if smaller else place(best.name) < place(name)
+    if near and fewer >= 0 and better(best.fitted, now, every):
+        return True
     return fewer > 0 and rms(best.fitted.errors(held, now)) <= residual
 
 
