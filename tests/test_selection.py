@@ -290,11 +290,11 @@ OF_MADE: Any = SimpleNamespace(
         ("other", 1, (1.3, 1.1), False),
         ("other", 5, (0.9, 0.9), False),  # more numbers: the records have to separate it
         ("other", 5, (0.7, 0.7), True),
-        ("other", 3, (0.98, 0.98), True),  # as many numbers: the smaller error
+        ("other", 3, (0.98, 0.98), True),  # as many numbers: the smaller error over all records
         ("other", 3, (0.998, 0.998), False),
-        ("other", 3, (1.02, 0.97), True),  # those of all records are equal: that of held-out ones
+        ("other", 3, (1.02, 0.97), True),  # equal over all records: the smaller held-out error
         ("other", 3, (0.98, 1.02), False),
-        ("other", 3, (0.9, 1.06), False),  # but those separate the two
+        ("other", 3, (0.9, 1.06), False),  # held-out records separate the two
         ("one", 5, (0.9, 0.9), True),  # another shape: its name is no question
         ("one", 3, (0.98, 0.98), False),
         ("one", 1, (1.1, 1.1), False),
@@ -357,7 +357,7 @@ def test_all_records_decide_between_equal_numbers(held_out: float, fitted: float
 
 @pytest.mark.parametrize(("fitted", "first"), [(1.004, "simple"), (1.006, "rich")])
 def test_errors_that_hardly_differ_are_equal_however_certain_the_difference_is(fitted: float, first: str) -> None:
-    """In each block the simpler one leaves a little more, which no chance explains."""
+    """The simpler one leaves a little more in every block, so that chance does not explain the difference."""
     assert first_of(Made("rich", 2, (1.0, 1.0)), Made("simple", 1, (fitted, 1.03))) == first
 
 

@@ -226,9 +226,9 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
     return Shaped(shape, p, root_mean_square(pi.residual(whole, np.arange(n1), best), samples), best, samples, derived)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Fitted:
-    """A structure with its numbers and weights, and the rms error of the fit; compared by identity."""
+    """A structure with its numbers and weights, and the rms error of the fit."""
 
     structure: Structure
     shape: Array

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -215,8 +215,6 @@ class Records:
     """whether the fitted ones pass their loops in the same time"""
     compared: float
     """share of the recorded samples that are compared"""
-    on_terms: dict[tuple[Fitted, Fitted], Fitted] = field(default_factory=dict)
-    """what `terms` has found: a candidate is judged several times"""
 
     @classmethod
     def of(
@@ -251,9 +249,7 @@ class Records:
         """
         if all(len(other.actuator.nuisances(item)) == 1 for item in self.quick):
             return [now]
-        if (now, other) not in self.on_terms:
-            self.on_terms[now, other] = fits.on_equal_terms(now, other, self.quick)
-        return [now, self.on_terms[now, other]]
+        return [now, fits.on_equal_terms(now, other, self.quick)]
 
     def extensions(self, now: Fitted, worth: Callable[[Option], bool] | None = None) -> list[Tried]:
         """The hypothesis with one more effect, the best shapes first; `worth`: selects the options to try."""
@@ -484,7 +480,8 @@ def _cost(structure: Structure, option: Option) -> int:
 def _kept(tried: Sequence[_Screened], helpful: Sequence[_Screened]) -> list[_Screened]:
     """The best on held-out records, the best of the others on fitted ones, and helpful ones that are twins of these.
 
-    Of an effect that is kept already, the twin with the fewest numbers if those that are kept have more.
+    A twin of an effect that is kept already has to have fewer numbers than its kept shapes; the one with the fewest is
+    taken.
     """
     kept: list[_Screened] = []
     by_held_out, by_fit = sorted(tried, key=lambda one: one.residual), sorted(tried, key=lambda one: one.fitted.rms)

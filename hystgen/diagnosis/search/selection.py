@@ -232,7 +232,7 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
 
 ORDER = "creep", "resonance", "lag", "delay", "rate_dependence", "asymmetry"
 """The first of equal effects, in their order. What every amplifier or converter has, a lag or a delay, comes before
-plays that are late, and a bend of the actuator before one of its sensor."""
+plays that are late, and an asymmetric actuator before a nonlinear sensor."""
 
 
 def place(name: str) -> int:
