@@ -247,8 +247,9 @@ def reduce(
 
 def triangle(*parts: Array) -> Array:
     """The triangular factor of parts stacked on each other: same normal equations, at most as many rows as columns."""
-    stacked = np.concatenate(parts)
-    return np.asarray(np.linalg.qr(stacked, mode="r")) if len(stacked) > 1 else stacked
+    rows, columns = sum(map(len, parts)), parts[0].shape[1]
+    stacked = np.concatenate(parts, out=np.empty((columns, rows)).T)
+    return reflected(stacked).triangle if rows > 1 else stacked
 
 
 @dataclass(frozen=True)

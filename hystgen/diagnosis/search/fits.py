@@ -32,6 +32,9 @@ Bools = NDArray[np.bool_]
 POLISHED = 1e-5
 """A search ends after a step that lowers the error by a smaller share: far below any difference that decides."""
 
+COARSE = 1e-3
+"""The same for a search that ranks shapes or shows whether another is worth while: these differ by per cents."""
+
 CROSSINGS = 2
 """[changes of side] A component of the start that goes from one limit beyond the other is measured from that one; at
 the second time it stays there, so that the search for those at a limit ends. With 1, 3 of 600 pairs of records, with
@@ -338,10 +341,10 @@ def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> F
         structure = replace(fitted.structure, starts=tuple(found.items()))
         if structure.starts == fitted.structure.starts:
             break
-        other = fit(structure, quick, fitted.shape, fitted.weights)
-        if not other.rms < (1.0 - acceptance.BETTER) * fitted.rms:
+        search = begun(structure, quick, fitted.shape, fitted.weights).further(little=COARSE)
+        if not search.now.rms < (1.0 - acceptance.BETTER) * fitted.rms:
             break
-        fitted = other
+        fitted = search.further().found(fitted.weights)
     return fitted
 
 

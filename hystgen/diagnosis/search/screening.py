@@ -155,9 +155,6 @@ def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple
 # Screening of the options ------------------------------------------------------------------------------------
 
 
-COARSE = 1e-3
-"""A search of the screening ends after a step that lowers the error by a smaller share: ranks differ by per cents."""
-
 WORTH_PROCESSES = 5_000
 """Fewest fitted samples with which the options are tried in several processes; fewer are not worth starting them."""
 
@@ -381,7 +378,7 @@ class _Searches:
             *others, last = option.alone.parts
             amounts = replace(last, candidate=last.candidate.at(start))
             structure = replace(option.alone, parts=(*others, amounts))
-            return fits.begun(structure, thin, start, now.weights).further(1, COARSE).now.shape
+            return fits.begun(structure, thin, start, now.weights).further(1, fits.COARSE).now.shape
 
         begun = [fits.begun(option.alone, thin, enough_of_it(start), now.weights) for start in option.starts]
         if option.grown is not None and task.shape is not None and task.weights is not None:
@@ -389,7 +386,7 @@ class _Searches:
         if option.name.startswith(USER) and not any(math.isfinite(each.now.rms) for each in begun):
             raise EffectsError(f"the effect {option.name} gives no finite output wherever a search for it begins")
         near = acceptance.TOO_FAR * min(each.now.rms for each in acting(begun))
-        searches = [each.further(acceptance.FIRST_STEPS, COARSE) for each in begun if each.now.rms <= near]
+        searches = [each.further(acceptance.FIRST_STEPS, fits.COARSE) for each in begun if each.now.rms <= near]
         best = min(acting(searches), key=lambda each: each.now.rms)
         search = _while_falling(best, acceptance.SCREENING_STEPS)
         return min(search, *searches, key=lambda each: each.now.rms).found(now.weights)
@@ -419,7 +416,7 @@ def _while_falling(search: Search, steps: int) -> Search:
     cubic sensor far from straight was judged where its search began.
     """
     for _ in range(acceptance.LONGER):
-        before, search = search.now, search.further(steps, COARSE)
+        before, search = search.now, search.further(steps, fits.COARSE)
         if search.now is not before and search.now.rms >= acceptance.FALLING * before.rms:
             break
     return search
@@ -527,7 +524,8 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) ->
     going_on = {k: numbers for k, numbers in done.items() if not numbers.residual > hopeful}
     done |= all_of([_Task(_POLISH, k, *numbers[:2], joint.MOST_STEPS) for k, numbers in going_on.items()])
     if any(map(fits.restarts, (*records.to_fit, *records.held))):
-        done = all_of([_Task(_RESTART, k, *numbers[:2], rms=numbers.rms) for k, numbers in done.items()])
+        polished = [(k, done[k]) for k in going_on]
+        done |= all_of([_Task(_RESTART, k, *numbers[:2], rms=numbers.rms) for k, numbers in polished])
     tried = []
     for k, option in found.items():
         if done[k].rms >= now.rms:
