@@ -425,7 +425,7 @@ def _followed(screen: Sequence[tuple[float, float]], joint: Sequence[float]) -> 
     steps: dict[int, list[int]] = {k: [] for k in range(len(screen))}
 
     class Pool:
-        def each(self, tasks: Sequence[Any], _: Any) -> Any:
+        def each(self, tasks: Sequence[Any], *_: Any) -> Any:
             for task in tasks:
                 steps[task.k].append(task.steps)
                 yield task, screening._Numbers(np.zeros(0), np.zeros(0), 2.0, joint[task.k], ())

@@ -171,7 +171,6 @@ class TestSeveralProcesses:
 
     @pytest.mark.thorough
     def test_they_find_the_same(self, case: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(screening, "WORTH_PROCESSES", 0)
         found = []
         for cores in (1, 3):
             monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
@@ -183,10 +182,9 @@ class TestSeveralProcesses:
     def test_an_interrupt_leaves_nothing(self, case: Path, forks: int, fits: int) -> None:
         program = (
             "import os, sys; from hystgen import cli; from hystgen.basics import parallel; "
-            "from hystgen.diagnosis.search import screening; "
             "from hystgen.basics.progress import Progress; tick = Progress.tick; "
             "Progress.tick = lambda bar, n: (print('fitted', flush=True), tick(bar, n)); "
-            "screening.WORTH_PROCESSES = 0; parallel.cores = lambda: 2; "
+            "parallel.cores = lambda: 2; "
             "os.register_at_fork(after_in_parent=lambda: print('forked', flush=True)); sys.exit(cli.main(sys.argv[1:]))"
         )
         with subprocess.Popen(

@@ -155,10 +155,6 @@ def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple
 # Screening of the options ------------------------------------------------------------------------------------
 
 
-WORTH_PROCESSES = 5_000
-"""Fewest fitted samples with which the options are tried in several processes; fewer are not worth starting them."""
-
-
 @dataclass(frozen=True)
 class Tried:
     """A fully fitted option, with its held-out errors."""
@@ -234,7 +230,7 @@ class Records:
         known = about(to_fit, structure.thresholds)
         taking_part, recorded = compared([*to_fit, *held])
         return cls(
-            to_fit, held, full, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(to_fit),
+            to_fit, held, full, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(),
             signals.one_loop([*to_fit, *held]), signals.one_speed(to_fit), taking_part / recorded,
         )  # fmt: skip
 
@@ -279,10 +275,8 @@ def _rough(now: Fitted, thin: Sequence[Item]) -> Fitted:
     return fits.begun(structure, thin, now.shape, p).found(p)
 
 
-def _jobs(to_fit: Sequence[Item]) -> int:
+def _jobs() -> int:
     """Number of processes; loads the compiled functions of effects, so that processes need not do so after the fork."""
-    if sum(len(item.run.t) for item in to_fit) < WORTH_PROCESSES:
-        return 1
     jobs = parallel.cores()
     if jobs > 1:
         effects.load_compiled()
@@ -515,17 +509,20 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) ->
         shape = found[each.k].joined(now, each.fitted.shape)
         return _Task(_JOIN, each.k, shape, now.weights, acceptance.JOINT_STEPS if promising else 0)
 
+    starting_anew = any(map(fits.restarts, (*records.to_fit, *records.held)))
+
+    def anew(task: _Task, numbers: _Numbers) -> list[_Task]:
+        follows = task.what == _POLISH and starting_anew
+        return [_Task(_RESTART, task.k, *numbers[:2], rms=numbers.rms)] if follows else []
+
     def all_of(tasks: Sequence[_Task]) -> dict[int, _Numbers]:
         order = sorted(tasks, key=lambda task: _cost(found[task.k].structure, found[task.k]), reverse=True)
-        return {task.k: numbers for task, numbers in pool.each(order, records.tick)}
+        return {task.k: numbers for task, numbers in pool.each(order, records.tick, anew)}  # the latest of each
 
     done = all_of([join(each) for each in kept])
     hopeful = acceptance.HOPEFUL * min((numbers.residual for numbers in done.values()), default=0.0)
     going_on = {k: numbers for k, numbers in done.items() if not numbers.residual > hopeful}
     done |= all_of([_Task(_POLISH, k, *numbers[:2], joint.MOST_STEPS) for k, numbers in going_on.items()])
-    if any(map(fits.restarts, (*records.to_fit, *records.held))):
-        polished = [(k, done[k]) for k in going_on]
-        done |= all_of([_Task(_RESTART, k, *numbers[:2], rms=numbers.rms) for k, numbers in polished])
     tried = []
     for k, option in found.items():
         if done[k].rms >= now.rms:
