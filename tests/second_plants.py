@@ -214,31 +214,35 @@ class Plant:
 
 
 def filtered(t: Array, x: Array, time: float) -> Array:
-    """A first-order lag over uneven times, exact for steps."""
+    """A first-order lag over uneven times, whose input steps halfway between two of them."""
     out = np.empty(len(x))
-    state, kept = float(x[0]), np.exp(-np.diff(t, prepend=t[0]) / time).tolist()
+    state, last, kept = float(x[0]), float(x[0]), np.exp(-0.5 * np.diff(t, prepend=t[0]) / time).tolist()
     for k, (value, keep) in enumerate(zip(x.tolist(), kept, strict=True)):
+        state = last + (state - last) * keep
         state = value + (state - value) * keep
-        out[k] = state
+        out[k], last = state, value
     return out
 
 
 def _mode(t: Array, x: Array, frequency: float, damping: float) -> Array:
-    """A mode driven by x, by exact steps of its rotation."""
+    """A mode driven by x, which steps halfway between two times, by exact steps of its rotation."""
     out = np.empty(len(x))
     w, dt = TAU * frequency, np.diff(t, prepend=t[0])
     damped = w * np.sqrt(1.0 - damping**2)
-    a, b = 0.0, 0.0  # deviation from x and its speed
-    last = float(x[0])
-    for k, (value, step) in enumerate(zip(x.tolist(), dt.tolist(), strict=True)):
-        a -= value - last
-        last = value
+
+    def turned(a: float, b: float, step: float) -> tuple[float, float]:
         fade, c, s = np.exp(-damping * w * step), np.cos(damped * step), np.sin(damped * step)
-        a, b = (
+        return (
             fade * (a * c + (b + damping * w * a) / damped * s),
             fade * (b * c - (w * w * a + damping * w * b) / damped * s),
         )
-        out[k] = value + a
+
+    a, b = 0.0, 0.0  # deviation from x and its speed
+    last = float(x[0])
+    for k, (value, step) in enumerate(zip(x.tolist(), dt.tolist(), strict=True)):
+        a, b = turned(a, b, 0.5 * step)
+        a, b = turned(a - (value - last), b, 0.5 * step)
+        out[k], last = value + a, value
     return out
 
 
@@ -281,10 +285,11 @@ def slew_limit(rng: np.random.Generator, made: Session, x: float, plant: Plant) 
     rate = 0.05 / (x * 20.0 * made.step)
 
     def change(made: Session, v: Array) -> Array:
-        out, now = np.empty(len(v)), float(v[0])
+        out, now, last = np.empty(len(v)), float(v[0]), float(v[0])
         for k, (value, step) in enumerate(zip(v.tolist(), np.diff(made.t, prepend=made.t[0]).tolist(), strict=True)):
-            now += float(np.clip(value - now, -rate * step, rate * step))
-            out[k] = now
+            for goal in (last, value):  # the drive steps halfway between two times
+                now += float(np.clip(goal - now, -0.5 * rate * step, 0.5 * rate * step))
+            out[k], last = now, value
         return out
 
     plant.drive.append(change)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import second_plants
 from numpy.typing import NDArray
-from second_plants import EFFECTS, FOREIGN, Session, Stage, filtered
+from second_plants import EFFECTS, FOREIGN, Plant, Session, Stage, filtered
 
 import hystgen
 
@@ -39,16 +39,32 @@ def test_the_stack_of_extremes_is_a_preisach_model() -> None:
 
 
 def test_a_mode_and_a_lag_answer_a_step_as_known() -> None:
+    """It happens halfway between two times, where its mean over a sample puts it."""
     t = np.arange(400) * 1e-3
     x = np.where(t > 0.0, 1.0, 0.0)
-    assert filtered(t, x, 0.02)[-1] == pytest.approx(1.0 - math.exp(-0.4 / 0.02 + 0.05), abs=1e-6)
+    since = t[1:] - 0.5e-3
+    assert filtered(t, x, 0.02)[1:] == pytest.approx(1.0 - np.exp(-since / 0.02), abs=1e-9)
     rings = second_plants._mode(t, x, 20.0, 0.05)
-    damped = 2.0 * np.pi * 20.0 * math.sqrt(1.0 - 0.05**2)
-    at = t[1:] - t[1]
-    decay = np.exp(-0.05 * 2.0 * np.pi * 20.0 * (at + 1e-3))
-    phase = damped * (at + 1e-3)
-    expected = 1.0 - decay * (np.cos(phase) + 0.05 / math.sqrt(1.0 - 0.05**2) * np.sin(phase))
+    root = math.sqrt(1.0 - 0.05**2)
+    phase, decay = 2.0 * np.pi * 20.0 * root * since, np.exp(-0.05 * 2.0 * np.pi * 20.0 * since)
+    expected = 1.0 - decay * (np.cos(phase) + 0.05 / root * np.sin(phase))
     assert rings[1:] == pytest.approx(expected, abs=1e-9)
+    limited = Plant([], [], [])
+    second_plants.slew_limit(np.random.default_rng(0), Session(t, x, (), (), (), 400, 1e-3), 0.05, limited)
+    assert limited.drive[0](Session(t, x, (), (), (), 400, 1e-3), x)[1:] == pytest.approx(np.minimum(since * 50.0, 1.0))
+
+
+def test_a_sine_passes_a_mode_and_a_lag_without_being_early() -> None:
+    """Four times a sample, at the sixteen samples a period of a fast record: the phase is right to 0.1 degrees."""
+    t = np.arange(64 * 400) / 64.0
+    x, last = np.exp(2j * np.pi * t), slice(64 * 300, None)
+    for found, gain in (
+        (filtered(t, x.real, 0.05), 1.0 / (1.0 + 0.05 * 2j * np.pi)),
+        (second_plants._mode(t, x.real, 2.0, 0.05), 1.0 / (1.0 - 0.25 + 2j * 0.05 * 0.5)),
+    ):
+        passed = np.mean(found[last] * x[last].conj()) * 2.0
+        assert np.angle(passed / gain, deg=True) == pytest.approx(0.0, abs=0.1)
+        assert abs(passed / gain) == pytest.approx(1.0, abs=0.005)
 
 
 @pytest.mark.thorough
