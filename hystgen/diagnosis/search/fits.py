@@ -341,7 +341,10 @@ def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> F
         structure = replace(fitted.structure, starts=tuple(found.items()))
         if structure.starts == fitted.structure.starts:
             break
-        search = begun(structure, quick, fitted.shape, fitted.weights).further(little=COARSE)
+        search = begun(structure, quick, fitted.shape, fitted.weights)
+        if not search.now.rms < fitted.rms:  # sought for these numbers, and no better with them
+            break
+        search = search.further(little=COARSE)
         if not search.now.rms < (1.0 - acceptance.BETTER) * fitted.rms:
             break
         fitted = search.further().found(fitted.weights)

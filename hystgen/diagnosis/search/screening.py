@@ -511,18 +511,25 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) ->
 
     starting_anew = any(map(fits.restarts, (*records.to_fit, *records.held)))
 
-    def anew(task: _Task, numbers: _Numbers) -> list[_Task]:
-        follows = task.what == _POLISH and starting_anew
-        return [_Task(_RESTART, task.k, *numbers[:2], rms=numbers.rms)] if follows else []
+    def anew(k: int, numbers: _Numbers) -> list[_Task]:
+        return [_Task(_RESTART, k, *numbers[:2], rms=numbers.rms)] if starting_anew else []
+
+    def then(task: _Task, numbers: _Numbers) -> list[_Task]:
+        return anew(task.k, numbers) if task.what == _POLISH else []
 
     def all_of(tasks: Sequence[_Task]) -> dict[int, _Numbers]:
         order = sorted(tasks, key=lambda task: _cost(found[task.k].structure, found[task.k]), reverse=True)
-        return {task.k: numbers for task, numbers in pool.each(order, records.tick, anew)}  # the latest of each
+        return {task.k: numbers for task, numbers in pool.each(order, records.tick, then)}  # the latest of each
 
     done = all_of([join(each) for each in kept])
     hopeful = acceptance.HOPEFUL * min((numbers.residual for numbers in done.values()), default=0.0)
-    going_on = {k: numbers for k, numbers in done.items() if not numbers.residual > hopeful}
-    done |= all_of([_Task(_POLISH, k, *numbers[:2], joint.MOST_STEPS) for k, numbers in going_on.items()])
+    going_on, others = [], []
+    for k, numbers in done.items():
+        if numbers.residual > hopeful:
+            others += anew(k, numbers)  # beside the memory found without it, a right one can be twice as far off
+        else:
+            going_on.append(_Task(_POLISH, k, *numbers[:2], joint.MOST_STEPS))
+    done |= all_of([*going_on, *others])
     tried = []
     for k, option in found.items():
         if done[k].rms >= now.rms:
