@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hystgen.basics.problems import counted
 from hystgen.chain import chain
 from hystgen.diagnosis.data.items import Item, Model, masks, rms
-from hystgen.diagnosis.data.signals import unresolved_edges
+from hystgen.diagnosis.data.signals import stands_within, unresolved_edges
 from hystgen.diagnosis.findings.kinds import (
     DropOuts,
     ExchangedRecords,
@@ -30,7 +30,7 @@ from hystgen.effects.base import Run
 from hystgen.identification import faults, pi, prepared, start
 from hystgen.identification.faults import runs_of
 from hystgen.identification.pi import IdentificationError
-from hystgen.identification.reduction import Course, settled
+from hystgen.identification.reduction import AS_FAR, Course, settled
 from hystgen.identification.start import STARTS, UNLIKE
 from hystgen.records import Record, no_value
 
@@ -395,12 +395,27 @@ def _without_faults(ready: Prepared) -> Prepared:
 
 
 def _item(course: Course, record: Record, rest: float) -> Item:
-    y = course.y.copy()
-    y[: course.first] = np.nan
-    y[unresolved_edges(course.v)] = np.nan
+    y, edges = course.y.copy(), unresolved_edges(course.v)
+    y[: _arrived(course, edges)] = np.nan
+    y[edges] = np.nan
     run = Run(np.ascontiguousarray(record.t, dtype=np.float64), course.v, dict(record.extra), rest)
     turns = None if course.start is None else course.start.turns
     return Item(course.name, run, y, course.history, course.output_range, turns=turns, timed=record.timed)
+
+
+def _arrived(course: Course, edges: NDArray[np.bool_]) -> int:
+    """First sample to compare: where a step of the drive wipes the start memory, that at which the output has come to
+    rest behind it (within `AS_FAR`), since a lag or a limit in front of the plays has them wiped no earlier."""
+    first = course.first
+    if course.start is not None or course.visited is not None or not edges[first : first + 1].any():
+        return first
+    moves = np.abs(course.v[first:] - course.v[first]) > stands_within(course.v)
+    y = course.y[first : first + int(np.argmax(moves)) if moves.any() else course.last]
+    rest = y[len(y) // 2 :]
+    if not np.isfinite(rest).any():
+        return first
+    close = np.abs(y - np.nanmedian(rest)) <= AS_FAR * course.output_range
+    return first + int(np.argmax(close))
 
 
 def _outliers(course: Course) -> NDArray[np.intp]:

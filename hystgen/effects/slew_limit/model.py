@@ -29,10 +29,11 @@ LEAST = 3.0
 
 
 @jit
-def limit(u: Array, up: Array, down: Array, out: Array) -> None:
+def limit(u: Array, up: Array, down: Array, out: Array, off: Array) -> None:
     """`u`, straight between samples, followed at no more than `up_k` upwards and `down_k` downwards in a step.
 
-    Where it is met within a step, the rest of the step goes along with it, or as fast as it may.
+    Where it is met within a step, the rest of the step goes along with it, or as fast as it may. `off`: mean distance
+    from `u` over each step.
     """
     x = u[0]
     out[0] = x
@@ -42,11 +43,15 @@ def limit(u: Array, up: Array, down: Array, out: Array) -> None:
         closing = up[k] - change if ahead > 0.0 else down[k] + change
         if ahead != 0.0 and not closing > abs(ahead):
             x = x + up[k] if ahead > 0.0 else x - down[k]
+            off[k] = 0.5 * (x - u[k + 1] - ahead)
         elif -down[k] <= change <= up[k]:
+            part = abs(ahead) / closing if ahead != 0.0 else 0.0
             x = u[k + 1]
+            off[k] = -0.5 * part * ahead
         else:
             part = abs(ahead) / closing if ahead != 0.0 else 0.0
             x = u[k] + part * change + (1.0 - part) * (up[k] if change > 0.0 else -down[k])
+            off[k] = 0.5 * ((1.0 - part) * (x - u[k + 1]) - part * ahead)
         out[k + 1] = x
 
 
@@ -111,6 +116,12 @@ class _SlewLimit(Effect):
             object.__setattr__(self, "falling_rate", self.rate)
         return self
 
+    def limited(self, u: Array, steps: Array) -> tuple[Array, Array]:
+        """A drive as fast as it may be, and its mean distance from `u` over each of the steps [s]."""
+        out, off = np.empty_like(u), np.empty(len(steps))
+        limit(u, self.rate * steps, self.falling_rate * steps, out, off)
+        return out, off
+
     @classmethod
     def _candidate(cls, label: str, n: int, about: About, anywhere: bool = False, **more: Any) -> Candidate:
         """One rate, or one for each direction, up to the fastest recorded one; `anywhere`: also the place of edges."""
@@ -147,9 +158,7 @@ class SlewLimit(_SlewLimit):
 
     def drive(self, a: Array, run: Run) -> Array:
         """The drive as fast as it may be."""
-        out = np.empty_like(a)
-        limit(a, self.rate * run.steps, self.falling_rate * run.steps, out)
-        return out
+        return self.limited(a, run.steps)[0]
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -183,9 +192,18 @@ class SuddenSlewLimit(_SlewLimit):
         """The drive as fast as it may be."""
         times, drive, given = np.empty(3 * len(a)), np.empty(3 * len(a)), np.empty(len(a), dtype=np.intp)
         n = sudden(run.t, a, self.edge, times, drive, given)
-        steps, out = np.diff(times[:n]), np.empty(n)
-        limit(drive[:n], self.rate * steps, self.falling_rate * steps, out)
-        return np.asarray(out[given])
+        times, drive = times[:n], drive[:n]
+        if self.edge != MIDDLE or n == len(a):
+            return np.asarray(self.limited(drive, np.diff(times))[0][given])
+        between = 0.5 * (run.t[:-1] + run.t[1:])
+        at = np.searchsorted(times, between)
+        share = (between - times[at - 1]) / (times[at] - times[at - 1])
+        drive = np.insert(drive, at, drive[at - 1] + share * (drive[at] - drive[at - 1]))
+        steps = np.diff(np.insert(times, at, between))
+        _, off = self.limited(drive, steps)
+        edges = np.concatenate([[0], at + np.arange(len(at)), [len(steps)]])
+        summed = np.concatenate([[0.0], np.cumsum(off * steps)])
+        return np.asarray(a + np.diff(summed[edges]) / np.diff(np.concatenate([run.t[:1], between, run.t[-1:]])))
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -210,5 +228,5 @@ SHAPES = (SlewLimit, SuddenSlewLimit)
 def load() -> None:
     """Have the recursions compiled, or read from the cache, on two samples."""
     two, one = np.arange(2.0), np.ones(1)
-    limit(two, one, one, np.empty(2))
+    limit(two, one, one, np.empty(2), np.empty(1))
     sudden(two, two, MIDDLE, np.empty(6), np.empty(6), np.empty(2, dtype=np.intp))
