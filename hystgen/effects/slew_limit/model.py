@@ -177,7 +177,8 @@ class SuddenSlewLimit(_SlewLimit):
     A generator steps where the record has a change within a sample or two. Taken as straight, the limited edge begins
     up to a sample early, and everything until it arrives is early by as much. When in that time the drive steps depends
     on how it was recorded: halfway in averages over each sample, at the later sample if a command was recorded as the
-    converter took it, at the earlier one if the converter had been given it by then.
+    converter took it, at the earlier one if the converter had been given it by then. What a record of averages shows
+    behind the limit is an average too: the drive, and the mean distance from it over each sample.
     """
 
     shape: Literal["sudden"] = Field(description="steps of the drive within one or two samples take no time")
@@ -193,17 +194,21 @@ class SuddenSlewLimit(_SlewLimit):
         times, drive, given = np.empty(3 * len(a)), np.empty(3 * len(a)), np.empty(len(a), dtype=np.intp)
         n = sudden(run.t, a, self.edge, times, drive, given)
         times, drive = times[:n], drive[:n]
-        if self.edge != MIDDLE or n == len(a):
-            return np.asarray(self.limited(drive, np.diff(times))[0][given])
-        between = 0.5 * (run.t[:-1] + run.t[1:])
-        at = np.searchsorted(times, between)
-        share = (between - times[at - 1]) / (times[at] - times[at - 1])
+        if self.edge == MIDDLE and n > len(a):
+            return np.asarray(a + self._mean_off(run.t, times, drive))
+        return np.asarray(self.limited(drive, np.diff(times))[0][given])
+
+    def _mean_off(self, t: Array, times: Array, drive: Array) -> Array:
+        """Mean distance of the limited drive from that of `times` over each sample, which ends halfway to the next."""
+        ends = 0.5 * (t[:-1] + t[1:])
+        at = np.searchsorted(times, ends)
+        share = (ends - times[at - 1]) / (times[at] - times[at - 1])
         drive = np.insert(drive, at, drive[at - 1] + share * (drive[at] - drive[at - 1]))
-        steps = np.diff(np.insert(times, at, between))
+        steps = np.diff(np.insert(times, at, ends))
         _, off = self.limited(drive, steps)
-        edges = np.concatenate([[0], at + np.arange(len(at)), [len(steps)]])
         summed = np.concatenate([[0.0], np.cumsum(off * steps)])
-        return np.asarray(a + np.diff(summed[edges]) / np.diff(np.concatenate([run.t[:1], between, run.t[-1:]])))
+        ended = np.concatenate([[0], at + np.arange(len(at)), [len(steps)]])
+        return np.asarray(np.diff(summed[ended]) / np.diff(np.concatenate([t[:1], ends, t[-1:]])))
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
