@@ -287,8 +287,12 @@ def slew_limit(rng: np.random.Generator, made: Session, x: float, plant: Plant) 
     def change(made: Session, v: Array) -> Array:
         out, now, last = np.empty(len(v)), float(v[0]), float(v[0])
         for k, (value, step) in enumerate(zip(v.tolist(), np.diff(made.t, prepend=made.t[0]).tolist(), strict=True)):
-            for goal in (last, value):  # the drive steps halfway between two times
-                now += float(np.clip(goal - now, -0.5 * rate * step, 0.5 * rate * step))
+            most = rate * step
+            if abs(value - last) <= most:
+                now += float(np.clip(value - now, -most, most))
+            else:  # the drive steps halfway between two times
+                for goal in (last, value):
+                    now += float(np.clip(goal - now, -0.5 * most, 0.5 * most))
             out[k], last = now, value
         return out
 

@@ -49,9 +49,11 @@ def test_a_mode_and_a_lag_answer_a_step_as_known() -> None:
     phase, decay = 2.0 * np.pi * 20.0 * root * since, np.exp(-0.05 * 2.0 * np.pi * 20.0 * since)
     expected = 1.0 - decay * (np.cos(phase) + 0.05 / root * np.sin(phase))
     assert rings[1:] == pytest.approx(expected, abs=1e-9)
-    limited = Plant([], [], [])
-    second_plants.slew_limit(np.random.default_rng(0), Session(t, x, (), (), (), 400, 1e-3), 0.05, limited)
-    assert limited.drive[0](Session(t, x, (), (), (), 400, 1e-3), x)[1:] == pytest.approx(np.minimum(since * 50.0, 1.0))
+    limited, made = Plant([], [], []), Session(t, x, (), (), (), 400, 1e-3)
+    second_plants.slew_limit(np.random.default_rng(0), made, 0.05, limited)
+    assert limited.drive[0](made, x)[1:] == pytest.approx(np.minimum(since * 50.0, 1.0))
+    within = np.sin(49.0 * t)  # as fast as the limit lets pass
+    assert limited.drive[0](made, within) == pytest.approx(within, abs=1e-12)
 
 
 def test_a_sine_passes_a_mode_and_a_lag_without_being_early() -> None:
