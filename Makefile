@@ -38,10 +38,10 @@ demo: $(VENV)/demo
 test: $(VENV)/ready
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough"
 
-# All that CI runs; each process has half of the files to begin with, so that few functions are compiled twice
+# All that CI runs
 check: $(VENV)/ready lint
 	$(BIN)/python tests/static_checks.py
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	$(BIN)/python -m pytest -n 2
 
 # All proofs of Frama-C, which has to be there; `make check` does half of them
 prove: $(VENV)/ready
