@@ -178,7 +178,7 @@ class SuddenSlewLimit(_SlewLimit):
     up to a sample early, and everything until it arrives is early by as much. When in that time the drive steps depends
     on how it was recorded: halfway in averages over each sample, at the later sample if a command was recorded as the
     converter took it, at the earlier one if the converter had been given it by then. What a record of averages shows
-    behind the limit is an average too: the drive, and the mean distance from it over each sample.
+    behind the limit is an average too.
     """
 
     shape: Literal["sudden"] = Field(description="steps of the drive within one or two samples take no time")
@@ -194,21 +194,27 @@ class SuddenSlewLimit(_SlewLimit):
         times, drive, given = np.empty(3 * len(a)), np.empty(3 * len(a)), np.empty(len(a), dtype=np.intp)
         n = sudden(run.t, a, self.edge, times, drive, given)
         times, drive = times[:n], drive[:n]
-        if self.edge == MIDDLE and n > len(a):
-            return np.asarray(a + self._mean_off(run.t, times, drive))
-        return np.asarray(self.limited(drive, np.diff(times))[0][given])
+        then = self.limited(drive, np.diff(times))[0][given]
+        return self._averaged(a, then, run.t, times, drive) if self.edge == MIDDLE and n > len(a) else then
 
-    def _mean_off(self, t: Array, times: Array, drive: Array) -> Array:
-        """Mean distance of the limited drive from that of `times` over each sample, which ends halfway to the next."""
+    def _averaged(self, a: Array, then: Array, t: Array, times: Array, drive: Array) -> Array:
+        """The limited drive, `then` at its samples, with means over those that last halfway to the samples beside them.
+
+        A sample `a` is the mean of the drive if that steps or stands there, which the mean distance then adds to. It is
+        the drive itself where that is bent between samples by more than a tenth of what the limit lets pass.
+        """
         ends = 0.5 * (t[:-1] + t[1:])
         at = np.searchsorted(times, ends)
         share = (ends - times[at - 1]) / (times[at] - times[at - 1])
         drive = np.insert(drive, at, drive[at - 1] + share * (drive[at] - drive[at - 1]))
         steps = np.diff(np.insert(times, at, ends))
-        _, off = self.limited(drive, steps)
-        summed = np.concatenate([[0.0], np.cumsum(off * steps)])
-        ended = np.concatenate([[0], at + np.arange(len(at)), [len(steps)]])
-        return np.asarray(np.diff(summed[ended]) / np.diff(np.concatenate([t[:1], ends, t[-1:]])))
+        summed = np.concatenate([[0.0], np.cumsum(self.limited(drive, steps)[1] * steps)])
+        first = np.concatenate([[0], at + np.arange(len(at)), [len(steps)]])
+        last = np.diff(np.concatenate([t[:1], ends, t[-1:]]))
+        jumps = np.add.reduceat((steps == 0.0) & (np.diff(drive) != 0.0), first[:-1]) > 0
+        bent = np.abs(drive[first[:-1]] - 2.0 * a + drive[first[1:]])
+        stands = bent <= min(self.rate, self.falling_rate) * last / BESIDE
+        return np.where(jumps | stands, a + np.diff(summed[first]) / last, then)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
