@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hystgen.basics.problems import counted
 from hystgen.chain import chain
 from hystgen.diagnosis.data.items import Item, Model, masks, rms
-from hystgen.diagnosis.data.signals import stands_within, unresolved_edges
+from hystgen.diagnosis.data.signals import still, unresolved_edges
 from hystgen.diagnosis.findings.kinds import (
     DropOuts,
     ExchangedRecords,
@@ -404,18 +404,19 @@ def _item(course: Course, record: Record, rest: float) -> Item:
 
 
 def _arrived(course: Course, edges: NDArray[np.bool_]) -> int:
-    """First sample to compare: where a step of the drive wipes the start memory, that at which the output has come to
-    rest behind it (within `AS_FAR`), since a lag or a limit in front of the plays has them wiped no earlier."""
+    """First sample to compare; where a step of the drive wipes the start memory, the first at which the output has come
+    within `AS_FAR` of where it settles. Behind a lag or a slew limit the plays are wiped only then."""
     first = course.first
     if course.start is not None or course.visited is not None or not edges[first : first + 1].any():
         return first
-    moves = np.abs(course.v[first:] - course.v[first]) > stands_within(course.v)
-    y = course.y[first : first + int(np.argmax(moves)) if moves.any() else course.last]
-    rest = y[len(y) // 2 :]
+    holds = still(course.v[first : course.last], acceptance.EDGE_STANDS)
+    if not holds or holds[0][0] > 0:
+        return first
+    y = course.y[first : first + holds[0][1]]
+    rest = y[int(acceptance.HOLD_SETTLING * len(y)) :]
     if not np.isfinite(rest).any():
         return first
-    close = np.abs(y - np.nanmedian(rest)) <= AS_FAR * course.output_range
-    return first + int(np.argmax(close))
+    return first + int(np.argmax(np.abs(y - np.nanmedian(rest)) <= AS_FAR * course.output_range))
 
 
 def _outliers(course: Course) -> NDArray[np.intp]:

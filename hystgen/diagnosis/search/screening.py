@@ -526,7 +526,7 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) ->
     going_on, others = [], []
     for k, numbers in done.items():
         if numbers.residual > hopeful:
-            others += anew(k, numbers)  # beside the memory found without it, a right one can be twice as far off
+            others += anew(k, numbers)  # with the old start memories the right shape can leave twice the error
         else:
             going_on.append(_Task(_POLISH, k, *numbers[:2], joint.MOST_STEPS))
     done |= all_of([*going_on, *others])

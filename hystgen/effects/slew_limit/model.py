@@ -18,7 +18,9 @@ BELOW = (0.3, 0.5, 0.7, 1.0, 1.6, 2.2)
 BESIDE = 10.0
 """[times] A step of the drive is faster than the changes beside it by at least this; those of a smooth drive are alike.
 Steps between levels at rest are far beyond it, up to the noise of the converter. Changed by:
-test_effects::test_sudden_edges_leave_other_drives_alone."""
+test_effects::test_sudden_edges_leave_other_drives_alone. What bends by less than this part of a limit's travel in a
+sample counts as straight: with 2 `friction damper, exchanged` of docs/recordings.csv has the limit as a rival, from 10
+to 50 it does not, and steps of `tests.second_plants` (single 23015) are the same."""
 
 MIDDLE = 0.5
 """[samples] Place of a step between two samples of a drive that was measured by averages over each of them. Derived:
@@ -198,10 +200,10 @@ class SuddenSlewLimit(_SlewLimit):
         return self._averaged(a, then, run.t, times, drive) if self.edge == MIDDLE and n > len(a) else then
 
     def _averaged(self, a: Array, then: Array, t: Array, times: Array, drive: Array) -> Array:
-        """The limited drive, `then` at its samples, with means over those that last halfway to the samples beside them.
+        """Mean of the limited drive over each sample, which lasts halfway to those beside it; `then`: its value there.
 
-        A sample `a` is the mean of the drive if that steps or stands there, which the mean distance then adds to. It is
-        the drive itself where that is bent between samples by more than a tenth of what the limit lets pass.
+        Where the drive steps or is straight, a sample `a` is its mean, and the mean distance is added. Where it bends,
+        `a` is not, and the bend would pass the limit: `then` stands.
         """
         ends = 0.5 * (t[:-1] + t[1:])
         at = np.searchsorted(times, ends)
