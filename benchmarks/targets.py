@@ -661,7 +661,7 @@ def measure(
         for target, compiler in itertools.product(chosen, names):
             try:
                 cross.find(target, compiler)
-            except cross.MissingError as error:
+            except compilers.MissingError as error:
                 print(f"left out: {error}", file=sys.stderr)
                 continue
             for n, arithmetic in itertools.product(plays, arithmetics):

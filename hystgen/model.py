@@ -212,12 +212,14 @@ class Model:
             engine or emit.engine, optimize or emit.optimize, self.cascade, *about, effects=bool(self.effects)
         )
 
-    def tables(self, arithmetic: str, engine: str) -> Tables | FixedTables | ChainTables:
-        """The numbers of the emitted model in one arithmetic, with the parameter file's LSBs in fixed point."""
+    def tables(
+        self, arithmetic: str, engine: str, operator: str | None = None
+    ) -> Tables | FixedTables | ChainTables:
+        """The numbers of an emitted operator, by default the parameter file's, with its LSBs in fixed point."""
         if self.effects:
             from hystgen.compensator.chain import tables as chain_tables
 
-            self.need_compensated(arithmetic, self.parameters.emit.operator)
+            self.need_compensated(arithmetic, operator or self.parameters.emit.operator)
             assert self.parameters.sample_time is not None
             how = self.parameters.emit.compensation
             return chain_tables.build(

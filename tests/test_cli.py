@@ -613,18 +613,97 @@ def test_a_compiler_that_is_not_installed_fails_and_is_named(monkeypatch: pytest
     monkeypatch.setattr(compilers, "find", lambda _: None)
     Path("linear.yaml").write_text(FILES["linear"])
     for arguments, named in ((("--compiler", "clang"), "clang"), ((), "compiler")):
-        result = hyst("verify", "linear.yaml", *arguments, "--json", "r.json", "--junit", "r.xml", code=1)
+        result = hyst("verify", "linear.yaml", *arguments, "--json", "r.json", "--junit", "r.xml", code=2)
         assert named in result.stdout
+        assert re.search("install(ed)?[ :]", result.stdout)
+        assert "verification failed" not in result.stderr
         assert report()["ok"] is False
+        assert all(row["missing"] for row in report()["rows"])
         suite = ElementTree.parse("r.xml").getroot()
-        assert int(suite.get("failures", 0)) == len(suite.findall("testcase")) == len(suite.findall(".//failure")) > 0
+        assert int(suite.get("errors", 0)) == len(suite.findall("testcase")) == len(suite.findall(".//error")) > 0
+        assert suite.get("failures") == "0"
 
 
 @pytest.mark.usefixtures("_short")
 def test_a_compiler_that_does_not_exist_fails_and_is_named(installed: str) -> None:
     Path("linear.yaml").write_text(FILES["linear"])
-    result = hyst("verify", "linear.yaml", "--compiler", "no-such-cc", "--compiler", installed, code=1)
-    assert "no-such-cc" in result.stdout + result.stderr
+    result = hyst("verify", "linear.yaml", "--compiler", "no-such-cc", "--compiler", installed, code=2)
+    assert "no-such-cc is not installed; install it, or name another compiler: gcc, clang, zig" in result.stdout
+    assert result.stdout.count("bits equal") == 2
+
+
+@pytest.mark.usefixtures("_short")
+def test_a_missing_tool_does_not_hide_a_wrong_bit(installed: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    sabotage(monkeypatch, "inverse", up)
+    result = hyst("verify", "stage.yaml", "--compiler", "no-such-cc", "--compiler", installed, code=1)
+    assert "verification failed" in result.stderr
+
+
+@pytest.mark.usefixtures("_short")
+def test_several_models_are_verified_in_one_report(installed: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two of them of one name; one of them wrong."""
+    Path("linear.yaml").write_text(FILES["linear"])
+    Path("other").mkdir()
+    Path("other/linear.yaml").write_text(FILES["linear"].replace("[2]", "[3]"))
+    files = ("stage.yaml", "linear.yaml", "other/linear.yaml")
+    how = ("--compiler", installed, "--json", "r.json", "--junit", "r.xml")
+    result = hyst("verify", *files, "stage.yaml", *how)  # one named twice
+    assert result.stdout.count("bits equal") == 6
+    assert [line.split(":")[0] for line in result.stdout.splitlines() if ": " in line] == list(files)
+    said = report()
+    assert (said["hystgen"], said["ok"], [one["file"] for one in said["reports"]]) == (1, True, list(files))
+    assert [one["name"] for one in said["reports"]] == ["stage", "linear", "linear"]
+    assert all(row["ok"] for one in said["reports"] for row in one["rows"])
+    root = ElementTree.parse("r.xml").getroot()
+    assert (root.tag, root.get("tests"), root.get("failures"), root.get("errors")) == ("testsuites", "6", "0", "0")
+    names = {(case.get("classname"), case.get("name")) for case in root.iter("testcase")}
+    assert len(names) == 6, "no test case hides another"
+    sabotage(monkeypatch, "inverse", up)
+    monkeypatch.setattr(module, "files", partial(_only_stage, module.files, right=_RIGHT))
+    result = hyst("verify", "linear.yaml", "stage.yaml", *how, code=1)
+    assert [one["ok"] for one in report()["reports"]] == [True, False]
+
+
+_RIGHT = module.files
+
+
+def _only_stage(wrong: Callable[..., dict[str, str]], *arguments: Any, right: Any) -> dict[str, str]:
+    made: dict[str, str] = (wrong if arguments[0].name == "stage" else right)(*arguments)
+    return made
+
+
+def test_one_model_that_is_refused_stops_all_before_any_runs() -> None:
+    Path("flat.yaml").write_text(NO_INVERSE)
+    Path("bad.yaml").write_text(BROKEN)
+    before = everything()
+    result = hyst("verify", "stage.yaml", "flat.yaml", "--json", "r.json", code=1)
+    assert "flat.yaml: error: no inverse" in result.stderr
+    assert "verifying" not in result.stderr
+    result = hyst("verify", "stage.yaml", "bad.yaml", "gone.yaml", "--json", "r.json", code=2)
+    assert "bad.yaml:3:" in result.stderr
+    assert "gone.yaml: error: cannot be read" in result.stderr
+    assert everything() == before
+
+
+@pytest.mark.usefixtures("_short")
+@pytest.mark.parametrize(
+    ("weights", "effect", "more"),
+    [
+        ("[0.0, 0.02, 0.01]", "name: creep, time_constants: [0.1], weights: [0.02]", ""),
+        ("[0.1, 0.02, 0.01]", "name: lag, time_constant: 0.1", "emit: {compensation: {noise_gain: 1.0e-3}}\n"),
+    ],
+)
+def test_verify_takes_the_forward_operators_that_emit_writes(
+    weights: str, effect: str, more: str, installed: str
+) -> None:
+    """Also of models whose inverse does not exist, or has more noise than is allowed."""
+    Path("m.yaml").write_text(
+        "hystgen: 1\nname: m\nsample_time: 1.0e-3\ninput_range: [0.0, 100.0]\nmodel:\n"
+        f"  pi: {{thresholds: [0, 5, 10], weights: {weights}}}\n  effects:\n    - {{{effect}}}\n{more}"
+    )
+    for command in (("emit", "m.yaml", "-o", "fw"), ("verify", "m.yaml", "--compiler", installed)):
+        hyst(*command, code=1)
+        hyst(*command, "--operator", "forward")
 
 
 def sabotage(monkeypatch: pytest.MonkeyPatch, operator: str, change: Callable[[np.float32], np.float32]) -> None:

@@ -421,7 +421,8 @@ def test_an_avr_without_its_tools_is_a_failure(tmp_path: Path) -> None:
     board = targets.Board("atmega1284p", "no-such-gcc", (), "no-such-simulator", "no-such-size", 0x4000)
     nothing = sources.Sources("plain", (), (), tmp_path / "harness.c")
     (row,) = avr.rows(board, nothing, None, (), tmp_path, lambda _: None)
-    assert row.error == "no-such-gcc and no-such-size and no-such-simulator not installed"
+    assert row.missing
+    assert row.error == "no-such-gcc and no-such-size and no-such-simulator are not installed; install them"
 
 
 def test_what_is_named_twice_is_done_once() -> None:
@@ -437,7 +438,8 @@ def test_what_is_named_twice_is_done_once() -> None:
 def test_c_that_does_not_compile_for_a_core_is_a_failure(changed_c: Callable[..., None]) -> None:
     changed_c("plain.c", lambda text: text + "\nint unused_argument(int x) { return 0; }\n")
     report = hystgen.verify(model("plain"), targets=["rv32imac"], compiler=["zig"], target_length=100)
-    assert [row.ok for row in report.rows] == [False]
+    assert [(row.ok, row.missing) for row in report.rows] == [(False, False)]
+    assert report.wrong
     assert "unused" in report.table()
 
 
@@ -465,6 +467,7 @@ def test_a_missing_wheel_is_a_failure_that_says_what_to_install(package: str, mo
     monkeypatch.setitem(sys.modules, package, None)
     report = hystgen.verify(model("plain"), targets=["cortex-m4f", "rv32imac"], target_length=100)
     assert [(row.target, row.ok) for row in report.rows] == [("cortex-m4f", False), ("rv32imac", False)]
+    assert all(row.missing for row in report.rows)
     assert report.table().count(extras.install("targets")) == 2
 
 
@@ -475,7 +478,10 @@ def test_missing_compilers_are_failures(monkeypatch: pytest.MonkeyPatch) -> None
     by_default = hystgen.verify(model("plain"), targets=["cortex-m4f"], target_length=100)
     assert [row.error for row in by_default.rows] == [f"zig is not installed: {extras.install('targets')}"]
     asked = hystgen.verify(model("plain"), targets=["rv32imac"], compiler=["gcc", "clang"], target_length=100)
-    assert [row.error for row in asked.rows] == ["riscv64-unknown-elf-gcc is not installed"]
+    assert [row.error for row in asked.rows] == [
+        "riscv64-unknown-elf-gcc is not installed; on Debian: apt install gcc-riscv64-unknown-elf"
+    ]
+    assert all(row.missing for row in (*by_default.rows, *asked.rows))
     only = hystgen.verify(model("plain"), targets=["rv32imac"], compiler=["clang"], target_length=100)
     assert [row.error for row in only.rows] == ["clang does not build for rv32imac; use zig or gcc"]
     cross.find.cache_clear()
@@ -722,6 +728,7 @@ def test_a_wheel_that_cannot_be_loaded_is_a_failure(tmp_path: Path, monkeypatch:
     monkeypatch.syspath_prepend(tmp_path)
     report = hystgen.verify(model("plain"), targets=["cortex-m4f"], target_length=9)
     assert [row.error for row in report.rows] == ["unicorn cannot be loaded: ImportError: no libunicorn here"]
+    assert not report.wrong
 
 
 def test_progress_says_what_is_being_built() -> None:

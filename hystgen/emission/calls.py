@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from hystgen.basics import arguments, writing
+from hystgen.basics.problems import NotInvertibleError
 from hystgen.compensator import engines
 from hystgen.compensator.chain.bounds import swing
 from hystgen.compensator.chain.parts import Parts
@@ -55,6 +56,8 @@ def emit_options(
         left_out = tuple(worth.sentence(model, effect, reason) for effect, reason in refused)
         model = model.without([effect for effect, _ in refused])
     model.need_compensated(arithmetic, operator)
+    if operator != "forward" and model.cascade.inverse_problems():
+        raise NotInvertibleError(model.cascade.inverse_problems())
     return Options(operator, arithmetic, model.engine(engine, operator, arithmetic, optimize), layout, left_out)
 
 

@@ -14,7 +14,6 @@ from typing import Any
 import jinja2
 import numpy as np
 
-from hystgen.basics.problems import NotInvertibleError
 from hystgen.basics.version import __version__
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
@@ -57,10 +56,8 @@ def files(
 ) -> dict[str, str]:
     """File names and their ASCII text; `sha256`: hash of the parameters in the file, by default of `parameters`.
 
-    Raises NotInvertibleError and tables.FormatError.
+    Raises tables.FormatError.
     """
-    if options.inverse and cascade.inverse_problems():
-        raise NotInvertibleError(cascade.inverse_problems())
     values = values_of(parameters, cascade, options)
     values.sha256 = sha256 or parameters_sha256(parameters)
     name, shared = parameters.name, options.layout == "shared-runtime"

@@ -4,10 +4,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from hystgen.verification.report import Report as Report
+    from hystgen.verification.report import Reports as Reports
     from hystgen.verification.report import Row as Row
     from hystgen.verification.run import verify as verify
 
-__all__ = ["Report", "Row", "verify"]
+__all__ = ["Report", "Reports", "Row", "verify"]
 
 
 def __getattr__(name: str) -> Any:

@@ -62,11 +62,13 @@ def rows(
     """
     if compiler and "gcc" not in compiler:
         words = f"does not build for {board.name}; use gcc"
-        return [Row(board.name, each, "-", "-", error=f"{each} {words}") for each in compiler]
+        return [
+            failed(Row(board.name, each, "-", "-"), compilers.MissingError(f"{each} {words}")) for each in compiler
+        ]
     row = Row(board.name, "gcc", "firmware", "selftest")
     missing = [command for command in (board.gcc, board.size, board.simulator) if shutil.which(command) is None]
     if missing:
-        return [failed(row, f"{' and '.join(missing)} not installed")]
+        return [failed(row, compilers.uninstalled(missing))]
     progress(f"{board.name}, gcc, firmware on {board.simulator}")
     try:
         built = build(board, sources, folder / board.name)
@@ -78,7 +80,7 @@ def rows(
         result = run(board, link(board, sources, built.objects, folder / board.name))
         return [selftest(row, sources.name, result)]
     except (compilers.CompileError, EmulatorError) as error:
-        return [replace(row, error=str(error))]
+        return [failed(row, error)]
 
 
 def _too_large(board: Board, built: Built, size: Size) -> str:

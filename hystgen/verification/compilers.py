@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from hystgen.basics import writing
+from hystgen.basics import extras, writing
 
 WARNINGS = [
     "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wshadow", "-Wundef",
@@ -34,8 +34,20 @@ DEFAULTS = [*USER, *(["-march=native"] if platform.machine() in ("x86_64", "AMD6
 NAMES = ("gcc", "clang", "zig")
 
 
+DEBIAN = {
+    "gcc": "gcc", "clang": "clang", "arm-none-eabi-gcc": "gcc-arm-none-eabi",
+    "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf", "avr-gcc": "gcc-avr avr-libc", "avr-size": "binutils-avr",
+    "simavr": "simavr",
+}  # fmt: skip
+"""Debian's packages of the commands that a verification calls."""
+
+
 class CompileError(RuntimeError):
     """The compiler refused; the message holds its output."""
+
+
+class MissingError(CompileError):
+    """A tool that is asked for cannot be used on this machine; the message says what to install."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +66,7 @@ class Compiler:
                 check=False, stdin=subprocess.DEVNULL, env={**os.environ, **_own(self.name), "TMPDIR": str(folder)},
             )  # fmt: skip
         except OSError as failure:
-            raise CompileError(f"{self.name} cannot be started: {failure.strerror}") from None
+            raise MissingError(f"{self.name} cannot be started: {failure.strerror}; install it anew") from None
         if done.returncode:
             raise CompileError(f"{self.name} failed:\n{(done.stderr or done.stdout).strip()}")
 
@@ -92,9 +104,27 @@ def find(name: str) -> Compiler | None:
     return Compiler(name, (path, *words[1:])) if path else None
 
 
-def missing(name: str) -> str:
-    """The message for a compiler that `find` does not find."""
-    return f"{shlex.split(name)[0]} is not installed"
+def missing(name: str) -> MissingError:
+    """The error for a compiler that `find` does not find."""
+    command = shlex.split(name)[0]
+    if command == "zig":
+        return MissingError(f"zig is not installed; install it with: {extras.install('zig')}")
+    if command in DEBIAN:
+        return uninstalled([command])
+    return MissingError(f"{command} is not installed; install it, or name another compiler: {', '.join(NAMES)}")
+
+
+def uninstalled(commands: Sequence[str]) -> MissingError:
+    """The error for commands that are not installed, with Debian's packages of those that have one."""
+    packages = " ".join(DEBIAN[command] for command in commands if command in DEBIAN)
+    advice = f"; on Debian: apt install {packages}" if packages else "; install them"
+    are = "are" if len(commands) > 1 else "is"
+    return MissingError(f"{' and '.join(commands)} {are} not installed{advice}")
+
+
+def none_found() -> MissingError:
+    """The error for a machine without any compiler."""
+    return MissingError(f"no C compiler found; install gcc or clang, or: {extras.install('zig')}")
 
 
 @functools.cache

@@ -28,15 +28,16 @@ def rows(
     compilers contract a product and a sum, with a row for the self-test; where qemu is installed, also the self-test as
     a whole firmware.
     """
-    problem = cross.wheel_problem()
-    if problem:
-        yield Row(target.name, "-", "-", "-", error=problem)
+    try:
+        cross.check_wheels()
+    except compilers.MissingError as error:
+        yield failed(Row(target.name, "-", "-", "-"), error)
         return
     for name in cross.chosen(target, compiler):
         try:
             found = cross.find(target, name)
-        except cross.MissingError as error:
-            yield Row(target.name, name, "-", "-", error=str(error))
+        except compilers.MissingError as error:
+            yield failed(Row(target.name, name, "-", "-"), error)
             continue
         builds = [("strict", compilers.STRICT)] + ([("defaults", compilers.USER)] if target.fpu else [])
         for build, flags in builds:
@@ -76,7 +77,7 @@ def _emulated(
             core = emulator.Core(target, image)
             size = core.call(f"hystgen_harness_{op}_size")
             outcome = compare(functools.partial(core.run, sources.name, op), records(op))
-        except emulator.EmulatorError as error:
+        except (compilers.MissingError, emulator.EmulatorError) as error:
             yield failed(row, error)
             continue
         yield Row(
@@ -95,7 +96,7 @@ def _emulated(
     row = Row(target.name, compiler.name, build, "selftest")
     try:
         row = selftest(row, sources.name, emulator.Core(target, image).call(f"{sources.name}_selftest"))
-    except emulator.EmulatorError as error:
+    except (compilers.MissingError, emulator.EmulatorError) as error:
         row = failed(row, error)
     if build == "defaults" or not row.ok:
         yield row

@@ -23,10 +23,6 @@ NAMES = ("zig", "gcc")
 FREESTANDING = ["-ffreestanding", "-fno-unwind-tables", "-fno-asynchronous-unwind-tables", "-g0"]
 
 
-class MissingError(RuntimeError):
-    """A compiler that is asked for is not there; the message says what to install."""
-
-
 @dataclass(frozen=True)
 class Layout:
     """Where an image lies in memory."""
@@ -90,15 +86,15 @@ def find(target: Target, name: str) -> CrossCompiler:
     if name == "zig":
         found = compilers.find("zig")
         if found is None:
-            raise MissingError(f"zig is not installed: {extras.install(EXTRA)}")
+            raise compilers.MissingError(f"zig is not installed: {extras.install(EXTRA)}")
         return CrossCompiler(found, target.zig, ())
     if name == "gcc":
         path = shutil.which(target.gcc)
         if path is None:
-            raise MissingError(f"{target.gcc} is not installed")
+            raise compilers.uninstalled([target.gcc])
         # No library but the compiler's own: emitted code needs none
         return CrossCompiler(compilers.Compiler("gcc", (path,)), (*target.gcc_flags, "-nostdlib"), ("-lgcc",))
-    raise MissingError(f"{name} does not build for {target.name}; use {' or '.join(NAMES)}")
+    raise compilers.MissingError(f"{name} does not build for {target.name}; use {' or '.join(NAMES)}")
 
 
 def chosen(target: Target, compiler: Sequence[str]) -> tuple[str, ...]:
@@ -111,15 +107,14 @@ def chosen(target: Target, compiler: Sequence[str]) -> tuple[str, ...]:
     return NAMES if shutil.which(target.gcc) else NAMES[:1]
 
 
-def wheel_problem() -> str:
-    """Why the wheels of the emulator cannot be used; empty where they can."""
+def check_wheels() -> None:
+    """Raise MissingError where the wheels of the emulator cannot be used."""
     wheels = {"unicorn": "unicorn", "elftools": "pyelftools"}
     missing = [wheel for package, wheel in wheels.items() if importlib.util.find_spec(package) is None]
     if missing:
-        return f"{', '.join(missing)} not installed: {extras.install(EXTRA)}"
+        raise compilers.MissingError(f"{', '.join(missing)} not installed: {extras.install(EXTRA)}")
     for package, wheel in wheels.items():
         try:
             importlib.import_module(package)
         except Exception as error:
-            return f"{wheel} cannot be loaded: {type(error).__name__}: {error}"
-    return ""
+            raise compilers.MissingError(f"{wheel} cannot be loaded: {type(error).__name__}: {error}") from None

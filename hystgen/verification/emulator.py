@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics import extras, writing
+from hystgen.basics import writing
 from hystgen.emission import runtime
 from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
@@ -82,15 +82,17 @@ class _Counter(ctypes.Structure):
 
 @functools.cache
 def _hook() -> Any:
-    """The counting hook as machine code of this machine. Raises EmulatorError."""
+    """The counting hook as machine code of this machine. Raises EmulatorError and MissingError."""
     found = compilers.available()
     if not found:
-        raise EmulatorError(f"no C compiler for this machine; install gcc or clang, or: {extras.install('zig')}")
+        raise compilers.none_found()
     source = runtime.data_folder("templates") / "instruction_counter.c"
     with writing.temporary() as folder:
         library = folder / "instruction_counter.so"
         try:
             found[0].shared_library([source], library, compilers.STRICT)
+        except compilers.MissingError:
+            raise
         except compilers.CompileError as error:
             raise EmulatorError(f"the instruction counter: {error}") from None
         try:

@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics import extras
 from hystgen.plays.slots import Bytes
 from hystgen.verification import compilers
 from hystgen.verification.comparison import Expected, compare
 from hystgen.verification.loading import LoadError, load
-from hystgen.verification.report import Row
+from hystgen.verification.report import Row, failed, selftest
 from hystgen.verification.sources import Sources
 from hystgen.verification.targets import HOST
 
@@ -74,26 +73,25 @@ def rows(
     """One row per operator, compiler and build; compilers: those named, else all that are installed."""
     chosen = [(name, compilers.find(name)) for name in compiler] or [(c.name, c) for c in compilers.available()]
     if not chosen:
-        message = f"no C compiler found; install gcc or clang, or: {extras.install('zig')}"
-        yield Row(HOST, "-", "-", "-", error=message)
+        yield failed(Row(HOST, "-", "-", "-"), compilers.none_found())
         return
     for number, (name, found) in enumerate(chosen):
         for build, flags in BUILDS:
             progress(f"{name} {build}")
             if found is None:
-                yield Row(HOST, name, build, "-", error=compilers.missing(name))
+                yield failed(Row(HOST, name, build, "-"), compilers.missing(name))
                 continue
             output = folder / f"{number}-{build}.so"
             try:
                 found.shared_library(sources.all, output, flags)
                 library = _Library(output, sources, dtype)
             except (compilers.CompileError, LoadError) as error:
-                yield Row(HOST, name, build, "-", error=str(error))
+                yield failed(Row(HOST, name, build, "-"), error)
                 continue
             for op in sources.operators:
                 outcome = compare(functools.partial(library.run, op), records(op))
                 yield Row(HOST, name, build, op, **vars(outcome), ram=library.size(op))
-            failed = library.selftest()
+            row = selftest(Row(HOST, name, build, "selftest"), sources.name, library.selftest())
             library.close()
-            if failed:
-                yield Row(HOST, name, build, "selftest", error=f"{sources.name}_selftest() returned {failed}")
+            if not row.ok:
+                yield row

@@ -7,7 +7,7 @@ from typing import Any
 import cffi
 
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.basics import extras, writing
+from hystgen.basics import writing
 from hystgen.emission.options import Options
 from hystgen.model import Model
 from hystgen.verification import compilers, sources
@@ -27,8 +27,7 @@ class Instance:
             raise ValueError(f"compiler {compiler!r} is none of {', '.join(compilers.NAMES)}")
         chosen = compilers.find(compiler) if compiler else next(iter(compilers.available()), None)
         if chosen is None:
-            missing = f"{compiler} is not installed" if compiler else "no C compiler found"
-            raise compilers.CompileError(f"{missing}; install gcc or clang, or: {extras.install('zig')}")
+            raise compilers.missing(compiler) if compiler else compilers.none_found()
         name, op = model.name, options.operator
         real = ARITHMETICS[options.arithmetic].c_type
         self._ffi = cffi.FFI()

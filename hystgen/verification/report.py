@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
 from hystgen.basics import display
 from hystgen.basics.problems import counted
+from hystgen.verification.compilers import MissingError
 
 
 @dataclass(frozen=True)
@@ -19,7 +22,8 @@ class Row:
     bytes of code and constants of the emitted module, `library` those of what the compiler linked to it (soft float,
     and whatever else the image called), `ram` the size of an instance, `stack` the bytes below the caller's frame that
     the deepest call used, as measured. On an AVR, where constants lie in RAM, `ram` has them too, beside an instance of
-    each operator. `note`: what to know about the figures.
+    each operator. `note`: what to know about the figures. `missing`: nothing was compared, since a tool cannot be
+    used on this machine.
     """
 
     target: str
@@ -38,6 +42,7 @@ class Row:
     stack: int | None = None
     note: str = ""
     error: str = ""
+    missing: bool = False
 
     @property
     def ok(self) -> bool:
@@ -60,7 +65,7 @@ class Row:
 
 def failed(row: Row, error: object) -> Row:
     """The row of a build that could not be built or run."""
-    return Row(row.target, row.compiler, row.build, row.operator, error=str(error))
+    return replace(row, error=str(error), missing=isinstance(error, MissingError))
 
 
 def selftest(row: Row, name: str, result: int) -> Row:
@@ -92,13 +97,14 @@ _RIGHT = {"samples", *(name for name, _ in _WHERE_MEASURED)}
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """All rows of a verification."""
+    """All rows of a model's verification; `file`: its parameter file, where that is known."""
 
     name: str
     arithmetic: str
     engine: str
     layout: str
     rows: list[Row] = field(default_factory=list)
+    file: str = ""
 
     def __repr__(self) -> str:
         wrong = sum(not row.ok for row in self.rows)
@@ -115,6 +121,11 @@ class Report:
         """Whether everything that was asked for was built, run and equal."""
         return bool(self.rows) and all(row.ok for row in self.rows)
 
+    @property
+    def wrong(self) -> bool:
+        """Whether the C is at fault: bits differ, or tools that are there cannot build or run it."""
+        return not self.rows or any(not row.ok and not row.missing for row in self.rows)
+
     def table(self) -> str:
         """A table for people; columns that no row has a figure for are left out."""
         measured = [(name, cell) for name, cell in _WHERE_MEASURED if any(cell(row) != "-" for row in self.rows)]
@@ -129,28 +140,100 @@ class Report:
         details = [f"\n{r.target} {r.compiler} {r.build}: {r.error}" for r in self.rows if "\n" in r.error]
         return "\n".join(lines + notes + details)
 
+    def content(self) -> dict[str, Any]:
+        """The report for JSON."""
+        file = {"file": self.file} if self.file else {}
+        about = {"name": self.name, "arithmetic": self.arithmetic, "engine": self.engine, "layout": self.layout}
+        rows = [{**asdict(row), "ok": row.ok} for row in self.rows]
+        return {**file, **about, "ok": self.ok, "rows": rows}
+
     def to_json(self) -> str:
         """The report for programs."""
-        rows = [{**asdict(row), "ok": row.ok} for row in self.rows]
-        about = {"name": self.name, "arithmetic": self.arithmetic, "engine": self.engine, "layout": self.layout}
-        return json.dumps({"hystgen": 1, **about, "ok": self.ok, "rows": rows}, indent=2) + "\n"
+        return _json(self.content())
 
-    def to_junit(self) -> str:
-        """The report as JUnit XML, one test case a row."""
-        failures = sum(not row.ok for row in self.rows)
+    def suite(self, title: str = "") -> ElementTree.Element:
+        """A test suite of JUnit, one test case a row, a failure where the C is at fault and an error where a tool is
+        missing; `title`: in place of the model's name."""
+        title = title or self.name
         suite = ElementTree.Element(
-            "testsuite", name=f"hystgen verify {self.name}", tests=str(len(self.rows)), failures=str(failures)
-        )
+            "testsuite", name=f"hystgen verify {title}", tests=str(len(self.rows)),
+            failures=str(sum(not row.ok and not row.missing for row in self.rows)),
+            errors=str(sum(row.missing for row in self.rows)),
+        )  # fmt: skip
         for row in self.rows:
-            where = f"{self.name}.{self.arithmetic}.{self.engine}.{self.layout}"
+            where = f"{title}.{self.arithmetic}.{self.engine}.{self.layout}"
             case = ElementTree.SubElement(
                 suite, "testcase", classname=where, name=f"{row.target} {row.compiler} {row.build} {row.operator}"
             )
             if not row.ok:
-                ElementTree.SubElement(case, "failure", message=row.verdict).text = row.error or row.verdict
+                outcome = "error" if row.missing else "failure"
+                ElementTree.SubElement(case, outcome, message=row.verdict).text = row.error or row.verdict
             elif row.flash is not None:
                 properties = ElementTree.SubElement(case, "properties")
                 keys = ("mean_instructions", "max_instructions", "flash", "library", "ram", "stack")
                 for key in (key for key in keys if getattr(row, key) is not None):
                     ElementTree.SubElement(properties, "property", name=key, value=str(getattr(row, key)))
-        return ElementTree.tostring(suite, encoding="unicode") + "\n"
+        return suite
+
+    def to_junit(self) -> str:
+        """The report as JUnit XML."""
+        return _xml(self.suite())
+
+
+@dataclass(frozen=True)
+class Reports:
+    """The reports of several models as one; a single report reads as it does alone."""
+
+    reports: Sequence[Report]
+
+    @property
+    def ok(self) -> bool:
+        """Whether everything that was asked for was built, run and equal."""
+        return bool(self.reports) and all(report.ok for report in self.reports)
+
+    @property
+    def wrong(self) -> bool:
+        """Whether the C of a model is at fault: bits differ, or tools that are there cannot build or run it."""
+        return not self.reports or any(report.wrong for report in self.reports)
+
+    @property
+    def titles(self) -> list[str]:
+        """A title a report: the model's name, its file where models share a name, a number where files do too."""
+        names = Counter(report.name for report in self.reports)
+        found = [report.name if names[report.name] == 1 else report.file or report.name for report in self.reports]
+        again = Counter(found)
+        return [title if again[title] == 1 else f"{title} {number}" for number, title in enumerate(found, 1)]
+
+    def table(self) -> str:
+        """A table a model, below its title."""
+        if len(self.reports) == 1:
+            return self.reports[0].table()
+        return "\n\n".join(
+            f"{report.file or title}: {report.name}, {report.arithmetic}, {report.engine}, {report.layout}\n"
+            f"{report.table()}"
+            for title, report in zip(self.titles, self.reports, strict=True)
+        )
+
+    def to_json(self) -> str:
+        """The reports for programs; several are listed under `reports`."""
+        if len(self.reports) == 1:
+            return self.reports[0].to_json()
+        return _json({"ok": self.ok, "reports": [report.content() for report in self.reports]})
+
+    def to_junit(self) -> str:
+        """The reports as JUnit XML, a suite a model."""
+        if len(self.reports) == 1:
+            return self.reports[0].to_junit()
+        root = ElementTree.Element("testsuites", name="hystgen verify")
+        root.extend(report.suite(title) for title, report in zip(self.titles, self.reports, strict=True))
+        for key in ("tests", "failures", "errors"):
+            root.set(key, str(sum(int(suite.attrib[key]) for suite in root)))
+        return _xml(root)
+
+
+def _json(content: dict[str, Any]) -> str:
+    return json.dumps({"hystgen": 1, **content}, indent=2) + "\n"
+
+
+def _xml(root: ElementTree.Element) -> str:
+    return ElementTree.tostring(root, encoding="unicode") + "\n"

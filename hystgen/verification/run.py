@@ -38,8 +38,9 @@ def verify(
     default dialect, over records of `length` calls. On the cores of `verification.targets` with zig and, where
     installed, Debian's cross gcc, emulated, over records of `target_length` calls (default: as many as that core is
     fast enough for), with the instructions of every sample counted. On the AVR the emitted self-test alone. What is
-    named twice is done once. A compiler or target that is asked for and missing is a failed row. Raises what `emit`
-    raises, and ValueError for a target that does not exist.
+    named twice is done once. A tool that is asked for and not on this machine makes a row that is `missing`.
+    `hystgen.verification.Reports` joins the reports of several models. Raises what `emit` raises, and ValueError for a
+    target that does not exist.
 
     >>> import hystgen
     >>> model = hystgen.load("examples/note/example_1.yaml")
@@ -55,7 +56,7 @@ def verify(
     model = as_model(source)
     options = emit_options(model, operator, arithmetic, engine, layout, optimize, allow_partial)
     model = emitted_model(model, options)
-    numbers = model.tables(options.arithmetic, options.engine)
+    numbers = model.tables(options.arithmetic, options.engine, options.operator)
     real = ARITHMETICS[options.arithmetic].number
     report = Report(model.name, options.arithmetic, options.engine, options.layout)
     known = {HOST: None, AVR.name: AVR}
