@@ -36,7 +36,9 @@ if TYPE_CHECKING:
 @engine_option
 @optimize_option
 @layout_option
-@click.option("--check", is_flag=True, help="write nothing; exit 1 if what is in the folder differs, and say in what")
+@click.option(
+    "--check", is_flag=True, help="write nothing; exit 1 if files of C differ, or none of PARAMS writes them; say which"
+)
 @partial_option
 @effects_option
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
@@ -46,6 +48,8 @@ def emit(
     """Write the C files of models.
 
     Example: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --operator inverse --arithmetic float32
+
+    All emitted files of a folder up to date: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --check
 
     With an effect of your own: hystgen emit diagnosis/params.yaml -o firmware/ --effects my_effect/
     """
@@ -59,7 +63,7 @@ def emit(
     texts = for_each(named, lambda one: guarded(one[0], lambda: calls.emitted_files(one[1], **options)))
     made = {name: text for each in texts for name, text in each.items()}
     if check:
-        _check(named, output, options, effects)
+        _check(named, texts, output, options, effects)
     elif list_outputs:
         for name in made:
             console.say(str(Path(output) / name))
@@ -69,22 +73,22 @@ def emit(
 
 
 def _check(
-    models: Sequence[tuple[str, Model]], output: str, options: Mapping[str, Any], effects: Sequence[str]
+    models: Sequence[tuple[str, Model]], texts: Sequence[Mapping[str, str]], output: str, options: Mapping[str, Any],
+    effects: Sequence[str],
 ) -> None:
     """Exit with code 1; says how the files on disk differ and which commands bring them up to date."""
     from hystgen.emission import calls, stale
     from hystgen.emission.options import OPTIONS
 
-    problems, advice = [], []
-    for path, model in models:
-        found = guarded(path, partial(calls.stale_files, model, output, **options))
+    folder = Path(output)
+    differing = []
+    for (path, model), files in zip(models, texts, strict=True):
+        found = guarded(path, partial(stale.find, folder, files))
         if not found:
             continue
-        given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
         partial_too = {"allow_partial": True} if options["allow_partial"] else {}
         chosen = calls.emit_options(model, **options)
         wanted = {key: getattr(chosen, key) for key in OPTIONS} | partial_too
-        problems += [f"error: {each.sentence()}" for each in found]
 
         def again(other: Mapping[str, str], model: Model = model, found: Any = found) -> list[stale.Difference]:
             try:
@@ -92,6 +96,11 @@ def _check(
             except ValueError:  # no such model any more
                 return list(found)
 
-        advice += stale.advice(found, path, output, given, wanted, again, effects)
-    if problems:
-        raise Failed("\n".join(dict.fromkeys([*problems, *advice])), 1)
+        differing.append(stale.Stale(path, found, wanted, again))
+    written = {name for files in texts for name in files}
+    unwritten = guarded(output, lambda: stale.orphans(folder, written, [model.name for _, model in models]))
+    if differing or unwritten:
+        wrong = [*(each for one in differing for each in one.differences), *unwritten]
+        problems = dict.fromkeys(f"error: {each.sentence()}" for each in wrong)
+        given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
+        raise Failed("\n".join([*problems, *stale.advice(differing, unwritten, output, given, effects)]), 1)

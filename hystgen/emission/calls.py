@@ -138,16 +138,22 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
 def differences(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) -> list[str]:
     """The files in folder `output` that are missing or differ from what `emit` would write, one sentence per file.
 
-    The sentence names what differs: options, parameters, version of hystgen, edits by hand, line ends.
+    The sentence names what differs: options, parameters, version of hystgen, edits by hand, line ends. Emitted files
+    that none of the models writes are among them: give all models of a folder together.
     """
-    return [each.sentence() for each in stale_files(source, output, **options)]
+    from hystgen.emission import stale
+
+    folder, models = Path(arguments.path("output", output)), _models(source)
+    files = emitted_files(models, **options)
+    unwritten = stale.orphans(folder, files, [model.name for model in models])
+    return [*(each.sentence() for each in stale.find(folder, files)), *(each.sentence() for each in unwritten)]
 
 
 @arguments.taking(emit_options, "emit")
 def stale_files(
     source: Sources, output: str | os.PathLike[str] = ".", **options: Any
 ) -> list[Difference]:
-    """The differences behind the sentences of `differences`."""
+    """The files in folder `output` that are missing or differ, with the options of their banners."""
     from hystgen.emission import stale
 
     return stale.find(Path(arguments.path("output", output)), emitted_files(source, **options))

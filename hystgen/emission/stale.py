@@ -1,9 +1,12 @@
-"""Emitted files that are out of date: how they differ, and the command that updates them."""
+"""Emitted files that are out of date or that no model writes, and the commands that settle that."""
 
 from __future__ import annotations
 
+import contextlib
+import json
+import os
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -68,42 +71,110 @@ def _words(options: Mapping[str, str], keys: list[str]) -> str:
     return " ".join(f"--{key} {options[key]}" for key in keys if key in options) or "options that are not legible"
 
 
+@dataclass(frozen=True)
+class Orphan:
+    """An emitted file that none of the models writes; `reason`: in words."""
+
+    path: Path
+    reason: str
+
+    def sentence(self) -> str:
+        """The file and why it is one."""
+        return f"{self.path} {self.reason}"
+
+
+def orphans(folder: Path, written: Collection[str], models: Collection[str]) -> list[Orphan]:
+    """Files of C in `folder` with a banner of hystgen that are not among the names `written` for all the `models`."""
+    found = []
+    for path in sorted(folder.iterdir()) if folder.is_dir() else []:
+        if path.suffix not in (".c", ".h") or path.name in written or not path.is_file():
+            continue
+        with contextlib.suppress(OSError):  # a file of somebody else's that may not be read
+            text = path.read_bytes().decode("utf-8", "surrogateescape").replace("\r\n", "\n")
+            banner = read_banner(text.partition("*/")[0])
+            if banner is None:
+                continue
+            if not banner.model:
+                reason = "is a shared run time that none of the given models uses"
+            elif banner.model in models:
+                reason = f"is a file of {banner.model} that is not written with these options"
+            else:
+                reason = f"is of the model {banner.model}, which none of the given parameter files has"
+            found.append(Orphan(path, reason))
+    return found
+
+
+@dataclass(frozen=True)
+class Stale:
+    """A model whose files differ: its parameter file, the differences, `wanted`: all options that the command line led
+    to, and `again`, which compares the files with other options."""
+
+    parameters: str
+    differences: list[Difference]
+    wanted: Mapping[str, str | bool]
+    again: Callable[[Mapping[str, str]], list[Difference]]
+
+    @property
+    def flags(self) -> dict[str, str | bool]:
+        """The options that a banner does not tell."""
+        return {key: value for key, value in self.wanted.items() if value is True}
+
+    @property
+    def own(self) -> dict[str, str]:
+        """The options of the banners, if they are others than the wanted ones and all legible."""
+        complete = len(self.wanted) - len(self.flags)
+        theirs = next((dict(each.options) for each in self.differences if len(each.options) == complete), {})
+        return {} if {**theirs, **self.flags} == self.wanted else theirs
+
+
 def advice(
-    found: list[Difference],
-    parameters: str,
+    models: Sequence[Stale],
+    unwritten: Sequence[Orphan],
     folder: str,
     given: Mapping[str, str | bool],
-    wanted: Mapping[str, str | bool],
-    again: Callable[[Mapping[str, str]], list[Difference]],
     effects: Sequence[str] = (),
 ) -> list[str]:
-    """Commands that settle these differences of one model's files, each with what it does.
+    """Commands that settle the differences of all models and their orphans, each with what it does.
 
-    `given`: options of the command line, `wanted`: all that it led to; `again` compares the files with other options;
-    `effects`: files of effects of the user's own.
+    One writes all of them as asked. Files that were made with other options of their own are confirmed, or written
+    again with these, by one command for each set of options. `given`: options of the command line; `effects`: files of
+    effects of the user's own.
     """
-    asked = command(parameters, folder, given, effects)
-    lost = "; their edits are lost" if any(EDITED in each.reasons for each in found) else ""
+    found = [each for model in models for each in model.differences]
+    lost = _lost(found)
     said = []
     if any(LINE_ENDS in each.reasons for each in found):
         said.append('git leaves line ends alone with "*.[ch] text eol=lf" in .gitattributes')
-    flags = {key: value for key, value in wanted.items() if value is True}
-    theirs = next((each.options for each in found if len(each.options) == len(wanted) - len(flags)), {})
-    if not theirs or {**theirs, **flags} == wanted:
-        return [*said, f"to write them again: {asked}{lost}"]
-    own = command(parameters, folder, {**theirs, **flags}, effects)
-    if again(theirs):
-        said.append(f"to write them again with their own options: {own}{lost}")
-    else:
-        said.append(f"with their own options they are up to date: {own} --check")
-    return [*said, f"to replace them: {asked}{lost}"]
+    groups: dict[tuple[bool, str], list[Stale]] = {}
+    for model in models:
+        if model.own:
+            groups.setdefault((bool(model.again(model.own)), json.dumps(model.own)), []).append(model)
+    for (differ, _), group in groups.items():
+        own = command([each.parameters for each in group], folder, {**group[0].own, **group[0].flags}, effects)
+        if differ:
+            theirs = [each for model in group for each in model.differences]
+            said.append(f"to write them again with their own options: {own}{_lost(theirs)}")
+        else:
+            said.append(f"with their own options they are up to date: {own} --check")
+    if models:
+        asked = command([model.parameters for model in models], folder, given, effects)
+        said.append(f"to {'replace them' if groups else 'write them again'}: {asked}{lost}")
+    if unwritten:
+        paths = [os.path.join(folder, each.path.name) for each in unwritten]
+        which = ", or give their parameter files too" if any("which none" in each.reason for each in unwritten) else ""
+        said.append(f"to delete what no model writes: {shlex.join(['rm', *paths])}{which}")
+    return said
+
+
+def _lost(found: Sequence[Difference]) -> str:
+    return "; their edits are lost" if any(EDITED in each.reasons for each in found) else ""
 
 
 def command(
-    parameters: str, folder: str, options: Mapping[str, str | bool], effects: Sequence[str] = ()
+    parameters: Sequence[str], folder: str, options: Mapping[str, str | bool], effects: Sequence[str] = ()
 ) -> str:
     """The command that emits with these options and files of the user's own effects."""
-    words = ["hystgen", "emit", parameters, *(["-o", folder] if folder != "." else [])]
+    words = ["hystgen", "emit", *parameters, *(["-o", folder] if folder != "." else [])]
     for key, value in options.items():
         words.append(f"--{key.replace('_', '-')}")
         if isinstance(value, str):
