@@ -37,6 +37,11 @@ if TYPE_CHECKING:
 MOST_A_CODE = 0.01
 """[share of its range] The drive may move this far for one code of the reference; in fixed point more is noise."""
 
+MOST_GAIN = 100.0
+"""[times the gain at rest] Largest noise gain of an inverse for which nobody has asked: noise of 1e-4 of the
+reference's range, less than the best of recorded sensors have, then moves the drive by MOST_A_CODE of its range. Set
+by: benchmarks/chosen_numbers.py noise."""
+
 SETTLED = 0.01
 """Error within which the output has settled after a step, share of the final step, where none is given."""
 
@@ -154,25 +159,38 @@ class Model:
 
     def _check_noise_gain(self, arithmetic: str) -> None:
         """Raise UnsupportedEffectsError where the inverse makes more of the reference's noise than is allowed."""
-        from hystgen.compensator.chain import noise
+        from hystgen.compensator.chain import layout, noise
         from hystgen.compensator.chain import tables as chain_tables
+        from hystgen.compensator.chain.parts import Parts
 
         how, seconds = self.parameters.emit.compensation, self.parameters.sample_time
-        fixed = ARITHMETICS[arithmetic].fixed
-        if seconds is None or (how.noise_gain is None and not fixed):
+        assert seconds is not None
+        responses = layout.gain(self.cascade, Parts.of(self.effects), seconds, how)
+        gain = noise.largest(responses)
+        if how.noise_gain is not None:
+            noise.check(gain, how.noise_gain)
             return
-        compiled = chain_tables.build(self.chain, arithmetic, seconds, how, self._lsb)
-        gain = compiled.noise_gain
-        if how.noise_gain is None:
+        advice = (
+            "hold it with emit.compensation.noise_gain: 10, by averages of the reference, or allow it with "
+            f"noise_gain: {math.ceil(gain)}"
+        )
+        if ARITHMETICS[arithmetic].fixed:
+            compiled = chain_tables.build(self.chain, arithmetic, seconds, how, self._lsb)
             low, high = (int(end) for end in compiled.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
             if gain > MOST_A_CODE * (high - low):
                 raise UnsupportedEffectsError(
                     f"with a noise gain of {gain:.4g} one of the {high - low} codes of a reference in {arithmetic} "
                     f"moves the drive by {100.0 * gain / (high - low):.2g} % of its range; use "
-                    f"{ARITHMETICS[arithmetic].finer}, or hold or allow it with emit.compensation.noise_gain"
+                    f"{ARITHMETICS[arithmetic].finer}, or {advice}"
                 )
-            return
-        noise.check(gain, how.noise_gain)
+        if gain > MOST_GAIN:
+            drive, hertz = noise.loudest(responses)
+            units = self.parameters.units
+            raise UnsupportedEffectsError(
+                f"the noise gain is {gain:.4g}, above {MOST_GAIN:g}: noise of the reference of 1 "
+                f"{units.output or 'output unit'} rms at {hertz:.4g} Hz would move the drive by {drive:.4g} "
+                f"{units.input or 'input units'} rms; {advice}"
+            )
 
     def refusals(self, operator: str, arithmetic: str) -> list[tuple[Effect, str]]:
         """The effects that an emitted operator cannot have, with the reasons; none without a sample time."""

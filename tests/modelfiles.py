@@ -56,6 +56,10 @@ BRANCHES = (
 )
 
 
+ALLOWED = "emit: {compensation: {noise_gain: 1.0e+4}}\n"
+"""For inverses whose noise gain is above what is emitted unasked; more than any here has, so that nothing averages."""
+
+
 def chain(name: str, *effects: str, front: str = "", compensate: str = "") -> str:
     """A model with effects, a sample a millisecond; `compensate`: of those that nothing measures."""
     asked = f"emit: {{compensation: {{compensate: [{compensate}]}}}}\n" if compensate else ""
@@ -90,7 +94,7 @@ CHAINS = {
     "bumpy": chain("bumpy", "name: noncongruent, shape: centre, amplitude: -0.3, centre: -1, width: 1.5"),
     "viscous_twin": chain("viscous_twin", "name: rate_dependence, betas: [5.0e-3, 5.0e-3, 5.0e-3, 0, 0, 0]"),
     "straight": chain("straight", "name: resonance, frequency: 20, damping: 0.1", "name: lag, time_constant: 3.0e-3",
-                      CREEP).replace(PLAYS, "\n  pi: {thresholds: [0], weights: [2]}\n"),
+                      CREEP).replace(PLAYS, "\n  pi: {thresholds: [0], weights: [2]}\n") + ALLOWED,
     "drifting": chain("drifting", "name: drift, shape: curved, rate: 0.05, change: 0.01", CREEP,
                       "name: saturation, level: 15, centre: 4", compensate="drift"),
     "drifting_late": chain("drifting_late", "name: drift, rate: -0.08", "name: delay, time: 2.6e-3", CREEP,
@@ -103,7 +107,7 @@ CHAINS = {
     "everything": chain("everything", CREEP, "name: lag, time_constant: 0.01", "name: delay, time: 2.0e-3",
                         "name: resonance, frequency: 40, damping: 0.3", "name: saturation, level: 15",
                         "name: slew_limit, rate: 3000", "name: ageing, loss: 0.01, travel: 100",
-                        "name: thermal, gain_per_degree: 0.001", front=BRANCHES),
+                        "name: thermal, gain_per_degree: 0.001", front=BRANCHES) + ALLOWED,
 }  # fmt: skip
 """Models with effects, every block and every kind of each; some can be emitted as an inverse alone."""
 

@@ -267,6 +267,11 @@ class Effect(BaseModel):
         """DRIVE: seconds before a change of the drive shows at all."""
         return 0.0
 
+    def time_scale(self, drive_range: float) -> float:
+        """Longest time constant in s, or duration of a move over the drive's range; 0 for an effect without either, inf
+        for one that never ends."""
+        return 0.0
+
     def drive(self, a: Array, run: Run) -> Array:
         """DRIVE: the drive (N,) behind the effect."""
         return a

@@ -8,8 +8,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import arguments, writing
-from hystgen.basics.problems import NotInvertibleError
+from hystgen.basics.problems import FormatError, NotInvertibleError
+from hystgen.basics.problems import Path as Key
 from hystgen.compensator import engines
 from hystgen.compensator.chain.bounds import swing
 from hystgen.compensator.chain.parts import Parts
@@ -55,10 +57,25 @@ def emit_options(
     if allow_partial and (refused := model.refusals(operator, arithmetic)):
         left_out = tuple(worth.sentence(model, effect, reason) for effect, reason in refused)
         model = model.without([effect for effect, _ in refused])
+    _check_codes(model, arithmetic, operator)
     model.need_compensated(arithmetic, operator)
     if operator != "forward" and model.cascade.inverse_problems():
         raise NotInvertibleError(model.cascade.inverse_problems())
     return Options(operator, arithmetic, model.engine(engine, operator, arithmetic, optimize), layout, left_out)
+
+
+def _check_codes(model: Model, arithmetic: str, operator: str) -> None:
+    """Raise FormatError for sizes of codes in floating point, where only a quiet drive has one, its converter's."""
+    if ARITHMETICS[arithmetic].fixed:
+        return
+    emit = model.parameters.emit
+    quiet = emit.compensation.quiet and model.effects and operator != "forward"
+    given = {"drive_lsb": None if quiet else emit.drive_lsb, "output_lsb": emit.output_lsb}
+    fixed = " or ".join(each.name for each in ARITHMETICS.values() if each.fixed)
+    words = f"is the size of a code, and {arithmetic} has no codes; remove it, or emit with --arithmetic {fixed}"
+    problems: list[tuple[Key, str]] = [(("emit", key), words) for key, value in given.items() if value is not None]
+    if problems:
+        raise FormatError(*problems)
 
 
 def emitted_model(model: Model, options: Options) -> Model:
@@ -78,11 +95,12 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
     check_names(models)
     made: dict[str, str] = {}
     for model in models:
-        for doubt in doubts(model):
-            warnings.warn(f"{model.name}: {doubt}", stacklevel=3)
         chosen = emit_options(model, **options)
-        emitted = emitted_model(model, chosen)
-        made |= module.files(emitted.parameters, model.cascade, chosen, parameters_sha256(model.parameters))
+        kept = emitted_model(model, chosen)
+        texts, found = module.emitted(kept.parameters, model.cascade, chosen, parameters_sha256(model.parameters))
+        for doubt in (*doubts(model), *found):
+            warnings.warn(f"{model.name}: {doubt}", stacklevel=3)
+        made |= texts
     return made
 
 

@@ -18,12 +18,12 @@ from hystgen.basics.version import __version__
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import tables as chain_tables
-from hystgen.compensator.chain.bounds import UNSLEWED, kept_branch, together
+from hystgen.compensator.chain.bounds import kept_branch, together
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, LEAST_LATE, SHARE_BITS, Compiled
 from hystgen.effects import own as own_effects
 from hystgen.effects.base import USER
-from hystgen.emission import chain, cost, numbers, own, runtime, selftest
+from hystgen.emission import chain, cost, doubts, numbers, own, runtime, selftest
 from hystgen.emission.options import OPTIONS, Options, seal
 from hystgen.emission.text import WIDTH, comment_text, define, fit, literal
 from hystgen.front.tanh.model import TanhEnvelope
@@ -51,12 +51,17 @@ def render(template: str, values: SimpleNamespace, **more: object) -> str:
     return _environment().get_template(template).render({**vars(values), **more})
 
 
-def files(
-    parameters: Parameters, cascade: StaticModel, options: Options, sha256: str | None = None
-) -> dict[str, str]:
-    """File names and their ASCII text; `sha256`: hash of the parameters in the file, by default of `parameters`.
+def files(parameters: Parameters, cascade: StaticModel, options: Options) -> dict[str, str]:
+    """File names and their ASCII text. Raises tables.FormatError."""
+    return emitted(parameters, cascade, options)[0]
 
-    Raises tables.FormatError.
+
+def emitted(
+    parameters: Parameters, cascade: StaticModel, options: Options, sha256: str | None = None
+) -> tuple[dict[str, str], list[str]]:
+    """File names and their ASCII text, and sentences of the banner on what makes the inverse of little use.
+
+    `sha256`: hash of the parameters in the file, by default of `parameters`. Raises tables.FormatError.
     """
     values = values_of(parameters, cascade, options)
     values.sha256 = sha256 or parameters_sha256(parameters)
@@ -89,7 +94,7 @@ def files(
         file = f"{name}_selftest{ending}"
         top = banner_of(values, file, about, details)
         made[file] = render(f"selftest{ending}.j2", values, banner=top, operators=operators)
-    return {file: seal(_tidy(fit(text))) for file, text in made.items()}
+    return {file: seal(_tidy(fit(text))) for file, text in made.items()}, values.doubts
 
 
 def _implementation(values: SimpleNamespace) -> str:
@@ -239,6 +244,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.timing = _timing(parameters, compiled) if compiled else []
     reading = [*_reading(compiled), *_branches(compiled, parameters), *_quiet(values)] if compiled else []
     values.reading = reading if options.inverse else []
+    values.doubts = doubts.found(parameters, compiled, values) if options.inverse else []
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
     values.corners = (max(n, 1) if values.fixed else n + 1) if corners else 0
     front = render("front.c.j2", values) if values.stages else ""
@@ -312,10 +318,9 @@ def _limits(values: SimpleNamespace) -> list[str]:
         found.append((f"FORWARD_MAX_ERROR{lsb}", values.forward_max_error, bound + output))
     if values.inverse:
         found.append((f"INVERSE_MAX_ERROR{lsb}", values.inverse_max_error, bound + drive))
-    condition = values.condition or UNSLEWED * values.variant.slew
+    branch, condition = doubts.conditions(values)
     apart = condition and values.inverse_rounding_error != values.inverse_max_error
     if values.inverse and (values.branches or apart):
-        branch = "both take the same branch" if values.branches else ""
         words = f"the same while {together(branch, condition)}"
         found.append((f"INVERSE_ROUNDING_ERROR{lsb}", values.inverse_rounding_error, words))
     return [define(f"{values.NAME}_{name}", value, comment) for name, value, comment in found]
@@ -505,6 +510,7 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         f"layout {options.layout}",
         *(f"Not compensated: {words}" for words in options.left_out),
         *values.reading,
+        *values.doubts,
         *([""] if values.precision else []),
         *values.precision,
         "",

@@ -119,8 +119,8 @@ def settling(model: Model, within: float = SETTLED) -> str:
 
 def cost(model: Model) -> str:
     """Cost of the C that `emit` would write, that of the forward operator if there is no inverse; "" if it refuses."""
-    options = emit_options(model, operator="forward" if model.cascade.inverse_problems() else None)
     try:
+        options = emit_options(model, operator="forward" if model.cascade.inverse_problems() else None)
         found = module.cost_of(model.parameters, model.cascade, options)
     except FormatError:
         return ""

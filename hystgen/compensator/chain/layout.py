@@ -186,10 +186,15 @@ class Compiled:
         """Modes of the stage."""
         return [resonance.numbers(each, self.seconds) for each in self.parts.modes]
 
+    @property
+    def gain(self) -> noise.Gain:
+        """Gain from reference to drive."""
+        return noise.Gain(self.static, self.parts, self.seconds, self.taps or preview.PLAIN)
+
     @cached_property
     def noise_gain(self) -> float:
         """Largest gain from reference to drive over all frequencies, divided by the gain at rest."""
-        return noise.largest(noise.Gain(self.static, self.parts, self.seconds, self.taps or preview.PLAIN))
+        return noise.largest(self.gain)
 
 
 QUIET = 32
@@ -292,6 +297,11 @@ def read(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -
         needed = smoothing.before(needed)
     led = preview.led(needed, how.preview)
     return Read(led if len(led.weights) > 1 or led.first else None, smoothing, preview.shaped(modes, seconds, by))
+
+
+def gain(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> noise.Gain:
+    """`Compiled.gain` of a model, in every arithmetic."""
+    return noise.Gain(static, parts, seconds, read(static, parts, seconds, how).taps or preview.PLAIN)
 
 
 def settled(static: StaticModel, effects: Sequence[Effect], w: float) -> float:

@@ -79,6 +79,21 @@ class Gain:
         return [own.linear(each, self.seconds) for each in (*self.parts.own_drives, *self.parts.own_outputs)]
 
     def __call__(self, at: Array) -> Array:
+        led, rest, answers = self._answers(at)
+        return np.asarray(np.abs(led) * np.max([np.abs(slope * rest / answer) for slope, answer in answers], axis=0))
+
+    def drive(self, at: Array) -> Array:
+        """The same in drive units per unit of the reference, where plays and front are least steep; saturation, which
+        adds to it near its ends, is left out."""
+        led, _, answers = self._answers(at)
+        least = self.static.front_slopes[0]
+        if not self._moving_plays:
+            least *= moving.least_slope(self.static, self.parts.plays)
+        return np.asarray(np.abs(led) * np.max([1.0 / np.abs(answer) for _, answer in answers], axis=0) / least)
+
+    def _answers(self, at: Array) -> tuple[NDArray[np.complex128], float, list[tuple[float, NDArray[np.complex128]]]]:
+        """The lead (N,), the gain at rest behind the plays, and for each number of plays that follow, their slope at
+        rest and the response (N,) by which the lead is divided."""
         z = np.exp(-1j * at)
         led = np.polynomial.polynomial.polyval(z, self.taps.weights[::-1].astype(complex))
         arriving = np.ones_like(z)
@@ -103,18 +118,17 @@ class Gain:
             else:
                 led = led * block.backward.response(z)
             rest = rest * block.rest
-        found = np.zeros(len(z))
+        answers = []
         for slope, plays, at_once in self._plays(z):
             later, first = plays * passed, at_once * direct
-            found = np.maximum(found, np.abs(slope * rest / (first + (later - first) * arriving)))
-        return np.asarray(np.abs(led) * found)
+            answers.append((slope, first + (later - first) * arriving))
+        return led, rest, answers
 
     def _plays(self, z: NDArray[np.complex128]) -> Iterator[tuple[float, NDArray[np.complex128], float]]:
         """For each number of plays that follow their slope at rest, their response, and what of it comes at once."""
-        moving_plays = [each for each in self.parts.plays if isinstance(each, RelaxingPlays | ThresholdRate)]
-        if not moving_plays:
+        if not self._moving_plays:
             yield 1.0, np.ones_like(z), 1.0
-        for effect in moving_plays:
+        for effect in self._moving_plays:
             p = self._steepest
             if dashpot.nonlinear(effect):  # some stretch is so slow that its play does not follow
                 yield float(np.sum(p)), np.full_like(z, p[0]), float(p[0])
@@ -129,6 +143,11 @@ class Gain:
                     followed = (first + early * z) / (1.0 - decay * z)
                 slope, response, at_once = slope + weight, response + weight * followed, at_once + weight * first
                 yield slope, response, at_once
+
+    @property
+    def _moving_plays(self) -> list[RelaxingPlays | ThresholdRate]:
+        """The effect that makes plays depend on the rate, if there is one."""
+        return [each for each in self.parts.plays if isinstance(each, RelaxingPlays | ThresholdRate)]
 
     @cached_property
     def _steepest(self) -> Array:
@@ -162,6 +181,13 @@ def peaks(gain: Callable[[Array], Array], near: Array) -> tuple[Array, Array]:
 def largest(gain: Gain) -> float:
     """The largest gain over all frequencies."""
     return float(np.max(peaks(gain, gain.near)[0]))
+
+
+def loudest(gain: Gain) -> tuple[float, float]:
+    """The largest `Gain.drive` over all frequencies, and its frequency in Hz."""
+    found, at = peaks(gain.drive, gain.near)
+    k = int(np.argmax(found))
+    return float(found[k]), float(at[k]) / (2.0 * np.pi * gain.seconds)
 
 
 def check(gain: float, limit: float) -> None:

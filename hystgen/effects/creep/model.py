@@ -110,6 +110,10 @@ class ExponentialCreep(_Creep):
         """One weight for each time constant."""
         yield from not_as_many("weights", self.weights, "time_constants", self.time_constants)
 
+    def time_scale(self, drive_range: float) -> float:
+        """The longest time constant."""
+        return max(self.time_constants)
+
     def filtered(self, h: Array, run: Run) -> Array:
         """The play sum with its creep."""
         return h + _states(h, run, np.array(self.time_constants), np.array(self.weights))
@@ -176,6 +180,10 @@ class LogarithmicCreep(_Creep):
             yield ("t_max",), f"{self.t_max!r} is not above t_min = {self.t_min!r}; give seconds, t_min < t_max"
         elif self.t_max > 1e12 * self.t_min:
             yield ("t_max",), "is more than 12 decades above t_min; narrow the two"
+
+    def time_scale(self, drive_range: float) -> float:
+        """The longest time constant."""
+        return self.t_max
 
     def spectrum(self) -> tuple[Array, float]:
         """Time constants and the weight of each."""

@@ -34,6 +34,10 @@ class Delay(Effect):
         """The time itself."""
         return self.time
 
+    def time_scale(self, drive_range: float) -> float:
+        """The time itself."""
+        return self.time
+
     def drive(self, a: Array, run: Run) -> Array:
         """The drive `time` seconds earlier."""
         return np.asarray(np.interp(run.t - self.time, run.t, a)) if self.time else a

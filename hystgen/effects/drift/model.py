@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -20,6 +21,10 @@ class _Drift(Effect):
     compensation: ClassVar[str] = (
         "by set_offset, where it is measured; over the time since then with emit.compensation.compensate: [drift]"
     )
+
+    def time_scale(self, drive_range: float) -> float:
+        """It never ends."""
+        return math.inf
 
 
 class LinearDrift(_Drift):

@@ -26,6 +26,10 @@ class Lag(Effect):
     compensated: ClassVar[Compensated] = "approximate"
     compensation: ClassVar[str] = "a lead, exact on ramps; a quarter of the second difference of the drive is left"
 
+    def time_scale(self, drive_range: float) -> float:
+        """The time constant."""
+        return self.time_constant
+
     def drive(self, a: Array, run: Run) -> Array:
         """The drive behind the lag."""
         out = np.empty_like(a)

@@ -297,6 +297,10 @@ class ThresholdRate(_RateDependence):
             return []
         return [f"thresholds stay in order up to |w'| = {np.min(gaps[closing] / falls[closing]):.6g} a second"]
 
+    def time_scale(self, drive_range: float) -> float:
+        """The largest beta: the plays are as late as behind a dashpot of that time constant."""
+        return max(self.betas)
+
     def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
         """Plays with a dynamic threshold."""
         with np.errstate(over="ignore"):
@@ -346,6 +350,10 @@ class RelaxingPlays(_RateDependence):
 
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact: one equation per sample is solved"
+
+    def time_scale(self, drive_range: float) -> float:
+        """The time constant."""
+        return self.time_constant
 
     def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
         """Viscous plays."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -70,6 +71,12 @@ class _Mode(Effect):
     place: ClassVar[Place] = Place.LINEAR
     fades: ClassVar[bool] = True
     repeatable: ClassVar[bool] = True
+
+    def time_scale(self, drive_range: float) -> float:
+        """The time in which a free oscillation decays by e."""
+        zeta = self.damping
+        slow = zeta if zeta < 1.0 else 1.0 / (zeta + math.sqrt(zeta * zeta - 1.0))
+        return 1.0 / (2.0 * math.pi * self.frequency * slow)
 
     def factors(self, times: Array) -> tuple[Array, Array, Array]:
         """Times in radians of the undamped oscillation, and the decaying cosine and sine."""

@@ -118,6 +118,10 @@ class _SlewLimit(Effect):
             object.__setattr__(self, "falling_rate", self.rate)
         return self
 
+    def time_scale(self, drive_range: float) -> float:
+        """The time of a move over the drive's range."""
+        return drive_range / min(self.rate, self.falling_rate)
+
     def limited(self, u: Array, steps: Array) -> tuple[Array, Array]:
         """A drive as fast as it may be, and its mean distance from `u` over each of the steps [s]."""
         out, off = np.empty_like(u), np.empty(len(steps))

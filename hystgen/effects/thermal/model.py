@@ -146,6 +146,10 @@ class OwnHeat(_Thermal):
         "the temperature is not measured; followed open loop with emit.compensation.compensate: [self_heating]"
     )
 
+    def time_scale(self, drive_range: float) -> float:
+        """The time constant."""
+        return self.time_constant
+
     @abstractmethod
     def heat(self, run: Run) -> Array:
         """Final rise at the heat of each step (N - 1,), K."""

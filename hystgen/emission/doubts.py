@@ -1,0 +1,96 @@
+"""What makes an emitted inverse of little use, in the words of its banner and of the command line."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+from hystgen.compensator.chain import noise, own
+from hystgen.compensator.chain.bounds import UNSLEWED, together
+from hystgen.compensator.chain.layout import Compiled
+from hystgen.effects.base import Effect
+from hystgen.emission.text import comment_text
+from hystgen.parameters.files import Parameters
+from hystgen.plays import slots
+
+NOISY = 4.0
+"""[times the gain at rest] Noise gain from which it is told: the drive then has two bits of noise more than the
+reference. The inverse of a lag of one sample has 3.6. Set by: benchmarks/chosen_numbers.py noise."""
+
+FAST = 50.0
+"""[samples] Shortest step, in time constants of the slowest effect, that is taken for a mistake: the effect then moves
+the drive by a 50th of a sample, of the fastest sweep with a stated bound (SAMPLES_A_SWEEP) 4e-4 of the range. Set by:
+benchmarks/chosen_numbers.py fast."""
+
+
+def found(
+    parameters: Parameters, compiled: Compiled | None, values: SimpleNamespace
+) -> list[str]:
+    """A sentence for each; `compiled`: of a model with effects; `values`: bounds of the inverse as they are printed."""
+    dynamic = [*_noise(parameters, compiled), *_too_fast(parameters, compiled)] if compiled else []
+    return [*dynamic, *_unbounded(values)]
+
+
+def _noise(parameters: Parameters, compiled: Compiled) -> list[str]:
+    """The noise of the reference that the drive shows."""
+    if compiled.noise_gain <= NOISY:
+        return []
+    drive, hertz = noise.loudest(compiled.gain)
+    into, out = comment_text(parameters.units.input), comment_text(parameters.units.output)
+    if compiled.codes is None:
+        shown = f"1 {out or 'output unit'} rms of it there is {drive:.3g} {into or 'input units'} rms of the drive"
+    else:
+        least = float(compiled.codes.drive_lsb) / drive
+        shown = f"{least:.3g} {out or 'output units'} rms of it there dither the drive by one code rms"
+    asked = parameters.emit.compensation.noise_gain
+    advice = "" if asked else "; emit.compensation.noise_gain holds it by averages of the reference"
+    return [
+        f"Noise of the reference reaches the drive {compiled.noise_gain:.3g} times as large as slow motion, most at "
+        f"{hertz:.4g} Hz: {shown}{advice}"
+    ]
+
+
+def _too_fast(parameters: Parameters, compiled: Compiled) -> list[str]:
+    """Effects that are over long before the next sample."""
+    seconds = compiled.seconds
+    scale, name = max((_time_scale(effect, compiled), effect.name) for effect in parameters.model.effects)
+    if not 0.0 < scale <= seconds / FAST:
+        return []
+    return [
+        f"Effects are over within a sample: the slowest, {name}, takes {scale:.3g} s of sample_time = {seconds:.3g} s, "
+        f"so that the inverse hardly differs from one without them; sample_time is in seconds, {1e-6 * seconds:.3g} "
+        f"for {seconds:.3g} us"
+    ]
+
+
+def _time_scale(effect: Effect, compiled: Compiled) -> float:
+    """`Effect.time_scale`, of an effect of the user's own that of its slowest state."""
+    low, high = compiled.static.input_range
+    scale = effect.time_scale(high - low)
+    if scale or effect.block is None:
+        return scale
+    radius = own.linear(effect, compiled.seconds).forward.radius
+    if not 0.0 < radius < 1.0:
+        return math.inf if radius else 0.0
+    return -compiled.seconds / math.log(radius)
+
+
+def conditions(values: SimpleNamespace) -> tuple[str, str]:
+    """The conditions of NAME_INVERSE_ROUNDING_ERROR in words: of two branches, and of the memory; empty ones do not
+    matter."""
+    branch = "both take the same branch" if values.branches else ""
+    return branch, values.condition or UNSLEWED * values.variant.slew
+
+
+def _unbounded(values: SimpleNamespace) -> list[str]:
+    """A bound of the inverse's error that says nothing."""
+    limits = values.numbers.limits
+    whole = float(limits[slots.DRIVE_MAX]) - float(limits[slots.DRIVE_MIN])
+    bounds = [float(text.rstrip("f")) for text in (values.inverse_max_error, values.inverse_rounding_error)]
+    if bounds[0] < whole:
+        return []
+    lsb, unit = "_LSB" * values.fixed, " codes" if values.fixed else values.units.drive.replace(",", "")
+    said = f"Error: {values.NAME}_INVERSE_MAX_ERROR{lsb} is the whole range of the drive, {whole:.4g}{unit}"
+    if bounds[1] < whole:
+        return [f"{said}; at most {bounds[1]:.3g}{unit} while {together(*conditions(values))}"]
+    return [f"{said}: no drive is near the exact one for certain"]
