@@ -1,14 +1,15 @@
 """Runs that set numbers which no test of a model can set: what each would cost or spoil with another value.
 
     python benchmarks/chosen_numbers.py [lag] [newton] [decades] [sweeps] [unknown] [exact] [lengths] [visits]
-        [quiet] [averages] [shifts] [branches]
+        [quiet] [averages] [shifts] [branches] [noisy] [fast]
 
 lag: `effects.lag.compensator.LONG_STEP`; newton: `effects.thermal.compensator.MOST_CHANGE`; decades:
 `effects.ageing.compensator.DECADES`; sweeps: `emission.worth.SWEEPS`; unknown: `tracking.MOST_UNKNOWN`; exact:
 `diagnosis.data.signals.UNMEASURED`; lengths: `diagnosis.findings.content.LENGTHS`; visits: `chain.chain.VISIT_SAMPLES`;
 quiet: `compensator.chain.layout.QUIET`; averages: `compensator.chain.noise.MOST_TIMES`; shifts: the bounds of
-`compensator.chain.moving.found_shifted`; branches: `effects.lag.compensator.MOST_LED`. All of them
-take some seconds, shifts a minute; what is random has fixed seeds.
+`compensator.chain.moving.found_shifted`; branches: `effects.lag.compensator.MOST_LED`; noisy: `model.MOST_GAIN` and
+`emission.doubts.NOISY`; fast: `emission.doubts.FAST`. All of them take some seconds, shifts a minute; what is random
+has fixed seeds.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from hystgen.chain import chain
 from hystgen.compensator import reference
 from hystgen.compensator.chain import layout, moving, noise, preview, tables
 from hystgen.compensator.chain.layout import SAMPLES_A_SWEEP
+from hystgen.compensator.chain.run import answers as reference_answers
 from hystgen.diagnosis.data import signals
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.findings import content
@@ -327,6 +329,43 @@ def branches() -> None:
             print(f"  {times:6.3g}", *(f"{x:8.4f}" for x in [*found, float(np.max(error(step)[50:]))]))
 
 
+def noisy() -> None:
+    """Lags by their noise gain, and the drive's noise for white noise of the reference of 1e-4 of its range, rms, on a
+    slow ramp, where all plays follow, and behind a turn of it, where none does."""
+    print("noisy: lag / step, noise gain, rms noise of the drive / its range on the ramp, behind its turn")
+    rng = np.random.default_rng(1)
+    for samples in (0.5, 1.0, 1.2, 2.0, 5.0, 10.0, 20.0, 25.0, 50.0, 250.0):
+        effect = f"name: lag, time_constant: {1e-3 * samples:g}"
+        model = hystgen.Model(parse_parameters(WITH_EFFECT.format(effect=effect), "stage_x.yaml"))
+        numbers = tables.build(model.chain, "float64", 1e-3)
+        low, high = model.cascade.output_range
+        u = np.concatenate([np.linspace(0.5 * low, 0.5 * high, 2000), np.linspace(0.5 * high, 0.45 * high, 500)])
+        loud = u + 1e-4 * (high - low) * rng.standard_normal(len(u))
+        quiet, drive = (
+            reference_answers(numbers, Run(1e-3 * np.arange(len(u)), each, {}), True) for each in (u, loud)
+        )
+        moved = (drive - quiet) / (model.cascade.input_range[1] - model.cascade.input_range[0])
+        rms = [math.sqrt(float(np.mean(part**2))) for part in (moved[1000:2000], moved[2100:])]
+        print(f"  {samples:6.4g} {numbers.noise_gain:8.4g}", *(f"{each:9.2g}" for each in rms))
+
+
+def fast() -> None:
+    """Effects over within a sample: how far they move the output at the fastest rate with a stated bound, % of its
+    range."""
+    shapes = ("lag, time_constant", "delay, time", "rate_dependence, shape: relaxation, time_constant")
+    print("fast: step / time constant; lag, delay, relaxing plays")
+    place = np.arange(8 * SAMPLES_A_SWEEP + 1) / SAMPLES_A_SWEEP
+    v = -4.0 + 8.0 * np.abs(place % 2.0 - 1.0)
+    for ratio in (2.0, 5.0, 10.0, 50.0, 250.0):
+        moved = []
+        for shape in shapes:
+            effect = f"name: {shape}: {1e-3 / ratio:g}"
+            model = hystgen.Model(parse_parameters(WITH_EFFECT.format(effect=effect), "stage_x.yaml"))
+            missing = model.simulate(v) - model.without(model.effects).simulate(v)
+            moved.append(100.0 * float(np.max(np.abs(missing))) / float(np.ptp(model.simulate(v))))
+        print(f"  {ratio:4.3g}", *(f"{each:8.2g}" for each in moved))
+
+
 def _lost(response: NDArray[np.complex128]) -> float:
     """Rms of what a response changes, %."""
     return 100.0 * math.sqrt(float(np.mean(np.abs(response - 1.0) ** 2)))
@@ -334,7 +373,9 @@ def _lost(response: NDArray[np.complex128]) -> float:
 
 RUNS: dict[str, Callable[[], None]] = {
     each.__name__: each
-    for each in (lag, newton, decades, sweeps, unknown, exact, lengths, visits, quiet, averages, shifts, branches)
+    for each in (
+        lag, newton, decades, sweeps, unknown, exact, lengths, visits, quiet, averages, shifts, branches, noisy, fast
+    )
 }
 
 

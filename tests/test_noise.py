@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from modelfiles import BRANCHES, CREEP, chain
 
 import hystgen
 from hystgen.basics import jit
-from hystgen.basics.problems import UnsupportedEffectsError
+from hystgen.basics.problems import FormatError, UnsupportedEffectsError
+from hystgen.cli import main
 from hystgen.compensator.chain import noise, tables
 from hystgen.compensator.chain.layout import Compiled
 from hystgen.compensator.chain.run import answers
@@ -195,3 +199,124 @@ def test_what_needs_no_average_has_none() -> None:
     bare = [re.sub(r"sha256 \w+|SHA256 .*", "", text) for text in (plain["noisy.c"], allowed["noisy.c"])]
     assert bare[0] == bare[1]
     assert compiled(model(CREEP)).tables.limits[slots.OUTPUT_MIN] < 0.0
+
+
+HEAD = "hystgen: 1\nname: noisy\nunits: {input: V, output: um}\nsample_time: %s\ninput_range: [0, 100]\nmodel:\n"
+STAGE = "  pi: {thresholds: [0, 5, 10], weights: [0.1, 0.02, 0.01]}\n  effects:\n"
+
+
+def of(*effects: str, seconds: str = "1.0e-3", front: str = "", emit: str = "") -> Model:
+    """A model with a slope of 0.1 um/V behind a turn; `front`: of its drive; `emit`: that section."""
+    listed = "".join(f"    - {{{effect}}}\n" for effect in effects)
+    return Model(parse_parameters(HEAD % seconds + front + STAGE + listed + emit, "noisy.yaml"))
+
+
+def told(one: Model, **options: Any) -> list[str]:
+    """The warnings of an emission; its banner has the same sentences."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        text = emitted_files(one, **options)["noisy.h"].replace("\n * ", " ")
+    said = [str(each.message).removeprefix("noisy: ") for each in caught]
+    assert all(each in text for each in said)
+    return said
+
+
+def shown_noise(one: Model, arithmetic: str, size: float) -> float:
+    """Rms noise of the drive, V, for one of `size` um at half the sample rate on a reference at rest behind a turn."""
+    numbers = compiled(one, arithmetic)
+    drive, output = (float(x.drive_lsb), float(x.output_lsb)) if (x := numbers.codes) else (1.0, 1.0)
+    u = np.concatenate([np.linspace(3.0, 7.0, 100), np.linspace(7.0, 6.8, 50), np.full(450, 6.8)])
+    u[250:] += size * (-1.0) ** np.arange(350)
+    u = np.rint(u / output) if numbers.codes else u
+    with jit.plain():
+        v = answers(numbers, Run(np.arange(len(u)) * T, u, {}), True).astype(float) * drive
+    return float(np.std(v[350:]))
+
+
+@pytest.mark.parametrize("arithmetic", ["float64", "q31"])
+def test_the_figure_of_the_noise_is_that_of_the_drive(arithmetic: str) -> None:
+    """A sine at the stated frequency, small enough for the plays to stand, gives the stated drive."""
+    one = of("name: lag, time_constant: 0.004")
+    (said, *_) = told(one, arithmetic=arithmetic)
+    found = re.match(
+        r"Noise of the reference reaches the drive ([0-9.]+) times as large as slow motion, most at ([0-9.]+) Hz: "
+        r"([0-9.e-]+) um rms of it there (?:is ([0-9.e-]+) V rms|dither the drive by one code rms)",
+        said,
+    )
+    assert found, said
+    gain, hertz, size = (float(found[k]) for k in (1, 2, 3))
+    decay = math.exp(-1.0 / 4.0)
+    theta = 4.0 - decay / (1.0 - decay)
+    assert gain == pytest.approx((1.0 + 2.0 * theta) * (1.0 + decay) / (1.0 - decay), rel=5e-3)  # the lead's, by hand
+    assert hertz == 500.0
+    form = compiled(one, arithmetic).codes
+    drive = float(found[4]) if form is None else float(form.drive_lsb)
+    scale = 0.5 / drive  # to half a volt, for which the plays stand
+    assert shown_noise(one, arithmetic, scale * size) == pytest.approx(0.5, rel=1e-2)
+
+
+def test_little_noise_is_not_told() -> None:
+    assert told(of("name: creep, time_constants: [0.1], weights: [0.05]")) == []
+
+
+def test_more_noise_than_anyone_wants_has_to_be_allowed() -> None:
+    loud = "name: lag, time_constant: 0.03"
+    for arithmetic in ("float32", "float64", "q31"):
+        with pytest.raises(UnsupportedEffectsError, match=r"noise gain is 119\.\d, above 100: .* 1 um rms at 500 Hz"):
+            emit_options(of(loud), arithmetic=arithmetic)
+        with pytest.raises(UnsupportedEffectsError, match=r"noise_gain: 120$"):
+            hystgen.verify(of(loud), arithmetic)
+        emit_options(of(loud, emit="emit: {compensation: {noise_gain: 120}}\n"), arithmetic=arithmetic)
+        emit_options(of(loud, emit="emit: {compensation: {noise_gain: 10}}\n"), arithmetic=arithmetic)
+        emit_options(of(loud), arithmetic=arithmetic, operator="forward")
+        emit_options(of("name: lag, time_constant: 0.025"), arithmetic=arithmetic)
+
+
+@pytest.mark.parametrize(
+    "effect",
+    [
+        "name: lag, time_constant: 0.99", "name: delay, time: 0.99",
+        "name: creep, time_constants: [0.01, 0.99], weights: [0.02, 0.03]",
+        "name: creep, shape: logarithmic, per_decade: 0.02, t_min: 0.01, t_max: 0.99",
+        "name: rate_dependence, shape: relaxation, time_constant: 0.99",
+        "name: rate_dependence, betas: [0.5, 0.99]", "name: slew_limit, rate: 101.1, falling_rate: 300",
+        "name: resonance, frequency: 1.0, damping: 0.1608", "name: resonance, frequency: 0.5, damping: 1.71",
+    ],
+)  # fmt: skip
+def test_effects_that_are_over_within_a_sample_are_told(effect: str) -> None:
+    """Just below a 50th of a sample, but not above, nor beside an effect that is slow."""
+    (said,) = (each for each in told(of(effect, seconds="50.0")) if each.startswith("Effects are over"))
+    name = effect.partition(",")[0].removeprefix("name: ")
+    assert f"the slowest, {name}, takes 0.9" in said
+    assert "5e-05 for 50 us" in said
+    slow = "name: lag, time_constant: 20" if name == "creep" else CREEP
+    for other in (of(effect, seconds="49.0"), of(effect, slow, seconds="50.0")):
+        assert not any(each.startswith("Effects are over") for each in told(other))
+
+
+def test_a_bound_of_the_whole_range_is_told() -> None:
+    said = told(of("name: lag, time_constant: 1.0e-3"))
+    bound = float(header(of("name: lag, time_constant: 1.0e-3"), "INVERSE_ROUNDING_ERROR"))
+    assert said == [
+        f"Error: NOISY_INVERSE_MAX_ERROR is the whole range of the drive, 100 V; at most {bound:.3g} V while both have "
+        "seen the same drives"
+    ]
+    assert told(of("name: lag, time_constant: 1.0e-3"), operator="forward") == []
+
+
+def test_sizes_of_codes_are_refused_where_there_are_no_codes(tmp_path: Path) -> None:
+    path = tmp_path / "noisy.yaml"
+    path.write_text(HEAD % "1.0e-3" + STAGE.replace("  effects:\n", "") + "emit: {drive_lsb: 0.1, output_lsb: 0.1}\n")
+    for command in ("emit", "verify"):
+        done = CliRunner().invoke(main, [command, str(path), *(["-o", str(tmp_path / "fw")] * (command == "emit"))])
+        assert done.exit_code == 2
+        assert [line.split(": is the size of a code")[0] for line in done.output.splitlines()] == [
+            f"{path}:8:19: error: emit.drive_lsb", f"{path}:8:36: error: emit.output_lsb"
+        ]  # fmt: skip
+    assert not (tmp_path / "fw").exists()
+    assert CliRunner().invoke(main, ["show", str(path)]).exit_code == 0
+    emitted_files(hystgen.load(path), arithmetic="q15")
+    quiet = "emit: {drive_lsb: 0.1, compensation: {quiet: true}}\n"
+    emit_options(of("name: lag, time_constant: 0.002", emit=quiet))  # the step of its converter
+    with pytest.raises(FormatError, match=r"emit\.drive_lsb: is the size of a code, and float32 has no codes"):
+        emit_options(of("name: lag, time_constant: 0.002", emit=quiet), operator="forward")

@@ -15,7 +15,7 @@ from hystgen.plays import slots
 
 NOISY = 4.0
 """[times the gain at rest] Noise gain from which it is told: the drive then has two bits of noise more than the
-reference. The inverse of a lag of one sample has 3.6. Set by: benchmarks/chosen_numbers.py noise."""
+reference. The inverse of a lag of one sample has 3.97. Set by: benchmarks/chosen_numbers.py noisy."""
 
 FAST = 50.0
 """[samples] Shortest step, in time constants of the slowest effect, that is taken for a mistake: the effect then moves
