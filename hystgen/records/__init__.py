@@ -24,7 +24,7 @@ from hystgen.basics.problems import RecordError, printable
 from hystgen.basics.progress import Progress
 from hystgen.basics.writing import write_atomically
 from hystgen.records.array_files import read_mat, read_npz
-from hystgen.records.columns import LISTED, agreed_units, headers, parse_columns
+from hystgen.records.columns import LISTED, headers, parse_columns
 from hystgen.records.csv_file import read_csv
 from hystgen.records.hdf5 import read_hdf5, read_mat_73
 from hystgen.records.memory import Columns, in_memory
@@ -33,6 +33,7 @@ from hystgen.records.parquet import read_parquet
 from hystgen.records.reading import LARGEST, SHORTEST, CountingFile, Reading, Table, no_value, repaired
 from hystgen.records.record import Record
 from hystgen.records.tdms import read_tdms
+from hystgen.records.units import agreed_units, in_units
 from hystgen.records.writing import columns_text, write_columns
 
 Source = Record | str | os.PathLike[str] | Columns
@@ -224,6 +225,7 @@ __all__ = [
     "agreed_units",
     "columns_text",
     "headers",
+    "in_units",
     "no_value",
     "parse_columns",
     "read_record",
