@@ -57,7 +57,7 @@ def run(
 ) -> tuple[NDArray[np.float64], list[str]]:
     """Answers (N,) of a session from its start memory, and remarks on the samples.
 
-    `double`: no bit reference; what rounding alone takes beyond a range is then not counted.
+    `double`: no bit reference; counted are then the references that are missed by more than rounding.
     """
     answers, status = session.run(x)
     signal = arguments.signal("x", x)
@@ -70,7 +70,7 @@ def run(
         reached, _ = Session(cascade, "forward").run(answers)
         low, high = (float(end) for end in session.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
         missed = np.abs(signal - reached) > ROUNDED * (high - low)
-        references, drives = references * missed, drives * missed
+        references, drives = references & 0, (references | drives) * missed
     return answers, inverse(len(signal), int(np.count_nonzero(references)), int(np.count_nonzero(drives)), held)
 
 
