@@ -16,7 +16,6 @@ from hystgen.model import Model
 from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 from hystgen.records import Record, in_units
-from hystgen.records.units import of_model
 
 
 def simulate_records(
@@ -35,8 +34,7 @@ def simulate_records(
     limited to `input_range`, the inverse and every `arithmetic` are. Raises NotInvertibleError, FormatError,
     EffectsError, UnsupportedEffectsError and RecordError.
     """
-    wanted = of_model(model.parameters.units)
-    converted = in_units(records, wanted, ("v" if operator == "forward" else "u",))
+    converted = in_units(records, model.parameters.units, need=("v" if operator == "forward" else "u",))
     found = _simulated(model, converted, operator, arithmetic, engine, history, rest)
     notes = [new.notes[len(old.notes) :] for old, new in zip(records, converted, strict=True)]
     return [

@@ -14,7 +14,6 @@ from hystgen.identification import identify
 from hystgen.identification.prepared import samples_in
 from hystgen.model import Model
 from hystgen.records import in_units
-from hystgen.records.units import of_model
 
 if TYPE_CHECKING:
     from hystgen.records import Record
@@ -104,7 +103,7 @@ def track(
     """
     if any(record.y is None for record in records):
         raise ValueError("tracking needs the measured motion: a column y in every record")
-    given, records = records, in_units(records, of_model(model.parameters.units))
+    given, records = records, in_units(records, model.parameters.units)
     notes = [f"{b.name}: {note}" for a, b in zip(given, records, strict=True) for note in b.notes[len(a.notes) :]]
     model.inverse()
     plain = Model(identify(list(records), history=list(history) or None, rest=rest, skip=skip).parameters)

@@ -132,7 +132,6 @@ def diagnose(
     from hystgen.basics import drawing, extras, writing
     from hystgen.effects import load_user_effects
     from hystgen.planning.session import Session
-    from hystgen.records.units import of_model
     from hystgen.report import diagnosis as report
 
     model = load_model(params, effects)
@@ -149,8 +148,8 @@ def diagnose(
         to_fit: list[Any] = list(data)
         if session is not None:
             played = Session.read(session)
-            wanted = of_model(model.parameters.units)
-            (recording,) = records.in_units(records.read_records(to_fit, **read_as), wanted, sources=to_fit)
+            read = records.read_records(to_fit, **read_as)
+            (recording,) = records.in_units(read, model.parameters.units, sources=to_fit)
             to_fit, held = played.cut(recording)
             how.update(holdout=held, history=played.history, rest=played.rest)
         found = report.diagnose(model, to_fit, effects=own, **how, **read_as)

@@ -122,8 +122,8 @@ def identify(
             writing.check_files(Path(report), pages.names())
         older = settings.of(output)
         read = records.read_records([*data, *holdout], points=True, **how)
-        wanted = older.wanted(units, "--units")
-        read = records.in_units(read, wanted, sources=[*data, *holdout], option="--units")
+        before = (older.file, older.units)
+        read = records.in_units(read, file=before, named=("--units", units), sources=[*data, *holdout])
         fit = identification.identify(
             read[: len(data)],
             holdout=read[len(data) :],

@@ -52,7 +52,6 @@ def simulate(
     Example: hystgen simulate stage_x.yaml drive.csv -o predicted.csv --history 100,-100
     """
     from hystgen import records, simulation
-    from hystgen.records.units import of_model
 
     if len(data) > 1 and output is None:
         raise Failed("error: several records need -o with a folder", 2)
@@ -63,8 +62,8 @@ def simulate(
     how = reading_options(**reading)
     column, answer = ("v", "y") if operator == "forward" else ("u", "v")
     read = guarded(params, partial(records.read_records, data, need=(column,), **how))
-    wanted = of_model(model.parameters.units)
-    converted = guarded(params, partial(records.in_units, read, wanted, (column,), data))
+    units_of_model = model.parameters.units
+    converted = guarded(params, partial(records.in_units, read, units_of_model, need=(column,), sources=data))
     for record in converted:
         if {answer, f"{answer}_measured"} <= record.columns().keys():
             raise Failed(f"error: {record.name} has both {answer} and {answer}_measured; rename one with --columns", 2)
@@ -90,7 +89,7 @@ def simulate(
             units[f"{answer}_measured"] = units.pop(answer, "")
         columns[answer] = answers
         if record.units.keys() - {"t"}:  # a header with units says that of the answer too
-            units[answer] = getattr(model.parameters.units, "output" if answer == "y" else "input")
+            units[answer] = getattr(units_of_model, "output" if answer == "y" else "input")
         header = records.headers(columns, units)
         if target is None:
             console.say(records.columns_text(header, list(columns.values())).encode())  # data: always UTF-8

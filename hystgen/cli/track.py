@@ -39,7 +39,6 @@ def track(
     """
     from hystgen import records, tracking
     from hystgen.basics import drawing, extras
-    from hystgen.records.units import of_model
     from hystgen.report import plots
 
     model = load_model(params, effects)
@@ -49,7 +48,7 @@ def track(
         keep_inputs([plot], [params, *data])
         guarded(params, partial(drawing.check_path, plot))
     read = guarded(params, partial(records.read_records, data, need=("v", "y"), **reading_options(**reading)))
-    read = guarded(params, partial(records.in_units, read, of_model(model.parameters.units), sources=data))
+    read = guarded(params, partial(records.in_units, read, model.parameters.units, sources=data))
     for record in read:
         for note in record.notes:
             console.note(f"warning: {record.name}: {note}")

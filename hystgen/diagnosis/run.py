@@ -28,7 +28,6 @@ from hystgen.identification import P0_FLOOR, quality, stage_content
 from hystgen.identification.fit import visited
 from hystgen.identification.pi import DIGITS, FALLS, IdentificationError, Weights, rounded, written
 from hystgen.records import Record, Source, agreed_units, in_units, read_records, several
-from hystgen.records.units import of_model
 
 if TYPE_CHECKING:
     from hystgen.cascade import Cascade
@@ -91,7 +90,7 @@ def diagnose(
     if not all(isinstance(effect, type) and issubclass(effect, Effect) for effect in effects):
         raise TypeError("effects are classes, of files as hystgen.effects.load_user_effects returns them")
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress, points=True)
-    read = in_units(read, of_model(model.parameters.units), sources=[*fitted, *others])
+    read = in_units(read, model.parameters.units, sources=[*fitted, *others])
     nominal = _with_units(model.parameters, read)
     given, unit = nominal.model.effects, nominal.units.output
     before = None if history is None else visited(history)

@@ -104,9 +104,9 @@ def _fitted(task: Task, records: list[str], holdout: list[str]) -> Result:
     sources = [*records, *holdout]
     read = in_units(
         read_records(sources, points=True, **reading),
-        task.settings.wanted(task.options.get("units"), "units"),
+        file=(task.settings.file, task.settings.units),
+        named=("units", task.options.get("units")),
         sources=sources,
-        option="units",
     )
     to_fit, to_hold = read[: len(records)], read[len(records) :]
     fit = task.settings.on(identification.identify(to_fit, holdout=to_hold, name=task.unit, **task.options))

@@ -31,7 +31,6 @@ from hystgen.identification.quality import Row
 from hystgen.identification.reduction import Course
 from hystgen.plays import play_sum
 from hystgen.records import SHORTEST, Record, Source, agreed_units, in_units, read_records, several
-from hystgen.records.units import wanted_by
 
 if TYPE_CHECKING:
     from hystgen.parameters.files import Parameters
@@ -129,7 +128,7 @@ def identify(
     how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve, units)
     to_fit, to_hold = several(records), several(holdout)
     read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress, points=True)
-    read = in_units(read, wanted_by("of units", units, named=True), sources=[*to_fit, *to_hold], option="units")
+    read = in_units(read, named=("units", units), sources=[*to_fit, *to_hold])
     fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
     if not fit_records:
         raise ValueError("there is no record to fit")

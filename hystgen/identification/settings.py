@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hystgen.records.units import Wanted, conversion, wanted_by
+from hystgen.records.units import conversion
 
 if TYPE_CHECKING:
     from hystgen.identification.fit import Fit
@@ -44,11 +44,6 @@ class Settings:
         if "emit" in self.values:
             data["emit"], _ = self._emit(fit)
         return replace(fit, parameters=make_parameters(data))
-
-    def wanted(self, given: Mapping[str, str] | None, option: str) -> dict[str, Wanted]:
-        """The units that records are wanted in: those that the user gives by `option`, else those of the file."""
-        of_file = wanted_by(f"in {self.file}", self.units)
-        return {**of_file, **wanted_by(f"of {option}", given, named=True)}
 
     def sentences(self, fit: Fit) -> list[str]:
         """Sentences about settings kept and left out; `fit`: without these settings."""

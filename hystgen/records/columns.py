@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from hystgen.basics.names import MAX_UNIT
 from hystgen.basics.problems import printable
-from hystgen.records.record import Array
+from hystgen.records.record import Array, Record
 
-# Units: how headers write them, and which ones are times ------------------------------------------------------
+# Units: how headers write them, which ones are times, and what several records agree on ----------------------
 
 
 SECONDS = ("s", "sec", "secs", "second", "seconds")
@@ -36,6 +36,8 @@ _ONE = (
     r"|microns?|sec|msec|usec|counts?|lsb)|min|h|%|deg|deg ?C|°|°C|°F|arcsec|a\.u\.)"
 )
 _UNIT = re.compile(rf"{_ONE}(?:\^?-?\d)?(?:\s?[*/·]\s?{_ONE}(?:\^?-?\d)?)*")
+
+_LENGTH = re.compile(r"(?:[pnumc]?m|(?i:(?:pico|nano|micro|milli|centi)?met(?:er|re)s?|microns?))")
 
 # After an underscore a word is a unit only when it is hardly anything else: v_in, y_min and v_m are names
 _AFTER_UNDERSCORE = re.compile(
@@ -94,6 +96,37 @@ def to_seconds(t: Array, unit: str) -> tuple[Array, str]:
     seconds = t / divisor
     seconds *= factor
     return seconds, f"t is in {printable(unit)}; it was converted to seconds"
+
+
+def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = None) -> tuple[dict[str, str], list[str]]:
+    """Units `input` and `output` of a model made from `records`, and a sentence for each that is strange.
+
+    `given` wins over the records, the first record that has a unit over later ones. All are in one unit each, as
+    `in_units` makes them.
+    """
+    units = {}
+    strange = []
+    everything = list(records)
+    for key, column in (("input", "v"), ("output", "y")):
+        unit = (given or {}).get(key, "")
+        for record in everything:
+            own = record.units.get(column, "")
+            if len(own) > MAX_UNIT or not own.isprintable():
+                strange.append(
+                    f'the unit "{printable(own)}" of {column} in {record.name} is not taken over: a unit has up to '
+                    f"{MAX_UNIT} characters on one line"
+                )
+            elif not unit:
+                unit = own
+        if unit:
+            units[key] = unit
+    drive, displacement = units.get("input", ""), units.get("output", "")
+    if _LENGTH.fullmatch(plain(drive)) and displacement and not _LENGTH.fullmatch(plain(displacement)):
+        strange.append(
+            f"the drive is in {printable(drive)} and the displacement in {printable(displacement)}, as if they were "
+            "exchanged; check the columns and the units, the drive comes first"
+        )
+    return units, strange
 
 
 def plain(unit: str) -> str:

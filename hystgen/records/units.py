@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import NamedTuple, Protocol
@@ -155,40 +155,32 @@ QUANTITIES = {"input": "drive", "output": "output"}
 """Keys of a parameter file's `units`, and what they are the units of."""
 
 
-def of_model(units: HasUnits) -> dict[str, Wanted]:
-    """The units that a model's records are wanted in."""
-    return {
-        key: Wanted(getattr(units, key), f"the model's {quantity}", told=True) for key, quantity in QUANTITIES.items()
-    }
-
-
-def wanted_by(of: str, units: Mapping[str, str] | None, named: bool = False) -> dict[str, Wanted]:
-    """The units of a mapping; `of`: where they are from, as in "of --units"."""
-    return {key: Wanted(unit, f"the {QUANTITIES[key]} {of}", named) for key, unit in (units or {}).items() if unit}
-
-
 KEYS = {"v": "input", "y": "output", "u": "output"}
 """Of columns in a parameter file's `units`."""
 
 
-def in_units(
-    records: Iterable[Record],
-    wanted: Mapping[str, Wanted],
-    need: Sequence[str] = ("v", "y"),
-    sources: Sequence[object] = (),
-    option: str = "",
-) -> list[Record]:
-    """The records with the columns `need`, and temperatures, in the units wanted; each conversion is one of its notes.
+def wanted(
+    model: HasUnits | None, file: tuple[str, Mapping[str, str]], named: tuple[str, Mapping[str, str]]
+) -> dict[str, Wanted]:
+    """What is wanted of `input` and `output`: what the user names, else what a file has, else what a model has."""
+    found: dict[str, Wanted] = {}
+    for key, quantity in QUANTITIES.items():
+        if model is not None:
+            found[key] = Wanted(getattr(model, key), f"the model's {quantity}", told=True)
+        for of, units, by_user in ((f"in {file[0]}", file[1], False), (f"of {named[0]}", named[1], True)):
+            if units.get(key):
+                found[key] = Wanted(units[key], f"the {quantity} {of}", by_user)
+    return found
 
-    `wanted`: of `input` and `output`; columns without a unit are taken to be in it. Where nothing is wanted, the first
-    record with a unit decides. `sources`: as given for the records, for messages; `option`: which one names units.
-    Raises RecordError with every column in another quantity, or in a unit that nobody knows.
-    """
-    everything = list(records)
-    taken = dict(wanted)
+
+def converted(
+    records: Sequence[Record], goals: Mapping[str, Wanted], need: Sequence[str], sources: Sequence[object], option: str
+) -> list[Record]:
+    """The records in the units of `goals`; see `hystgen.records.in_units`."""
+    taken = dict(goals)
     problems: list[str] = []
     found = []
-    for k, record in enumerate(everything):
+    for k, record in enumerate(records):
         source = sources[k] if k < len(sources) else None
         place = os.fspath(source) if isinstance(source, str | os.PathLike) else record.name
         columns, units, notes = {}, dict(record.units), []
@@ -244,34 +236,3 @@ def _with(record: Record, columns: Mapping[str, Array], units: Mapping[str, str]
     extra = {name: columns.get(name, values) for name, values in record.extra.items()}
     v, y = columns.get("v", record.v), record.y if record.y is None else columns.get("y", record.y)
     return replace(record, v=v, y=y, extra=extra, units=dict(units), notes=(*record.notes, *notes))
-
-
-def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = None) -> tuple[dict[str, str], list[str]]:
-    """Units `input` and `output` of a model made from records in one unit each, and sentences about strange ones.
-
-    `given` wins over the records, the first record that has a unit over later ones.
-    """
-    units = {}
-    strange = []
-    everything = list(records)
-    for key, column in (("input", "v"), ("output", "y")):
-        unit = (given or {}).get(key, "")
-        for record in everything:
-            own = record.units.get(column, "")
-            if len(own) > MAX_UNIT or not own.isprintable():
-                strange.append(
-                    f'the unit "{printable(own)}" of {column} in {record.name} is not taken over: a unit has up to '
-                    f"{MAX_UNIT} characters on one line"
-                )
-            elif not unit:
-                unit = own
-        if unit:
-            units[key] = unit
-    drive, displacement = (quantity(units.get(key, "")) for key in ("input", "output"))
-    lengths = [each is not None and each.kind == "m" for each in (drive, displacement)]
-    if lengths == [True, False] and "output" in units:
-        strange.append(
-            f"the drive is in {printable(units['input'])} and the displacement in {printable(units['output'])}, as if "
-            "they were exchanged; check the columns and the units, the drive comes first"
-        )
-    return units, strange
