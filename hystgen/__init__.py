@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hystgen.basics.problems import FormatError as FormatError
     from hystgen.basics.problems import NotInvertibleError as NotInvertibleError
     from hystgen.basics.problems import ParameterError as ParameterError
+    from hystgen.basics.problems import SampleWarning as SampleWarning
     from hystgen.cascade import PI as PI
     from hystgen.cascade import Cascade as Cascade
     from hystgen.cascade import InverseCascade as InverseCascade
@@ -58,6 +59,7 @@ _PLACES = {
     "NotInvertibleError": "basics.problems",
     "PI": "cascade",
     "ParameterError": "basics.problems",
+    "SampleWarning": "basics.problems",
     "Session": "compensator.reference",
     "TanhEnvelope": "front.tanh.model",
     "diagnose": "report.diagnosis",

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics.problems import NotInvertibleError
 from hystgen.chain.static import StaticModel
+from hystgen.compensator import remarks
 from hystgen.compensator.reference import Session
 from hystgen.plays.play_sum import PlaySum
 
@@ -44,8 +45,13 @@ class Cascade(StaticModel):
     pi: PI
 
     def simulate(self, v: ArrayLike, clamp: bool = False) -> Array:
-        """Output for the drive samples `v` (N,) from the start memory, in double; `clamp` limits the drive."""
-        return Session(self, "forward", clamp=clamp).run(v)[0]
+        """Output for the drive samples `v` (N,) from the start memory, in double; `clamp` limits the drive.
+
+        Warns (`SampleWarning`) of drives outside `input_range`, and of samples that are not finite, which are held.
+        """
+        y, said = remarks.run(self, Session(self, "forward", clamp=clamp), v, double=True)
+        remarks.tell(said)
+        return y
 
     def inverse(self) -> InverseCascade:
         """The compensator `v = G^-1[PI^-1[u]]` (48). Raises NotInvertibleError."""
@@ -65,6 +71,12 @@ class InverseCascade:
         """The model that this compensates."""
         return self.forward
 
-    def simulate(self, u: ArrayLike, clamp: bool = False) -> Array:
-        """Drive for the reference samples `u` (N,), in double precision; `clamp` keeps it inside `input_range`."""
-        return Session(self.forward, "inverse", clamp=clamp).run(u)[0]
+    def simulate(self, u: ArrayLike, clamp: bool = True) -> Array:
+        """Drive for the reference samples `u` (N,), in double precision; `clamp` keeps it inside `input_range`.
+
+        The memory follows the limited drive. Warns (`SampleWarning`) with the number of limited samples, and of those
+        that are not finite, for which the drive holds.
+        """
+        v, said = remarks.run(self.forward, Session(self.forward, "inverse", clamp=clamp), u, double=True)
+        remarks.tell(said)
+        return v

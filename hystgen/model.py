@@ -6,8 +6,8 @@ import math
 import os
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, partial
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
@@ -17,7 +17,7 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import arguments, display, drawing
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError, counted
 from hystgen.cascade import PI, Cascade
-from hystgen.compensator import engines, tables
+from hystgen.compensator import engines, remarks, tables
 from hystgen.compensator.reference import Session
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
@@ -95,7 +95,7 @@ class Model:
         from hystgen import portrait
 
         shown = not self.cascade.inverse_problems() and not self.effects
-        inverse = partial(self.inverse().simulate, clamp=True) if shown else None
+        inverse = (lambda u: self.inverse().answers(u)[0]) if shown else None
         return portrait.figure(self.name, self.cascade, self.parameters.units, inverse, bool(self.effects))
 
     @cached_property
@@ -278,12 +278,39 @@ class Model:
         Only effects see time: `t` (N,) in seconds, rising, or the parameter file's `sample_time`; and `extra`, further
         columns (N,) such as `temperature`. Everything starts at rest at the first sample. Raises EffectsError for what
         they need and do not get, UnsupportedEffectsError for effects in an `arithmetic`.
+
+        Warns (`SampleWarning`) with the number of drives outside `input_range`, and of samples that are not finite: the
+        drive before them is held.
         """
+        y, said = self.answers(v, arithmetic, clamp, engine, t=t, extra=extra)
+        remarks.tell(said)
+        return y
+
+    def answers(
+        self,
+        v: ArrayLike,
+        arithmetic: str | None = None,
+        clamp: bool = False,
+        engine: str | None = None,
+        *,
+        t: ArrayLike | None = None,
+        extra: Mapping[str, ArrayLike] | None = None,
+    ) -> tuple[NDArray[Any], list[str]]:
+        """What `simulate` gives, and its warnings as sentences."""
         if not self.effects:
-            return self.session("forward", arithmetic, engine, clamp).run(v)[0]
+            session = self.session("forward", arithmetic, engine, clamp)
+            return remarks.run(self.cascade, session, v, arithmetic is None)
         if arithmetic is not None:
             return self._reference(v, arithmetic, engine, t, extra, inverse=False)
-        return self.chain.simulate([self.run(v, t, extra, clamp)])[0]
+        drives, held = _held("v", v, self._drive_at_start())
+        run = self.run(drives, t, extra, clamp)
+        said = remarks.forward(drives, self.cascade.input_range, clamp, int(np.count_nonzero(held)))
+        return self.chain.simulate([run])[0], said
+
+    def _drive_at_start(self) -> float:
+        """The drive of the start memory, in which samples that begin with none are held."""
+        cascade = self.cascade
+        return float(cascade.front_inverse(cascade.pi.start[0])) if cascade.start_is_defined else 0.0
 
     def _reference(
         self,
@@ -293,8 +320,8 @@ class Model:
         t: ArrayLike | None,
         extra: Mapping[str, ArrayLike] | None,
         inverse: bool,
-    ) -> NDArray[Any]:
-        """Answers (N,) of the bit reference of a model with effects; see `simulate`."""
+    ) -> tuple[NDArray[Any], list[str]]:
+        """Answers (N,) of the bit reference of a model with effects, and remarks; see `simulate`."""
         from hystgen.compensator.chain import run, tables
         from hystgen.compensator.chained import EVEN
 
@@ -302,7 +329,8 @@ class Model:
         self.need_compensated(arithmetic, "inverse" if inverse else "forward")
         seconds = self.parameters.sample_time
         assert seconds is not None
-        record = self.run(x, t, extra)
+        samples = arguments.signal("u" if inverse else "v", x)
+        record = replace(self.run(_held("x", samples, 0.0)[0], t, extra), v=samples)
         if np.max(np.abs(record.steps - seconds), initial=0.0) > EVEN * seconds:
             raise EffectsError(
                 f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
@@ -314,7 +342,15 @@ class Model:
             )
         how = self.parameters.emit.compensation
         chosen = self.engine(engine, arithmetic=arithmetic)
-        return run.answers(tables.build(self.chain, arithmetic, seconds, how, self._lsb, chosen), record, inverse)
+        compiled = tables.build(self.chain, arithmetic, seconds, how, self._lsb, chosen)
+        found, status = run.answers(compiled, record, inverse)
+        clamped, limited, held = (
+            remarks.counted(status, bit) for bit in (slots.INPUT_CLAMPED, slots.OUTPUT_CLAMPED, slots.HELD)
+        )
+        if inverse:
+            return found, remarks.inverse(len(samples), clamped, limited, held)
+        ends = compiled.tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
+        return found, remarks.forward(samples, (float(ends[0]), float(ends[1])), True, held)
 
     def run(
         self,
@@ -389,7 +425,7 @@ class InverseModel:
         self,
         u: ArrayLike,
         arithmetic: str | None = None,
-        clamp: bool = False,
+        clamp: bool = True,
         engine: str | None = None,
         *,
         t: ArrayLike | None = None,
@@ -397,22 +433,63 @@ class InverseModel:
     ) -> NDArray[Any]:
         """Drive (N,) for the reference samples `u` (N,); arguments as for `Model.simulate`.
 
+        The drive stays in `input_range` as that of the C does, and the memory follows the limited drive, so that all
+        is exact again at the next reference in reach; `clamp=False` gives the mathematical inverse without a range, in
+        double precision. For a sample that is not finite the drive holds. Warns (`SampleWarning`) with the numbers of
+        limited and of held samples.
+
         With effects the whole reference is known: delays and modes take it before its time, and everything is at rest
         at the first sample. It is read as `emit.compensation` of the parameter file says, in samples of the record;
         `quiet` changes nothing in double precision, which has no codes to dither between. What a mode leaves is its
         reference's fourth difference over 6, what a lag leaves a quarter of the second difference of the drive behind
         it; all else is exact.
         """
-        if not self.forward.effects:
-            return self.forward.session("inverse", arithmetic, engine, clamp).run(u)[0]
+        v, said = self.answers(u, arithmetic, clamp, engine, t=t, extra=extra)
+        remarks.tell(said)
+        return v
+
+    def answers(
+        self,
+        u: ArrayLike,
+        arithmetic: str | None = None,
+        clamp: bool = True,
+        engine: str | None = None,
+        *,
+        t: ArrayLike | None = None,
+        extra: Mapping[str, ArrayLike] | None = None,
+    ) -> tuple[NDArray[Any], list[str]]:
+        """What `simulate` gives, and its warnings as sentences."""
+        model = self.forward
+        if not model.effects:
+            session = model.session("inverse", arithmetic, engine, clamp)
+            return remarks.run(model.cascade, session, u, arithmetic is None)
         if arithmetic is not None:
-            return self.forward._reference(u, arithmetic, engine, t, extra, inverse=True)
-        ends = self.forward.cascade.input_range if clamp else (-math.inf, math.inf)
-        return self.forward.compensator.drives(self.forward.run(u, t, extra), ends)
+            return model._reference(u, arithmetic, engine, t, extra, inverse=True)
+        low, high = model.cascade.input_range
+        references, held = _held("u", u, None)
+        ends = (low, high) if clamp else (-math.inf, math.inf)
+        v, beyond = model.compensator.answers(model.run(references, t, extra), ends, held=held)
+        limited = int(np.count_nonzero(beyond > remarks.ROUNDED * (high - low)))
+        return v, remarks.inverse(len(v), 0, limited, int(np.count_nonzero(held)))
 
     def inverse(self) -> Model:
         """The model that this compensates."""
         return self.forward
+
+
+def _held(name: str, x: ArrayLike, first: float | None) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Samples (N,), called `name`, with the finite one before in place of each that is not, and which those are.
+
+    Before the first finite one stands `first`, or where that is None the first finite one itself.
+    """
+    samples = np.array(arguments.signal(name, x), dtype=np.float64)
+    wrong = ~np.isfinite(samples)
+    if np.any(wrong):
+        last = np.maximum.accumulate(np.where(wrong, -1, np.arange(len(samples))))
+        finite = samples[~wrong]
+        begin = first if first is not None else float(finite[0]) if len(finite) else 0.0
+        samples = np.where(last < 0, begin, samples[np.maximum(last, 0)])
+    return samples, wrong
 
 
 def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] | type[Effect]] = ()) -> Model:

@@ -10,11 +10,12 @@ from numpy.typing import NDArray
 
 from hystgen.basics.problems import EffectsError
 from hystgen.chain.chain import join
+from hystgen.compensator import remarks
 from hystgen.compensator.reference import Session
 from hystgen.model import Model
 from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
-from hystgen.records import Record
+from hystgen.records import Record, in_units
 
 
 def simulate_records(
@@ -29,9 +30,29 @@ def simulate_records(
     """Answers of the model (column v) or its inverse (column u) for records that are one session, each with remarks.
 
     `history`: drives visited before the first record; `rest`: seconds of pause before every record, which effects
-    alone see. The forward model is not limited to `input_range`, the inverse and every `arithmetic` are. Raises
-    NotInvertibleError, FormatError, EffectsError and UnsupportedEffectsError.
+    alone see. Records in other units of the same quantity are converted to the model's. The forward model is not
+    limited to `input_range`, the inverse and every `arithmetic` are. Raises NotInvertibleError, FormatError,
+    EffectsError, UnsupportedEffectsError and RecordError.
     """
+    converted = in_units(records, model.parameters.units, need=("v" if operator == "forward" else "u",))
+    found = _simulated(model, converted, operator, arithmetic, engine, history, rest)
+    notes = [new.notes[len(old.notes) :] for old, new in zip(records, converted, strict=True)]
+    return [
+        (answers, [*_of(record.name, said), *more])
+        for record, said, (answers, more) in zip(converted, notes, found, strict=True)
+    ]
+
+
+def _simulated(
+    model: Model,
+    records: Sequence[Record],
+    operator: str,
+    arithmetic: str | None,
+    engine: str | None,
+    history: Sequence[float],
+    rest: float,
+) -> list[tuple[NDArray[Any], list[str]]]:
+    """The same for records in the model's units."""
     if operator == "inverse":
         model.inverse()
     if model.effects and arithmetic is None and operator == "inverse":
@@ -40,7 +61,7 @@ def simulate_records(
         runs = [model.run(record.v, record.t, record.extra, rest=rest) for record in records]
         answers = model.chain.simulate(runs, history)
         ends = model.cascade.input_range
-        return [(y, _outside(r.name, ends, r.v, False)) for r, y in zip(records, answers, strict=True)]
+        return [(y, _of(r.name, remarks.forward(r.v, ends, False))) for r, y in zip(records, answers, strict=True)]
     if model.effects:
         return [_emulated(model, records, operator, arithmetic)]
     session = model.session(operator, arithmetic, engine, clamp=operator == "inverse")
@@ -57,13 +78,14 @@ def simulate_records(
 def _emulated(
     model: Model, records: Sequence[Record], operator: str, arithmetic: str | None
 ) -> tuple[NDArray[Any], list[str]]:
-    """Answers of the bit reference of a model with effects, which takes one record, and no remarks."""
+    """Answers of the bit reference of a model with effects, which takes one record, and remarks."""
     if len(records) > 1:
         raise EffectsError("the bit reference of a model with effects takes one record; simulate them one by one")
     (record,) = records
     signal = record.columns()["v" if operator == "forward" else "u"]
-    run = model.simulate if operator == "forward" else model.inverse().simulate
-    return run(signal, arithmetic, t=record.t, extra=record.extra), []
+    run = model.answers if operator == "forward" else model.inverse().answers
+    answers, said = run(signal, arithmetic, t=record.t, extra=record.extra)
+    return answers, _of(record.name, said)
 
 
 def _compensated(
@@ -87,27 +109,15 @@ def _compensated(
     return found
 
 
-def _outside(name: str, ends: tuple[float, float], signal: NDArray[np.float64], limited: bool) -> list[str]:
-    """A sentence about drives outside the range, if there are any."""
-    outside = int(np.count_nonzero((signal < ends[0]) | (signal > ends[1])))
-    how = "limited to it" if limited else "extrapolated, not limited"
-    said = f"{name}: {outside} of {len(signal)} samples lie outside input_range {ends[0]:g} to {ends[1]:g}, {how}"
-    return [said] if outside else []
+def _of(name: str, said: Sequence[str]) -> list[str]:
+    return [f"{name}: {text}" for text in said]
 
 
 def _remarks(
     name: str, session: Session, operator: str, signal: NDArray[np.float64], status: Bytes
 ) -> list[str]:
     """What a user should know about a simulated record, one sentence each."""
+    clamped, limited = (remarks.counted(status, bit) for bit in (slots.INPUT_CLAMPED, slots.OUTPUT_CLAMPED))
     if operator == "forward":
-        limited = bool(np.any(status & slots.INPUT_CLAMPED))
-        return _outside(name, session.drive_range, signal, limited)
-    said = []
-    for bit, what in (
-        (slots.INPUT_CLAMPED, "references lie outside the output range and were limited"),
-        (slots.OUTPUT_CLAMPED, "drives were limited to input_range"),
-    ):
-        count = int(np.count_nonzero(status & bit))
-        if count:
-            said.append(f"{name}: {count} of {len(signal)} {what}")
-    return said
+        return _of(name, remarks.forward(signal, session.drive_range, clamped > 0))
+    return _of(name, remarks.inverse(len(signal), clamped, limited))

@@ -13,6 +13,7 @@ from hystgen.compensator.chain.layout import LEAST_LATE
 from hystgen.identification import identify
 from hystgen.identification.prepared import samples_in
 from hystgen.model import Model
+from hystgen.records import in_units
 
 if TYPE_CHECKING:
     from hystgen.records import Record
@@ -54,10 +55,14 @@ class Tracked:
 
 @dataclass(frozen=True)
 class Tracking:
-    """Errors that tracking would leave on the recorded actuator, record by record."""
+    """Errors that tracking would leave on the recorded actuator, record by record.
+
+    `unit`: that of the displacement; `notes`: what was converted, one sentence each.
+    """
 
     unit: str
     records: tuple[Tracked, ...]
+    notes: tuple[str, ...] = ()
 
     def table(self) -> str:
         """The table that the command prints."""
@@ -94,10 +99,12 @@ def track(
     record. `straight line`: the drive as a linear function of the reference, least squares; `plays alone`: the inverse
     of a Prandtl-Ishlinskii model identified from the same records; `whole model`: the inverse of `model`. `history` and
     `rest` come before every record; `skip`: seconds at its start that are not compared. Raises NotInvertibleError,
-    EffectsError, ValueError for records without y.
+    EffectsError, ValueError for records without y, RecordError for units that do not fit the model's.
     """
     if any(record.y is None for record in records):
         raise ValueError("tracking needs the measured motion: a column y in every record")
+    given, records = records, in_units(records, model.parameters.units)
+    notes = [f"{b.name}: {note}" for a, b in zip(given, records, strict=True) for note in b.notes[len(a.notes) :]]
     model.inverse()
     plain = Model(identify(list(records), history=list(history) or None, rest=rest, skip=skip).parameters)
     runs = [model.run(record.v, record.t, record.extra, rest=rest) for record in records]
@@ -109,8 +116,8 @@ def track(
         assert record.y is not None
         drives = {
             LINE: np.clip(start + slope * reference, *ends),
-            PLAYS: plain.inverse().simulate(reference, clamp=True),
-            WHOLE: model.inverse().simulate(reference, t=run.t, extra=run.extra, clamp=True),
+            PLAYS: plain.inverse().answers(reference)[0],
+            WHOLE: model.inverse().answers(reference, t=run.t, extra=run.extra)[0],
         }
         beside = record.y - reference
         moves = {which: model.chain.simulate([model.run(v, run.t, run.extra)])[0] for which, v in drives.items()}
@@ -121,4 +128,4 @@ def track(
             error = y - reference + beside
             errors[which] = error - np.mean(error[known:])
         found.append(Tracked(record.name, run.t, reference, errors, float(np.ptp(reference)), known))
-    return Tracking(model.parameters.units.output, tuple(found))
+    return Tracking(model.parameters.units.output, tuple(found), tuple(notes))

@@ -771,16 +771,6 @@ def test_units_that_records_agree_on() -> None:
         [],
     )
     assert agreed_units([record("a", v="V", y="um")], {"input": "V", "output": ""})[0] == {"input": "V", "output": "um"}
-    units, reported = agreed_units([record("a.csv", v="V", y="um"), record("b.csv", v="mV", y="um")])
-    assert units == {"input": "V", "output": "um"}
-    assert reported == [
-        'the unit of v is "V" in a.csv and "mV" in b.csv; no number was converted, check that they agree'
-    ]
-    units, reported = agreed_units([record("a.csv", y="nm")], {"output": "um"})
-    assert units == {"output": "um"}
-    assert reported == [
-        'the unit of y is "um" given and "nm" in a.csv; no number was converted, check that they agree'
-    ]
     units, reported = agreed_units([record("a.csv", v="µm", y="V")])
     assert units == {"input": "µm", "output": "V"}
     assert len(reported) == 1
@@ -820,10 +810,10 @@ def test_identify_takes_the_units_of_the_records(tmp_path: Path) -> None:
     assert "unit" not in reported
     content, reported = run(one, "--holdout", two)
     assert content["units"] == {"input": "V", "output": "um"}
-    assert 'warning: the unit of v is "V" in one.csv and "mV" in two.csv; no number was converted' in reported
+    assert "warning: two.csv: column v [mV] was converted to V: 1 mV is 0.001 V" in reported
     content, reported = run(one, "--units", "V,nm")
     assert content["units"] == {"input": "V", "output": "nm"}
-    assert 'warning: the unit of y is "nm" given and "um" in one.csv' in reported
+    assert "warning: one.csv: column y [um] was converted to nm: 1 um is 1000 nm" in reported
     fit = identify(one, thresholds=2)
     assert (fit.parameters.units.input, fit.parameters.units.output) == ("V", "um")
 
@@ -858,7 +848,7 @@ def test_simulate_writes_the_units_back(tmp_path: Path) -> None:
     result = CliRunner().invoke(cli.main, ["simulate", str(model), str(path)])
     assert result.exit_code == 0, result.stderr
     rows = list(csv.DictReader(io.StringIO(result.stdout)))
-    assert list(rows[0]) == ["t [s]", "v [V]", "y_measured [um]", "y"]
+    assert list(rows[0]) == ["t [s]", "v [V]", "y_measured [um]", "y"], "the model does not say in which unit"
     assert float(rows[5]["t [s]"]) == 0.00005
 
 

@@ -48,9 +48,10 @@ def test_settings_of_a_replaced_file_are_kept_and_reported(tmp_path: Path, run: 
     assert (found.description, found.sample_time, found.emit, found.name) == (
         old.description, old.sample_time, old.emit, old.name
     )  # fmt: skip
-    assert (found.model, found.input_range) == (fresh.model, fresh.input_range)
-    assert (found.units.input, found.units.output) == ("V", "um"), "those of the records"
-    assert f"{target}: name, description, sample_time, emit kept from the file that was there" in said
+    assert (found.units.input, found.units.output) == ("kV", "nm"), "the records are converted to them"
+    assert found.input_range == pytest.approx([1e-3 * end for end in fresh.input_range])
+    assert found.model.pi.weights == pytest.approx([1e6 * weight for weight in fresh.model.pi.weights], rel=1e-6)
+    assert f"{target}: name, units, description, sample_time, emit kept from the file that was there" in said
     bytes_now = target.read_bytes()
     assert identified(target, run, record=record)[0] == found
     assert target.read_bytes() == bytes_now

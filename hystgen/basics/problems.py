@@ -131,6 +131,10 @@ class FormatError(ValueError):
         super().__init__("\n".join(Problem(path_text(path), message).named for path, message in self.problems))
 
 
+class SampleWarning(UserWarning):
+    """Samples that a model limited, held or extrapolated; `str()` says how many, and what was done with them."""
+
+
 def counted(number: int, one: str, several: str = "") -> str:
     """`1 sample`, `2 samples`; `several`: the words behind any other number, where they are not `one` with an s."""
     return f"{number} {one if number == 1 else several or f'{one}s'}"

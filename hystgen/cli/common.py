@@ -221,7 +221,7 @@ _RECORD_OPTIONS = [
     ),
     click.option("--sample-time", type=float, help="seconds, for files without time"),
     click.option("--delimiter", help="default: what the file shows"),
-    click.option("--history", metavar="V,V,..", help="drive values visited before"),
+    click.option("--history", metavar="V,V,..", help="drive values visited before, in the model's units"),
     click.option(
         "--rest", type=float, callback=seconds, default=0.0, help="seconds of pause, seen by effects alone"
     ),

@@ -148,7 +148,8 @@ def diagnose(
         to_fit: list[Any] = list(data)
         if session is not None:
             played = Session.read(session)
-            (recording,) = records.read_records(to_fit, **read_as)
+            read = records.read_records(to_fit, **read_as)
+            (recording,) = records.in_units(read, model.parameters.units, sources=to_fit)
             to_fit, held = played.cut(recording)
             how.update(holdout=held, history=played.history, rest=played.rest)
         found = report.diagnose(model, to_fit, effects=own, **how, **read_as)

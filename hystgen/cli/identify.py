@@ -52,7 +52,10 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
 @skip_option
 @click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, from 0 up")
 @click.option("--name", help="C identifier of the model; default: from the output file")
-@click.option("--units", metavar="V,um", callback=_units, help="units of drive and output; default: the records'")
+@click.option(
+    "--units", metavar="V,um", callback=_units,
+    help="units of drive and output, to which records are converted; default: the records'",
+)  # fmt: skip
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
 @click.option("--report", type=click.Path(file_okay=False), help="folder for report.html and its pictures")
 @record_options
@@ -122,6 +125,8 @@ def identify(
             writing.check_files(Path(report), pages.names())
         older = settings.of(output)
         read = records.read_records([*data, *holdout], points=True, **how)
+        before = (older.file, older.units)
+        read = records.in_units(read, file=before, named=("--units", units), sources=[*data, *holdout])
         fit = identification.identify(
             read[: len(data)],
             holdout=read[len(data) :],

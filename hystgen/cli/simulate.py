@@ -62,7 +62,9 @@ def simulate(
     how = reading_options(**reading)
     column, answer = ("v", "y") if operator == "forward" else ("u", "v")
     read = guarded(params, partial(records.read_records, data, need=(column,), **how))
-    for record in read:
+    units_of_model = model.parameters.units
+    converted = guarded(params, partial(records.in_units, read, units_of_model, need=(column,), sources=data))
+    for record in converted:
         if {answer, f"{answer}_measured"} <= record.columns().keys():
             raise Failed(f"error: {record.name} has both {answer} and {answer}_measured; rename one with --columns", 2)
         for note in record.notes:
@@ -75,7 +77,7 @@ def simulate(
     keep_inputs(targets, [params, *data])
     simulated = guarded(
         params,
-        lambda: simulation.simulate_records(model, read, operator, arithmetic, engine, visited or (), rest),
+        lambda: simulation.simulate_records(model, converted, operator, arithmetic, engine, visited or (), rest),
     )
     for record, target, (answers, remarks) in zip(read, targets, simulated, strict=True):
         columns = record.columns()
@@ -86,6 +88,8 @@ def simulate(
             columns[f"{answer}_measured"] = columns.pop(answer)
             units[f"{answer}_measured"] = units.pop(answer, "")
         columns[answer] = answers
+        if record.units.keys() - {"t"}:  # a header with units says that of the answer too
+            units[answer] = getattr(units_of_model, "output" if answer == "y" else "input")
         header = records.headers(columns, units)
         if target is None:
             console.say(records.columns_text(header, list(columns.values())).encode())  # data: always UTF-8

@@ -48,6 +48,7 @@ def track(
         keep_inputs([plot], [params, *data])
         guarded(params, partial(drawing.check_path, plot))
     read = guarded(params, partial(records.read_records, data, need=("v", "y"), **reading_options(**reading)))
+    read = guarded(params, partial(records.in_units, read, model.parameters.units, sources=data))
     for record in read:
         for note in record.notes:
             console.note(f"warning: {record.name}: {note}")

@@ -279,13 +279,25 @@ class Compensator:
         return [effect for effect in self.effects if effect.name == name]
 
     def drives(self, reference: Run, ends: tuple[float, float], asked: NDArray[np.bool_] | None = None) -> Array:
-        """Drives (N,) within `ends` for the reference in `reference.v`.
+        """Drives (N,) within `ends` for the reference in `reference.v`; see `answers`."""
+        return self.answers(reference, ends, asked)[0]
+
+    def answers(
+        self,
+        reference: Run,
+        ends: tuple[float, float],
+        asked: NDArray[np.bool_] | None = None,
+        held: NDArray[np.bool_] | None = None,
+    ) -> tuple[Array, Array]:
+        """Drives (N,) within `ends` for the reference in `reference.v`, and how far each was taken back to them.
 
         `asked` (N,): the samples of `reference.v` that are references. Samples before the first of them are drives;
         between references the drive holds. Everything is at rest at the first sample. After the last sample the
-        reference keeps its value.
+        reference keeps its value. `held` (N,): samples without a reference of their own, at which the drive holds as
+        the C's does: what is read ahead of them is in `reference.v`.
         """
         asked = np.ones(len(reference.t), dtype=bool) if asked is None else asked
+        held = np.zeros(len(reference.t), dtype=bool) if held is None else held
         first = int(np.argmax(asked))
         self.actuator.start_over()
         t, n = reference.t, len(reference.t)
@@ -293,7 +305,7 @@ class Compensator:
         targets = self._targets(reference, asked)
         ageing_effects = self._called("ageing")
         heating = [Heating(effect, n) for effect in self.effects if isinstance(effect, OwnHeat)]
-        v = np.empty(n)
+        v, beyond = np.empty(n), np.zeros(n)
         travelled = 0.0
         for k in range(n):
             seconds = float(t[k] - t[k - 1]) if k else 0.0
@@ -306,13 +318,18 @@ class Compensator:
                 if not asked[k]:
                     drive = float(reference.v[k]) if k < first else before
                     break
+                if held[k]:
+                    drive = before if k else min(max(self.actuator.drive, ends[0]), ends[1])
+                    break
                 last = drive
                 way = travelled + (abs(drive - before) if k else 0.0)
                 y = float(targets[k])
                 for each in heating:
                     y = each.solve(y, each.risen(before, drive, seconds))
                 drive = self._solve(y, gains, k, [ageing.gain(e, way) for e in ageing_effects])
-                drive = min(max(self._slewed(drive, before, seconds), ends[0]), ends[1])
+                wanted = self._slewed(drive, before, seconds)
+                drive = min(max(wanted, ends[0]), ends[1])
+                beyond[k] = abs(wanted - drive)
                 if drive == last or not (ageing_effects or heating):
                     break
             x = drive
@@ -322,7 +339,7 @@ class Compensator:
             for each in heating:
                 each.move(before, drive, seconds)
             v[k] = drive
-        return v
+        return v, beyond
 
     def _solve(self, y: float, gains: Sequence[tuple[Array, Array]], k: int, aged: Sequence[float]) -> float:
         for gain, offset in reversed(gains):

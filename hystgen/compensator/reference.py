@@ -204,6 +204,11 @@ class Session:
         self._code.init(self.tables, self.state, self._inverse)
 
     @property
+    def inverse(self) -> bool:
+        """Whether the operator is the inverse."""
+        return bool(self._inverse)
+
+    @property
     def drive_range(self) -> tuple[float, float]:
         """`input_range` in the operator's own numbers: physical units, or codes in fixed point."""
         if self._fixed:

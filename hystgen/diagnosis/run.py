@@ -27,7 +27,7 @@ from hystgen.effects.base import Effect, Place
 from hystgen.identification import P0_FLOOR, quality, stage_content
 from hystgen.identification.fit import visited
 from hystgen.identification.pi import DIGITS, FALLS, IdentificationError, Weights, rounded, written
-from hystgen.records import Record, Source, read_records, several
+from hystgen.records import Record, Source, agreed_units, in_units, read_records, several
 
 if TYPE_CHECKING:
     from hystgen.cascade import Cascade
@@ -60,10 +60,11 @@ def diagnose(
     """Find what a nominal model is missing.
 
     `parameters`: a `Model`, a parameter file, or a result of `identify`; `records`: measured records to fit, each as
-    for `identify`; `holdout`: records with other waveforms that judge; without them, or if too little of them can be
-    compared, every third record, or the end of each, is held out. `history`: drive values visited before every record,
-    ignored if the starts of the records contradict it; `rest`: seconds of pause after them. `skip`: seconds at the
-    start of every record that are not compared, although their drive counts. `effects`: further effects that take part.
+    for `identify` and converted to the model's units; `holdout`: records with other waveforms that judge; without them,
+    or if too little of them can be compared, every third record, or the end of each, is held out. `history`: drive
+    values visited before every record, ignored if the starts of the records contradict it; `rest`: seconds of pause
+    after them. `skip`: seconds at the start of every record that are not compared, although their drive counts.
+    `effects`: further effects that take part.
 
     The nominal model is refitted first. Then one effect after the other is added, with each shape fitted jointly with
     the weights on the free-run error, and accepted if it removes a worthwhile part of the held-out error that chance
@@ -81,7 +82,6 @@ def diagnose(
     from hystgen.model import as_model
 
     model = as_model(parameters)
-    given, unit = model.parameters.model.effects, model.parameters.units.output
     fitted, others = several(records), several(holdout)
     if not fitted:
         raise ValueError("there is no record to fit")
@@ -90,6 +90,9 @@ def diagnose(
     if not all(isinstance(effect, type) and issubclass(effect, Effect) for effect in effects):
         raise TypeError("effects are classes, of files as hystgen.effects.load_user_effects returns them")
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress, points=True)
+    read = in_units(read, model.parameters.units, sources=[*fitted, *others])
+    nominal = _with_units(model.parameters, read)
+    given, unit = nominal.model.effects, nominal.units.output
     before = None if history is None else visited(history)
     with parallel.one_thread(), Progress(STEPS, progress, "diagnosing") as bar:
         first = selection.as_given(model.cascade, given)
@@ -106,7 +109,7 @@ def diagnose(
         found = selection.no_worse_than(first, done.found, done.records)
         found, made = selection.invertible(found, done.records, P0_FLOOR)
         ready = done.cleaned.clean
-        extended = _extended(model.parameters, model.cascade, found, ready, effects)
+        extended = _extended(nominal, model.cascade, found, ready, effects)
         result = result_of(
             unit,
             ready,
@@ -121,6 +124,12 @@ def diagnose(
     notes += [*quality.repeated(read[: len(fitted)], read[len(fitted) :]), *ready.notes]
     notes += [*done.cleaned.notes(unit), *done.notes]
     return Diagnosis(result, extended, tuple(notes), _signals(ready, found))
+
+
+def _with_units(parameters: Parameters, records: Sequence[Record]) -> Parameters:
+    """The parameters with the units of the records where they have none."""
+    units, _ = agreed_units(records, parameters.units.model_dump())
+    return parameters.model_copy(update={"units": parameters.units.model_copy(update=units)})
 
 
 NO_FRONT = "the memoryless part of the model was left out: held-out records are predicted better without it"

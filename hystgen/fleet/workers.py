@@ -98,8 +98,18 @@ def _fitted(task: Task, records: list[str], holdout: list[str]) -> Result:
     from hystgen import identification
     from hystgen.emission import calls
     from hystgen.model import Model
+    from hystgen.records import in_units, read_records
 
-    fit = task.settings.on(identification.identify(records, holdout=holdout, name=task.unit, **task.options))
+    reading = {name: task.options[name] for name in ("columns", "sample_time", "delimiter") if name in task.options}
+    sources = [*records, *holdout]
+    read = in_units(
+        read_records(sources, points=True, **reading),
+        file=(task.settings.file, task.settings.units),
+        named=("units", task.options.get("units")),
+        sources=sources,
+    )
+    to_fit, to_hold = read[: len(records)], read[len(records) :]
+    fit = task.settings.on(identification.identify(to_fit, holdout=to_hold, name=task.unit, **task.options))
     model = Model(fit.parameters)
     text, figures = fit.text(), _figures(fit, model)
     if task.emission is None:

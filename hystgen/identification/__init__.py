@@ -30,7 +30,7 @@ from hystgen.identification.pi import IdentificationError, rounded
 from hystgen.identification.quality import Row
 from hystgen.identification.reduction import Course
 from hystgen.plays import play_sum
-from hystgen.records import SHORTEST, Record, Source, agreed_units, read_records, several
+from hystgen.records import SHORTEST, Record, Source, agreed_units, in_units, read_records, several
 
 if TYPE_CHECKING:
     from hystgen.parameters.files import Parameters
@@ -100,7 +100,8 @@ def identify(
       left, its start memory is estimated together with the weights.
     - `rest`: seconds of pause after the history; a PI model does not depend on time, so it changes nothing here.
     - `name`: C identifier of the model.
-    - `units`: `input` and `output`, by default those of the records.
+    - `units`: `input` and `output`, by default those of the first record that gives any; columns in others of the same
+      quantity are converted, which `history`, `thresholds` and `breaks` are not.
     - `skip`: seconds at the start of every record that are not compared, although their drive counts.
     - `loading_curve`: the records are initial loading curves, with the drive rising from 0 in a virgin actuator, and
       nothing is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22).
@@ -127,13 +128,14 @@ def identify(
     how, before = check_options(model, thresholds, breaks, history, rest, skip, p0_floor, loading_curve, units)
     to_fit, to_hold = several(records), several(holdout)
     read = read_records([*to_fit, *to_hold], columns, sample_time, delimiter, progress=progress, points=True)
+    read = in_units(read, named=("units", units), sources=[*to_fit, *to_hold])
     fit_records, held_records = read[: len(to_fit)], read[len(to_fit) :]
     if not fit_records:
         raise ValueError("there is no record to fit")
     reported = [f"{record.name}: {note}" for record in (*fit_records, *held_records) for note in record.notes]
     reported += quality.repeated(fit_records, held_records)
-    units, conflicts = agreed_units(read, units)
-    reported += conflicts
+    units, strange = agreed_units(read, units)
+    reported += strange
     for record in fit_records if loading_curve else ():
         _check_loading_curve(record)
     courses, notes = prepared.courses(fit_records, before, skip)

@@ -18,7 +18,7 @@ from hystgen.basics.problems import counted
 from hystgen.identification import faults, joint, quality, reduction
 from hystgen.identification.quality import Intervals, Row, table
 from hystgen.identification.reduction import Course, Start
-from hystgen.records import Record, Source, read_record, write_atomically
+from hystgen.records import Record, Source, in_units, read_record, write_atomically
 
 if TYPE_CHECKING:
     from hystgen.model import Model
@@ -87,7 +87,7 @@ class Fit:
         drive value, so that samples before the drive has swept its range mean little. `free_offset` shifts the result
         to the mean of the record's `y`. Warns if the drive leaves the fitted range.
         """
-        data = _read(record)
+        (data,) = in_units([_read(record)], self.parameters.units, sources=[record])
         outside = quality.outside(data.name, data.v, self.parameters.input_range)
         if outside:
             python_warnings.warn(outside, stacklevel=2)

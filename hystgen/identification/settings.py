@@ -8,18 +8,24 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hystgen.records.units import conversion
+
 if TYPE_CHECKING:
     from hystgen.identification.fit import Fit
 
 KEPT_KEYS = ("description", "sample_time", "emit")
+
+MEASURED = {"drive_lsb": "input", "output_lsb": "output", "compensation.max_rate": "input"}
+"""Keys of `emit` with numbers in units of the drive or the displacement, or per second of them."""
 
 
 @dataclass(frozen=True)
 class Settings:
     """Settings of an older parameter file.
 
-    `values`: its values for `KEPT_KEYS`; `name` and `units`: used if neither the user nor the records give any;
-    `effects`: names of its effects, which are dropped with its weights; `problem`: why nothing could be read.
+    `values`: its values for `KEPT_KEYS`; `name` and `units`: used where the user gives none, and records are converted
+    to the units; `effects`: names of its effects, which are dropped with its weights; `problem`: why nothing could be
+    read.
     """
 
     file: str = ""
@@ -34,8 +40,9 @@ class Settings:
         from hystgen.parameters.files import make_parameters
 
         data = {**fit.parameters.model_dump(), **self.values}
-        if self._gives_units(fit):
-            data["units"] = self.units
+        data["units"] = {**data["units"], **self._units(fit)}
+        if "emit" in self.values:
+            data["emit"], _ = self._emit(fit)
         return replace(fit, parameters=make_parameters(data))
 
     def sentences(self, fit: Fit) -> list[str]:
@@ -44,12 +51,16 @@ class Settings:
         if self.problem:
             said.append(f"{self.file}: nothing of what was there is kept, it is not a parameter file: {self.problem}")
         names = [key for key in KEPT_KEYS if key in self.values]
-        if self._gives_units(fit):
+        if self._kept(fit):
             names.insert(0, "units")
         if self.name == fit.parameters.name:
             names.insert(0, "name")
         if names:
             said.append(f"{self.file}: {', '.join(names)} kept from the file that was there")
+        _, lost = self._emit(fit)
+        if lost:
+            keys = ", ".join(f"emit.{key}" for key in lost)
+            said.append(f"{self.file}: {keys} left out, given in other units than the model now has")
         if self.effects:
             said.append(
                 f"{self.file}: the effects of the file that was there ({', '.join(self.effects)}) are left out, they "
@@ -57,9 +68,36 @@ class Settings:
             )
         return said
 
-    def _gives_units(self, fit: Fit) -> bool:
-        units = fit.parameters.units
-        return self.units is not None and not (units.input or units.output)
+    def _emit(self, fit: Fit) -> tuple[dict[str, Any], list[str]]:
+        """The `emit` of the file in the units of the fit, and the keys whose numbers cannot be converted to them."""
+        emit, lost = dict(self.values.get("emit") or {}), []
+        for path, key in MEASURED.items():
+            *above, last = path.split(".")
+            holder = emit
+            for name in above:
+                if name in holder:
+                    holder[name] = dict(holder[name])
+                holder = holder.get(name, {})
+            before, now = (self.units or {}).get(key, ""), getattr(fit.parameters.units, key)
+            if holder.get(last) is None or not before or not now:
+                continue
+            how = conversion(before, now)
+            if how is None:
+                lost.append(path)
+                del holder[last]
+            elif not how.same:
+                holder[last] = float(f"{float(how.times) * float(holder[last]):.12g}")  # without rounding's last digits
+        return emit, lost
+
+    def _units(self, fit: Fit) -> dict[str, str]:
+        """Units of the file that the fit has none for."""
+        units = fit.parameters.units.model_dump()
+        return {key: unit for key, unit in (self.units or {}).items() if unit and not units[key]}
+
+    def _kept(self, fit: Fit) -> bool:
+        """Whether the fit ends up with the units of the file."""
+        units = {**fit.parameters.units.model_dump(), **self._units(fit)}
+        return bool(self.units) and all(units[key] == unit for key, unit in (self.units or {}).items())
 
 
 def of(path: str | os.PathLike[str]) -> Settings:

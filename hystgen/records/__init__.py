@@ -33,6 +33,7 @@ from hystgen.records.parquet import read_parquet
 from hystgen.records.reading import LARGEST, SHORTEST, CountingFile, Reading, Table, no_value, repaired
 from hystgen.records.record import Record
 from hystgen.records.tdms import read_tdms
+from hystgen.records.units import HasUnits, converted, wanted
 from hystgen.records.writing import columns_text, write_columns
 
 Source = Record | str | os.PathLike[str] | Columns
@@ -136,6 +137,29 @@ def read_record(
     return read_records([path], columns, sample_time, delimiter, need)[0]
 
 
+def in_units(
+    records: Iterable[Record],
+    model: HasUnits | None = None,
+    *,
+    need: Sequence[str] = ("v", "y"),
+    file: tuple[str, Mapping[str, str] | None] = ("", None),
+    named: tuple[str, Mapping[str, str] | None] = ("units", None),
+    sources: Sequence[object] = (),
+) -> list[Record]:
+    """The records with their columns `need`, and temperatures, in one unit each; each conversion is one of its notes.
+
+    Wanted are the units that the user names, by which option and what for `input` and `output`, else those of a
+    parameter file, by its path and with its units, else those of a model; where there are none the first record with a
+    unit decides. Columns without a unit are taken to be in the one wanted. `sources`: as given for the records, for
+    messages. Raises RecordError with every column of another quantity, or in a unit that nobody knows.
+    """
+    everything = list(records)
+    if not any(record.units for record in everything):
+        return everything
+    goals = wanted(model, (file[0], file[1] or {}), (named[0], named[1] or {}))
+    return converted(everything, goals, need, sources, named[0] if model is None else "")
+
+
 def several(sources: Source | Iterable[Source]) -> list[Source]:
     """One source of a record, or several, as a list. Raises TypeError for anything else."""
     if isinstance(sources, Record | str | os.PathLike):
@@ -224,6 +248,7 @@ __all__ = [
     "agreed_units",
     "columns_text",
     "headers",
+    "in_units",
     "no_value",
     "parse_columns",
     "read_record",

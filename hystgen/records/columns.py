@@ -54,10 +54,10 @@ def split_unit(header: str) -> tuple[str, str]:
     if match and not match[2].isdecimal() and len(match[2]) <= MAX_UNIT and match[2].isprintable():
         return match[1], "" if match[2] == "-" else match[2]
     match = re.fullmatch(r"(.*?\S)\s*\(\s*([^()]*?)\s*\)", text) or re.fullmatch(r"(.*?[^\s/])\s*/\s*(\S+)", text)
-    if match and len(match[2]) <= MAX_UNIT and _UNIT.fullmatch(_plain(match[2])):
+    if match and len(match[2]) <= MAX_UNIT and _UNIT.fullmatch(plain(match[2])):
         return match[1], match[2]
     name, _, unit = text.rpartition("_")
-    known = _AFTER_UNDERSCORE.fullmatch(_plain(unit)) or (name.casefold() in _TIME_NAMES and _plain(unit) in TIMES)
+    known = _AFTER_UNDERSCORE.fullmatch(plain(unit)) or (name.casefold() in _TIME_NAMES and plain(unit) in TIMES)
     return (name, unit) if name and known else (text, "")
 
 
@@ -67,12 +67,12 @@ def unit_alone(text: str) -> str | None:
     unit = text.strip() if inside is None else inside[1] or inside[2] or ""
     if unit in ("", "-") or (inside is not None and inside[1] and not unit.isdecimal()):
         return "" if unit == "-" else unit
-    return unit if _UNIT.fullmatch(_plain(unit)) or _plain(unit).casefold() in TIMES else None
+    return unit if _UNIT.fullmatch(plain(unit)) or plain(unit).casefold() in TIMES else None
 
 
 def is_time_unit(unit: str) -> bool:
     """Whether a unit is one of time."""
-    return _plain(unit).casefold() in TIMES
+    return plain(unit).casefold() in TIMES
 
 
 def headers(names: Iterable[str], units: Mapping[str, str]) -> list[str]:
@@ -87,7 +87,7 @@ def headers(names: Iterable[str], units: Mapping[str, str]) -> list[str]:
 
 def to_seconds(t: Array, unit: str) -> tuple[Array, str]:
     """Times in seconds, and what the user should know about it, empty when they were seconds already."""
-    scale = TIMES.get(_plain(unit).partition(" since ")[0].casefold())
+    scale = TIMES.get(plain(unit).partition(" since ")[0].casefold())
     if scale is None:
         return t, f'the unit "{printable(unit)}" of t is not a known unit of time; its numbers were taken as seconds'
     factor, divisor = scale
@@ -99,42 +99,37 @@ def to_seconds(t: Array, unit: str) -> tuple[Array, str]:
 
 
 def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = None) -> tuple[dict[str, str], list[str]]:
-    """Units `input` and `output` of a model made from `records`, and a sentence for each disagreement.
+    """Units `input` and `output` of a model made from `records`, and a sentence for each that is strange.
 
-    `given` wins over the records, the first record that has a unit over later ones. No number is converted.
+    `given` wins over the records, the first record that has a unit over later ones. All are in one unit each, as
+    `in_units` makes them.
     """
     units = {}
-    conflicts = []
+    strange = []
     everything = list(records)
     for key, column in (("input", "v"), ("output", "y")):
         unit = (given or {}).get(key, "")
-        source = "given"
         for record in everything:
             own = record.units.get(column, "")
             if len(own) > MAX_UNIT or not own.isprintable():
-                conflicts.append(
+                strange.append(
                     f'the unit "{printable(own)}" of {column} in {record.name} is not taken over: a unit has up to '
                     f"{MAX_UNIT} characters on one line"
                 )
-            elif own and not unit:
-                unit, source = own, f"in {record.name}"
-            elif own and _plain(own) != _plain(unit):
-                conflicts.append(
-                    f'the unit of {column} is "{printable(unit)}" {source} and "{printable(own)}" in {record.name}; '
-                    "no number was converted, check that they agree"
-                )
+            elif not unit:
+                unit = own
         if unit:
             units[key] = unit
     drive, displacement = units.get("input", ""), units.get("output", "")
-    if _LENGTH.fullmatch(_plain(drive)) and displacement and not _LENGTH.fullmatch(_plain(displacement)):
-        conflicts.append(
+    if _LENGTH.fullmatch(plain(drive)) and displacement and not _LENGTH.fullmatch(plain(displacement)):
+        strange.append(
             f"the drive is in {printable(drive)} and the displacement in {printable(displacement)}, as if they were "
             "exchanged; check the columns and the units, the drive comes first"
         )
-    return units, conflicts
+    return units, strange
 
 
-def _plain(unit: str) -> str:
+def plain(unit: str) -> str:
     """A unit with the letter u for either of Unicode's two micro signs."""
     return unit.strip().replace("\u00b5", "u").replace("\u03bc", "u")
 
@@ -217,19 +212,19 @@ def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
     """Seconds per sample, from a rate or an interval; None if the unit fits neither."""
     if not 0.0 < value < float("inf"):
         return None
-    plain = unit.strip().replace("\u00b5", "u").replace("\u03bc", "u")
+    text = plain(unit)
     if rate:
-        if plain and plain not in RATES:
+        if text and text not in RATES:
             return None
-        said = f"sample rate {value:g} {plain or 'Hz'}"
-        seconds = 1.0 / (value * RATES.get(plain, 1.0))
+        said = f"sample rate {value:g} {text or 'Hz'}"
+        seconds = 1.0 / (value * RATES.get(text, 1.0))
     else:
-        if plain and plain.casefold() not in TIMES:
+        if text and text.casefold() not in TIMES:
             return None
-        factor, divisor = TIMES.get(plain.casefold(), (1.0, 1.0))
-        said = f"sample time {value:g} {plain or 's'}"
+        factor, divisor = TIMES.get(text.casefold(), (1.0, 1.0))
+        said = f"sample time {value:g} {text or 's'}"
         seconds = value / divisor * factor
-    return Step(seconds, f"{said} ({printable(where)}{'' if plain else ', which gives no unit'})")
+    return Step(seconds, f"{said} ({printable(where)}{'' if text else ', which gives no unit'})")
 
 
 # Which column of a file is which of ours: t, v, y, u ---------------------------------------------------------
@@ -311,12 +306,12 @@ def column(
 
 def meaning(c: Column) -> str:
     """Our column that the words of a name mean; empty if they mean none, or more than one."""
-    plain = _words(c)
-    if plain & OTHERWISE:
+    words = _words(c)
+    if words & OTHERWISE:
         return ""
     timed = is_time_unit(c.unit)
-    found = {ours for ours, known in DECIDE.items() if plain & known}
-    found = found or {ours for ours, known in MEANINGS.items() if plain & known}
+    found = {ours for ours, known in DECIDE.items() if words & known}
+    found = found or {ours for ours, known in MEANINGS.items() if words & known}
     # What has a unit is a time if and only if it is one of time
     if c.unit and timed != ("t" in found):
         return ""

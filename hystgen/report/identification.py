@@ -22,7 +22,7 @@ from hystgen.identification.fit import HELD_OUT, Fit
 from hystgen.identification.quality import WORD_COLUMNS, Row, cells
 from hystgen.model import Model, cascade_of
 from hystgen.parameters.files import parameters_sha256
-from hystgen.records import Record, Source, read_records, several
+from hystgen.records import Record, Source, in_units, read_records, several
 from hystgen.report import fit_figures, plots, properties
 from hystgen.report.fit_figures import Shown
 from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, page
@@ -81,7 +81,8 @@ def report_fit(
     """
     if not isinstance(fit, Fit):
         raise TypeError(f"fit is what hystgen.identify returns, not {arguments.kind(fit)}")
-    return write(fit, read_records([*several(records), *several(holdout)]), folder)
+    sources = [*several(records), *several(holdout)]
+    return write(fit, in_units(read_records(sources), fit.parameters.units, sources=sources), folder)
 
 
 def write(

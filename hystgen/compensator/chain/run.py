@@ -15,11 +15,12 @@ from hystgen.effects.thermal.model import COLUMN
 from hystgen.plays import slots
 
 
-def answers(compiled: Compiled, record: Run, inverse: bool) -> NDArray[Any]:
-    """Answers (N,) for the drives or references in `record.v`; for a preview the last sample repeats.
+def answers(compiled: Compiled, record: Run, inverse: bool) -> tuple[NDArray[Any], NDArray[np.uint8]]:
+    """Answers (N,) for the drives or references in `record.v`, and their status bits; for a preview the last sample
+    repeats.
 
-    Fixed point takes and gives codes, except temperatures, which are in degC. Raises ValueError for numbers that are
-    not codes.
+    The bits of a sample itself (limited, held) are with the sample, those of a drive with the drive. Fixed point takes
+    and gives codes, except temperatures, which are in degC. Raises ValueError for numbers that are not codes.
     """
     t = compiled.tables
     x = reference.codes(t, record.v) if t.fixed else record.v
@@ -39,5 +40,8 @@ def answers(compiled: Compiled, record: Run, inverse: bool) -> NDArray[Any]:
         calls.append(np.full(len(x), slots.OP_STEP, dtype=np.uint8))
         given.append(later)
     op = np.concatenate(calls)
-    found, _ = reference.answers(t, inverse, op, np.concatenate(given))
-    return np.asarray(found[op == slots.OP_STEP])
+    found, status = reference.answers(t, inverse, op, np.concatenate(given))
+    step = op == slots.OP_STEP
+    own = slots.INPUT_CLAMPED | slots.HELD
+    taken = status[step | (op == slots.OP_PUSH)][: len(x)]
+    return np.asarray(found[step]), np.asarray((taken & own) | (status[step] & ~np.uint8(own)))

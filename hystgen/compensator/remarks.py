@@ -1,0 +1,80 @@
+"""What became of samples that an operator did not simply answer, in words: limited, held, beyond the range."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hystgen.basics import arguments
+from hystgen.basics.problems import SampleWarning
+from hystgen.chain.static import StaticModel
+from hystgen.compensator.reference import Session
+from hystgen.plays import slots
+
+ROUNDED = 1e-9
+"""[share of the range] A reference or drive no farther beyond its range is at its end but for rounding: a converter of
+29 bits has larger steps, and in double precision models and their inverses compose to 1e-12. Only counts depend on it.
+Set by: tests/test_clamped_inverse.py."""
+
+
+def forward(v: NDArray[np.float64], ends: tuple[float, float], limited: bool, held: int = 0) -> list[str]:
+    """Of drives (N,) of a forward model: those outside its range, and the number of those held."""
+    with np.errstate(invalid="ignore"):
+        outside = int(np.count_nonzero(np.isfinite(v) & ((v < ends[0]) | (v > ends[1]))))
+    how = "limited to it" if limited else "extrapolated, not limited"
+    lie = "lies" if outside == 1 else "lie"
+    beyond = f"{outside} of {len(v)} samples {lie} outside input_range {ends[0]:g} to {ends[1]:g}, {how}"
+    return [*([beyond] if outside else []), *_held(held, len(v))]
+
+
+def inverse(samples: int, references: int, drives: int, held: int = 0) -> list[str]:
+    """Of references of an inverse: the numbers of references and of drives that were limited, and of those held."""
+    said = []
+    if references:
+        lie, were = ("lies", "was") if references == 1 else ("lie", "were")
+        said.append(f"{references} of {samples} references {lie} outside the output range and {were} limited")
+    if drives:
+        said.append(f"{drives} of {samples} drives {'was' if drives == 1 else 'were'} limited to input_range")
+    return [*said, *_held(held, samples)]
+
+
+def _held(number: int, samples: int) -> list[str]:
+    are, them = ("is", "it") if number == 1 else ("are", "them")
+    said = f"{number} of {samples} samples {are} not finite; the answer before {them} was held"
+    return [said] if number else []
+
+
+def counted(status: slots.Bytes, bit: int) -> int:
+    """The number of samples with a status bit."""
+    return int(np.count_nonzero(status & bit))
+
+
+def run(
+    cascade: StaticModel, session: Session, x: ArrayLike, double: bool
+) -> tuple[NDArray[np.float64], list[str]]:
+    """Answers (N,) of a session from its start memory, and remarks on the samples.
+
+    `double`: no bit reference; counted are then the references that are missed by more than rounding.
+    """
+    answers, status = session.run(x)
+    signal = arguments.signal("x", x)
+    held = counted(status, slots.HELD)
+    if not session.inverse:
+        limited = counted(status, slots.INPUT_CLAMPED) > 0
+        return answers, forward(signal, session.drive_range, limited, held)
+    references, drives = status & slots.INPUT_CLAMPED, status & slots.OUTPUT_CLAMPED
+    if double and np.any(references | drives):
+        reached, _ = Session(cascade, "forward").run(answers)
+        low, high = (float(end) for end in session.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
+        missed = np.abs(signal - reached) > ROUNDED * (high - low)
+        references, drives = references & 0, (references | drives) * missed
+    return answers, inverse(len(signal), int(np.count_nonzero(references)), int(np.count_nonzero(drives)), held)
+
+
+def tell(said: Iterable[str], depth: int = 2) -> None:
+    """Warn with each remark; `depth`: calls between here and the user's."""
+    for text in said:
+        warnings.warn(text, SampleWarning, stacklevel=depth + 1)

@@ -1,0 +1,166 @@
+"""The inverse in Python keeps the drive range as the C does, with the memory where the actuator is, and says so."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy import signal
+
+import hystgen
+from hystgen.cascade import PI, Cascade
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+
+Array = NDArray[np.float64]
+R, P = np.array([0.0, 5.0, 20.0]), np.array([120.0, 20.0, 30.0])
+OFFSET, HIGH, PERIOD, TAU, SHARE = 7.0, 100.0, 1e-3, 0.05, 0.02
+PLAIN = f"""hystgen: 1
+name: stage
+sample_time: {PERIOD}
+input_range: [0, {HIGH}]
+model:
+  pi: {{thresholds: {R.tolist()}, weights: {P.tolist()}}}
+  output_offset: {OFFSET}
+"""
+CREEP = f"{PLAIN}  effects: [{{name: creep, time_constants: [{TAU}], weights: [{SHARE}]}}]\n"
+
+
+def plays(v: Array) -> Array:
+    """(1), sample by sample, from a virgin memory."""
+    s, y = np.zeros(len(R)), []
+    for x in v:
+        s = np.maximum(x - R, np.minimum(x + R, s))
+        y.append(float(P @ s))
+    return np.array(y)
+
+
+def crept(v: Array) -> Array:
+    """The plays behind a spring with a damper, which rests at the first sample; scipy holds signals straight too."""
+    h = plays(v)
+    late = signal.lsim(([SHARE], [TAU, 1.0]), h - h[0], PERIOD * np.arange(len(h)))[1]
+    return np.asarray(h + late + SHARE * h[0] + OFFSET)
+
+
+ACTUATORS: dict[str, tuple[str, Callable[[Array], Array]]] = {
+    "plain": (PLAIN, lambda v: plays(v) + OFFSET), "creep": (CREEP, crept)
+}  # fmt: skip
+
+
+def model(text: str) -> Model:
+    return Model(parse_parameters(text))
+
+
+def reference(samples: int = 300) -> Array:
+    """Through the range and far out of it at both ends."""
+    turns = np.random.default_rng(5).uniform(-0.4, 1.4, 21) * float(P.sum()) * HIGH
+    return np.interp(np.linspace(0.0, 20.0, samples), np.arange(21.0), turns)
+
+
+def told(run: Callable[[], Array]) -> tuple[Array, dict[str, int]]:
+    """Samples, and the numbers that were warned of by the word that says what with."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = run()
+    counts = {}
+    for each in caught:
+        assert each.category is hystgen.SampleWarning, str(each.message)
+        assert each.filename == __file__, "it names the caller's line"
+        match = re.match(r"(\d+) of (\d+) (references|drives|samples) .*?(extrapolated|limited|held)", str(each.message))
+        assert match is not None, str(each.message)
+        assert int(match[2]) == len(found)
+        counts[f"{match[3]} {match[4]}"] = int(match[1])
+    return found, counts
+
+
+@pytest.mark.parametrize("name", ACTUATORS)
+def test_the_drive_stays_in_range_and_is_exact_wherever_it_is_not_limited(name: str) -> None:
+    text, actuator = ACTUATORS[name]
+    u = reference()
+    v, counts = told(lambda: model(text).inverse().simulate(u))
+    assert np.min(v) == 0.0
+    assert np.max(v) == HIGH
+    off = np.abs(actuator(v) - u) > 1e-9 * float(P.sum()) * HIGH
+    assert 20 < np.count_nonzero(off) < 250
+    assert counts == {"drives limited": np.count_nonzero(off)}
+    assert np.all((v[off] == 0.0) | (v[off] == HIGH)), "where it misses, it is at an end"
+    assert off[:-1][~off[1:]].any(), "the sample behind a limited one is exact again"
+
+
+@pytest.mark.parametrize("name", ACTUATORS)
+def test_it_limits_as_the_c_does(name: str) -> None:
+    """The bit reference in float64 has the bits of the C."""
+    one = model(ACTUATORS[name][0]).inverse()
+    u = reference()
+    u[[50, 51, 200]] = np.nan, np.inf, -np.inf
+    v, counts = told(lambda: one.simulate(u))
+    bits, those_of_c = told(lambda: one.simulate(u, "float64"))
+    assert np.max(np.abs(v - bits)) < 1e-9 * HIGH
+    assert counts["samples held"] == those_of_c["samples held"] == 3
+    assert v[50] == v[51] == v[49]
+    assert v[200] == v[199]
+    assert "drives limited" in those_of_c
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q15"])
+def test_every_arithmetic_says_what_it_limits(arithmetic: str) -> None:
+    drive, output = (0.005, 0.6) if arithmetic == "q15" else (1.0, 1.0)
+    one = model(PLAIN + "emit: {drive_lsb: 0.005, output_lsb: 0.6}\n" * (arithmetic == "q15")).inverse()
+    u = np.clip(np.rint(reference() / output), -32768, 32767) if arithmetic == "q15" else reference()
+    v, counts = told(lambda: one.simulate(u, arithmetic))
+    off = np.abs(plays(v * drive) + OFFSET - u * output) > 0.01 * float(P.sum()) * HIGH
+    assert max(counts.values()) <= np.count_nonzero(off) + 5
+    assert sum(counts.values()) >= np.count_nonzero(off)
+    if arithmetic == "float32":
+        u[7] = np.nan
+        v, counts = told(lambda: one.simulate(u, arithmetic))
+        assert (counts["samples held"], v[7]) == (1, v[6])
+
+
+@pytest.mark.parametrize("name", ACTUATORS)
+def test_nothing_is_said_where_the_ends_are_only_touched(name: str) -> None:
+    """Outputs of drives that go to both ends are in reach, whatever rounding does to them."""
+    text, actuator = ACTUATORS[name]
+    v = np.concatenate([[0.0], np.clip(reference() / float(P.sum()), 0.0, HIGH)])
+    again, counts = told(lambda: model(text).inverse().simulate(actuator(v)))
+    assert counts == {}
+    assert np.max(np.abs(again - v)) < 1e-10 * HIGH
+
+
+def test_without_a_limit_on_demand() -> None:
+    u = reference()
+    v, counts = told(lambda: model(PLAIN).inverse().simulate(u, clamp=False))
+    assert counts == {}
+    assert np.max(v) > 1.2 * HIGH
+    assert np.max(np.abs(plays(v) + OFFSET - u)) < 1e-9 * float(P.sum()) * HIGH
+
+
+@pytest.mark.parametrize("name", ACTUATORS)
+def test_the_forward_model_tells_of_drives_outside_and_of_none(name: str) -> None:
+    text, actuator = ACTUATORS[name]
+    v = reference() / float(P.sum())
+    v[[0, 40]] = np.nan
+    held = v.copy()
+    held[[0, 40]] = 0.0, v[39]
+    y, counts = told(lambda: model(text).simulate(v))
+    assert np.max(np.abs(y - actuator(held))) < 1e-9 * float(np.max(np.abs(y)))
+    outside = np.count_nonzero((held < 0.0) | (held > HIGH)) - int(not 0.0 <= v[39] <= HIGH)
+    assert counts == {"samples extrapolated": outside, "samples held": 2}
+    _, counts = told(lambda: model(text).simulate(v, clamp=True))
+    assert counts == {"samples limited": outside, "samples held": 2}
+
+
+def test_a_pure_cascade_keeps_its_range_and_a_play_sum_has_none() -> None:
+    u = reference()
+    pi = PI(R.tolist(), P.tolist())
+    v, counts = told(lambda: Cascade(pi, (), OFFSET, (0.0, HIGH)).inverse().simulate(u))
+    assert (np.min(v), np.max(v)) == (0.0, HIGH)
+    assert set(counts) == {"drives limited"}
+    free, counts = told(lambda: Cascade(pi).inverse().simulate(u))
+    assert counts == {}
+    assert np.max(np.abs(plays(free) - u)) < 1e-9 * float(np.max(u))
+    assert told(lambda: pi.simulate(free))[1] == {}
