@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.problems import EffectsError
 from hystgen.chain.chain import join
-from hystgen.compensator.reference import Session
+from hystgen.compensator.chained import LIMITED
 from hystgen.model import Model
 from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
@@ -44,13 +44,23 @@ def simulate_records(
     if model.effects:
         return [_emulated(model, records, operator, arithmetic)]
     session = model.session(operator, arithmetic, engine, clamp=operator == "inverse")
-    if history:
-        session.visit(history)
+    moved = model.session() if operator == "inverse" and arithmetic is None else None
+    for each in (session, moved):
+        if each is not None and history:
+            each.visit(history)
     found = []
     for record in records:
         signal = record.columns()["v" if operator == "forward" else "u"]
         samples, status = session.run(signal)
-        found.append((samples, _remarks(record.name, session, operator, signal, status)))
+        if operator == "forward":
+            limited = bool(np.any(status & slots.INPUT_CLAMPED))
+            found.append((samples, _outside(record.name, session.drive_range, signal, limited)))
+            continue
+        missed = np.ones(len(samples), dtype=bool)
+        if moved is not None:  # the bit reference says what the C says
+            reached = model.cascade.output_range
+            missed = np.abs(moved.run(samples)[0] - signal) > LIMITED * (reached[1] - reached[0])
+        found.append((samples, _remarks(record.name, status, missed)))
     return found
 
 
@@ -72,19 +82,14 @@ def _compensated(
     """Drives for the references of records that are one session, of a model with effects."""
     runs = [model.run(record.columns()["u"], record.t, record.extra, rest=rest) for record in records]
     session = join(runs, history)
-    low, high = ends = model.cascade.input_range
     asked = np.zeros(len(session.run.t), dtype=bool)
     for part in session.parts:
         asked[part] = True
-    drives = model.compensator.drives(session.run, ends, asked)
-    found = []
-    for record, part in zip(records, session.parts, strict=True):
-        v = drives[part]
-        limited = int(np.count_nonzero((v <= low) | (v >= high)))
-        were = "was" if limited == 1 else "were"
-        said = [f"{record.name}: {limited} of {len(v)} drives {were} limited to input_range"] if limited else []
-        found.append((v, said))
-    return found
+    drives, limited = model.compensator.limited_drives(session.run, model.cascade.input_range, asked)
+    return [
+        (drives[part], _counted(record.name, limited[part], *DRIVES))
+        for record, part in zip(records, session.parts, strict=True)
+    ]
 
 
 def _outside(name: str, ends: tuple[float, float], signal: NDArray[np.float64], limited: bool) -> list[str]:
@@ -95,19 +100,26 @@ def _outside(name: str, ends: tuple[float, float], signal: NDArray[np.float64], 
     return [said] if outside else []
 
 
-def _remarks(
-    name: str, session: Session, operator: str, signal: NDArray[np.float64], status: Bytes
-) -> list[str]:
-    """What a user should know about a simulated record, one sentence each."""
-    if operator == "forward":
-        limited = bool(np.any(status & slots.INPUT_CLAMPED))
-        return _outside(name, session.drive_range, signal, limited)
-    said = []
-    for bit, what in (
-        (slots.INPUT_CLAMPED, "references lie outside the output range and were limited"),
-        (slots.OUTPUT_CLAMPED, "drives were limited to input_range"),
-    ):
-        count = int(np.count_nonzero(status & bit))
-        if count:
-            said.append(f"{name}: {count} of {len(signal)} {what}")
-    return said
+REFERENCES = (
+    "references", "lies outside the output range and was limited", "lie outside the output range and were limited",
+)  # fmt: skip
+DRIVES = "drives", "was limited to input_range", "were limited to input_range"
+"""What is counted, and how one of them and several are spoken of."""
+
+
+def _remarks(name: str, status: Bytes, missed: NDArray[np.bool_]) -> list[str]:
+    """What a user should know about the drives of a record, one sentence each.
+
+    `missed` (N,): references that the drives miss by more than rounding; where none is missed, none was limited.
+    """
+    return [
+        said
+        for bit, words in ((slots.INPUT_CLAMPED, REFERENCES), (slots.OUTPUT_CLAMPED, DRIVES))
+        for said in _counted(name, (status & bit != 0) & missed, *words)
+    ]
+
+
+def _counted(name: str, limited: NDArray[np.bool_], things: str, one: str, several: str) -> list[str]:
+    """A sentence about how many were limited, if any were."""
+    count = int(np.count_nonzero(limited))
+    return [f"{name}: {count} of {len(limited)} {things} {one if count == 1 else several}"] if count else []

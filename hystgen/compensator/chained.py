@@ -44,6 +44,10 @@ is 9e-4 with 60 samples in a period."""
 ROUNDING = 1e-14
 """Relative change of a number below which it counts as rounding: some tens of roundings of 1.1e-16."""
 
+LIMITED = 1e-9
+"""[share of the range] A drive that an end of the range moves by less is not limited but rounded: the rounding of an
+inverse is some 1e-14 of the range, a code of a 20-bit converter 1e-6. Set by: tests/test_tracking.py TestLimited."""
+
 TURNS = 8
 """Most iterations in a sample, if the gain depends on the drive to be found. 500 jumps over a quarter of the range,
 with a loss of 1 % per decade from half the range on, converge to the last bit in 5 iterations on average, 7 at most."""
@@ -279,7 +283,13 @@ class Compensator:
         return [effect for effect in self.effects if effect.name == name]
 
     def drives(self, reference: Run, ends: tuple[float, float], asked: NDArray[np.bool_] | None = None) -> Array:
-        """Drives (N,) within `ends` for the reference in `reference.v`.
+        """Drives (N,) within `ends` for the reference in `reference.v`; `asked` as for `limited_drives`."""
+        return self.limited_drives(reference, ends, asked)[0]
+
+    def limited_drives(
+        self, reference: Run, ends: tuple[float, float], asked: NDArray[np.bool_] | None = None
+    ) -> tuple[Array, NDArray[np.bool_]]:
+        """Drives (N,) within `ends` for the reference in `reference.v`, and which of them `ends` limited.
 
         `asked` (N,): the samples of `reference.v` that are references. Samples before the first of them are drives;
         between references the drive holds. Everything is at rest at the first sample. After the last sample the
@@ -293,7 +303,7 @@ class Compensator:
         targets = self._targets(reference, asked)
         ageing_effects = self._called("ageing")
         heating = [Heating(effect, n) for effect in self.effects if isinstance(effect, OwnHeat)]
-        v = np.empty(n)
+        v, limited = np.empty(n), np.zeros(n, dtype=bool)
         travelled = 0.0
         for k in range(n):
             seconds = float(t[k] - t[k - 1]) if k else 0.0
@@ -312,7 +322,9 @@ class Compensator:
                 for each in heating:
                     y = each.solve(y, each.risen(before, drive, seconds))
                 drive = self._solve(y, gains, k, [ageing.gain(e, way) for e in ageing_effects])
-                drive = min(max(self._slewed(drive, before, seconds), ends[0]), ends[1])
+                wanted = self._slewed(drive, before, seconds)
+                drive = min(max(wanted, ends[0]), ends[1])
+                limited[k] = abs(wanted - drive) > LIMITED * (ends[1] - ends[0])
                 if drive == last or not (ageing_effects or heating):
                     break
             x = drive
@@ -322,7 +334,7 @@ class Compensator:
             for each in heating:
                 each.move(before, drive, seconds)
             v[k] = drive
-        return v
+        return v, limited
 
     def _solve(self, y: float, gains: Sequence[tuple[Array, Array]], k: int, aged: Sequence[float]) -> float:
         for gain, offset in reversed(gains):
