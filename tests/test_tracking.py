@@ -59,7 +59,7 @@ def test_the_whole_model_leaves_the_noise_and_plays_alone_the_creep() -> None:
     table = found.table()
     assert f"{one.rms(tracking.WHOLE):6.3f}" in table
     assert "plays alone: the inverse of the model without its effects (creep), all else as in" in table
-    assert [text.rpartition(", ")[2] for text in one.limited] == [tracking.PLAYS], "which reach less far than they crept"
+    assert [text.rpartition(", ")[2] for text in one.limited] == [tracking.PLAYS], "they do not reach what crept"
 
 
 def solved(y: float, states: list[float]) -> float:
