@@ -328,7 +328,7 @@ BAD_C = {
     "call beside a comment": ("return self->reached;", "return sin/* of */\n(self->reached);", ":40: sin is called"),
     "call in parentheses": ("return self->reached;", "return ((sin)) (self->reached);", ":40: (sin) is called"),
     "call of a pointer": ("return self->reached;", "return (*self->reached)(x);", ":40: *self->reached is called"),
-    "call of an answer": ("y - self->reached);", "y - self->reached)(x);", ":32: what hystgen_product returns is called"),
+    "call of an answer": ("y - self->reached);", "y - self->reached)(x);", ":32: what hystgen_product returns is"),
     "late include": (SECOND, f'#include "hystgen_runtime.h"\n{SECOND}', ":8: a line of the preprocessor"),
     "other characters": (VOID, "    (void)t; a$b = x;\n    self", ":16: $ is no character of C"),
     "return": (VOID, "    (void)t;\r    self", r":16: '\\r' is not printable ASCII"),
