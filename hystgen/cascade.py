@@ -49,7 +49,7 @@ class Cascade(StaticModel):
 
         Warns (`SampleWarning`) of drives outside `input_range`, and of samples that are not finite, which are held.
         """
-        y, said = remarks.run(self, Session(self, "forward", clamp=clamp), v, double=True)
+        y, said = remarks.run(Session(self, "forward", clamp=clamp), v)
         remarks.tell(said)
         return y
 
@@ -77,6 +77,7 @@ class InverseCascade:
         The memory follows the limited drive. Warns (`SampleWarning`) with the number of limited samples, and of those
         that are not finite, for which the drive holds.
         """
-        v, said = remarks.run(self.forward, Session(self.forward, "inverse", clamp=clamp), u, double=True)
+        session = Session(self.forward, "inverse", clamp=clamp)
+        v, said = remarks.run(session, u, Session(self.forward, "forward"))
         remarks.tell(said)
         return v

@@ -299,7 +299,7 @@ class Model:
         """What `simulate` gives, and its warnings as sentences."""
         if not self.effects:
             session = self.session("forward", arithmetic, engine, clamp)
-            return remarks.run(self.cascade, session, v, arithmetic is None)
+            return remarks.run(session, v)
         if arithmetic is not None:
             return self._reference(v, arithmetic, engine, t, extra, inverse=False)
         drives, held = _held("v", v, self._drive_at_start())
@@ -462,7 +462,7 @@ class InverseModel:
         model = self.forward
         if not model.effects:
             session = model.session("inverse", arithmetic, engine, clamp)
-            return remarks.run(model.cascade, session, u, arithmetic is None)
+            return remarks.run(session, u, model.session() if arithmetic is None else None)
         if arithmetic is not None:
             return model._reference(u, arithmetic, engine, t, extra, inverse=True)
         low, high = model.cascade.input_range

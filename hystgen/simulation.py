@@ -11,10 +11,7 @@ from numpy.typing import NDArray
 from hystgen.basics.problems import EffectsError
 from hystgen.chain.chain import join
 from hystgen.compensator import remarks
-from hystgen.compensator.reference import Session
 from hystgen.model import Model
-from hystgen.plays import slots
-from hystgen.plays.slots import Bytes
 from hystgen.records import Record, in_units
 
 
@@ -65,13 +62,15 @@ def _simulated(
     if model.effects:
         return [_emulated(model, records, operator, arithmetic)]
     session = model.session(operator, arithmetic, engine, clamp=operator == "inverse")
-    if history:
-        session.visit(history)
+    moved = model.session() if operator == "inverse" and arithmetic is None else None
+    for each in (session, moved):
+        if each is not None and history:
+            each.visit(history)
     found = []
     for record in records:
         signal = record.columns()["v" if operator == "forward" else "u"]
-        samples, status = session.run(signal)
-        found.append((samples, _remarks(record.name, session, operator, signal, status)))
+        samples, said = remarks.run(session, signal, moved)
+        found.append((samples, _of(record.name, said)))
     return found
 
 
@@ -98,26 +97,13 @@ def _compensated(
     asked = np.zeros(len(session.run.t), dtype=bool)
     for part in session.parts:
         asked[part] = True
-    drives = model.compensator.drives(session.run, ends, asked)
-    found = []
-    for record, part in zip(records, session.parts, strict=True):
-        v = drives[part]
-        limited = int(np.count_nonzero((v <= low) | (v >= high)))
-        were = "was" if limited == 1 else "were"
-        said = [f"{record.name}: {limited} of {len(v)} drives {were} limited to input_range"] if limited else []
-        found.append((v, said))
-    return found
+    drives, beyond = model.compensator.answers(session.run, ends, asked)
+    limited = beyond > remarks.ROUNDED * (high - low)
+    return [
+        (drives[part], _of(record.name, remarks.inverse(len(drives[part]), 0, int(np.count_nonzero(limited[part])))))
+        for record, part in zip(records, session.parts, strict=True)
+    ]
 
 
 def _of(name: str, said: Sequence[str]) -> list[str]:
     return [f"{name}: {text}" for text in said]
-
-
-def _remarks(
-    name: str, session: Session, operator: str, signal: NDArray[np.float64], status: Bytes
-) -> list[str]:
-    """What a user should know about a simulated record, one sentence each."""
-    clamped, limited = (remarks.counted(status, bit) for bit in (slots.INPUT_CLAMPED, slots.OUTPUT_CLAMPED))
-    if operator == "forward":
-        return _of(name, remarks.forward(signal, session.drive_range, clamped > 0))
-    return _of(name, remarks.inverse(len(signal), clamped, limited))

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.compensator.chain.layout import LEAST_LATE
-from hystgen.identification import identify
 from hystgen.identification.prepared import samples_in
 from hystgen.model import Model
 from hystgen.records import in_units
+from hystgen.simulation import simulate_records
 
 if TYPE_CHECKING:
     from hystgen.records import Record
@@ -34,7 +35,8 @@ class Tracked:
     """The motion of one record, tracked: error (N,) of each compensator in output units, over `span` of the motion.
 
     `known`: the first sample behind both ends of the drive, from where on it no longer matters what the stage did
-    before the record. Errors are about their mean from there on: the zero of a displacement is free.
+    before the record. Errors are about their mean from there on: the zero of a displacement is free. `limited`: what
+    ends of ranges did to the drives of each compensator, one sentence each.
     """
 
     name: str
@@ -43,6 +45,7 @@ class Tracked:
     errors: dict[str, Array]
     span: float
     known: int
+    limited: tuple[str, ...] = ()
 
     def rms(self, which: str) -> float:
         """Rms error, % of the span."""
@@ -57,12 +60,25 @@ class Tracked:
 class Tracking:
     """Errors that tracking would leave on the recorded actuator, record by record.
 
-    `unit`: that of the displacement; `notes`: what was converted, one sentence each.
+    `left_out`: names of the effects that the model has and its plays alone have not; `notes`: what was converted, one
+    sentence each.
     """
 
     unit: str
     records: tuple[Tracked, ...]
+    left_out: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+
+    @property
+    def compensators(self) -> dict[str, str]:
+        """What each compensator is, in words."""
+        names = ", ".join(self.left_out)
+        without = f"the inverse of the model without its effects ({names}), all else as in the parameter file"
+        return {
+            LINE: "the drive as a linear function of the motion, by least squares over these records",
+            PLAYS: without if names else "the inverse of the model, which has no effects",
+            WHOLE: "the inverse of the model",
+        }
 
     def table(self) -> str:
         """The table that the command prints."""
@@ -72,7 +88,28 @@ class Tracking:
             for which in each.errors:
                 name = each.name if which == LINE else ""
                 lines.append(f"{name:{width}}  {which:14} {each.rms(which):6.3f}  {each.most(which):7.3f}")
+        lines += [f"{which}: {what}." for which, what in self.compensators.items()]
         return "\n".join(lines)
+
+    def to_json(self) -> str:
+        """The same for programs: errors in % of each motion's span, the span in output units."""
+        content = {
+            "hystgen": 1,
+            "unit": self.unit,
+            "left_out": list(self.left_out),
+            "compensators": self.compensators,
+            "records": [
+                {
+                    "name": each.name,
+                    "span": each.span,
+                    "samples": len(each.t) - each.known,
+                    "errors": {which: {"rms": each.rms(which), "max": each.most(which)} for which in each.errors},
+                    "limited": list(each.limited),
+                }
+                for each in self.records
+            ],
+        }
+        return json.dumps(content, indent=2, allow_nan=False) + "\n"
 
 
 def late(model: Model, records: Sequence[Record]) -> str:
@@ -97,16 +134,17 @@ def track(
     The recorded actuator answers a drive as the model does, and beyond that by what it did in the record that the model
     does not explain: `y = model[v] + (y_recorded - model[v_recorded])`. The reference is the model's own motion of the
     record. `straight line`: the drive as a linear function of the reference, least squares; `plays alone`: the inverse
-    of a Prandtl-Ishlinskii model identified from the same records; `whole model`: the inverse of `model`. `history` and
-    `rest` come before every record; `skip`: seconds at its start that are not compared. Raises NotInvertibleError,
-    EffectsError, ValueError for records without y, RecordError for units that do not fit the model's.
+    of `model` without its effects, nothing else changed and nothing fitted; `whole model`: the inverse of `model`.
+    `history` and `rest` come before every record; `skip`: seconds at its start that are not compared. Raises
+    NotInvertibleError, EffectsError, ValueError for records without y, RecordError for units that do not fit the
+    model's.
     """
     if any(record.y is None for record in records):
         raise ValueError("tracking needs the measured motion: a column y in every record")
     given, records = records, in_units(records, model.parameters.units)
     notes = [f"{b.name}: {note}" for a, b in zip(given, records, strict=True) for note in b.notes[len(a.notes) :]]
     model.inverse()
-    plain = Model(identify(list(records), history=list(history) or None, rest=rest, skip=skip).parameters)
+    compensators = {PLAYS: model.without(model.effects), WHOLE: model}
     runs = [model.run(record.v, record.t, record.extra, rest=rest) for record in records]
     moved = [model.chain.simulate([run], history)[0] for run in runs]
     ends = model.cascade.input_range
@@ -114,11 +152,12 @@ def track(
     found = []
     for record, run, reference in zip(records, runs, moved, strict=True):
         assert record.y is not None
-        drives = {
-            LINE: np.clip(start + slope * reference, *ends),
-            PLAYS: plain.inverse().answers(reference)[0],
-            WHOLE: model.inverse().answers(reference, t=run.t, extra=run.extra)[0],
-        }
+        asked = replace(record, extra={**record.extra, "u": reference})
+        drives = {LINE: np.clip(start + slope * reference, *ends)}
+        limited = []
+        for which, each in compensators.items():
+            ((drives[which], said),) = simulate_records(each, [asked], "inverse")
+            limited += [f"{sentence}, {which}" for sentence in said]
         beside = record.y - reference
         moves = {which: model.chain.simulate([model.run(v, run.t, run.extra)])[0] for which, v in drives.items()}
         known = max(int(np.argmax(record.v)), int(np.argmin(record.v)))
@@ -127,5 +166,6 @@ def track(
         for which, y in moves.items():
             error = y - reference + beside
             errors[which] = error - np.mean(error[known:])
-        found.append(Tracked(record.name, run.t, reference, errors, float(np.ptp(reference)), known))
-    return Tracking(model.parameters.units.output, tuple(found), tuple(notes))
+        found.append(Tracked(record.name, run.t, reference, errors, float(np.ptp(reference)), known, tuple(limited)))
+    names = dict.fromkeys(effect.name for effect in model.effects)
+    return Tracking(model.parameters.units.output, tuple(found), tuple(names), tuple(notes))

@@ -23,6 +23,7 @@ from hystgen.compensator.reference import answers as computed
 from hystgen.effects import Run, load_user_effects
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Kind
+from hystgen.emission import own as emitted_own
 from hystgen.emission import runtime
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
@@ -314,6 +315,23 @@ BAD_C = {
     "end": ("    return self->reached;\n}\n", "    return self->reached;\n}\nint x", ":42: 'int x' belongs to no type"),
     "bare": ("hystgen_product(&t->rate, x - self->reached)", "t->rate * (x - self->reached)", ":39: t->rate by itself"),
     "foreign": ("self->reached = x;", "self->reached = hystgen_tanh(x);", ":17: hystgen_tanh is not in the file"),
+    "joined": (VOID, "    (void)t; /* hidden *\\\n/ (void)system(0); /* */\n    self", ":16: a backslash, which joins"),
+    "joined word": (VOID, "    (void)t; sys\\\ntem(0);\n    self", ":16: a backslash, which joins"),
+    "joined slashes": (VOID, "    (void)t; /* */ /\\\n/ x\n    self", ":16: a backslash, which joins"),
+    "named letter": (VOID, "    (void)t; \\u0073elf;\n    self", ":16: a backslash, which joins"),
+    "trigraph": (VOID, "    (void)t; /* hidden *?" "?/\n/ (void)system(0); /* */\n    self", ":16: two question marks"),
+    "digraph": (VOID, "    (void)t; self<:0:>.reached = x;\n    self", ":16: <:, a digraph"),
+    "directive digraph": (SECOND, f"%:include <math.h>\n{SECOND}", ":8: %:, a digraph"),
+    "comment in a text": (VOID, '    (void)"/*"; system(0); (void)"*/";\n    self', ":16: a text or a character"),
+    "comment in a character": (VOID, "    (void)'/*'; system(0);\n    (void)'*/';\n    self", ":16: a text or a char"),
+    "comment in slashes": (VOID, "    // /*\n    system(0);\n    // */\n    self", ":16: a comment with //"),
+    "call beside a comment": ("return self->reached;", "return sin/* of */\n(self->reached);", ":40: sin is called"),
+    "call in parentheses": ("return self->reached;", "return ((sin)) (self->reached);", ":40: (sin) is called"),
+    "call of a pointer": ("return self->reached;", "return (*self->reached)(x);", ":40: *self->reached is called"),
+    "call of an answer": ("y - self->reached);", "y - self->reached)(x);", ":32: what hystgen_product returns is"),
+    "late include": (SECOND, f'#include "hystgen_runtime.h"\n{SECOND}', ":8: a line of the preprocessor"),
+    "other characters": (VOID, "    (void)t; a$b = x;\n    self", ":16: $ is no character of C"),
+    "return": (VOID, "    (void)t;\r    self", r":16: '\\r' is not printable ASCII"),
     "escape": ("    (void)t;\n    return y;", "    (void)t; }\nint y(void) {\n    return 0;", ":25: 'int y(void)"),
 }  # fmt: skip
 
@@ -329,6 +347,35 @@ def test_a_wrong_c_file_is_refused_with_its_place(tmp_path: Path, run: Call, wro
     assert re.search(r"follower\.c:(\d+:)? ", err)
     assert "Traceback" not in err
     assert not (tmp_path / "out").exists()
+
+
+TOLD = ("\\", "\\\n", "?" "?/", "//", '"', "'", "#", "%:", "<:", "<%", "$")
+UNTOLD = ("/*", "*/", "*", "\n", " ", "evil", ";", "x", "/**/", "?", "/*", "*/")
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="the oracle is gcc's preprocessor")
+def test_the_check_sees_what_a_compiler_sees(tmp_path: Path) -> None:
+    """Of texts put together at random, those that pass without a problem of a line have the comments of gcc -E."""
+    rng = np.random.default_rng(0)
+    texts = {"".join(rng.choice([*UNTOLD, *rng.choice(TOLD, 1)], 9)) for _ in range(4000)}
+    passed = [text for text in sorted(texts) if not list(emitted_own._of_lines(text))]
+    assert 500 < len(passed) < 0.5 * len(texts)
+    mark = "boundary;"
+    (tmp_path / "all.c").write_text("".join(f"\n{text}\n{mark}" for text in passed))
+    command = ["gcc", "-E", "-P", "-std=c99", "-trigraphs", str(tmp_path / "all.c")]
+    seen = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split(mark)
+    for text, code in zip(passed, seen, strict=False):
+        assert "".join(emitted_own._code(text).split()) == "".join(code.split()), repr(text)
+
+
+def test_a_comment_stands_above_its_function_as_a_whole(tmp_path: Path) -> None:
+    """Also one with an empty line in it."""
+    above = "/* The first half.\n\n   The second one. */\n"
+    head_of = "static hystgen_signal_t hystgen_user_follower_absorb("
+    assert "*/\nstatic" not in STAGE_C
+    text = STAGE_C.replace(head_of, above + head_of)
+    emitted = emitted_files(hystgen.load(written(tmp_path, FOLLOWER), [outside(tmp_path, c=text)]))["stage.c"]
+    assert above in emitted
 
 
 def test_a_missing_c_file_is_named(tmp_path: Path, run: Call) -> None:

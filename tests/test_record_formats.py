@@ -11,10 +11,12 @@ import json
 import os
 import pty
 import re
+import struct
 import subprocess
 import sys
 import time
 import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -25,6 +27,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import scipy.io
+import scipy.sparse
 from click.testing import CliRunner
 from numpy.typing import NDArray
 from ruamel.yaml import YAML
@@ -39,6 +42,7 @@ from hystgen.records import (
     agreed_units,
     csv_file,
     hdf5,
+    mat_nesting,
     parquet,
     parse_columns,
     read_record,
@@ -1080,3 +1084,122 @@ def terminal(ours: int) -> str:
             os.close(ours)
             return text.decode("utf-8", "replace")
         text += part
+
+
+# Nesting ------------------------------------------------------------------------------------------------------
+
+
+def element(kind: int, data: bytes) -> bytes:
+    return struct.pack("<II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
+
+
+def array(sort: int, name: bytes, inside: bytes) -> bytes:
+    """A MATLAB array of 1 x 1, by the description of the format."""
+    head = element(6, struct.pack("<II", sort, 0)) + element(5, struct.pack("<ii", 1, 1)) + element(1, name)
+    return element(14, head + inside)
+
+
+def nested(sort: int, depth: int, packed: bool) -> bytes:
+    """A .mat file of structs or cells in each other, put together from the inside."""
+    fields = struct.pack("<HHi", 5, 4, 8) + element(1, b"a".ljust(8, b"\0"))
+    found = array(6, b"", element(9, struct.pack("<d", 1.0)))
+    for level in range(depth):
+        found = array(sort, b"s" if level == depth - 1 else b"", (fields if sort == 2 else b"") + found)
+    if packed:
+        data = zlib.compress(found)
+        found = struct.pack("<II", 15, len(data)) + data
+    return b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + found
+
+
+class TestNesting:
+    """Files that a library reads by recursion in C, which takes the process down."""
+
+    @pytest.mark.parametrize("packed", [False, True])
+    @pytest.mark.parametrize("sort", [1, 2])
+    def test_structs_and_cells(self, tmp_path: Path, sort: int, packed: bool) -> None:
+        path = tmp_path / "deep.mat"
+        for depth in (33, 20_000):
+            path.write_bytes(nested(sort, depth, packed))
+            (said,) = problems(path)
+            assert said.endswith("has structs or cells nested more than 32 deep; export the signals as vectors")
+        path.write_bytes(nested(sort, 31, packed))
+        (said,) = problems(path)
+        assert 'there are no columns "v" and "y"' in said
+        assert scipy.io.whosmat(path)[0][0] == "s", "a file that scipy reads"
+
+    @pytest.mark.parametrize("packed", [False, True])
+    def test_the_walk_goes_through_every_class(self, tmp_path: Path, packed: bool) -> None:
+        """A struct of everything that scipy writes, itself in cells: the depth is that of the nested dicts and lists."""
+        everything: Any = {
+            "numbers": np.arange(5.0), "imaginary": np.arange(3) * 1j, "text": "abc", "words": ["a", "bcd"],
+            "short": np.int8([1, 2, 3]), "none": np.zeros((0, 0)), "sparse": scipy.sparse.eye(3).tocsc(),
+            "imaginary_sparse": scipy.sparse.eye(3).tocsc() * 1j, "yes": True,
+            "list": np.array([{"u": 1.0}, {"u": 2.0}], dtype=object), "a_name_that_is_longer": 3,
+        }  # fmt: skip
+        for _ in range(3):
+            everything = {"in": everything, "cell": np.array([everything, None], dtype=object), "last": 1.0}
+        path = tmp_path / "all.mat"
+        scipy.io.savemat(path, {"v": V, "s": everything, "y": Y}, do_compression=packed, long_field_names=True)
+
+        def depth_of(found: Any) -> int:
+            if not isinstance(found, np.ndarray) or found.dtype.kind not in "OV":
+                return 1
+            inner = [x[name] for x in found.ravel() for name in found.dtype.names] if found.dtype.names else found.flat
+            return 1 + max(map(depth_of, inner), default=0)
+
+        wanted = depth_of(scipy.io.loadmat(path)["s"])
+        assert wanted > 8
+        with path.open("rb") as stream:
+            for most in (wanted, wanted - 1):
+                with pytest.MonkeyPatch.context() as patch:
+                    patch.setattr(mat_nesting, "MOST", most)
+                    assert mat_nesting.too_deep(stream) == (most < wanted)
+
+    def test_a_damaged_file_is_left_to_its_library(self, tmp_path: Path) -> None:
+        whole, rng = nested(2, 20, packed=False), np.random.default_rng(0)
+        for k in range(60):
+            data = bytearray(whole[: int(rng.integers(100, len(whole)))] if k % 2 else whole)
+            for place in rng.integers(120, len(data), 3):
+                data[place] = int(rng.integers(256))
+            (tmp_path / "damaged.mat").write_bytes(data)
+            assert len(problems(tmp_path / "damaged.mat")) == 1
+
+    def test_groups(self, tmp_path: Path) -> None:
+        with h5py.File(tmp_path / "deep.h5", "w") as file:
+            group = file
+            for _ in range(33):
+                group = group.create_group("a")
+            group["b"] = 1.0
+        assert problems(tmp_path / "deep.h5")[0].endswith("nested more than 32 deep; export the signals into one group")
+
+    def test_lists_in_parquet_and_headers_of_arrays(self, tmp_path: Path) -> None:
+        kind = pa.int32()
+        for _ in range(500):
+            kind = pa.struct([("a", kind)])
+        pq.write_table(pa.table({"x": pa.nulls(1, kind)}), tmp_path / "deep.parquet", store_schema=False)
+        assert len(problems(tmp_path / "deep.parquet")) == 1
+        for head in ("(" * 9000, "-" * 9000 + "1", "[" * 200_000, "{'descr':" + "~" * 4000 + "1}"):
+            with zipfile.ZipFile(tmp_path / "deep.npz", "w") as archive:
+                archive.writestr("v.npy", b"\x93NUMPY\x02\0" + struct.pack("<I", len(head)) + head.encode())
+            assert len(problems(tmp_path / "deep.npz")) == 1
+
+    def test_a_fleet_goes_on(self, tmp_path: Path) -> None:
+        (tmp_path / "units").mkdir()
+        (tmp_path / "units" / "a.mat").write_bytes(nested(2, 20_000, packed=False))
+        v = 50.0 - 50.0 * np.cos(np.linspace(0.0, 4.0 * np.pi, 200))
+        np.savetxt(tmp_path / "units" / "b.csv", np.column_stack([0.01 * np.arange(200), v, 0.1 * v]), "%.6g", ",",
+                   header="t,v,y", comments="")  # fmt: skip
+        words = ["identify", "--batch", f"{tmp_path}/units/*", "-o", f"{tmp_path}/out", "--jobs", "1", "--no-emit"]
+        run = CliRunner().invoke(cli.main, words)
+        assert "nested more than 32 deep" in run.output
+        assert (tmp_path / "out" / "b.yaml").is_file()
+
+
+@pytest.mark.parametrize("header", ["t,v,", "t,v,,", ",,,"])
+def test_columns_without_a_name_by_their_number(tmp_path: Path, header: str) -> None:
+    cells = [f"{0.01 * k:.2f},{k % 9},{k % 7}" + ",7" * (header.count(",") - 2) for k in range(40)]
+    (tmp_path / "a.csv").write_text("\n".join([header, *cells]))
+    record = read_record(tmp_path / "a.csv", {"t": "#1", "v": "#2", "y": "#3"})
+    assert record.v.tolist() == [k % 9 for k in range(40)]
+    assert record.y is not None
+    assert record.y.tolist() == [k % 7 for k in range(40)]

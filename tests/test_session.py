@@ -16,7 +16,7 @@ from modelfiles import head
 from numpy.typing import NDArray
 
 import hystgen
-from hystgen.basics.problems import PlanError
+from hystgen.basics.problems import ParameterError, PlanError
 from hystgen.planning.session import Session
 from hystgen.records import Record
 from hystgen.report import diagnosis as report
@@ -191,15 +191,71 @@ class TestCut:
         with pytest.raises(PlanError, match=re.escape(said)):
             parts_of(played).cut(Record("all.csv", t, v, v, sample_time=float(t[1] - t[0])))
 
-    @pytest.mark.parametrize("text", ["", "[]", "{}", '{"hystgen": 1}', '{"hystgen": 1, "records": [{"name": "a"}]}',
-                                      '"rate": "50"', '"rate": -50.0', '"hystgen": 2', '"history": [1.0]'])  # fmt: skip
-    def test_a_file_that_is_no_session(self, played: Plan, tmp_path: Path, text: str) -> None:
-        """Of other content, or a session with one key of another value."""
-        if text.startswith('"'):
-            text = json.dumps({**json.loads(parts_of(played).to_json()), **json.loads(f"{{{text}}}")})
-        (tmp_path / "session.json").write_text(text)
-        with pytest.raises(PlanError, match="no session; give the session"):
+    @pytest.mark.parametrize(
+        ("change", "said"),
+        [
+            ({"rate": "50"}, ['3:11: error: rate: has to be a number above 0, not the text "50"; give the session']),
+            ({"rate": -50.0, "hystgen": 2}, [":2:14: error: hystgen: has to be 1, not 2", "rate: has to be a number"]),
+            ({"rate": True}, ["rate: has to be a number above 0, not true"]),
+            ({"samples": 1e9}, ["samples: has to be a whole number from 2 on, not 1000000000.0"]),
+            ({"history": [1.0]}, ["history: has to be the highest and the lowest drive"]),
+            ({"history": [0.0, 1.0]}, ["history: has to be the highest and the lowest drive"]),
+            ({"rest": None, "rise": "x"}, ["rest: has to be a number from 0 on, not nothing", "rise: has to be a num"]),
+            ({"speed": 1}, ["speed: this key is unknown"]),
+            ({"records": []}, ["records: has to be a list of records, not a list"]),
+            ({"records": [1, {"name": "a"}]}, ["records[0]: has to be a record, not 1", "records[1].first: is missing",
+                                               "records[1].samples: is missing", "records[1].held_out: is missing"]),
+            ({"records": [{"name": "", "first": -1, "samples": 2, "held_out": 1, "more": 0}]},
+             ["records[0].name: has to be text", "records[0].first: has to be", "records[0].held_out: has to be true",
+              "records[0].more: this key is unknown"]),
+            ({"records": [{"name": "a", "first": 0, "samples": 20, "held_out": False}] * 2},
+             ["records[1].name: the text \"a\" is the name", "records[1].first: begins in the record before"]),
+            ({"records": [{"name": "a", "first": 0, "samples": 10**8, "held_out": False}]},
+             ["records[0].samples: ends at sample 100000000"]),
+            ({"dac": {"bits": 99, "low": 1, "high": 0, "coding": "straight"}}, ["a DAC of 99 bits", "does not rise"]),
+            ({"dac": {"bits": 16, "low": 0, "coding": "gray"}}, ["dac.high: is missing", "dac.coding: has to be"]),
+            ({"dac": 3}, ["dac: has to be a mapping or null, not 3"]),
+        ],
+    )  # fmt: skip
+    def test_every_wrong_value_is_told(
+        self, played: Plan, tmp_path: Path, change: dict[str, Any], said: list[str]
+    ) -> None:
+        content = {**json.loads(parts_of(played).to_json()), **change}
+        (tmp_path / "session.json").write_text(json.dumps(content, indent=2))
+        with pytest.raises(ParameterError) as refused:
             Session.read(tmp_path / "session.json")
+        assert len(refused.value.problems) == len(said)
+        for text in said:
+            assert text in str(refused.value)
+
+    def test_every_missing_key_is_told(self, played: Plan, tmp_path: Path) -> None:
+        keys = json.loads(parts_of(played).to_json()).keys()
+        (tmp_path / "session.json").write_text("{}")
+        with pytest.raises(ParameterError) as refused:
+            Session.read(tmp_path / "session.json")
+        assert sorted(problem.path for problem in refused.value.problems) == sorted(keys)
+
+    @pytest.mark.parametrize(
+        ("content", "said"),
+        [
+            (b"[" * 200_000, "nested more than 16 deep"),
+            (b'{"a":' * 200_000, "nested more than 16 deep"),
+            (b"[]", "the top level must be a mapping"),
+            (b"", "the file is empty"),
+            (b'{"hystgen": 1', "not valid YAML"),
+            (b'{"hystgen": "\xff"}', "is not UTF-8; give the session.json"),
+            (b" " * (1 << 21), "more than 1048576 bytes; give the session.json"),
+            (b'{"hystgen": 1, "hystgen": 1}', "this key is given twice"),
+        ],
+    )
+    def test_a_file_that_is_no_session(self, run: Call, tmp_path: Path, content: bytes, said: str) -> None:
+        (tmp_path / "s.json").write_bytes(content)
+        (tmp_path / "a.csv").write_text("t,v,y\n")
+        code, out, err = run("diagnose", file_of(tmp_path), tmp_path / "a.csv", "-o", tmp_path / "out", "--session",
+                             tmp_path / "s.json")  # fmt: skip
+        assert (code, out) == (2, "")
+        assert said in err
+        assert not (tmp_path / "out").exists()
 
     def test_the_file_is_read_back(self, played: Plan, tmp_path: Path) -> None:
         (tmp_path / "session.json").write_text(parts_of(played).to_json())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from recordings import brute_output, brute_plays, noisy, record
 
 import hystgen
-from hystgen.identification import IdentificationError, reduction, start
+from hystgen.identification import IdentificationError, pi, reduction, start
 
 Array = NDArray[np.float64]
 
@@ -155,6 +156,92 @@ class TestHeldOutPart:
         assert held.rms < 0.3
 
 
+def ahead(v: Array) -> Array:
+    """A force ahead of its displacement: loops that run clockwise, whatever the drive."""
+    return np.asarray(1.5 * v - brute_output(v, (0.0, 10.0), (0.0, 1.0), v[0]))
+
+
+def behind(v: Array) -> Array:
+    """Plays with positive weights, whose loops run counterclockwise."""
+    return brute_output(v, PLACES, WEIGHTS, v[0])
+
+
+def iron(v: Array) -> Array:
+    """Magnetization that saturates, over the field."""
+    return hystgen.plants.JilesAtherton(Ms=100.0, a=5.0, k=20.0, c=0.1).simulate(v)
+
+
+SWEEP = legs([0.0, 100.0, -100.0, 100.0, -60.0, 80.0, -100.0, 100.0], 0.5)
+"""Settled loops with turns inside them, behind a first loading."""
+
+DRIVES = {
+    "loops": SWEEP,
+    "random turns": never_twice(),
+    "one loop": legs([0.0, 100.0, 0.0], 0.5),
+    "a part of a loop": legs([0.0, 100.0, 30.0], 0.5),
+    "few samples": legs([0.0, 100.0, 0.0, 100.0], 9.0),
+}
+
+
+def clockwise(v: Array, y: Array) -> bool:
+    return pi.runs_clockwise([reduction.Course("one", v, y, None, 0, len(v))])
+
+
+class TestDirection:
+    """Recorded loops whose direction is known from what made them."""
+
+    @pytest.mark.parametrize("drive", DRIVES)
+    def test_of_loops_with_noise(self, drive: str) -> None:
+        v = DRIVES[drive]
+        for scale in (0.0, 1.0):
+            assert not clockwise(v, noisy(behind(v), scale))
+            assert clockwise(v, noisy(ahead(v), scale))
+            assert clockwise(behind(v), v), "exchanged columns"
+            assert not clockwise(ahead(v), v)
+            assert not clockwise(v, noisy(iron(v), scale)), "saturates"
+        shaken = noisy(v, 1.0)
+        assert not clockwise(shaken, behind(v))
+        assert clockwise(shaken, ahead(v))
+
+    @pytest.mark.parametrize("drive", ["loops", "random turns", "few samples"])
+    @pytest.mark.parametrize("share", [-0.5, 0.5])
+    def test_of_loops_that_drift(self, drive: str, share: float) -> None:
+        v = DRIVES[drive]
+        drift = share * np.ptp(v) * np.linspace(0.0, 1.0, len(v))
+        assert not clockwise(v, behind(v) + drift)
+        assert clockwise(v, ahead(v) + drift)
+        assert not clockwise(v, v + drift)
+
+    @pytest.mark.parametrize("late", [-5, -3, 3, 5, 10])
+    def test_of_loops_beside_a_lag(self, late: int) -> None:
+        """Fast loops are wide because of the lag alone, and run as it says; the slow ones tell."""
+        t = np.linspace(0.0, 10.0, 4000)
+        v = 100.0 * np.sin(2.0 * np.pi * (0.2 * t + 0.2 * t**2))
+        k = np.arange(len(t))
+        assert not clockwise(v, np.interp(k - late, k, behind(v)))
+        assert clockwise(v, np.interp(k - late, k, ahead(v)))
+
+    def test_of_lines_and_curves(self) -> None:
+        """No hysteresis, so that any direction is one of the noise."""
+        for seed in range(30):
+            noise = np.random.default_rng(seed).standard_normal(len(SWEEP))
+            for y in (SWEEP, 100.0 * np.tanh(SWEEP / 30.0)):
+                assert not clockwise(SWEEP, y + noise)
+
+    @pytest.mark.parametrize("drive", ["loops", "random turns"])
+    @pytest.mark.parametrize("way", [behind, ahead, iron])
+    def test_of_a_butterfly(self, drive: str, way: Callable[[Array], Array]) -> None:
+        """Its wings run opposite ways."""
+        v = DRIVES[drive] - np.mean(DRIVES[drive])
+        assert not clockwise(v, way(v) ** 2)
+
+    def test_without_a_turn(self) -> None:
+        v = np.linspace(0.0, 1.0, 50)
+        assert not clockwise(v, v)
+        assert not clockwise(np.zeros(50), v)
+        assert not clockwise(v, np.full(50, np.nan))
+
+
 class TestSense:
     def test_clockwise_loops_are_told(self) -> None:
         """A force ahead of its displacement; the exchanged columns are fitted."""
@@ -166,6 +253,14 @@ class TestSense:
         exchanged = hystgen.identify(record(force, x))
         assert not any("clockwise" in text or "no hysteresis" in text for text in exchanged.warnings)
         assert exchanged.rows[-1].rms < 0.1 * fit.rows[-1].rms * np.ptp(x) / np.ptp(force)
+
+    def test_loops_that_saturate_are_not_clockwise(self) -> None:
+        """Weights of either sign follow the saturation, and those that are negative say nothing of the direction."""
+        loops = []
+        for top in (32.0, 160.0):
+            v = np.append(0.0, top * np.cos(np.linspace(0.0, 4.0 * np.pi, 513)))
+            loops.append(record(v[257:], iron(v)[257:]))
+        assert not any("clockwise" in text for text in hystgen.identify(loops).warnings)
 
     def test_falling_outputs_are_refused_with_what_to_do(self) -> None:
         v = never_twice()

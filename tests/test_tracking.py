@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from hystgen import tracking
+from hystgen import simulation, tracking
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.records import Record
@@ -57,7 +58,91 @@ def test_the_whole_model_leaves_the_noise_and_plays_alone_the_creep() -> None:
     assert one.rms(tracking.WHOLE) < 3.0 * noise
     table = found.table()
     assert f"{one.rms(tracking.WHOLE):6.3f}" in table
-    assert "whole model" in table
+    assert "plays alone: the inverse of the model without its effects (creep), all else as in" in table
+    assert [text.rpartition(", ")[2] for text in one.limited] == [tracking.PLAYS], "they do not reach what crept"
+
+
+def solved(y: float, states: list[float]) -> float:
+    """The drive in range at which the plays of `TEXT` alone give y or are nearest to it, by bisection."""
+    r, p = (0.0, 4.0, 10.0, 20.0, 35.0), (0.15, 0.02, 0.02, 0.02, 0.01)
+    low, high = 0.0, 100.0
+    for _ in range(80):
+        v = 0.5 * (low + high)
+        found = sum(b * min(max(s, v - a), v + a) for a, b, s in zip(r, p, states, strict=True))
+        low, high = (v, high) if found < y else (low, v)
+    states[:] = [min(max(s, v - a), v + a) for a, s in zip(r, states, strict=True)]
+    return v
+
+
+def test_plays_alone_are_the_plays_of_the_model() -> None:
+    """Not others that were fitted to the record that is tracked: here it creeps far more than the model says."""
+    record = recorded()
+    assert record.y is not None
+    other = Record("other.csv", record.t, record.v, record.y + 0.05 * np.cumsum(record.v - 50.0) * T)
+    model = Model(parse_parameters(TEXT))
+    (one,) = tracking.track(model, [other]).records
+    states = [0.0] * 5
+    v = [solved(float(y), states) for y in one.reference]
+    error = model.simulate(v, t=record.t) - one.reference + other.y - one.reference
+    error -= np.mean(error[one.known :])
+    assert one.errors[tracking.PLAYS] == pytest.approx(error, abs=1e-9)
+    (said,) = one.limited
+    limited = np.count_nonzero(one.reference > 0.22 * 100.0 - 0.02 * (4.0 + 10.0 + 20.0) - 0.01 * 35.0)
+    assert said == f"other.csv: {limited} of 4000 references lie outside the output range and were limited, plays alone"
+
+
+def test_a_model_without_effects_is_its_plays() -> None:
+    found = tracking.track(Model(parse_parameters(TEXT.partition("  effects")[0])), [recorded()])
+    (one,) = found.records
+    assert one.rms(tracking.PLAYS) == one.rms(tracking.WHOLE)
+    assert "plays alone: the inverse of the model, which has no effects." in found.table()
+
+
+class TestLimited:
+    """Drives that an end of the range really changed, counted beside a model whose range is wide."""
+
+    STATIC = TEXT.partition("  effects")[0]
+    LAGS = TEXT + "    - {name: lag, time_constant: 0.02}\n"
+
+    def said(self, text: str, u: np.ndarray) -> list[str]:
+        record = Record("u.csv", T * np.arange(len(u)), np.empty(0), extra={"u": u})
+        ((_, found),) = simulation.simulate_records(Model(parse_parameters(text)), [record], "inverse")
+        return found
+
+    @pytest.mark.parametrize("seed", range(12))
+    def test_motions_of_the_range_need_no_limit(self, seed: int) -> None:
+        """The drive goes exactly to both ends, and rests there."""
+        rng = np.random.default_rng(seed)
+        low, high = float(rng.uniform(-50.0, 0.0)), float(rng.uniform(50.0, 120.0))
+        weights = rng.uniform(0.01, 0.3, 5).tolist()
+        v = np.interp(np.arange(400) / 20.0, np.arange(20), [low, low, high, high, *rng.uniform(low, high, 16)])
+        for text in (self.STATIC, TEXT):
+            text = text.replace("[0, 100]", f"[{low}, {high}]").replace("[0.15, 0.02, 0.02, 0.02, 0.01]", f"{weights}")
+            u = Model(parse_parameters(text)).simulate(v, t=T * np.arange(len(v)))
+            assert self.said(text, u) == []
+
+    def test_at_rest_at_an_end(self) -> None:
+        for text in (self.STATIC, TEXT, self.LAGS):
+            assert self.said(text, np.zeros(50)) == []
+
+    def test_beyond_the_range(self) -> None:
+        u = np.concatenate([np.linspace(0.0, 12.0, 50), np.full(3, 500.0), np.full(40, 12.0)])
+        assert self.said(TEXT, u) == ["u.csv: 3 of 93 drives were limited to input_range"]
+        assert self.said(self.STATIC, u)[0] == "u.csv: 3 of 93 references lie outside the output range and were limited"
+        u[51:53] = 12.0
+        assert self.said(TEXT, u) == ["u.csv: 1 of 93 drives was limited to input_range"]
+        assert self.said(self.STATIC, u)[0] == "u.csv: 1 of 93 references lies outside the output range and was limited"
+
+    def test_a_little_beyond_the_range_counts(self) -> None:
+        """A millionth of the range, a code of a converter of 20 bits."""
+        for text in (self.STATIC, TEXT):
+            model = Model(parse_parameters(text))
+            wide = Model(parse_parameters(text.replace("[0, 100]", "[-10, 110]")))
+            v = np.interp(np.arange(60), [0, 50, 51, 59], [0.0, 100.0 + 1e-4, 99.0, 30.0])
+            u = wide.simulate(v, t=T * np.arange(len(v)))
+            assert model.cascade.input_range == (0.0, 100.0)
+            (said,) = self.said(text, u)
+            assert said.startswith("u.csv: 1 of 60 ")
 
 
 def test_track_prints_a_table_and_draws(tmp_path: Path, run: Callable[..., tuple[int, str, str]]) -> None:
@@ -66,9 +151,15 @@ def test_track_prints_a_table_and_draws(tmp_path: Path, run: Callable[..., tuple
     rows = np.column_stack([record.t, record.v, record.y])
     np.savetxt(tmp_path / "crept.csv", rows, delimiter=",", header="t,v,y", comments="")
     (tmp_path / "crept.yaml").write_text(TEXT)
-    code, out, err = run("track", tmp_path / "crept.yaml", tmp_path / "crept.csv", "--plot", tmp_path / "t.svg")
+    written_to = ["--plot", tmp_path / "t.svg", "--json", tmp_path / "t.json"]
+    code, out, err = run("track", tmp_path / "crept.yaml", tmp_path / "crept.csv", *written_to)
     assert code == 0, err
-    assert out.splitlines()[-1] == str(tmp_path / "t.svg")
+    assert out.splitlines()[-2:] == [str(tmp_path / "t.json"), str(tmp_path / "t.svg")]
+    written = json.loads((tmp_path / "t.json").read_text())
+    assert written["left_out"] == ["creep"]
+    assert "without its effects (creep)" in written["compensators"]["plays alone"]
+    (one,) = written["records"]
+    assert f"{one['errors']['whole model']['rms']:6.3f}" in out
     assert "straight line" in out
     assert (tmp_path / "t.svg").stat().st_size > 1000
     assert "late" not in err

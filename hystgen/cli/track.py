@@ -26,26 +26,32 @@ from hystgen.cli.common import (
 @params_argument
 @data_argument(required=True)
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the tracking errors along time")
+@click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the errors for programs")
 @effects_option
 @record_options
 @skip_option
 def track(
-    params: str, data: tuple[str, ...], plot: str | None, effects: tuple[str, ...], history: str | None, rest: float,
-    skip: float, **reading: Any,
+    params: str, data: tuple[str, ...], plot: str | None, json_file: str | None, effects: tuple[str, ...],
+    history: str | None, rest: float, skip: float, **reading: Any,
 ) -> None:
-    """Print the tracking error on the recorded actuator: with a straight line, with plays only, with the model.
+    """Print the tracking error on the recorded actuator: with a straight line, with plays alone, with the whole model.
+
+    The straight line is fitted to the records. Plays alone are the model without its effects: nothing else is changed,
+    and nothing is fitted.
 
     Example: hystgen track diagnosed/params.yaml held_out.csv --plot tracking.svg
     """
     from hystgen import records, tracking
-    from hystgen.basics import drawing, extras
+    from hystgen.basics import drawing, extras, writing
     from hystgen.report import plots
 
     model = load_model(params, effects)
     guarded(params, partial(extras.require_fit, "track", plot=plot is not None))
     visited = history_values(history)
+    keep_inputs([plot, json_file], [params, *data])
+    if json_file:
+        guarded(json_file, partial(writing.check_writable, json_file))
     if plot:
-        keep_inputs([plot], [params, *data])
         guarded(params, partial(drawing.check_path, plot))
     read = guarded(params, partial(records.read_records, data, need=("v", "y"), **reading_options(**reading)))
     read = guarded(params, partial(records.in_units, read, model.parameters.units, sources=data))
@@ -55,7 +61,13 @@ def track(
     found = guarded(params, lambda: tracking.track(model, read, visited or (), rest, skip))
     if note := tracking.late(model, read):
         console.note(f"warning: {note}")
+    for each in found.records:
+        for sentence in each.limited:
+            console.note(f"warning: {sentence}")
     console.say(found.table())
+    if json_file:
+        guarded(json_file, partial(writing.write_atomically, json_file, found.to_json()))
+        console.say(json_file)
     if plot:
         guarded(params, lambda: plots.show_tracking(found, plot))
         console.say(plot)

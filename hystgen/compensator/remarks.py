@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from hystgen.basics import arguments
 from hystgen.basics.problems import SampleWarning
-from hystgen.chain.static import StaticModel
 from hystgen.compensator.reference import Session
 from hystgen.plays import slots
 
@@ -52,12 +51,11 @@ def counted(status: slots.Bytes, bit: int) -> int:
     return int(np.count_nonzero(status & bit))
 
 
-def run(
-    cascade: StaticModel, session: Session, x: ArrayLike, double: bool
-) -> tuple[NDArray[np.float64], list[str]]:
-    """Answers (N,) of a session from its start memory, and remarks on the samples.
+def run(session: Session, x: ArrayLike, moved: Session | None = None) -> tuple[NDArray[np.float64], list[str]]:
+    """Answers (N,) of a session, and remarks on the samples.
 
-    `double`: no bit reference; counted are then the references that are missed by more than rounding.
+    `moved`: for an inverse in double precision a forward session with the same memory; counted are then the references
+    that the drives miss by more than rounding. The bit reference counts what the C would say.
     """
     answers, status = session.run(x)
     signal = arguments.signal("x", x)
@@ -66,11 +64,11 @@ def run(
         limited = counted(status, slots.INPUT_CLAMPED) > 0
         return answers, forward(signal, session.drive_range, limited, held)
     references, drives = status & slots.INPUT_CLAMPED, status & slots.OUTPUT_CLAMPED
-    if double and np.any(references | drives):
-        reached, _ = Session(cascade, "forward").run(answers)
+    if moved is not None:
         low, high = (float(end) for end in session.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
-        missed = np.abs(signal - reached) > ROUNDED * (high - low)
-        references, drives = references & 0, (references | drives) * missed
+        with np.errstate(invalid="ignore"):
+            missed = np.abs(signal - moved.run(answers)[0]) > ROUNDED * (high - low)
+        references, drives = references * missed, drives * missed
     return answers, inverse(len(signal), int(np.count_nonzero(references)), int(np.count_nonzero(drives)), held)
 
 

@@ -75,9 +75,37 @@ def of_effect(effect: type[Effect]) -> tuple[list[Piece], list[Piece]]:
     return [each for each in found if "typedef" in each.text], [each for each in found if "typedef" not in each.text]
 
 
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+
+
 def _code(text: str) -> str:
-    """The text with its comments blank, line by line."""
-    return re.sub(r"/\*.*?\*/", lambda found: re.sub(r"[^\n]", " ", found[0]), text, flags=re.DOTALL)
+    """The text with its comments blank, line by line.
+
+    A compiler takes the same for comments only because `_of_lines` refuses whatever it replaces before, which are
+    trigraphs and lines joined by a backslash, and all else in which a comment does not begin: texts, characters, and
+    comments with //.
+    """
+    return _COMMENT.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
+
+
+EVERYWHERE = (
+    (r"[^ -~]", "{0!r} is not printable ASCII; write another character"),
+    (r"\\", "a backslash, which joins two lines even inside a comment; leave it out"),
+    (r"\?\?", "two question marks, which begin a trigraph; write one"),
+)
+"""What no line may have, comments included."""
+
+IN_CODE = (
+    (r"<:|:>|<%|%>|%:", "{0}, a digraph; write the character that it stands for"),
+    (r"#", f"a line of the preprocessor; only {INCLUDE} is one, in front of all else"),
+    (r"//", "a comment with //; write /* */"),
+    (r"[\"']", "a text or a character; a block has none"),
+    (r"[$@`]", "{0} is no character of C; leave it out"),
+    (r"= *\{", "a list of values; put them in the table"),
+    (r"[/%]", "a division; put the reciprocal in the table"),
+    (r"(?<!\w)(?:\d+\.|\.\d|\d+[eE])", "a number with a fraction; put it in the table, rounded as Python has it"),
+)
+"""What no line may have outside comments; the first is told."""
 
 
 def _of_lines(text: str) -> Iterator[tuple[int, str]]:
@@ -87,25 +115,19 @@ def _of_lines(text: str) -> Iterator[tuple[int, str]]:
     if opened >= 0:
         yield text.count("\n", 0, opened) + 1, "a comment that does not end"
         return
+    begun = False
     for number, (whole, line) in enumerate(zip(text.split("\n"), code.split("\n"), strict=True), 1):
-        if strange := re.search(r"[^ -~]", whole):
-            yield number, f"{printable(strange[0])!r} is not printable ASCII; write another character"
+        for form, what in EVERYWHERE:
+            if found := re.search(form, whole):
+                yield number, what.format(printable(found[0]))
         if len(whole) > WIDTH:
             yield number, f"{len(whole)} columns, more than {WIDTH}; break the line"
-        if "?" "?" in whole:
-            yield number, "two question marks, which begin a trigraph; write one"
-        if line.strip() in ("", INCLUDE):
+        if line.strip() == "" or (line.strip() == INCLUDE and not begun):
             continue
-        for form, what in (
-            (r"#", f"a line of the preprocessor; only {INCLUDE} is one"),
-            (r"//", "a comment with //; write /* */"),
-            (r"[\"'\\]", "a text or a continued line; a block has none"),
-            (r"= *\{", "a list of values; put them in the table"),
-            (r"[/%]", "a division; put the reciprocal in the table"),
-            (r"(?<!\w)(\d+\.|\.\d|\d+[eE])", "a number with a fraction; put it in the table, rounded as Python has it"),
-        ):
-            if re.search(form, line):
-                yield number, what
+        begun = True
+        for form, what in IN_CODE:
+            if found := re.search(form, line):
+                yield number, what.format(found[0])
                 break
         for word in re.findall(r"[A-Za-z_]\w*", line):
             if word in REFUSED:
@@ -134,9 +156,17 @@ def _split(text: str, problems: list[tuple[int, str]]) -> Iterator[Piece]:
             problems.append((line, what))
             continue
         name = found[2] if whole.startswith("typedef") else found[1]
-        above = text[behind:begin].rpartition("\n\n")[2]
-        comment = above if above.strip().startswith("/*") else ""
-        yield Piece(name, f"{comment.lstrip()}{text[begin:end]}\n", frozenset(_NAME.findall(whole)) - {name})
+        comment = text[_above(text, behind, begin) : begin]
+        yield Piece(name, f"{comment}{text[begin:end]}\n", frozenset(_NAME.findall(whole)) - {name})
+
+
+def _above(text: str, behind: int, begin: int) -> int:
+    """Where the comments begin that stand right above a piece, without an empty line; its own begin without any."""
+    for comment in reversed(list(_COMMENT.finditer(text, behind, begin))):
+        if text[comment.end() : begin].strip() or "\n\n" in text[comment.end() : begin]:
+            break
+        begin = comment.start()
+    return begin
 
 
 def _end(code: str, begin: int) -> int:
@@ -171,15 +201,40 @@ def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int,
             yield line, f"{piece.name} is declared otherwise; write {wanted[piece.name]}"
         elif not piece.name.startswith(f"{own_name}_") or (piece.name not in wanted and piece.name not in functions):
             yield line, f"{piece.name} is none of the block's types, and no function {own_name}_..; leave it out"
+        for place, called in _calls(code):
+            if called not in CALLED and called not in functions and not _NAME.fullmatch(called):
+                line = text.count("\n", 0, at + place) + 1
+                yield line, f"{called} is called, and is not in the file; a block calls its own functions"
         for number, each in enumerate(code.split("\n")):
             place = text.count("\n", 0, at) + 1 + number
             for used in set(_NAME.findall(each)) - functions - wanted.keys() - GIVEN:
                 yield place, f"{used} is not in the file; a block has that, and {', '.join(sorted(GIVEN))}"
             for number in re.findall(r"(?<!&)\bt->(\w+)", each):
                 yield place, f"t->{number} by itself; write hystgen_product(&t->{number}, ..)"
-            for called in re.findall(r"(\w+) ?\(", each):
-                if called not in CALLED and called not in functions and not _NAME.fullmatch(called):
-                    yield place, f"{called} is called, and is not in the file; a block calls its own functions"
+
+
+BRANCHING = frozenset(["if", "for", "while", "switch"])
+"""Words before parentheses behind which an expression may begin with another one."""
+
+CAST = re.compile(r"\b(?:const|unsigned|int|bool|void|size_t|(?:u?int(?:8|16|32|64)|hystgen_\w+)_t)\b|\*\s*$")
+"""Words of a type in parentheses in front of a value."""
+
+
+def _calls(code: str) -> Iterator[tuple[int, str]]:
+    """Places and names of what is called: a word in front of a parenthesis, or an expression that is in one itself."""
+    for found in re.finditer(r"(\w+)\s*\(", code):
+        yield found.start(), found[1]
+    for found in re.finditer(r"\)\s*\(", code):
+        begin, depth = found.start(), 1
+        while depth and begin:
+            begin -= 1
+            depth += {")": 1, "(": -1}.get(code[begin], 0)
+        called = code[begin + 1 : found.start()]
+        word = re.search(r"(\w+)\s*$", code[:begin])
+        if word and word[1] not in CALLED:
+            yield begin, f"what {word[1]} returns"
+        elif not (word and word[1] in BRANCHING) and CAST.sub("", called).strip():
+            yield begin, " ".join(called.split())
 
 
 def _bare(declared: str) -> str:

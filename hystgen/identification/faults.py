@@ -163,7 +163,7 @@ def wrong_drive(v: Array, y: Array) -> Flags:
     span = _span(v)
     if span == 0.0:
         return found
-    slope, noise = _span(y[known]) / span, _noise(y[known])
+    slope, noise = _span(y[known]) / span, white_noise(y[known])
     unseen = np.zeros(len(v), dtype=bool)
     for first, last, jump in _pulses(v, span):
         pulse = flags_of([(first, last)], len(v))
@@ -281,7 +281,7 @@ def _span(x: Array) -> float:
     return high - low
 
 
-def _noise(x: Array) -> float:
+def white_noise(x: Array) -> float:
     """Robust estimate of the standard deviation of white noise: third differences have 20 times its variance."""
     third = np.diff(x, 3)
     return 1.4826 * float(np.median(np.abs(third - np.median(third)))) / math.sqrt(20.0)

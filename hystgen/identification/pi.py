@@ -7,14 +7,16 @@ implements it.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.identification import reduction
+from hystgen.identification.faults import white_noise
 from hystgen.identification.reduction import Course, Reduced, others, travel
 from hystgen.plays import operators
 
@@ -141,9 +143,13 @@ def compare(item: Course, r: Array, p: Array) -> Errors:
 
 
 # Sense of the output, and direction of its loops. A play sum with positive weights rises with its drive, and its loops
-# run counterclockwise: the output is behind. Weights of either sign can also follow clockwise loops, such as those of a
-# force over the displacement of a damper.
+# run counterclockwise: on the way back the output is above that of the way there. Which way recorded loops run is read
+# from the recording alone: weights of either sign also follow a saturating output, with negative ones in loops that run
+# counterclockwise.
 
+
+CLEARLY = 0.9
+"""[rms error] Share of the error below which another explanation of a record is clearly better."""
 
 SENSED_PLAYS = 8
 """[plays] Number of plays with weights of either sign: with many more, the weights of neighbours cancel."""
@@ -151,8 +157,23 @@ SENSED_PLAYS = 8
 SENSED_RANK = 1e-6
 """Share of the largest singular value below which the records do not determine a combination of plays."""
 
-CLEARLY = 0.9
-"""Weights of either sign count only if their rms error is below this share of that of positive weights."""
+LEAST_TURN = 0.05
+"""[share of the drive's range] Smaller moves back belong to the leg that they interrupt: noise of the drive, dither."""
+
+LEVELS = 32
+"""Points of a leg, each the mean of a group of its samples; drives at which the outputs of two legs are compared."""
+
+SIGMAS = 4.0
+"""[standard deviations] Loops have a direction if their width differs from zero by more than this: of 60 straight lines
+and saturating curves with noise none has. Set by: tests/test_start.py TestDirection."""
+
+ONE_WAY = 0.5
+"""[share of the area between the legs] Least of it that is left when areas of both directions cancel: the wings of a
+butterfly run opposite ways. Set by: tests/test_start.py TestDirection."""
+
+SLOWEST, SAME_SPEED = (0.125, 0.25, 0.5, 1.0), 1.05
+"""Shares of the time that the slowest turns take, tried one by one; turns faster by no more than a twentieth join them.
+Set by: tests/test_start.py TestDirection."""
 
 FALLING = (
     "y falls where v rises; if the sensor counts the other way, change the sign of y, else check which column is which"
@@ -174,9 +195,7 @@ def sense_of(reduced: Reduced, courses: Sequence[Course], squares: float) -> Sen
     matrix, target = reduced.whole[:, some], reduced.whole[:, -1]
     weights, *_ = np.linalg.lstsq(matrix, target, rcond=SENSED_RANK)
     left = float(np.sum((matrix @ weights - target) ** 2))
-    r = reduced.thresholds[some]
-    enclosed = sum(float(weights @ (r * _travelled(item, r))) for item in courses)
-    return Sense(together < 0.0, enclosed < 0.0 and left < CLEARLY**2 * squares)
+    return Sense(together < 0.0, left < CLEARLY**2 * squares and runs_clockwise(courses))
 
 
 def _covaried(item: Course) -> float:
@@ -185,11 +204,116 @@ def _covaried(item: Course) -> float:
     return float((v - np.mean(v)) @ (y - np.mean(y)))
 
 
-def _travelled(item: Course, r: Array) -> Array:
-    """Distance travelled by each play; times its weight and threshold, that is the area enclosed by its loops."""
-    states = reduction.start_states(item.v, item.visited, r)
-    moved = operators.plays(item.v[: item.last], r, states)[:, item.first :]
-    return np.asarray(np.abs(np.diff(moved, axis=1)).sum(axis=1))
+def runs_clockwise(courses: Sequence[Course]) -> bool:
+    """Whether the recorded loops enclose their area clockwise, beyond what noise, drift and lags make of loops.
+
+    A lag of either signal adds a width that vanishes with the speed: the slowest turns that show a direction decide.
+    """
+    turns = sorted((turn for item in courses for turn in _turns(item)), key=lambda turn: turn.speed)
+    spent = np.cumsum([abs(turn.later) for turn in turns])
+    for share in SLOWEST:
+        last = int(np.searchsorted(spent, share * spent[-1])) if turns else -1
+        slow = [turn for turn in turns if turn.speed <= turns[last].speed * SAME_SPEED]
+        if direction := _direction(slow, both=share < 1.0):
+            return direction < 0
+    return False
+
+
+def _direction(turns: Sequence[_Turn], both: bool) -> int:
+    """1 if these loops run counterclockwise, -1 clockwise, 0 if that cannot be said. `both`: only from turns at the top
+    and at the bottom.
+
+    The width of a loop, the output of the leg that comes down less that of the leg that goes up, is taken as
+    proportional to the span of drive that both share. A drift adds to it behind a turn at the top what it takes away
+    behind one at the bottom, and is fitted beside it.
+    """
+    width = np.array([np.mean(turn.widths) for turn in turns])
+    later = np.array([turn.later for turn in turns])
+    span = np.array([turn.span for turn in turns])
+    drifts = bool(np.any(later > 0.0) and np.any(later < 0.0))
+    if not turns or (both and not drifts):
+        return 0
+    columns = np.column_stack([span, later]) if drifts else span[:, None]
+    back = np.linalg.pinv(columns)
+    fitted = back @ width
+    deviation = _deviation(width - columns @ fitted, np.array([turn.deviation for turn in turns]), back[0])
+    drift = float(fitted[1]) if drifts else 0.0
+    profile = np.sum([turn.span * (turn.widths - drift * turn.later) for turn in turns], axis=0)
+    seen = abs(fitted[0]) > SIGMAS * deviation and abs(np.sum(profile)) > ONE_WAY * np.sum(np.abs(profile))
+    return int(np.sign(fitted[0])) if seen else 0
+
+
+def _deviation(error: Array, noise: Array, row: Array) -> float:
+    """Standard deviation of a fitted number, `row @ width`: by the noise of the widths, or by their scatter if more."""
+    spare = len(error) - (2 if len(error) > 2 else len(error))
+    scatter = math.sqrt(float(error @ error) / spare) if spare > 0 else 0.0
+    return float(np.linalg.norm(row * np.maximum(noise, scatter)))
+
+
+@dataclass(frozen=True)
+class _Turn:
+    """The two legs of the drive beside a turning point, over the `span` of drive that they share.
+
+    `widths` (LEVELS,): outputs on the way down less those on the way up; `later`: samples by which the way down is
+    later; `deviation`: of the mean width, by the noise of the output.
+    """
+
+    span: float
+    widths: Array
+    later: float
+    deviation: float
+
+    @property
+    def speed(self) -> float:
+        """Drive a sample."""
+        return self.span / abs(self.later)
+
+
+def _turns(item: Course) -> Iterator[_Turn]:
+    """The turns of the drive of a course between its first and its last compared sample."""
+    place = item.begin + np.flatnonzero(np.isfinite(item.y[item.begin : item.last]))
+    v, y = item.v[place], item.y[place]
+    corners = _corners(v)
+    noise = white_noise(y) if len(y) > 3 else 0.0
+    legs = [_leg(v, y, place, a, b) for a, b in itertools.pairwise(corners)]
+    for before, after, corner in zip(legs[:-1], legs[1:], corners[1:-1], strict=True):
+        low, high = max(before[0][0], after[0][0]), min(before[0][-1], after[0][-1])
+        if high - low < LEAST_TURN * float(np.ptp(v)):
+            continue
+        levels = low + (high - low) * (np.arange(LEVELS) + 0.5) / LEVELS
+        up, down = (before, after) if v[corner] >= high else (after, before)
+        widths, later = (np.interp(levels, down[0], down[k]) - np.interp(levels, up[0], up[k]) for k in (1, 2))
+        count = [np.count_nonzero((leg[0] >= low) & (leg[0] <= high)) * leg[3] for leg in (up, down)]
+        deviation = noise * math.sqrt(sum(1.0 / max(each, 1.0) for each in count))
+        if mean := float(np.mean(later)):
+            yield _Turn(high - low, widths, mean, deviation)
+
+
+def _corners(v: Array) -> list[int]:
+    """First sample, turning points and last sample of the legs of a drive; fewer than three without a turn.
+
+    A play of half of `LEAST_TURN` follows the drive without its smaller moves, and last moved where the drive turned.
+    """
+    if len(v) < 3:
+        return []
+    move = np.diff(operators.play(v, 0.5 * LEAST_TURN * float(np.ptp(v)), float(v[0])))
+    moved = np.flatnonzero(move)
+    if not len(moved):
+        return []
+    rises = move[moved] > 0.0
+    turned = moved[:-1][rises[1:] != rises[:-1]] + 1
+    start = v[: moved[0] + 1]
+    first = int(np.argmin(start) if rises[0] else np.argmax(start))
+    return [first, *turned.tolist(), int(moved[-1]) + 1]
+
+
+def _leg(v: Array, y: Array, place: NDArray[np.intp], a: int, b: int) -> tuple[Array, Array, Array, float]:
+    """Drive, output and sample of the points of one leg in the order of the drive, and samples a point."""
+    order = a + np.argsort(v[a : b + 1], kind="stable")
+    edges = np.unique(np.linspace(0, len(order), min(len(order), LEVELS) + 1).astype(int))[:-1]
+    sizes = np.diff(np.append(edges, len(order)))
+    drive, output, sample = (np.add.reduceat(x[order].astype(np.float64), edges) / sizes for x in (v, y, place))
+    return drive, output, sample, len(order) / len(edges)
 
 
 # Places and number of the plays ------------------------------------------------------------------------------

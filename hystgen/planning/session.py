@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.problems import PlanError
+from hystgen.basics.problems import ParameterError, PlanError, Problem, path_text, shown
+from hystgen.basics.problems import Path as Place
+from hystgen.parameters.yaml import MAX_BYTES, read
+from hystgen.planning.converter import CODINGS, Dac, wrong_bits, wrong_range
 from hystgen.records import Record
 
 FILE = "session.json"
@@ -55,22 +57,29 @@ class Session:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Session:
-        """The session of a file that `--plan` wrote. Raises PlanError, OSError."""
-        wrong = f"{os.fspath(path)}: no session; give the {FILE} that hystgen diagnose --plan --rate wrote"
+        """The session of a file that `--plan` wrote. Raises ParameterError with every problem in it, OSError."""
+        file = os.fspath(path)
+        with open(file, "rb") as stream:
+            content = stream.read(MAX_BYTES + 1)
+        if len(content) > MAX_BYTES:
+            raise ParameterError(file, [Problem("", f"has more than {MAX_BYTES} bytes; {GIVE}")])
         try:
-            content = json.loads(Path(path).read_text(encoding="utf-8"))
-            version = content.pop("hystgen")
-            parts = tuple(Part(**part) for part in content.pop("records"))
-            top, bottom = content.pop("history")
-            found = cls(history=(top, bottom), records=parts, **content)
-            inside = all(part.first >= 0 and part.first + part.samples <= found.samples for part in parts)
-            right = version == 1 and inside and found.rate > 0.0 and top > bottom
-            right = right and bool(np.isfinite([found.rate, found.rest, found.rise, top, bottom]).all())
-        except (ValueError, TypeError, KeyError, AttributeError):
-            right = False
-        if not right:
-            raise PlanError([wrong])
-        return found
+            text = content.decode("utf-8")
+        except UnicodeDecodeError:
+            raise ParameterError(file, [Problem("", f"is not UTF-8; {GIVE}")]) from None
+        document = read(text)  # JSON is YAML, which is read without recursion and with the place of every value
+        problems = list(document.problems)
+        if document.complete:
+            problems += [
+                Problem(path_text(place), what, *document.position(place, at_key=at_key))
+                for place, what, at_key in _problems(document.data)
+                if place not in document.poisoned
+            ]
+        if problems:
+            raise ParameterError(file, problems)
+        parts = tuple(Part(**part) for part in document.data["records"])
+        given = {key: value for key, value in document.data.items() if key != "hystgen"}
+        return cls(**{**given, "records": parts})
 
     def cut(self, recording: Record) -> tuple[list[Record], list[Record]]:
         """The records to fit and those held out of a recording of the whole session.
@@ -122,6 +131,109 @@ class Session:
         if rising is None:
             raise PlanError([f"{name}: the drive never rises; is it a recording of this session?"])
         return rising - self.rise
+
+
+GIVE = f"give the {FILE} that hystgen diagnose --plan --rate wrote"
+
+
+def _number(low: float, strict: bool = False) -> Callable[[Any], str]:
+    """What is wrong with a value that has to be a finite number from `low` on, or above it; empty if nothing."""
+    wanted = f"a number {'above' if strict else 'from'} {low:g}{'' if strict else ' on'}"
+
+    def wrong(value: Any) -> str:
+        number = isinstance(value, int | float) and not isinstance(value, bool) and -HUGE < value < HUGE
+        return "" if number and (value > low or (value == low and not strict)) else f"{wanted}, not {shown(value)}"
+
+    return wrong
+
+
+def _whole(low: int) -> Callable[[Any], str]:
+    def wrong(value: Any) -> str:
+        right = isinstance(value, int) and not isinstance(value, bool) and low <= value < HUGE
+        return "" if right else f"a whole number from {low} on, not {shown(value)}"
+
+    return wrong
+
+
+def _history(value: Any) -> str:
+    pair = isinstance(value, tuple) and len(value) == 2 and not any(map(_number(-HUGE), value))
+    return "" if pair and value[0] > value[1] else "the highest and the lowest drive, [highest, lowest]"
+
+
+HUGE = 1e30
+"""Numbers of a session are smaller, as those of a parameter file are."""
+
+FIELDS: Mapping[str, Callable[[Any], str]] = {
+    "hystgen": lambda value: "" if value == 1 and isinstance(value, int) else f"1, not {shown(value)}",
+    "rate": _number(0.0, strict=True),
+    "samples": _whole(2),
+    "history": _history,
+    "rest": _number(0.0),
+    "rise": _number(0.0),
+    "records": lambda value: "" if isinstance(value, tuple) and value else f"a list of records, not {shown(value)}",
+    "dac": lambda value: "" if value is None or isinstance(value, dict) else f"a mapping or null, not {shown(value)}",
+}
+"""Keys of the file, and what is wrong with their values."""
+
+PART_FIELDS: Mapping[str, Callable[[Any], str]] = {
+    "name": lambda value: "" if isinstance(value, str) and value else f"text, not {shown(value)}",
+    "first": _whole(0),
+    "samples": _whole(2),
+    "held_out": lambda value: "" if isinstance(value, bool) else f"true or false, not {shown(value)}",
+}
+
+DAC_FIELDS: Mapping[str, Callable[[Any], str]] = {
+    "bits": _whole(1),
+    "low": _number(-HUGE),
+    "high": _number(-HUGE),
+    "coding": lambda value: "" if value in CODINGS else f"{' or '.join(CODINGS)}, not {shown(value)}",
+}
+
+Wrong = tuple[Place, str, bool]
+"""Where a problem is, what it is, and whether the key there is meant and not its value."""
+
+
+def _of_fields(place: Place, content: Mapping[str, Any], fields: Mapping[str, Callable[[Any], str]]) -> Iterator[Wrong]:
+    """Keys of a mapping that are unknown, missing, or have a wrong value."""
+    for key in content.keys() - fields.keys():
+        yield (*place, key), f"this key is unknown; {GIVE}", True
+    for key, check in fields.items():
+        if key not in content:
+            yield (*place, key), f"is missing; {GIVE}", False
+        elif wrong := check(content[key]):
+            yield (*place, key), f"has to be {wrong}; {GIVE}", False
+
+
+def _problems(content: Mapping[str, Any]) -> Iterator[Wrong]:
+    """Everything that is wrong with the content of a file."""
+    found = list(_of_fields((), content, FIELDS))
+    yield from found
+    wrong = {place for place, _, _ in found}
+    if isinstance(content.get("dac"), dict):
+        own = list(_of_fields(("dac",), content["dac"], DAC_FIELDS))
+        yield from own
+        if not own:
+            dac = Dac(**content["dac"])
+            for what in (*wrong_bits(dac.bits), *wrong_range(dac.low, dac.high)):
+                yield ("dac",), f"{what}; {GIVE}", False
+    end, names = 0, set()
+    for k, part in enumerate(() if ("records",) in wrong or "records" not in content else content["records"]):
+        place: Place = ("records", k)
+        if not isinstance(part, dict):
+            yield place, f"has to be a record, not {shown(part)}; {GIVE}", False
+            continue
+        own = list(_of_fields(place, part, PART_FIELDS))
+        yield from own
+        if own:
+            continue
+        if part["name"] in names:
+            yield (*place, "name"), f"{shown(part['name'])} is the name of a record before; {GIVE}", False
+        if part["first"] < end:
+            yield (*place, "first"), f"begins in the record before, which ends at sample {end}; {GIVE}", False
+        names.add(part["name"])
+        end = part["first"] + part["samples"]
+        if ("samples",) not in wrong and "samples" in content and end > content["samples"]:
+            yield (*place, "samples"), f"ends at sample {end}, and the session at {content['samples']}; {GIVE}", False
 
 
 def crossing(t: NDArray[np.float64], v: NDArray[np.float64], middle: float) -> float | None:

@@ -11,6 +11,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from hystgen.basics import extras
+from hystgen.records import mat_nesting
 from hystgen.records.columns import Column, Step, column, from_number, is_named
 from hystgen.records.reading import Reading, Table, in_matrix, one_dimension
 
@@ -84,6 +85,11 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
             f"MATLAB .mat files need the package scipy; {extras.install('formats')}, or export CSV or .npz"
         ) from None
     with reading.parsing("a MATLAB v5 .mat file"):
+        if mat_nesting.too_deep(stream):
+            raise reading.refuse(
+                f"has structs or cells nested more than {mat_nesting.MOST} deep; export the signals as vectors"
+            )
+        stream.seek(0)
         columns: list[Column] = []
         ignored: list[str] = []
         steps: list[Step] = []

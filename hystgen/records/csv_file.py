@@ -243,11 +243,12 @@ class _Body:
         # Columns of numbers, as far as is known; those with text, and those called alike, are not stored
         alike = Counter(self.names)
         self.stored: dict[int, Array] = {
-            k: np.empty(0) for k, name in enumerate(self.names) if name and (alike[name] == 1 or k in self.wanted)
+            k: np.empty(0) for k, name in enumerate(self.names) if (name and alike[name] == 1) or k in self.wanted
         }
         self.text_columns: set[int] = set()
-        # Cells at the end of a line that have no name may be missing
-        self.fewest = max((k + 1 for k, name in enumerate(self.names) if name), default=len(self.names))
+        # Cells at the end of a line that have no name and are not asked for may be missing
+        named = [k + 1 for k, name in enumerate(self.names) if name or k in self.wanted]
+        self.fewest = max(named, default=len(self.names))
         self.rows = 0
         self.line = layout.first - 1
         self.lines = Lines()

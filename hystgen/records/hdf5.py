@@ -26,6 +26,9 @@ _UNITS = ("units", "unit", "Units", "Unit")
 LONGEST = 1 << 10
 """Characters of a text that may be a label or a unit; longer ones are not read."""
 
+DEEPEST = 32
+"""[levels] Groups in each other, as structs of `mat_nesting`: paths of 20,000 take minutes, as each holds all above."""
+
 _MATLAB_OWN = ("#refs#", "#subsystem#")
 """Groups in which MATLAB keeps what its cell arrays and objects refer to."""
 
@@ -64,6 +67,8 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
             if matlab and path.split("/")[0] in _MATLAB_OWN:
                 return
             *folders, name = path.split("/")
+            if len(folders) > DEEPEST:
+                raise reading.refuse(f"has groups nested more than {DEEPEST} deep; export the signals into one group")
             folder = "".join(part + join for part in folders)
             if not matlab:
                 of = f"{folder}{name}" if isinstance(found, h5py.Dataset) else f"{folder}{name}/"

@@ -1,0 +1,167 @@
+"""How deep structs and cells lie in each other in a MATLAB v5 file, from its headers alone.
+
+scipy reads them by recursion in C, and a file of some hundred kilobytes takes the process down. The elements are
+therefore walked here first, in the order in which scipy reads them, with a stack that costs nothing.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from typing import IO
+
+MOST = 32
+"""[levels] Structs and cells in each other: ControlDesk and Simulink save up to five. scipy 1.17 reads 1000, and at 5000
+ends the process, with 8 MB of stack. Set by: tests/test_record_formats.py TestNesting."""
+
+HEADER = 128
+"""Bytes in front of the first variable; the last two say which end of a number comes first."""
+
+MATRIX, COMPRESSED = 14, 15
+"""Types of elements."""
+
+CELL, STRUCT, OBJECT, CHAR, SPARSE, FUNCTION, OPAQUE = 1, 2, 3, 4, 5, 16, 17
+"""Classes of arrays; the others are numbers."""
+
+COMPLEX = 0x800
+"""Flag of an array with an imaginary part."""
+
+PIECE = 1 << 16
+"""Bytes read or unpacked at a time."""
+
+
+def too_deep(stream: IO[bytes]) -> bool:
+    """Whether structs and cells of a file lie deeper in each other than `MOST`.
+
+    What ends too early or is no array stops the walk; scipy stops there as well, with a message.
+    """
+    stream.seek(0)
+    head = stream.read(HEADER)
+    if len(head) < HEADER or 0 in head[:4]:  # version 4, which has numbers alone
+        return False
+    order = "<" if head[126:127] == b"I" else ">"
+    place = HEADER
+    while len(tag := stream.read(8)) == 8:
+        kind, size = struct.unpack(f"{order}II", tag)
+        place += 8 + size
+        elements = _Elements(stream if kind != COMPRESSED else _Unpacked(stream, size), order)
+        try:
+            if kind == COMPRESSED:
+                elements.matrix()
+            if any(depth > MOST for depth in elements.depths()):
+                return True
+        except (EOFError, ValueError, ZeroDivisionError, zlib.error):
+            pass
+        stream.seek(place)
+    return False
+
+
+class _Unpacked:
+    """The content of a compressed element."""
+
+    def __init__(self, stream: IO[bytes], size: int) -> None:
+        self._stream, self._left = stream, size
+        self._unpack = zlib.decompressobj()
+        self._packed = b""
+
+    def read(self, size: int) -> bytes:
+        """As many bytes, or fewer at the end."""
+        found = b""
+        while len(found) < size and not self._unpack.eof:
+            if not self._packed:
+                self._packed = self._stream.read(min(PIECE, self._left))
+                self._left -= len(self._packed)
+                if not self._packed:
+                    break
+            found += self._unpack.decompress(self._packed, size - len(found))
+            self._packed = self._unpack.unconsumed_tail
+        return found
+
+
+class _Elements:
+    """The elements of one variable, one by one."""
+
+    def __init__(self, stream: IO[bytes] | _Unpacked, order: str) -> None:
+        self._stream, self._order = stream, order
+        self._seek: Callable[[int, int], int] | None = getattr(stream, "seek", None)
+
+    def _bytes(self, size: int) -> bytes:
+        found = self._stream.read(size)
+        if len(found) < size:
+            raise EOFError
+        return found
+
+    def _skip(self, size: int) -> None:
+        if self._seek is not None:
+            self._seek(size, 1)
+            return
+        for start in range(0, size, PIECE):
+            self._bytes(min(PIECE, size - start))
+
+    def _tag(self) -> tuple[int, int, bytes | None]:
+        """Type and size of an element, and its content where it stands beside them."""
+        raw = self._bytes(8)
+        kind, size = struct.unpack(f"{self._order}II", raw)
+        return (kind & 0xFFFF, kind >> 16, raw[4 : 4 + (kind >> 16)]) if kind >> 16 else (kind, size, None)
+
+    def _element(self) -> int:
+        """The size of an element, which is passed."""
+        _, size, inside = self._tag()
+        if inside is None:
+            self._skip(size + -size % 8)
+        return size
+
+    def _integers(self) -> tuple[int, ...]:
+        _, size, inside = self._tag()
+        if size > PIECE:
+            raise ValueError
+        data = self._bytes(size + -size % 8)[:size] if inside is None else inside
+        return struct.unpack(f"{self._order}{len(data) // 4}i", data)
+
+    def matrix(self) -> int:
+        """The size of an array, whose header comes next."""
+        kind, size, inside = self._tag()
+        if kind != MATRIX or inside is not None:
+            raise ValueError
+        return size
+
+    def depths(self) -> Iterator[int]:
+        """How deep each array in a variable lies, beginning behind the tag of the variable itself."""
+        open_ = [1]
+        top = True
+        while open_:
+            open_[-1] -= 1
+            if top or self.matrix():
+                yield len(open_)
+                open_.append(self._inside(top))
+            top = False
+            while open_ and open_[-1] <= 0:
+                open_.pop()
+
+    def _inside(self, top: bool) -> int:
+        """How many arrays an array has in itself; all else of it is passed."""
+        self._bytes(8)
+        (flags, _) = struct.unpack(f"{self._order}II", self._bytes(8))
+        sort = flags & 0xFF
+        count = 0
+        if sort != OPAQUE:
+            count = math.prod(self._integers())
+            self._element()
+        if top and sort not in (CELL, STRUCT, OBJECT, FUNCTION, OPAQUE):
+            return 0
+        if sort == CELL:
+            return count
+        if sort in (FUNCTION, OPAQUE):
+            for _ in range(3 if sort == OPAQUE else 0):
+                self._element()
+            return 1
+        if sort in (STRUCT, OBJECT):
+            if sort == OBJECT:
+                self._element()
+            (length,) = self._integers()
+            return count * (self._element() // length)
+        for _ in range((3 if sort == SPARSE else 1) + (flags & COMPLEX != 0)):
+            self._element()
+        return 0
