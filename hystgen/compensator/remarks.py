@@ -30,7 +30,7 @@ def forward(v: NDArray[np.float64], ends: tuple[float, float], limited: bool, he
 
 
 def inverse(samples: int, references: int, drives: int, held: int = 0) -> list[str]:
-    """Of references of an inverse: the numbers of references and of drives that were limited, and of those held."""
+    """Of references of an inverse: the numbers that were limited, of other drives that were, and of those held."""
     said = []
     if references:
         lie, were = ("lies", "was") if references == 1 else ("lie", "were")
@@ -63,12 +63,13 @@ def run(session: Session, x: ArrayLike, moved: Session | None = None) -> tuple[N
     if not session.inverse:
         limited = counted(status, slots.INPUT_CLAMPED) > 0
         return answers, forward(signal, session.drive_range, limited, held)
-    references, drives = status & slots.INPUT_CLAMPED, status & slots.OUTPUT_CLAMPED
+    references, drives = status & slots.INPUT_CLAMPED != 0, status & slots.OUTPUT_CLAMPED != 0
     if moved is not None:
         low, high = (float(end) for end in session.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
         with np.errstate(invalid="ignore"):
             missed = np.abs(signal - moved.run(answers)[0]) > ROUNDED * (high - low)
-        references, drives = references * missed, drives * missed
+        references, drives = references & missed, drives & missed
+    drives &= ~references  # a sample counts once
     return answers, inverse(len(signal), int(np.count_nonzero(references)), int(np.count_nonzero(drives)), held)
 
 
