@@ -343,7 +343,7 @@ class Model:
         how = self.parameters.emit.compensation
         chosen = self.engine(engine, arithmetic=arithmetic)
         compiled = tables.build(self.chain, arithmetic, seconds, how, self._lsb, chosen)
-        found, status = run.answers(compiled, record, inverse)
+        found, status = run.with_status(compiled, record, inverse)
         clamped, limited, held = (
             remarks.counted(status, bit) for bit in (slots.INPUT_CLAMPED, slots.OUTPUT_CLAMPED, slots.HELD)
         )

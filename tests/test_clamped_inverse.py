@@ -70,8 +70,9 @@ def told(run: Callable[[], Array]) -> tuple[Array, dict[str, int]]:
     for each in caught:
         assert each.category is hystgen.SampleWarning, str(each.message)
         assert each.filename == __file__, "it names the caller's line"
-        match = re.match(r"(\d+) of (\d+) (references|drives|samples) .*?(extrapolated|limited|held)", str(each.message))
-        assert match is not None, str(each.message)
+        text = str(each.message)
+        match = re.match(r"(\d+) of (\d+) (references|drives|samples) .*?(extrapolated|limited|held)", text)
+        assert match is not None, text
         assert int(match[2]) == len(found)
         counts[f"{match[3]} {match[4]}"] = int(match[1])
     return found, counts

@@ -15,7 +15,12 @@ from hystgen.effects.thermal.model import COLUMN
 from hystgen.plays import slots
 
 
-def answers(compiled: Compiled, record: Run, inverse: bool) -> tuple[NDArray[Any], NDArray[np.uint8]]:
+def answers(compiled: Compiled, record: Run, inverse: bool) -> NDArray[Any]:
+    """Answers (N,) for the drives or references in `record.v`; see `with_status`."""
+    return with_status(compiled, record, inverse)[0]
+
+
+def with_status(compiled: Compiled, record: Run, inverse: bool) -> tuple[NDArray[Any], NDArray[np.uint8]]:
     """Answers (N,) for the drives or references in `record.v`, and their status bits; for a preview the last sample
     repeats.
 
