@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator
 from typing import IO
 
 MOST = 32
-"""[levels] Structs and cells in each other: ControlDesk and Simulink save up to five. scipy 1.17 reads 1000 and ends the
-process at 5000, with 8 MB of stack. Set by: tests/test_record_formats.py TestNesting."""
+"""[levels] Structs and cells in each other: ControlDesk and Simulink save up to five. scipy 1.17 reads 1000, and ends
+the process at 5000 with 8 MB of stack. Set by: tests/test_record_formats.py TestNesting."""
 
 HEADER = 128
 """Bytes in front of the first variable; the last two say which end of a number comes first."""
