@@ -1162,7 +1162,7 @@ class TestNesting:
             for most in (wanted, wanted - 1):
                 with pytest.MonkeyPatch.context() as patch:
                     patch.setattr(mat_nesting, "MOST", most)
-                    assert mat_nesting.too_deep(stream) == (most < wanted)
+                    assert bool(mat_nesting.problem(stream)) == (most < wanted)
 
     def test_a_damaged_file_is_left_to_its_library(self, tmp_path: Path) -> None:
         whole, rng = nested(2, 20, packed=False), np.random.default_rng(0)
@@ -1172,6 +1172,13 @@ class TestNesting:
                 data[place] = int(rng.integers(256))
             (tmp_path / "damaged.mat").write_bytes(data)
             assert problems(tmp_path / "damaged.mat")
+
+    def test_a_count_without_content(self, tmp_path: Path) -> None:
+        """Two thousand million structs without fields, in 136 bytes."""
+        fields = struct.pack("<HHi", 5, 4, 8) + element(1, b"")
+        data = array(2, b"s", fields).replace(struct.pack("<ii", 1, 1), struct.pack("<ii", 2**31 - 1, 1))
+        (tmp_path / "many.mat").write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + b"\0\1IM" + data)
+        assert problems(tmp_path / "many.mat")[0].endswith("structs or cells; export the signals as vectors")
 
     def test_groups(self, tmp_path: Path) -> None:
         with h5py.File(tmp_path / "deep.h5", "w") as file:
