@@ -85,10 +85,8 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
             f"MATLAB .mat files need the package scipy; {extras.install('formats')}, or export CSV or .npz"
         ) from None
     with reading.parsing("a MATLAB v5 .mat file"):
-        if mat_nesting.too_deep(stream):
-            raise reading.refuse(
-                f"has structs or cells nested more than {mat_nesting.MOST} deep; export the signals as vectors"
-            )
+        if wrong := mat_nesting.problem(stream):
+            raise reading.refuse(f"has {wrong}; export the signals as vectors")
         stream.seek(0)
         columns: list[Column] = []
         ignored: list[str] = []

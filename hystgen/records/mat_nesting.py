@@ -13,8 +13,12 @@ from collections.abc import Callable, Iterator
 from typing import IO
 
 MOST = 32
-"""[levels] Structs and cells in each other: ControlDesk and Simulink save up to five. scipy 1.17 reads 1000, and at 5000
-ends the process, with 8 MB of stack. Set by: tests/test_record_formats.py TestNesting."""
+"""[levels] Structs and cells in each other: ControlDesk and Simulink save up to five. scipy 1.17 reads 1000, and ends
+the process at 5000 with 8 MB of stack. Set by: tests/test_record_formats.py TestNesting."""
+
+MANY = 10_000_000
+"""[structs or cells in one array] scipy makes room for as many as the header says, and goes through them all before it
+sees that they are not there: 2^31 of them without a field take minutes."""
 
 HEADER = 128
 """Bytes in front of the first variable; the last two say which end of a number comes first."""
@@ -32,15 +36,15 @@ PIECE = 1 << 16
 """Bytes read or unpacked at a time."""
 
 
-def too_deep(stream: IO[bytes]) -> bool:
-    """Whether structs and cells of a file lie deeper in each other than `MOST`.
+def problem(stream: IO[bytes]) -> str:
+    """What of a file scipy must not be given, in words; empty if nothing.
 
     What ends too early or is no array stops the walk; scipy stops there as well, with a message.
     """
     stream.seek(0)
     head = stream.read(HEADER)
     if len(head) < HEADER or 0 in head[:4]:  # version 4, which has numbers alone
-        return False
+        return ""
     order = "<" if head[126:127] == b"I" else ">"
     place = HEADER
     while len(tag := stream.read(8)) == 8:
@@ -51,11 +55,13 @@ def too_deep(stream: IO[bytes]) -> bool:
             if kind == COMPRESSED:
                 elements.matrix()
             if any(depth > MOST for depth in elements.depths()):
-                return True
+                return f"structs or cells nested more than {MOST} deep"
+        except OverflowError:
+            return f"an array of more than {MANY} structs or cells"
         except (EOFError, ValueError, ZeroDivisionError, zlib.error):
             pass
         stream.seek(place)
-    return False
+    return ""
 
 
 class _Unpacked:
@@ -149,6 +155,8 @@ class _Elements:
         if sort != OPAQUE:
             count = math.prod(self._integers())
             self._element()
+        if sort in (CELL, STRUCT, OBJECT) and count > MANY:
+            raise OverflowError
         if top and sort not in (CELL, STRUCT, OBJECT, FUNCTION, OPAQUE):
             return 0
         if sort == CELL:
