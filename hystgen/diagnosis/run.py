@@ -247,10 +247,10 @@ class _Task:
 def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None) -> tuple[Outcome, list[str]]:
     """The outcome, or the model that `identify` chooses on the same samples, and a note that says so.
 
-    Where only noise is left, no other model can be better.
+    None is sought where only noise is left, of all records or, with names, of the held-out ones.
     """
-    left = records.residual(found.fitted)
-    if acceptance.is_noise(left, records.noise):
+    left, of_fitted = records.residual(found.fitted), rms(found.fitted.errors(records.to_fit))
+    if acceptance.is_noise(left if found.found else max(left, of_fitted), records.noise):
         return found, []
     courses = [[item.course for item in group if item.known.any()] for group in (records.to_fit, records.held)]
     try:

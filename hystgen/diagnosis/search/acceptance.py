@@ -165,16 +165,16 @@ END_LEAVES = 0.105
 its range, names stand only if they leave at most this of the held-out and of the fitted records, so that nine tenths
 are explained, in whole per cent as the verdict states it. Many times the noise says nothing of records with little
 noise. False names that left as much, room temperature acting on the gain, kept 0.62 and more. Set by: second_plants
-foreign 300:308, 11000:11020. Changed by: acceptance::test_a_number_at_an_end_of_its_range_explains_nine_tenths."""
+foreign 300:308, 11000:11020. Changed by: selection::test_a_number_at_an_end_of_its_range_explains_nine_tenths."""
 
 WIDER = 1.0
 """[times the width of a range] How much farther than to the end of its usual range a number is sought that stands
 there, in the coordinates of its search: ranges are chosen to an order of magnitude. The wider one counts if it lowers
-the held-out error by `BETTER`. Changed by: ranges::test_a_wider_range_where_a_number_is_at_its_end."""
+the held-out error by `BETTER`. Changed by: selection::test_a_wider_range_where_a_number_is_at_its_end."""
 
 WIDENINGS = 3
 """[searches] Most that a range is widened in a row, each time by `WIDER` usual widths. Changed by: run time, and
-ranges::test_how_often_a_range_is_widened."""
+selection::test_how_often_a_range_is_widened."""
 
 FEW_COMPARED = 0.25
 """[share of the samples] If fewer samples were compared, the verdict says so first and names nothing. Of blind records

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -84,12 +85,15 @@ def widened(part: Part, numbers: Array, thresholds: tuple[float, ...]) -> Part:
 
 
 def _allowed(candidate: Candidate, numbers: Array, j: int, way: float, thresholds: tuple[float, ...]) -> float:
-    """Largest share of a way from number j on at which the schema allows another effect than at its beginning."""
+    """Largest share of a way from number j on at which the schema allows another effect than at its beginning.
+
+    A search looks a little beyond a range, for a slope.
+    """
     here = _made(candidate, numbers, thresholds)
 
     def differs(share: float) -> bool:
         moved = numbers.copy()
-        moved[j] += share * way
+        moved[j] += share * way + math.copysign(DIFFERENCE, way)
         there = _made(candidate, moved, thresholds)
         return there is not None and there != here
 
