@@ -115,7 +115,7 @@ class Made:
         amount = SimpleNamespace(low=np.full(2, -1.0), high=np.full(2, 0.0 if most else 1.0), amounts=(1,))
         self.structure = SimpleNamespace(
             bounds=(np.full(2, -1.0), np.full(2, 1.0)),
-            parts=(SimpleNamespace(candidate=amount),),
+            parts=(SimpleNamespace(candidate=amount, ordinary=amount),),
             front=None,
             pieces=lambda shape: (np.empty(0), [shape]),
         )

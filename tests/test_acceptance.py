@@ -196,13 +196,6 @@ def test_names_near_the_noise_explain_half(left: float, gap: float, stand: bool)
     assert (selection.borne_out(now, none, RECORDS) is None) is stand  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("left", "most", "stand"), [(3.3, True, False), (2.7, True, True), (3.3, False, True)])
-def test_a_number_at_an_end_of_its_range_explains_nearly_all(left: float, most: bool, stand: bool) -> None:
-    """As multiples of the noise, of ten times that."""
-    now, none = Made("now", 1, (left * NOISE, left * NOISE), most=most), Made("none", 1, (0.6, 0.6))
-    assert (selection.borne_out(now, none, RECORDS) is None) is stand  # type: ignore[arg-type]
-
-
 def test_names_explain_most_without_the_free_start_states() -> None:
     """On equal terms there was little to explain."""
     now, none = Made("now", 1, (0.3, 0.3)), Made("none", 1, (1.0, 1.0), on_equal_terms=(0.33, 0.33))

@@ -30,11 +30,12 @@ from hystgen.diagnosis.data import items, preparing
 from hystgen.diagnosis.data.items import Item, rms
 from hystgen.diagnosis.data.preparing import set_aside
 from hystgen.diagnosis.data.signals import noise_floor
+from hystgen.diagnosis.findings import content
 from hystgen.diagnosis.findings.content import ONE_LOOP
 from hystgen.diagnosis.findings.kinds import Line
-from hystgen.diagnosis.findings.result import Errors, Gap, Result
-from hystgen.diagnosis.run import _extended
-from hystgen.diagnosis.search import acceptance, hypothesis, screening, selection
+from hystgen.diagnosis.findings.result import AtEnd, Contender, Errors, Gap, Result
+from hystgen.diagnosis.run import _extended, _no_worse_than_identified
+from hystgen.diagnosis.search import acceptance, hypothesis, ranges, screening, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Actuator
 from hystgen.effects.ageing.model import ExponentialAgeing
@@ -253,6 +254,89 @@ def test_the_sentence_says_what_is_left_open(tmp_path: Path) -> None:
     for unexplained, more in (([], "."), ([STRUCTURE], ", 2.5 times the noise and with structure.")):
         found = result("effects_found", ("lag", "creep"), 0.05, unexplained, rivals)
         assert Diagnosis(found, parameters, (), ()).sentence() == said + more
+
+
+def figures_of(said: str) -> list[float]:
+    """The numbers of a sentence."""
+    return [float(each) for each in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", said)]
+
+
+@pytest.mark.parametrize(("held", "fitted"), [(0.05, 0.03), (0.3, 0.04), (0.03, 0.45), (0.9, 0.9)])
+@pytest.mark.parametrize("why", ["range", "most", "above"])
+def test_what_is_said_of_withdrawn_effects_follows_from_their_figures(why: str, held: float, fitted: float) -> None:
+    """Of gaps of 50 and 40 times the noise, 0.02 um: shares from 3 to 90 %, which are stated and not judged."""
+    of_held, of_fitted = selection.Explained(1.0, held, 0.02), selection.Explained(0.8, fitted, 0.02)
+    refused = selection.Refusal(why, *{"range": (0.31, 0.105), "most": (held, 1.0), "above": (held, 0.04)}[why])
+    end = ranges.End(0, "creep", "weights 2", 3.0, "largest", 3.0, 9.0, 1.25 * held, "no less")
+    model: Any = SimpleNamespace()
+    withdrawn = selection.Withdrawn(("creep",), refused, of_held, of_fitted, (end,))
+    outcome = selection.Outcome(model, model, (), (), withdrawn)
+    told = content._withdrawn(outcome, "um")
+    before = result("unexplained", (), 0.5, [STRUCTURE])
+    ranked = ((Contender("creep", "creep", 0.1, 0.1, "refused"),),)
+    said = Diagnosis(dataclasses.replace(before, ranking=ranked, withdrawn=told), None, (), ()).sentence()  # type: ignore[arg-type]
+    assert "most would remain" not in said
+    (sentence,) = re.findall(r"Creep would leave .*", said)
+    shares = [round(100 * np.sqrt((x**2 - 0.02**2) / (gap**2 - 0.02**2))) for x, gap in ((held, 1.0), (fitted, 0.8))]
+    reason = {"range": [31, 10], "most": [held, 1.0], "above": [held, 0.04]}[why]
+    wider = [2.0, 3.0, 9.0, 1.25 * held, 5.0]
+    expected = [held, 1.0, shares[0], fitted, 0.8, shares[1], *reason, *wider]
+    assert figures_of(sentence) == pytest.approx(expected, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("why", "words"),
+    [
+        ("beyond", "beyond its usual range, which ends at 3 and leaves more"),
+        ("no less", "the largest that is tried: a range up to 9 leaves 0.07 um rms"),
+        ("limit", "the largest that is tried: farther on is no other effect"),
+        ("firm", "the largest that is tried: its range is not widened"),
+        ("noise", "the largest that is tried: only noise is left"),
+    ],
+)
+def test_the_verdict_says_what_is_left_and_which_number_is_at_its_end(why: str, words: str) -> None:
+    """0.07 um of 0.5 um, with noise of 0.02 um; without such a number of its own creep has two equal times."""
+    found = result("effects_found", ("creep",), 0.07, [])
+    end = AtEnd("weights 2", 4.0, "largest", 3.0, 9.0 if why == "no less" else None, 0.07, why)
+    named = dataclasses.replace(found.effects[0], at_an_end=True, ends=(end,))
+    said = Diagnosis(dataclasses.replace(found, effects=(named,)), None, (), ()).sentence()  # type: ignore[arg-type]
+    assert said.startswith("An error of 0.07 um rms is not explained, 3.5 times the noise. Missing, in part: creep.")
+    assert "falls by 86 %, from 0.5 um to 0.07 um" in said
+    assert f"weights 2 of creep is 4, {words}" in said
+    twice = dataclasses.replace(named, ends=())
+    said = Diagnosis(dataclasses.replace(found, effects=(twice,)), None, (), ()).sentence()  # type: ignore[arg-type]
+    assert "two time constants of creep are practically equal" in said
+    assert "range" not in said
+
+
+def test_no_worse_than_the_model_of_identify() -> None:
+    """A front of dead zones that bends both ways, and one loop: its effects have no name, and the plain plays of the
+    nominal model are far worse than what `identify` finds on the same records."""
+    t = np.arange(800) * 1e-3
+    records = []
+    for seed in range(2):
+        v = 50.0 - 50.0 * np.cos(2.0 * np.pi * 5.0 * t)
+        w = v + 0.8 * np.maximum(v - 30.0, 0.0) - 1.2 * np.maximum(v - 70.0, 0.0)
+        x = brute_output(w, (0.0, 5.0, 12.0), (0.1, 0.02, 0.02), 0.0)
+        records.append(Record(f"r{seed}", t, v, noisy(x, 0.01, seed)))
+    chosen = selection.as_given(hystgen.identify(records[:1], holdout=records[1:], model="auto").model.cascade, ())
+    ready = preparing.prepare(records[:1], records[1:], None, 0.0)
+    structure = hypothesis.Structure(ready.thresholds, Kept())
+    plain = selection.refit(structure, ready.to_fit, np.empty(0))
+    noise = noise_floor([*ready.to_fit, *ready.held]).rms
+    searched = screening.Records.of(ready.to_fit, ready.held, plain, noise)
+    outcome = selection.Outcome(plain, plain, (), ())
+    with parallel.one_thread():
+        best, (note,) = _no_worse_than_identified(outcome, searched, "um")
+    assert best.written == "identified"
+    assert best.refitted is plain
+    left = searched.residual(best.fitted)
+    assert left == pytest.approx(searched.residual(chosen), rel=0.005)
+    assert left < 0.5 * searched.residual(plain)
+    stated = figures_of(note.replace("--", ""))
+    assert stated == pytest.approx([left, searched.residual(plain)], rel=1e-3)
+    quiet = dataclasses.replace(searched, noise=searched.residual(plain))
+    assert _no_worse_than_identified(outcome, quiet, "um") == (outcome, [])
 
 
 @pytest.mark.parametrize(

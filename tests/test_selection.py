@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,9 +10,19 @@ import numpy as np
 import pytest
 from made_up import HELD, NOISE, RECORDS, TO_FIT, Hypothesis, Made, World, first_of
 from numpy.typing import NDArray
+from recordings import brute_output
 
 from hystgen.diagnosis import run
-from hystgen.diagnosis.search import screening, selection
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.search import fits, ranges, screening, selection
+from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.hypothesis import Part, Structure
+from hystgen.effects.base import About, Effect, Run
+from hystgen.effects.creep.model import ExponentialCreep
+from hystgen.effects.rate_dependence.model import RelaxingPlays
+from hystgen.effects.resonance.model import PartMode
+from hystgen.effects.thermal.model import LoggedThermal
+from hystgen.identification.joint import Kept
 
 Array = NDArray[np.float64]
 
@@ -482,6 +493,158 @@ def test_the_model_as_given_is_the_answer_where_it_does_better(left: float, name
     answer = selection.no_worse_than(first, selection.Outcome(found, found, effects, ()), records)  # type: ignore[arg-type]
     assert (answer.fitted is first) is given
     assert [each.name for each in answer.found] == ([] if given else names)
+
+
+@pytest.mark.parametrize(("left", "names", "taken"), [(0.601, [], False), (0.605, [], True), (0.605, ["lag"], True)])
+def test_what_identify_finds_is_the_answer_where_it_does_better(left: float, names: list[str], taken: bool) -> None:
+    """It leaves 0.6 of the held-out records, and wins by more than equal errors differ, over names too."""
+    other, found = Made("identified", 1, (1.0, 0.6)), Made("found", 1, (0.5, left))
+    records: Any = SimpleNamespace(held=HELD, residual=lambda each: each.left[1])
+    effects: Any = tuple(SimpleNamespace(name=name) for name in names)
+    before: Any = selection.Outcome(found, found, effects, ())  # type: ignore[arg-type]
+    answer = selection.no_worse_than(other, before, records, selection.IDENTIFIED)  # type: ignore[arg-type]
+    assert (answer.fitted is other) is taken
+    assert answer.refitted is found
+    assert answer.written == ("identified" if taken else before.written)
+    assert answer.found == (() if taken else effects)
+
+
+# Numbers at an end of their range ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("fitted", "held", "most", "stand"),
+    [
+        (9.0, 9.0, True, True),
+        (12.0, 9.0, True, False),
+        (9.0, 12.0, True, False),
+        (12.0, 12.0, False, True),
+        (2.7, 2.7, True, True),
+    ],
+)
+def test_a_number_at_an_end_of_its_range_explains_nine_tenths(
+    fitted: float, held: float, most: bool, stand: bool
+) -> None:
+    """As multiples of the noise, of a hundred times that: far above it, and nevertheless nearly all."""
+    now, none = Made("now", 1, (fitted * NOISE, held * NOISE), most=most), Made("none", 1, (100 * NOISE, 100 * NOISE))
+    refused = selection.borne_out(now, none, RECORDS)  # type: ignore[arg-type]
+    assert (refused is None) is stand
+    if refused is not None:
+        larger = max(fitted, held)
+        assert refused.why == "range"
+        assert refused.value == pytest.approx(np.sqrt((larger**2 - 1.0) / (100.0**2 - 1.0)), rel=0.05)
+
+
+def warm(gain: float, seed: int) -> Item:
+    """Plays in a room of 20 +- 0.5 degrees, whose gain follows the logged temperature."""
+    random = np.random.default_rng(seed)
+    t = np.arange(600) * 0.1
+    v = 50.0 - 50.0 * np.cos(0.9 * t + seed) * np.exp(-0.01 * t)
+    temperature = 20.0 + 0.5 * np.sin(0.13 * t + seed)
+    y = brute_output(v, (0.0, 10.0), (1.0, 0.5), 0.0) * (1.0 + gain * (temperature - 20.0))
+    return Item(f"r{seed}", Run(t, v, {"temperature": temperature}), y + random.normal(0.0, 0.02, len(t)), (), 150.0)
+
+
+def of_warm(gain: float) -> tuple[screening.Records, Fitted]:
+    """Two records to fit and one held out, and the effect at the end of its range: the only number of a gain."""
+    to_fit, held = [warm(gain, 0), warm(gain, 1)], [warm(gain, 2)]
+    structure = Structure(np.array([0.0, 10.0]), Kept())
+    plain = fits.fit(structure, to_fit, np.empty(0), np.array([1.0, 0.5]))
+    records = screening.Records.of(to_fit, held, plain, 0.02)
+    candidate = LoggedThermal.candidates(records.known)[0]
+    extended = replace(structure, parts=(Part("thermal", candidate),))
+    return records, fits.fit(extended, to_fit, candidate.start, plain.weights)
+
+
+def test_a_wider_range_where_a_number_is_at_its_end() -> None:
+    """0.4 a degree lies beyond 0.2, as far as the first wider range reaches, 0.6; 0.1 is inside."""
+    records, now = of_warm(0.4)
+    assert now.actuator.effects[0].gain_per_degree == pytest.approx(0.2)  # type: ignore[attr-defined]
+    wider = ranges.wider(now, records)
+    assert wider is not None
+    assert (wider.structure.bounds[0][0], wider.structure.bounds[1][0]) == (-20.0, 60.0)
+    found, leaves = selection._widened(now, records)
+    assert leaves is None
+    assert found.actuator.effects[0].gain_per_degree == pytest.approx(0.4, rel=0.01)  # type: ignore[attr-defined]
+    assert records.residual(found) < 1.1 * records.noise < records.residual(now)
+    (end,) = ranges.ends(found, leaves, False)
+    assert (end.key, end.end, end.usual, end.why) == ("gain_per_degree", "largest", pytest.approx(0.2), "beyond")
+    assert fits.part_at_an_end(found, 0)  # it is no less unlikely for having been found
+    records, now = of_warm(0.1)
+    assert ranges.wider(now, records) is None
+    assert ranges.ends(now, None, True) == ()
+
+
+def test_a_wider_range_without_a_gain_on_held_out_records_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The records to fit alone are better with it; what it leaves is told."""
+    records, now = of_warm(0.4)
+    held = [warm(0.2, 2)]
+    records = replace(records, held=held)
+    found, leaves = selection._widened(now, records)
+    assert found is now
+    (end,) = ranges.ends(found, leaves, False)
+    assert (end.why, end.reached) == ("no less", pytest.approx(0.6))
+    assert end.leaves == leaves
+    assert leaves is not None
+    assert leaves > 0.95 * records.residual(now)
+    monkeypatch.setattr(selection, "is_noise", lambda *_: True)
+    assert selection._widened(now, records) == (now, None)
+
+
+@pytest.mark.parametrize("better", [1, 2, 5])
+def test_how_often_a_range_is_widened(better: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each of the first `better` wider ranges halves the error; three are tried at most."""
+    tried = []
+
+    def wider(now: Made, _: Any) -> Made:
+        tried.append(now)
+        share = 0.5 if len(tried) <= better else 1.0
+        return Made("wider", 1, (1.0, share * now.left[1]))
+
+    monkeypatch.setattr(ranges, "wider", wider)
+    records: Any = SimpleNamespace(held=HELD, noise=NOISE, residual=lambda each: each.left[1])
+    found, leaves = selection._widened(Made("now", 1, (1.0, 1.0)), records)  # type: ignore[arg-type]
+    assert len(tried) == min(better + 1, 3)
+    assert found.left[1] == 0.5 ** min(better, 3)  # type: ignore[attr-defined]
+    assert leaves == (None if better >= 3 else found.left[1])  # type: ignore[attr-defined]
+
+
+ABOUT = About((0.0, 100.0), 10.0, 1e-3, 1.0, 1.0, 1e4, 1e3, (0.0, 10.0, 20.0), frozenset())
+
+
+@pytest.mark.parametrize(
+    ("kind", "shape", "at", "key", "farthest"),
+    [
+        (RelaxingPlays, 1, 1, "exponent", 10.0),  # the schema's largest
+        (ExponentialCreep, 0, 1, "weights", None),
+        (PartMode, 0, 2, "share", 1.0),
+    ],
+)
+def test_a_wider_range_ends_where_the_schema_does(
+    kind: type[Effect], shape: int, at: int, key: str, farthest: float | None
+) -> None:
+    """The effect at the wider end can be written, and a sixteenth of the way farther it could not."""
+    candidate = kind.candidates(ABOUT)[shape]
+    numbers = candidate.start.copy()
+    numbers[at] = candidate.high[at]
+    part = Part("made", candidate)
+    wide = ranges.widened(part, numbers, ABOUT.thresholds)
+    assert wide.ordinary is candidate
+    assert ranges.widened(replace(part, firm=True), numbers, ABOUT.thresholds).candidate is candidate
+    way = candidate.high[at] - candidate.low[at]
+    assert candidate.high[at] < wide.candidate.high[at] <= candidate.high[at] + way
+    changed = np.flatnonzero(wide.candidate.high != candidate.high)
+    assert changed.tolist() == [at]
+    numbers[at] = wide.candidate.high[at]
+    made = candidate.build(numbers)
+    type(made).model_validate(made.model_dump())
+    if farthest is not None:
+        assert getattr(made, key) <= farthest
+        numbers[at] += way / 16.0
+        with pytest.raises(ValueError, match=key):
+            kind.model_validate(candidate.build(numbers).model_dump())
+    numbers[at] = candidate.high[at]
+    assert ranges._number(candidate.build, numbers, at, True, numbers[at])[0] == key
 
 
 @pytest.mark.parametrize(

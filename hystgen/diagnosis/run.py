@@ -18,14 +18,16 @@ from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, noise_floor
 from hystgen.diagnosis.findings.content import result_of
 from hystgen.diagnosis.findings.kinds import OtherHistory
-from hystgen.diagnosis.findings.result import Diagnosis, Errors, Inverse, Signals
+from hystgen.diagnosis.findings.result import WRITTEN, Diagnosis, Errors, Inverse, Signals
 from hystgen.diagnosis.search import acceptance, fits, hypothesis, selection
 from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.hypothesis import Structure
 from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome
 from hystgen.effects.base import Effect, Place
-from hystgen.identification import P0_FLOOR, quality, stage_content
+from hystgen.identification import P0_FLOOR, auto, quality, stage_content
 from hystgen.identification.fit import visited
+from hystgen.identification.joint import Kept
 from hystgen.identification.pi import DIGITS, FALLS, IdentificationError, Weights, rounded, written
 from hystgen.records import Record, Source, agreed_units, in_units, read_records, several
 
@@ -107,6 +109,7 @@ def diagnose(
         )
         done, wrong = task.with_history(before, unit)
         found = selection.no_worse_than(first, done.found, done.records)
+        found, by_itself = _no_worse_than_identified(found, done.records, unit)
         found, made = selection.invertible(found, done.records, P0_FLOOR)
         ready = done.cleaned.clean
         extended = _extended(nominal, model.cascade, found, ready, effects)
@@ -122,7 +125,7 @@ def diagnose(
         )
     notes = [f"{record.name}: {note}" for record in read for note in record.notes]
     notes += [*quality.repeated(read[: len(fitted)], read[len(fitted) :]), *ready.notes]
-    notes += [*done.cleaned.notes(unit), *done.notes]
+    notes += [*done.cleaned.notes(unit), *done.notes, *by_itself]
     return Diagnosis(result, extended, tuple(notes), _signals(ready, found))
 
 
@@ -248,6 +251,31 @@ class _Task:
     def _records(self, clean: Prepared, refitted: Fitted) -> tuple[NoiseFloor, Records]:
         noise = noise_floor([*clean.to_fit, *clean.held])
         return noise, Records.of(clean.to_fit, clean.held, refitted, noise.rms, self.user, self.tick)
+
+
+def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None) -> tuple[Outcome, list[str]]:
+    """The outcome, or the model that `identify` chooses on the same samples, and a note that says so.
+
+    None is sought where only noise is left, of all records or, with names, of the held-out ones.
+    """
+    left, of_fitted = records.residual(found.fitted), rms(found.fitted.errors(records.to_fit))
+    if acceptance.is_noise(left if found.found else max(left, of_fitted), records.noise):
+        return found, []
+    courses = [[item.course for item in group if item.known.any()] for group in (records.to_fit, records.held)]
+    try:
+        identified = auto(*courses)
+    except IdentificationError:  # too little of these records is left behind a start whose memory is not known
+        return found, []
+    r, p = identified.solution.thresholds, identified.solution.weights
+    other = Fitted(Structure(r, Kept(identified.stages)), np.empty(0), p, np.nan)
+    best = selection.no_worse_than(other, found, records, selection.IDENTIFIED)
+    if best is found:
+        return found, []
+    u = f" {unit}" if unit else ""
+    return best, [
+        f"{WRITTEN[selection.IDENTIFIED]} is written, since it leaves {records.residual(other):.4g}{u} rms on held-out "
+        f"records, and {WRITTEN[found.written]} {left:.4g}{u}"
+    ]
 
 
 def _inverse(extended: Parameters, made: Weights) -> Inverse:

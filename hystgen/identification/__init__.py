@@ -147,10 +147,9 @@ def identify(
     with parallel.one_thread(), Progress(passes * samples, progress, "fitting") as bar:
         prepared.mask_outliers(courses, held, how.wanted, p0_floor)
         if held:
-            tried = [_best(courses, held, kind, how, bar) for kind in kinds]
-            chosen = _choose(tried)
-            rows = [tried[k].as_candidate() for k in range(len(tried))] if len(tried) > 1 else []
-            done = tried[chosen]
+            tried = [_best(courses, held, kind, how, bar.tick) for kind in kinds]
+            done = tried[_choose(tried)]
+            rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
             fitted, compared, held_errors = done.fitted, done.compared, done.errors
         else:
             rows, kind, held_errors, reason = _trial([] if loading_curve else courses, kinds, how, bar)
@@ -239,9 +238,17 @@ class _Tried:
         return replace(self.held_out, part="candidate", model=self.fitted.front.name)
 
 
-def _best(courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, bar: Progress) -> _Tried:
+def auto(courses: Sequence[Course], held: Sequence[Course]) -> Fitted:
+    """The model that `identify` chooses among all kinds by held-out courses. Raises IdentificationError."""
+    tried = [_best(courses, held, kind, _How(None, None, P0_FLOOR)) for kind in gpi.KINDS]
+    return tried[_choose(tried)].fitted
+
+
+def _best(
+    courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, tick: gpi.Tick = None
+) -> _Tried:
     """Fit one kind to courses and compare it with others, which choose where `gpi.to_judge` leaves them a choice."""
-    found = gpi.to_judge(courses, kind, how.wanted, how.breaks, how.floor, bar.tick)
+    found = gpi.to_judge(courses, kind, how.wanted, how.breaks, how.floor, tick)
     tried = [_compared(fitted, compared, fitted.begun(held)) for fitted, compared in found]
     return tried[_choose(tried)]
 

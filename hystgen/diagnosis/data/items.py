@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Run
 from hystgen.identification.joint import DIFFERENCE
+from hystgen.identification.reduction import Course, Start
 
 Array = NDArray[np.float64]
 Samples = slice | NDArray[np.intp]
@@ -102,6 +103,14 @@ class Item:
         if not len(steps) or np.any(steps != steps[0]):
             return found
         return slice(int(found[0]), int(found[-1]) + 1, int(steps[0]))
+
+    @property
+    def course(self) -> Course:
+        """The record as `identify` compares it."""
+        samples = np.flatnonzero(self.known)
+        first, last = (int(samples[0]), int(samples[-1]) + 1) if len(samples) else (0, 0)
+        start = None if self.turns is None else Start(self.turns, 0.0)
+        return Course(self.name, self.run.v, self.y, self.history, first, last, first, start=start)
 
     def step(self, h: Array) -> float:
         """Change of a predicted output (N,) by which the slope of a map is found, output units.

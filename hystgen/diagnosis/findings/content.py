@@ -15,11 +15,23 @@ from hystgen.diagnosis.data import disturbances, preparing
 from hystgen.diagnosis.data.items import Item, compared, rms
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, repetition, reversals, still
-from hystgen.diagnosis.findings.kinds import Fault, Finding, Line, Ripple, Structure
-from hystgen.diagnosis.findings.result import Contender, Errors, Gap, Inverse, NamedEffect, Result, Stretch
+from hystgen.diagnosis.findings.kinds import Fault, Finding, Line, Ripple, Structure, times_noise
+from hystgen.diagnosis.findings.result import (
+    AtEnd,
+    Contender,
+    Errors,
+    Gap,
+    Inverse,
+    NamedEffect,
+    Result,
+    Stretch,
+    Withdrawn,
+)
 from hystgen.diagnosis.search import acceptance, fits
+from hystgen.diagnosis.search.acceptance import is_noise
 from hystgen.diagnosis.search.fits import Fitted
-from hystgen.diagnosis.search.selection import Found, Outcome, Ranked
+from hystgen.diagnosis.search.ranges import End
+from hystgen.diagnosis.search.selection import Found, Outcome, Ranked, Refusal
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
@@ -68,7 +80,7 @@ def result_of(
         output_range=max(float(np.ptp(item.y[item.known])) for item in everything if item.known.any()),
         unit=unit,
         gap=gap,
-        effects=_effects(found, ready.to_fit, gap.refitted.holdout),
+        effects=_effects(found, ready.to_fit, gap.refitted.holdout, noise.rms),
         unexplained=(*remaining, *(each for each in odd if each not in remaining), *ready.repaired),
         where=worst(everything, [*before[0], *before[1]], noise.rms),
         not_separable=rivals,
@@ -81,7 +93,8 @@ def result_of(
         inverse=inverse,
         noise_from=noise.ruled,
         compared=compared(everything),
-        withdrawn=found.withdrawn,
+        withdrawn=_withdrawn(found, unit),
+        written=found.written,
     )
     in_digits: Result = _in_digits(result)
     return in_digits
@@ -89,10 +102,34 @@ def result_of(
 
 def _contender(ranked: Ranked, unit: str | None) -> Contender:
     tried, refused = ranked.tried, ranked.refused
-    why = None if refused is None else REFUSALS[refused.why].format(
-        value=refused.value, limit=refused.limit, unit=f" {unit}" if unit else ""
-    )  # fmt: skip
+    why = None if refused is None else reason(refused, unit)
     return Contender(tried.name, tried.option.label, tried.fitted.rms, tried.held_out, why)
+
+
+def reason(refused: Refusal, unit: str | None) -> str:
+    """Why an effect has no name, in words."""
+    return REFUSALS[refused.why].format(value=refused.value, limit=refused.limit, unit=f" {unit}" if unit else "")
+
+
+def _withdrawn(found: Outcome, unit: str | None) -> Withdrawn | None:
+    """What the withdrawn effects would leave."""
+    them = found.withdrawn
+    if them is None:
+        return None
+    held, to_fit = them.held, them.to_fit
+    left = tuple(each.left if math.isfinite(each.left) else None for each in (held, to_fit))
+    return Withdrawn(
+        them.names,
+        Errors(to_fit.before, held.before),
+        Errors(to_fit.after, held.after),
+        (left[0], left[1]),
+        tuple((each.name, _at_end(each)) for each in them.ends),
+        reason(them.refused, unit),
+    )
+
+
+def _at_end(end: End) -> AtEnd:
+    return AtEnd(end.key, end.value, end.end, end.usual, end.reached, end.leaves, end.why)
 
 
 REFUSALS = {
@@ -102,10 +139,13 @@ REFUSALS = {
     "unsure": "neither held-out nor fitted records are sure of it (p = {value:.1g}, at most {limit:g} is needed)",
     "small": "it removes {value:.0%} of the gap, and a name needs {limit:.0%}",
     "most": "the effects found leave {value:.3g}{unit} rms, most of {limit:.3g}{unit}",
+    "above": "the effects found leave {value:.3g}{unit} rms, and of one loop at most {limit:.3g}{unit} supports a name",
     "given": "the effects found leave {value:.3g}{unit} rms, and the model as given {limit:.3g}{unit}",
+    "identified": "the effects found leave {value:.3g}{unit} rms, and the model of `identify` {limit:.3g}{unit}",
     "few": "{value:.0%} of the samples were compared, and a name needs {limit:.0%}",
     "end": "it acts on {value:.1%} of the drive range at an end, and a limit needs {limit:.1%}",
-    "range": "with a number at an end of its range it leaves {value:.3g}{unit} rms, more than {limit:.3g}{unit}",
+    "range": "with a number at an end of its range the effects found leave {value:.0%} of the gap above the noise, and "
+    "then at most {limit:.0%} supports a name",
     "other": "another shape does better, or as well with fewer numbers",
 }
 """Why an effect that was tried has no name, in words."""
@@ -150,7 +190,7 @@ def _unexplained(
     return remaining
 
 
-def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float) -> tuple[NamedEffect, ...]:
+def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float, noise: float) -> tuple[NamedEffect, ...]:
     if not found.found:
         return ()
     sure = fits.intervals(found.fitted, to_fit)
@@ -158,6 +198,8 @@ def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float) -> tuple[N
     for k, each in enumerate(found.found):
         later = sum(other.name == each.name for other in found.found[k + 1 :])
         parameters = _parameters_of(found.fitted, each.name, later)
+        part = fits.place(found.fitted, each.name, later)
+        ends = tuple(_at_end(end) for end in found.ends if end.part == part)
         effects.append(
             NamedEffect(
                 each.name,
@@ -167,8 +209,9 @@ def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float) -> tuple[N
                 each.before,
                 each.after,
                 each.p_value,
-                _evidence(each),
-                fits.at_an_end(found.fitted, each.name, later) or _twice(parameters.get("time_constants", ())),
+                _evidence(each, refitted, noise),
+                bool(ends) or _twice(parameters.get("time_constants", ())),
+                ends,
             )
         )
     return tuple(effects)
@@ -184,9 +227,12 @@ def _advice(one: str, other: str) -> str:
     return f"{one} and {other} cannot be separated by these records; hystgen diagnose --plan writes drives that can"
 
 
-def _evidence(each: Found) -> str:
+def _evidence(each: Found, refitted: float, noise: float) -> str:
     gain = 100.0 * (1.0 - each.after / each.before) if each.before else 0.0
-    return f"{each.label}: held-out rms {each.before:.4g} to {each.after:.4g} ({gain:.0f} % less)"
+    said = f"{each.label}: held-out rms {each.before:.4g} to {each.after:.4g} ({gain:.0f} % less)"
+    if is_noise(each.after, noise) or not refitted:
+        return said
+    return f"{said}; {times_noise(each.after / noise)} and {100.0 * each.after / refitted:.0f} % of the gap are left"
 
 
 def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:

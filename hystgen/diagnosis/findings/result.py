@@ -43,13 +43,78 @@ class Gap:
     after: Errors
 
 
+NO_WIDER = {
+    "limit": "farther on is no other effect",
+    "firm": "its range is not widened",
+    "noise": "only noise is left",
+}
+"""Why no wider range was tried, in words."""
+
+
+@dataclass(frozen=True)
+class AtEnd:
+    """A number of an effect that stands at an end of its range, or beyond it.
+
+    `key`, `value`: as in the parameter file; `end`: `least` or `largest`; `usual`: value at that end of the usual
+    range; `reached`: the same of the widest range that was tried, and `leaves` the held-out rms error that it left,
+    None if none was tried in vain; `why`: `beyond` the usual range, since less is left there; `no less` in a wider
+    range; `limit`, none is wider; `firm`, the range of a number of the nominal model, or of your own effect, which is
+    not widened; `noise`, none was tried, since only noise is left.
+    """
+
+    key: str
+    value: float
+    end: str
+    usual: float
+    reached: float | None
+    leaves: float | None
+    why: str
+
+    def sentence(self, name: str, unit: str | None) -> str:
+        """The number of an effect, and why it stands there, without a full stop."""
+        what = f"{self.key.replace('_', ' ')} of {name}"
+        if self.why == "beyond":
+            return f"{what} is {self.value:.4g}, beyond its usual range, which ends at {self.usual:.4g} and leaves more"
+        said = f"{what} is {self.value:.4g}, the {self.end} that is tried"
+        if self.why == "no less" and self.leaves is not None and self.reached is not None:
+            left = f"{self.leaves:.4g}{' ' if unit else ''}{unit or ''} rms of held-out records"
+            gain = f"{100.0 * acceptance.BETTER:g} %"
+            return f"{said}: a range up to {self.reached:.4g} leaves {left}, which is not better by {gain}"
+        return f"{said}: {NO_WIDER[self.why]}"
+
+
+@dataclass(frozen=True)
+class Withdrawn:
+    """Effects that were accepted one by one and withdrawn in the end: what they leave, and why that gives no name.
+
+    `before`, `after`: rms errors without and with them, on equal terms, output units; `left`: shares of the gap above
+    the noise that they leave, None if there is none.
+    """
+
+    names: tuple[str, ...]
+    before: Errors
+    after: Errors
+    left: tuple[float | None, float | None]
+    ends: tuple[tuple[str, AtEnd], ...]
+    why: str
+
+
+WRITTEN = {
+    "extended": "the model with the effects",
+    "refitted": "the refitted model",
+    "given": "the model as given",
+    "identified": "the model of `identify --model auto`",
+}
+"""The model in `params.yaml`, in words."""
+
+
 @dataclass(frozen=True)
 class NamedEffect:
     """An effect that was found: `parameters` as in its entry of a parameter file, with 95 % `intervals`.
 
     `share_of_gap`: the held-out error that it removes, as a share of the refitted model's; errors in output units;
     `at_an_end`: whether one of its numbers is at an end of its range, or two of its parts coincide, so that its shape
-    is not certain.
+    is not certain; `ends`: those numbers.
     """
 
     name: str
@@ -61,6 +126,7 @@ class NamedEffect:
     p_value: float
     evidence: str
     at_an_end: bool = False
+    ends: tuple[AtEnd, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -97,8 +163,8 @@ class Result:
     """Everything in `diagnosis.json`, under the names of its keys; numbers have eight digits.
 
     `noise_from`: the source of the noise floor, `holds`, `periods`, `differences` or `resolution`; `compared`: numbers
-    of samples that took part and that were recorded; `withdrawn`: effects that were accepted one by one and withdrawn
-    in the end, since together they leave most of the gap, or too few samples were compared.
+    of samples that took part and that were recorded; `withdrawn`: effects without a name in the end, None for none;
+    `written`: the model in `params.yaml`, `extended` by the effects, `refitted`, as `given`, or as `identified`.
     """
 
     verdict: str
@@ -115,7 +181,8 @@ class Result:
     inverse: Inverse
     noise_from: str = "differences"
     compared: tuple[int, int] = (0, 0)
-    withdrawn: tuple[str, ...] = ()
+    withdrawn: Withdrawn | None = None
+    written: str = "refitted"
 
 
 @dataclass(frozen=True)
@@ -193,13 +260,21 @@ class Diagnosis:
     def sentence(self) -> str:
         """The verdict in a few sentences, its limits first."""
         parts = [*self._limits(), self._finding()]
-        ends = dict.fromkeys(effect.name for effect in self.result.effects if effect.at_an_end)
-        if ends:
-            parts.append(f"A parameter of {', '.join(ends)} is at a limit of its range: the shape is not certain")
+        if any(effect.at_an_end for effect in self.result.effects):
+            parts.append(f"The shape is not certain: {'; '.join(self.uncertain())}")
         wrong = kinds.faults(self.result.unexplained)
         if wrong:
             parts.append(f"The data have faults: {wrong}")
         return " ".join(f"{part}." for part in parts)
+
+    def uncertain(self) -> list[str]:
+        """What is at the end of a range, and effects of which two parts coincide."""
+        said = []
+        for effect in self.result.effects:
+            said += [each.sentence(effect.name, self.result.unit) for each in effect.ends]
+            if effect.at_an_end and not effect.ends:
+                said.append(f"two time constants of {effect.name} are practically equal")
+        return list(dict.fromkeys(said))
 
     def _limits(self) -> list[str]:
         """Warnings that come before any name: how few samples were compared, how much error remains."""
@@ -223,10 +298,12 @@ class Diagnosis:
             names = ", ".join(self._name(effect.name) for effect in result.effects)
             more = f", {self._times(gap.after.holdout)} and with structure" if structured else ""
             if gap.after.holdout > acceptance.MUCH_LEFT * result.noise_floor:
-                return f"Part of it: {names}. The held-out rms error falls from {before} to {after}"
+                by = f"{100.0 * (1.0 - gap.after.holdout / gap.refitted.holdout):.0f} %"
+                return f"Missing, in part: {names}. The held-out rms error falls by {by}, from {before} to {after}"
             return f"Missing: {names}. The held-out rms error falls from {before} to {after}{more}"
         if self.verdict == "nothing_missing":
-            return f"Nothing is missing: the refitted model leaves {after} rms on held-out records, which is noise"
+            whose = WRITTEN[result.written]
+            return f"Nothing is missing: {whose} leaves {after} rms on held-out records, which is noise"
         where, left = "", gap.after.holdout
         if acceptance.is_noise(left, result.noise_floor):  # the held-out records do not show it
             where, left = " of the fitted records", gap.after.fit
@@ -252,14 +329,28 @@ class Diagnosis:
         closest = self._closest()
         if closest is None:
             return ""
-        if self.result.withdrawn and not self._limits():
-            named = " and ".join(self.result.withdrawn)
-            return f". {named[0].upper()}{named[1:]} would explain a part of it, but most would remain"
+        if self.result.withdrawn is not None and not self._limits():
+            return f". {self._withdrawn(self.result.withdrawn)}"
         return f". The nearest is {closest.name}, which would leave {self._rms(closest.holdout)}; {closest.refused}"
+
+    def _withdrawn(self, found: Withdrawn) -> str:
+        """What effects without a name would leave, and why they have none."""
+        named = " and ".join(found.names)
+        left = [
+            f"{self._rms(after)} of {self._rms(before)} rms of {records} records"
+            + ("" if share is None else f" ({100.0 * share:.0f} % of what is above the noise)")
+            for records, before, after, share in (
+                ("held-out", found.before.holdout, found.after.holdout, found.left[0]),
+                ("fitted", found.before.fit, found.after.fit, found.left[1]),
+            )
+        ]
+        ends = "".join(f"; {each.sentence(name, self.result.unit)}" for name, each in found.ends)
+        return f"{named[0].upper()}{named[1:]} would leave {' and '.join(left)}: {found.why}{ends}"
 
     def _closest(self) -> Contender | None:
         first = self.result.ranking[0] if self.result.ranking else ()
-        enough = (1.0 - acceptance.BETTER) * self.result.gap.refitted.holdout
+        gap = self.result.gap
+        enough = (1.0 - acceptance.BETTER) * min(gap.refitted.holdout, gap.after.holdout)
         return min((each for each in first if each.holdout <= enough), key=lambda each: each.holdout, default=None)
 
     def _rms(self, error: float) -> str:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.search import acceptance
 from hystgen.diagnosis.search.hypothesis import RANK, Actuator, NotFiniteError, Structure, Sums, Turns
-from hystgen.effects.base import Effect
+from hystgen.effects.base import Candidate, Effect
 from hystgen.identification import joint, pi, reduction, stage_content, start
 from hystgen.identification.joint import DIFFERENCE, Shaped
 from hystgen.identification.pi import root_mean_square
@@ -261,20 +261,18 @@ class Fitted:
         return [actuator.error(item, self.weights, other) for item in items]
 
 
-def at_an_end(fitted: Fitted, name: str, later: int) -> bool:
-    """Whether a number of an effect behind the front is at an end of its range; `later` as in `place`.
+def part_at_an_end(fitted: Fitted, k: int) -> bool:
+    """Whether a number of a part is at an end of its usual range or beyond it."""
+    return bool(ends_of(fitted.structure.parts[k].ordinary, fitted.structure.pieces(fitted.shape)[1][k]))
+
+
+def ends_of(candidate: Candidate, numbers: Array) -> list[tuple[int, bool]]:
+    """Indices of the numbers at an end of a candidate's range or beyond it, and whether that is the largest value.
 
     A least value of 0 does not count as an end: one of several parts may be absent.
     """
-    k = place(fitted, name, later)
-    return k is not None and part_at_an_end(fitted, k)
-
-
-def part_at_an_end(fitted: Fitted, k: int) -> bool:
-    """Whether a number of a part is at an end of its range, as in `at_an_end`."""
-    numbers, found = fitted.structure.pieces(fitted.shape)[1][k], fitted.structure.parts[k].candidate
-    none = found.low == 0.0
-    return bool(np.any(((numbers <= found.low) & ~none) | (numbers >= found.high)))
+    low, high = (numbers <= candidate.low) & (candidate.low != 0.0), numbers >= candidate.high
+    return [(j, bool(high[j])) for j in np.flatnonzero(low | high).tolist()]
 
 
 @dataclass(frozen=True, eq=False)

@@ -370,10 +370,21 @@ def _within(columns: Array, y: Array, low: Array, high: Array) -> Array:
 
 @dataclass(frozen=True)
 class Part:
-    """An effect in a hypothesis: its catalogue name and the candidate whose numbers are fitted."""
+    """An effect in a hypothesis: its catalogue name and the candidate whose numbers are fitted.
+
+    `usual`: the candidate with its usual range, if that was widened; `firm`: whether it may not be, since farther off
+    the effect would be a different one, or since its author set the range.
+    """
 
     name: str
     candidate: Candidate
+    usual: Candidate | None = None
+    firm: bool = False
+
+    @property
+    def ordinary(self) -> Candidate:
+        """The candidate with its usual range."""
+        return self.usual or self.candidate
 
 
 def kept(effect: Effect) -> Part:
@@ -497,7 +508,7 @@ def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> 
     """The nominal model with free weights, front and effect numbers, and the start of a search."""
     front, shape = front_of(cascade.stages, found.drive)
     places = found.thresholds if cascade.stages else _through(found.thresholds, cascade.pi.thresholds)
-    parts = tuple(Part(effect.name, _near(effect)) for effect in given)
+    parts = tuple(Part(effect.name, _near(effect), firm=True) for effect in given)
     return Structure(places, front, parts), np.concatenate([shape, *(part.candidate.start for part in parts)])
 
 

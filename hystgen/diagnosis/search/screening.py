@@ -97,7 +97,7 @@ def options(now: Fitted, known: About, user: Sequence[type[Effect]] = ()) -> lis
         if (moved and kind.moves_plays()) or (kind.timed and not known.timed):
             continue
         for candidate in kind.candidates(known):
-            part = Part(name, candidate)
+            part = Part(name, candidate, firm=name.startswith(USER))
             pair = replace(structure, parts=(*structure.parts, part)), replace(held, parts=(*held.parts, part))
             starts = (candidate.start, *candidate.others)
             found.append(Option(candidate.label, name, *pair, starts, False, candidate.beyond, candidate.grown))

@@ -17,10 +17,11 @@ from hystgen import effects
 from hystgen.cascade import Cascade
 from hystgen.diagnosis.data.items import Item, everything, rms, thinned
 from hystgen.diagnosis.data.preparing import Prepared
-from hystgen.diagnosis.search import acceptance, fits, hypothesis
+from hystgen.diagnosis.search import acceptance, fits, hypothesis, ranges
 from hystgen.diagnosis.search.acceptance import apart, is_noise
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Structure
+from hystgen.diagnosis.search.ranges import End
 from hystgen.diagnosis.search.screening import Option, Records, Tried, free_numbers
 from hystgen.effects.base import Effect
 from hystgen.identification import joint
@@ -32,6 +33,9 @@ Array = NDArray[np.float64]
 
 FRONTS = "asymmetry", "saturation"
 """Names of effects that are a front."""
+
+EXTENDED, REFITTED, GIVEN, IDENTIFIED = "extended", "refitted", "given", "identified"
+"""The models that may be written: with the effects, the nominal one refitted or as given, and that of `identify`."""
 
 
 # Merit of an effect, and the choice among several similar ones -----------------------------------------------
@@ -62,8 +66,9 @@ class Refusal:
     """Why an effect that was tried has no name: a number, and the limit that it missed.
 
     `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
-    fitted ones], `small` [share of the gap], `most` [rms left], `given` [rms left], `few` [share of samples], `end`
-    [share of the drive range], `range` [rms left], `other`: another shape was chosen.
+    fitted ones], `small` [share of the gap], `most` [rms left], `above` [rms left of records of one loop], `given` and
+    `identified` [rms left], `few` [share of samples], `end` [share of the drive range], `range` [share of the gap
+    left], `other`: another shape was chosen.
     """
 
     why: str
@@ -315,28 +320,52 @@ def bear_two(records: Records) -> bool:
     return not (records.one_loop and records.one_speed)
 
 
+@dataclass(frozen=True)
+class Explained:
+    """rms errors of some records without the effects and with them, on equal terms; noise counts as explained."""
+
+    before: float
+    after: float
+    noise: float
+
+    @property
+    def left(self) -> float:
+        """Share of the gap above the noise that is left; infinite if there was none."""
+        left, gap = apart(self.after, self.noise), apart(self.before, self.noise)
+        return left / gap if gap > 0.0 else 0.0 if left == 0.0 else math.inf
+
+
+def explained(now: Fitted, none: Fitted, records: Records) -> tuple[Explained, Explained]:
+    """What effects explain of the held-out and of the fitted records, with the start states and offsets free that they
+    leave free; `none`: the model without them."""
+    held, to_fit = (
+        Explained(rms(none.errors(group, now)), rms(now.errors(group)), records.noise)
+        for group in (records.held, records.to_fit)
+    )
+    return held, to_fit
+
+
 def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
     """Why the names that were found are withdrawn, or None: together they have to explain most of the gap.
 
-    Both for held-out and for fitted records, with the start states and offsets free that the effects leave free; noise
-    counts as explained. Many effects can remove a part of a disturbance; the remaining error distinguishes it from a
-    real effect. Records of one loop support no name if more than noise remains, and too few compared samples none at
-    all. Where much remains, no number of an effect may be at an end of its range: so strong, slow or fast an effect
-    follows some of anything.
+    Both for held-out and for fitted records. Many effects can remove a part of a disturbance; the remaining error
+    distinguishes it from a real effect. Records of one loop support no name if more than noise remains, and too few
+    compared samples none at all. Where much remains, no number of an effect may be at an end of its range unless nine
+    tenths are explained: so strong, slow or fast an effect follows some of anything, but not nearly all of it.
     """
     if records.compared < acceptance.FEW_COMPARED:
         return Refusal("few", records.compared, acceptance.FEW_COMPARED)
-    for group in (records.held, records.to_fit):
-        after, before = rms(now.errors(group)), rms(none.errors(group, now))
-        if records.one_loop and group is records.held and after > acceptance.FAR_ABOVE_NOISE * records.noise:
-            return Refusal("most", after, acceptance.FAR_ABOVE_NOISE * records.noise)
-        left, gap = apart(after, records.noise), apart(before, records.noise)
-        far = after > acceptance.MUCH_LEFT * records.noise
-        if far and any(fits.part_at_an_end(now, k) for k in range(len(now.structure.parts))):
-            return Refusal("range", after, acceptance.MUCH_LEFT * records.noise)
+    held, to_fit = explained(now, none, records)
+    if records.one_loop and held.after > acceptance.FAR_ABOVE_NOISE * records.noise:
+        return Refusal("above", held.after, acceptance.FAR_ABOVE_NOISE * records.noise)
+    at_an_end = any(fits.part_at_an_end(now, k) for k in range(len(now.structure.parts)))
+    for each in (held, to_fit):
+        far = each.after > acceptance.MUCH_LEFT * records.noise
+        if far and at_an_end and each.left > acceptance.END_LEAVES:
+            return Refusal("range", each.left, acceptance.END_LEAVES)
         most = acceptance.MOSTLY_EXPLAINED if far else acceptance.LEAST_EXPLAINED
-        if not is_noise(after, records.noise) and left**2 > most * gap**2:
-            return Refusal("most", after, before)
+        if not is_noise(each.after, records.noise) and each.left**2 > most:
+            return Refusal("most", each.after, each.before)
     return None
 
 
@@ -397,17 +426,31 @@ class Ranked:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """The refitted nominal model, the model with the effects, these effects, and the ranking of each round.
+class Withdrawn:
+    """Effects that were accepted at first but not in the end (`borne_out`): what they would have explained."""
 
-    `withdrawn`: names of effects that were accepted at first but not in the end (`borne_out`).
+    names: tuple[str, ...]
+    refused: Refusal
+    held: Explained
+    to_fit: Explained
+    ends: tuple[End, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The refitted nominal model, the model to be written, its effects, and the ranking of each round.
+
+    `ends`: its numbers at an end of their ranges; `written`: which model is written, `extended` by effects, `refitted`,
+    as `given`, or as `identified` without the nominal one.
     """
 
     refitted: Fitted
     fitted: Fitted
     found: tuple[Found, ...]
     rankings: tuple[tuple[Ranked, ...], ...]
-    withdrawn: tuple[str, ...] = ()
+    withdrawn: Withdrawn | None = None
+    ends: tuple[End, ...] = ()
+    written: str = REFITTED
 
     @property
     def bends(self) -> bool:
@@ -440,25 +483,25 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array 
     return min(found, key=lambda each: rms(each.errors(quick)))
 
 
-def no_worse_than(given: Fitted, outcome: Outcome, records: Records) -> Outcome:
-    """The outcome, or the model as given if that predicts held-out records better.
+def no_worse_than(other: Fitted, outcome: Outcome, records: Records, written: str = GIVEN) -> Outcome:
+    """The outcome, or another model if that predicts held-out records better.
 
-    A refit that predicts them worse is not a better model; if effects were named, the difference has to count.
+    The model as given: a refit that predicts them worse is not a better model; if effects were named, the difference
+    has to count. The model that `identify` finds by itself: by more than equal errors differ.
     """
-    least, found = records.residual(given), outcome.fitted
-    if not (better(given, found, records.held) if outcome.found else least < records.residual(found)):
+    least, left = records.residual(other), records.residual(outcome.fitted)
+    named = acceptance.BETTER if outcome.found else 0.0
+    if not least < (1.0 - (acceptance.EQUAL if written == IDENTIFIED else named)) * left:
         return outcome
     if not outcome.found:
-        return replace(outcome, fitted=given)
-    refused = Refusal("given", records.residual(found), least)
-    return replace(_withdrawn(outcome, given, refused), withdrawn=())  # they explain something, but not enough
+        return replace(outcome, fitted=other, written=written)
+    refused = Refusal(written, left, least)
+    return Outcome(outcome.refitted, other, (), _refused(outcome.rankings, refused), written=written)
 
 
-def _withdrawn(outcome: Outcome, fitted: Fitted, refused: Refusal) -> Outcome:
-    """The outcome with another model, and without its effects."""
-    withdrawn = tuple(dict.fromkeys(each.name for each in outcome.found))
-    ranked = [tuple(replace(each, refused=each.refused or refused) for each in tried) for tried in outcome.rankings]
-    return Outcome(outcome.refitted, fitted, (), tuple(ranked), withdrawn)
+def _refused(rankings: Sequence[Sequence[Ranked]], refused: Refusal) -> tuple[tuple[Ranked, ...], ...]:
+    """The rankings without an accepted effect."""
+    return tuple(tuple(replace(each, refused=each.refused or refused) for each in tried) for tried in rankings)
 
 
 def better(one: Fitted, other: Fitted, items: Sequence[Item]) -> bool:
@@ -478,7 +521,8 @@ def invertible(outcome: Outcome, records: Records, floor: float) -> tuple[Outcom
         return outcome, made
     found = outcome.found
     if not found:
-        return replace(outcome, refitted=fitted, fitted=fitted), made
+        refitted = fitted if outcome.written == REFITTED else outcome.refitted
+        return replace(outcome, refitted=refitted, fitted=fitted), made
     last = replace(found[-1], after=records.residual(fitted))
     return replace(outcome, fitted=fitted, found=(*found[:-1], last)), made
 
@@ -523,25 +567,55 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
         now, found = _exchanged(*_without_needless(now, found, records), names, records)
         if len(found) > 1 and now is step.best.fitted and not is_noise(records.residual(now), records.noise):
             now, found = _both_exchanged(step, now, found, records)
+        wider, _ = _widened(now, records)
+        if wider is not now:
+            now, found[-1] = wider, replace(found[-1], after=records.residual(wider))
         if now is not step.best.fitted:
             latest = None
         if until(now):
-            return Outcome(refitted, now, tuple(found), tuple(rankings))
-    if found:
-        now, found = _finished(now, found, records)
-        refused = borne_out(now, none, records)
-        if refused is not None:
-            return _withdrawn(Outcome(refitted, now, tuple(found), tuple(rankings)), none, refused)
-    return Outcome(refitted, now, tuple(found), tuple(rankings))
+            return Outcome(refitted, now, tuple(found), tuple(rankings), written=EXTENDED)
+    if not found:
+        return Outcome(refitted, now, (), tuple(rankings))
+    now, found, leaves = _finished(now, found, records)
+    ends = ranges.ends(now, leaves, is_noise(records.residual(now), records.noise))
+    refused = borne_out(now, none, records)
+    if refused is None:
+        return Outcome(refitted, now, tuple(found), tuple(rankings), ends=ends, written=EXTENDED)
+    of_them = tuple(dict.fromkeys(each.name for each in found))
+    withdrawn = Withdrawn(of_them, refused, *explained(now, none, records), ends)
+    return Outcome(refitted, none, (), _refused(rankings, refused), withdrawn)
 
 
-def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
-    """The effects fitted to all samples, without those that then turn out to be needless."""
+def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found], float | None]:
+    """The effects fitted to all samples, without those that then turn out to be needless.
+
+    Also the held-out rms that wider ranges leave which were tried in vain, None for none.
+    """
     now = fits.fit(now.structure, records.full, now.shape, now.weights)
     kept, rest, _ = _without_needless(now, found, records)
     if kept is not now:
         now = fits.fit(kept.structure, records.full, kept.shape, kept.weights)
-    return now, [*rest[:-1], replace(rest[-1], after=records.residual(now))]
+    wider, leaves = _widened(now, records)
+    if wider is not now:
+        now = fits.fit(wider.structure, records.full, wider.shape, wider.weights)
+    return now, [*rest[:-1], replace(rest[-1], after=records.residual(now))], leaves
+
+
+def _widened(now: Fitted, records: Records) -> tuple[Fitted, float | None]:
+    """The hypothesis with wider ranges for the numbers at an end of theirs, as long as held-out records gain by it.
+
+    Also the held-out rms of the widest that was tried in vain, None for none. Where only noise is left none is tried.
+    """
+    for _ in range(acceptance.WIDENINGS):
+        if is_noise(records.residual(now), records.noise):
+            break
+        further = ranges.wider(now, records)
+        if further is None:
+            break
+        if not better(further, now, records.held):
+            return now, records.residual(further)
+        now = further
+    return now, None
 
 
 def _ranked(step: _Step, gap: float, records: Records) -> tuple[Ranked, ...]:

@@ -130,7 +130,7 @@ class LoggedThermal(_Thermal):
                 gain, offset = _of_row(x, row, about)
                 return cls(name="thermal", gain_per_degree=gain, offset_per_degree=offset)
 
-            bounds = np.full(n, 5.0)
+            bounds = np.full(n, 20.0)
             found.append(Candidate(f"thermal, logged, {what}", -bounds, bounds, np.zeros(n), build, np.zeros(n)))
         return found
 
