@@ -674,3 +674,14 @@ many samples. Changed by: acceptance::TestDescription::test_parity."""
 PARITY_SHARE = 0.05
 """[share of the error's variance] Parity means something only if the mean over drive and direction has at least this:
 half of `VARIABLE_SHARE`. Derived."""
+
+# Whether the hysteresis itself is no play sum ------------------------------------------------------------------
+
+FORGETS_WITHIN = 0.01, 1.0
+"""[shares of the drive range] Least and largest way over which an element forgets: below, plays of the smallest
+thresholds do as it does, above, it is a straight line and a memory of the start. Changed by:
+forgetting::test_plants_that_are_no_play_sum."""
+
+FORGETTING_STARTS = 5
+"""[widths] Number from which it is searched for, each about three times the one before. Changed by:
+forgetting::test_plants_that_are_no_play_sum."""

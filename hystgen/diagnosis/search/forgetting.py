@@ -1,0 +1,189 @@
+"""Whether the hysteresis itself is no play sum: minor loops stay open, and depend on what was before, at any speed.
+
+A play sum forgets a minor loop when it closes, and nothing else. Friction, Bouc-Wen and Duhem plants forget a little on
+all of the drive's way. An element of such a kind is fitted beside the plays, as an effect is, and judged by the same
+rules; it has no name in the catalogue and is written nowhere. At one speed way and time are the same: there it can
+take the place of creep, of a lag or of a rate dependence, and those the place of it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.diagnosis.data import signals
+from hystgen.diagnosis.data.items import Item, rms
+from hystgen.diagnosis.search import acceptance, fits, selection
+from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.hypothesis import Part, Structure
+from hystgen.diagnosis.search.screening import Option, Records, Tried
+from hystgen.diagnosis.search.selection import Outcome, Refusal
+from hystgen.effects.base import Candidate, Effect, Place, Run
+from hystgen.plants import BoucWen
+
+Array = NDArray[np.float64]
+
+NAME = "forgetting"
+
+BALANCE = 0.9
+"""Balance from which a search starts: between Dahl's element, 1, and one that turns back as it went, 0.5."""
+
+WEIGHT = 5.0
+"""[mean slopes of the records] Largest weight of the element, of either sign: a friction of five times the stage's
+stiffness has no inverse."""
+
+STEPS = 12
+"""[steps] Of the search from the best width: three numbers and linear weights, which most searches settle in six."""
+
+
+class Forgetting(Effect):
+    """Bouc-Wen's element beside the plays: `y + weight z`, `dz = dv (1 - (b sgn(z dv) + 1 - b) |z|/width)`.
+
+    With the balance b = 1 it is Dahl's friction element, the average over the drive's way of its direction.
+    """
+
+    name: Literal["forgetting"] = "forgetting"
+    weight: float
+    width: float
+    balance: float
+
+    place: ClassVar[Place] = Place.ADDED
+    timed: ClassVar[bool] = False
+
+    def added(self, run: Run) -> Array:
+        """`weight z`, from z = 0."""
+        return self.weight * run.remembered((NAME, self.width, self.balance), partial(self._element, run))
+
+    def _element(self, run: Run) -> Array:
+        made = BoucWen(0.0, 1.0, D=self.width, beta=self.balance, gamma=1.0 - self.balance)
+        return np.asarray(self.width * made.hysteretic(run.v))
+
+
+@dataclass(frozen=True)
+class Forgets:
+    """An element that forgets, fitted beside the plays, in place of names or beside them.
+
+    `before`, `after`: held-out rms without it, on equal terms, and with it; `width`: the way of the drive over which it
+    forgets, input units; `in_place_of`: names that it explains better, or as well where the records show no speed.
+    """
+
+    fitted: Fitted
+    before: float
+    after: float
+    width: float
+    in_place_of: tuple[str, ...]
+    shows_speed: bool
+
+
+def forgets(outcome: Outcome, records: Records) -> Forgets | None:
+    """The element, where records bear it out beside the effects that were found, or better than these; else None.
+
+    `outcome`: of the search. The element is first tried in place of all names. Names that explain more stand; where
+    they explain as much, no more than chance decides, they stand if the drive takes ways of equal length in different
+    times: an element that time does not enter cannot then follow one that it does.
+    """
+    none, now = outcome.refitted, outcome.fitted
+    if records.one_loop or not selection.leaves_enough(none, records):
+        return None
+    shown = shows_speed([*records.to_fit, *records.held])
+    names = tuple(dict.fromkeys(each.name for each in outcome.found))
+    alone = _element(none, records)
+    if _borne_out(none, alone, records) and (not names or _replaces(alone, now, records, shown)):
+        return _found(none, alone, names, shown, records)
+    if not names or not selection.leaves_enough(now, records):
+        return None
+    beside = _element(now, records)
+    return _found(now, beside, (), shown, records) if _borne_out(now, beside, records) else None
+
+
+def withheld(outcome: Outcome, found: Forgets) -> Outcome:
+    """The outcome without the names in whose place the element stands."""
+    if not found.in_place_of:
+        return outcome
+    why = Refusal("forgets" if found.shows_speed else "speed", found.after)
+    ranked = [tuple(replace(each, refused=each.refused or why) for each in tried) for tried in outcome.rankings]
+    return Outcome(outcome.refitted, outcome.refitted, (), tuple(ranked))
+
+
+def shows_speed(items: Sequence[Item]) -> bool:
+    """Whether the drive takes ways of about the same length, from one turn to the next, in different times."""
+    moves = []
+    for item in items:
+        at = signals.reversals(item.run.v)
+        for a, b in itertools.pairwise(at):
+            moves.append((abs(float(item.run.v[b] - item.run.v[a])), float(item.run.t[b] - item.run.t[a])))
+    moves.sort()
+    widest = moves[-1][0] if moves else 0.0
+    for k, (length, seconds) in enumerate(moves):
+        for other, more in moves[k + 1 :]:
+            if other - length > acceptance.LOOP_ENDS * min(length, widest):
+                break
+            if max(seconds, more) > acceptance.LOOP_SPEEDS * min(seconds, more):
+                return True
+    return False
+
+
+def _element(now: Fitted, records: Records) -> Tried:
+    """The hypothesis with the element, from the best of several widths, fitted as far as ranking needs."""
+    low, high = records.known.drive
+    wide, slope = high - low, records.known.output_range / (high - low)
+
+    def build(x: Array) -> Forgetting:
+        return Forgetting(weight=slope * float(x[0]), width=wide * float(10.0 ** x[1]), balance=float(x[2]))
+
+    ends = np.log10(acceptance.FORGETS_WITHIN)
+    starts = [np.array([0.0, place, BALANCE]) for place in np.linspace(*ends, acceptance.FORGETTING_STARTS)]
+    candidate = Candidate(
+        "an element that forgets", np.array([-WEIGHT, ends[0], 0.5 + 1e-6]), np.array([WEIGHT, ends[1], 1.0]), starts[0],
+        build, None, tuple(starts[1:]), amounts=(0,),
+    )  # fmt: skip
+
+    def structure(part: Candidate) -> Structure:
+        return replace(now.structure, parts=(*now.structure.parts, Part(NAME, part)))
+
+    def amount(start: Array) -> fits.Search:
+        shape = np.concatenate([now.shape, start])
+        return fits.begun(structure(candidate.at(start)), records.quick, shape, now.weights).further(1, fits.COARSE)
+
+    begun = min(map(amount, starts), key=lambda each: each.now.rms)
+    whole = structure(candidate)
+    fitted = fits.begun(whole, records.quick, begun.now.shape, begun.now.best).further(STEPS).found(now.weights)
+    errors = fitted.errors(records.held)
+    option = Option(candidate.label, NAME, whole, whole, tuple(starts))
+    return Tried(option, fitted, (NAME,), rms(errors), errors)
+
+
+def _borne_out(now: Fitted, tried: Tried, records: Records) -> bool:
+    """Whether the element has the merit of a name, and takes most of what it finds."""
+    merit = selection.merit_of(now, tried, records)
+    gap = records.residual(now)
+    return (
+        merit is not None
+        and merit.worth(records.gap, records)
+        and selection.takes_most(tried.held_out, gap, records.noise)
+        and selection.takes_most(rms(tried.fitted.errors(records.to_fit)), rms(now.errors(records.to_fit)), records.noise)
+    )
+
+
+def _replaces(alone: Tried, named: Fitted, records: Records, shown: bool) -> bool:
+    """Whether the element stands in place of what was named."""
+    groups = [
+        (items, alone.fitted.errors(items), named.errors(items)) for items in (records.held, records.to_fit)
+    ]
+    if not shown and all(selection.no_worse(rms(mine), rms(theirs), records.noise) for _, mine, theirs in groups):
+        return True
+    return all(rms(mine) <= (1.0 - acceptance.BETTER) * rms(theirs) for _, mine, theirs in groups) and any(
+        selection.difference(theirs, mine) <= acceptance.P_SURE for _, mine, theirs in groups
+    )
+
+
+def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, records: Records) -> Forgets:
+    element = tried.fitted.structure.effects(tried.fitted.shape)[-1]
+    assert isinstance(element, Forgetting)
+    return Forgets(tried.fitted, records.residual(now), tried.held_out, element.width, names, shown)
