@@ -17,10 +17,11 @@ from hystgen.diagnosis.data.items import Item, rms
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, noise_floor
 from hystgen.diagnosis.findings.content import result_of
-from hystgen.diagnosis.findings.kinds import OtherHistory
+from hystgen.diagnosis.findings.kinds import NotAPlaySum, OtherHistory
 from hystgen.diagnosis.findings.result import Diagnosis, Errors, Inverse, Signals
-from hystgen.diagnosis.search import acceptance, fits, hypothesis, selection
+from hystgen.diagnosis.search import acceptance, fits, forgetting, hypothesis, selection
 from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.forgetting import Forgets
 from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome
 from hystgen.effects.base import Effect, Place
@@ -113,7 +114,7 @@ def diagnose(
             done.noise,
             found,
             Errors(*(rms(first.errors(group)) for group in (ready.to_fit, ready.held))),
-            [*odd, *([] if wrong is None else [wrong]), *done.cleaned.lines],
+            [*_of_another_kind(done.forgets), *odd, *([] if wrong is None else [wrong]), *done.cleaned.lines],
             done.records.one_loop,
             _inverse(extended, made),
         )
@@ -134,6 +135,7 @@ class _Done:
     noise: NoiseFloor
     records: Records
     found: Outcome
+    forgets: Forgets | None = None
     notes: tuple[str, ...] = ()
 
     def noting(self, note: str) -> _Done:
@@ -216,7 +218,7 @@ class _Task:
         """
         done = self._search(ready, refit)
         left = rms(done.found.fitted.errors(done.records.to_fit))
-        if done.found.found or acceptance.is_noise(left, done.noise.rms):
+        if done.found.found or done.forgets is not None or acceptance.is_noise(left, done.noise.rms):
             return done
         more = preparing.with_ends(ready)
         again = None if more is None else self._search(more, refit)
@@ -234,11 +236,17 @@ class _Task:
             refitted = refit(cleaned.clean)
             noise, records = self._records(cleaned.clean, refitted)
             found = selection.select(records, refitted)
-        return _Done(cleaned, noise, records, found)
+        forgets = forgetting.forgets(found, records)
+        return _Done(cleaned, noise, records, forgetting.withheld(found, forgets), forgets)
 
     def _records(self, clean: Prepared, refitted: Fitted) -> tuple[NoiseFloor, Records]:
         noise = noise_floor([*clean.to_fit, *clean.held])
         return noise, Records.of(clean.to_fit, clean.held, refitted, noise.rms, self.user, self.tick)
+
+
+def _of_another_kind(forgets: Forgets | None) -> list[NotAPlaySum]:
+    """The finding about hysteresis that no play sum has."""
+    return [] if forgets is None else [NotAPlaySum(**vars(forgets))]
 
 
 def _inverse(extended: Parameters, made: Weights) -> Inverse:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics import arguments, display, drawing
 from hystgen.diagnosis.findings import kinds
-from hystgen.diagnosis.findings.kinds import Fault, Finding, Structure
+from hystgen.diagnosis.findings.kinds import Fault, Finding, NotAPlaySum, Structure
 from hystgen.diagnosis.search import acceptance
 
 if TYPE_CHECKING:
@@ -191,8 +191,9 @@ class Diagnosis:
         return self.result.verdict
 
     def sentence(self) -> str:
-        """The verdict in a few sentences, its limits first."""
-        parts = [*self._limits(), self._finding()]
+        """The verdict in a few sentences: first that the hysteresis is of another kind, then its limits."""
+        parts = [_capital(each.sentence(self.result.unit)) for each in self._of_another_kind()]
+        parts += [*self._limits(), self._finding()]
         ends = dict.fromkeys(effect.name for effect in self.result.effects if effect.at_an_end)
         if ends:
             parts.append(f"A parameter of {', '.join(ends)} is at a limit of its range: the shape is not certain")
@@ -200,6 +201,9 @@ class Diagnosis:
         if wrong:
             parts.append(f"The data have faults: {wrong}")
         return " ".join(f"{part}." for part in parts)
+
+    def _of_another_kind(self) -> list[NotAPlaySum]:
+        return [each for each in self.result.unexplained if isinstance(each, NotAPlaySum)]
 
     def _limits(self) -> list[str]:
         """Warnings that come before any name: how few samples were compared, how much error remains."""
@@ -231,7 +235,7 @@ class Diagnosis:
         if acceptance.is_noise(left, result.noise_floor):  # the held-out records do not show it
             where, left = " of the fitted records", gap.after.fit
         missing = f"{self._missing()}: {self._rms(left)} rms is left{where}{self._nearest()}"
-        disturbing = [each for each in seen if not isinstance(each, Fault | Structure)]
+        disturbing = [each for each in seen if not isinstance(each, Fault | Structure | NotAPlaySum)]
         if not disturbing:
             return missing
         first = disturbing[0].sentence(unit)
@@ -243,6 +247,8 @@ class Diagnosis:
 
     def _missing(self) -> str:
         """The subject of a verdict without a name."""
+        if self._of_another_kind():
+            return "No effect is named"
         if self._closest() is None:
             return "Something is missing that the catalogue does not hold or the records cannot show"
         return "Something is missing, and no effect is named"
@@ -250,7 +256,7 @@ class Diagnosis:
     def _nearest(self) -> str:
         """The candidate with the smallest error, and why it has no name; empty if none removes anything."""
         closest = self._closest()
-        if closest is None:
+        if closest is None or self._of_another_kind():
             return ""
         if self.result.withdrawn and not self._limits():
             named = " and ".join(self.result.withdrawn)
@@ -304,6 +310,10 @@ class Diagnosis:
         names = self.FILES if pages else (self.FILES[0], self.FILES[2])
         made = zip(names, (self.to_json(), *pages, text), strict=True)
         return writing.write_files(Path(folder), {name: content.encode("utf-8") for name, content in made})
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
 
 
 def plain(value: Any) -> Any:

@@ -26,6 +26,7 @@ from hystgen.diagnosis.search.screening import Option, Records, Tried
 from hystgen.diagnosis.search.selection import Outcome, Refusal
 from hystgen.effects.base import Candidate, Effect, Place, Run
 from hystgen.plants import BoucWen
+from hystgen.plays import operators
 
 Array = NDArray[np.float64]
 
@@ -35,8 +36,11 @@ BALANCE = 0.9
 """Balance from which a search starts: between Dahl's element, 1, and one that turns back as it went, 0.5."""
 
 WEIGHT = 5.0
-"""[mean slopes of the records] Largest weight of the element, of either sign: a friction of five times the stage's
-stiffness has no inverse."""
+"""[mean slopes of the records] Largest weight of the element, with which it lags: a friction of five times the stage's
+stiffness has no inverse. One that leads is left to plays with negative weights, which a play sum does not have."""
+
+LOOP = 0.1
+"""[share of the drive range] Width of the minor loop that is said to stay open, as in `docs/plants.md`."""
 
 STEPS = 12
 """[steps] Of the search from the best width: three numbers and linear weights, which most searches settle in six."""
@@ -69,14 +73,15 @@ class Forgetting(Effect):
 class Forgets:
     """An element that forgets, fitted beside the plays, in place of names or beside them.
 
-    `before`, `after`: held-out rms without it, on equal terms, and with it; `width`: the way of the drive over which it
-    forgets, input units; `in_place_of`: names that it explains better, or as well where the records show no speed.
+    `before`, `after`: held-out rms without it and with it; `way`: of the drive over which it forgets, and `open`: how
+    far a minor loop over a tenth of the drive range is from closing, of its height, both as shares; `in_place_of`:
+    names that it explains better, or as well where the records show no speed; `shows_speed`: whether they do.
     """
 
-    fitted: Fitted
     before: float
     after: float
-    width: float
+    way: float
+    open: float
     in_place_of: tuple[str, ...]
     shows_speed: bool
 
@@ -84,9 +89,9 @@ class Forgets:
 def forgets(outcome: Outcome, records: Records) -> Forgets | None:
     """The element, where records bear it out beside the effects that were found, or better than these; else None.
 
-    `outcome`: of the search. The element is first tried in place of all names. Names that explain more stand; where
-    they explain as much, no more than chance decides, they stand if the drive takes ways of equal length in different
-    times: an element that time does not enter cannot then follow one that it does.
+    The element is first tried in place of all names of the `outcome`, then beside them. Names that explain more stand.
+    Where chance alone could decide between the two, they stand if the drive takes ways of equal length in different
+    times: what follows time and what does not would then not look alike.
     """
     none, now = outcome.refitted, outcome.fitted
     if records.one_loop or not selection.leaves_enough(none, records):
@@ -102,11 +107,11 @@ def forgets(outcome: Outcome, records: Records) -> Forgets | None:
     return _found(now, beside, (), shown, records) if _borne_out(now, beside, records) else None
 
 
-def withheld(outcome: Outcome, found: Forgets) -> Outcome:
+def withheld(outcome: Outcome, found: Forgets | None) -> Outcome:
     """The outcome without the names in whose place the element stands."""
-    if not found.in_place_of:
+    if found is None or not found.in_place_of:
         return outcome
-    why = Refusal("forgets" if found.shows_speed else "speed", found.after)
+    why = Refusal("forgets", found.after)
     ranked = [tuple(replace(each, refused=each.refused or why) for each in tried) for tried in outcome.rankings]
     return Outcome(outcome.refitted, outcome.refitted, (), tuple(ranked))
 
@@ -140,7 +145,7 @@ def _element(now: Fitted, records: Records) -> Tried:
     ends = np.log10(acceptance.FORGETS_WITHIN)
     starts = [np.array([0.0, place, BALANCE]) for place in np.linspace(*ends, acceptance.FORGETTING_STARTS)]
     candidate = Candidate(
-        "an element that forgets", np.array([-WEIGHT, ends[0], 0.5 + 1e-6]), np.array([WEIGHT, ends[1], 1.0]), starts[0],
+        "an element that forgets", np.array([-WEIGHT, ends[0], 0.5 + 1e-6]), np.array([0.0, ends[1], 1.0]), starts[0],
         build, None, tuple(starts[1:]), amounts=(0,),
     )  # fmt: skip
 
@@ -162,28 +167,41 @@ def _element(now: Fitted, records: Records) -> Tried:
 def _borne_out(now: Fitted, tried: Tried, records: Records) -> bool:
     """Whether the element has the merit of a name, and takes most of what it finds."""
     merit = selection.merit_of(now, tried, records)
-    gap = records.residual(now)
-    return (
-        merit is not None
-        and merit.worth(records.gap, records)
-        and selection.takes_most(tried.held_out, gap, records.noise)
-        and selection.takes_most(rms(tried.fitted.errors(records.to_fit)), rms(now.errors(records.to_fit)), records.noise)
-    )
+    if merit is None or not merit.worth(records.gap, records):
+        return False
+    both = ((rms(tried.fitted.errors(items)), rms(now.errors(items))) for items in (records.held, records.to_fit))
+    return all(selection.takes_most(left, gap, records.noise) for left, gap in both)
 
 
 def _replaces(alone: Tried, named: Fitted, records: Records, shown: bool) -> bool:
     """Whether the element stands in place of what was named."""
-    groups = [
-        (items, alone.fitted.errors(items), named.errors(items)) for items in (records.held, records.to_fit)
-    ]
-    if not shown and all(selection.no_worse(rms(mine), rms(theirs), records.noise) for _, mine, theirs in groups):
+    both = [(alone.fitted.errors(items), named.errors(items)) for items in (records.held, records.to_fit)]
+    if all(rms(mine) <= (1.0 - acceptance.BETTER) * rms(theirs) for mine, theirs in both) and any(
+        selection.difference(theirs, mine) <= acceptance.P_SURE for mine, theirs in both
+    ):
         return True
-    return all(rms(mine) <= (1.0 - acceptance.BETTER) * rms(theirs) for _, mine, theirs in groups) and any(
-        selection.difference(theirs, mine) <= acceptance.P_SURE for _, mine, theirs in groups
+    return not shown and not any(
+        selection.difference(mine, theirs) <= acceptance.P_DIFFERENT
+        or not selection.no_worse(rms(mine), rms(theirs), records.noise)
+        for mine, theirs in both
     )
 
 
 def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, records: Records) -> Forgets:
     element = tried.fitted.structure.effects(tried.fitted.shape)[-1]
     assert isinstance(element, Forgetting)
-    return Forgets(tried.fitted, records.residual(now), tried.held_out, element.width, names, shown)
+    low, high = records.known.drive
+    return Forgets(
+        records.residual(now), tried.held_out, element.width / (high - low), _open(tried.fitted, element, low, high),
+        names, shown,
+    )  # fmt: skip
+
+
+def _open(fitted: Fitted, element: Forgetting, low: float, high: float) -> float:
+    """How far a minor loop in the middle of the drive is from closing, as a share of its height; the plays close."""
+    begin = 0.5 * (low + high)
+    end = begin + LOOP * (high - low)
+    v = np.array([low, high, low, end, begin, end])
+    r = fitted.structure.thresholds
+    y = fitted.weights @ operators.plays(v, r, np.full(len(r), low)) + element.added(Run(np.arange(6.0), v))
+    return abs(float((y[5] - y[3]) / (y[3] - y[4])))

@@ -63,7 +63,8 @@ class Refusal:
 
     `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
     fitted ones], `small` [share of the gap], `most` [rms left], `given` [rms left], `few` [share of samples], `end`
-    [share of the drive range], `range` [rms left], `other`: another shape was chosen.
+    [share of the drive range], `range` [rms left], `forgets` [rms left by
+    hysteresis that is no play sum], `other`: another shape was chosen.
     """
 
     why: str
