@@ -237,7 +237,7 @@ class _Task:
             noise, records = self._records(cleaned.clean, refitted)
             found = selection.select(records, refitted)
         forgets = forgetting.forgets(found, records)
-        return _Done(cleaned, noise, records, forgetting.withheld(found, forgets), forgets)
+        return _Done(cleaned, noise, records, forgetting.withheld(found, forgets, records), forgets)
 
     def _records(self, clean: Prepared, refitted: Fitted) -> tuple[NoiseFloor, Records]:
         noise = noise_floor([*clean.to_fit, *clean.held])

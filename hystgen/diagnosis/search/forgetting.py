@@ -9,7 +9,7 @@ take the place of creep, of a lag or of a rate dependence, and those the place o
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import ClassVar, Literal
@@ -89,31 +89,68 @@ class Forgets:
 def forgets(outcome: Outcome, records: Records) -> Forgets | None:
     """The element, where records bear it out beside the effects that were found, or better than these; else None.
 
-    The element is first tried in place of all names of the `outcome`, then beside them. Names that explain more stand.
-    Where chance alone could decide between the two, they stand if the drive takes ways of equal length in different
-    times: what follows time and what does not would then not look alike.
+    The element is first tried in place of all names of the `outcome`, then of those that depend on time, then beside
+    them. Names that explain more stand. Where chance alone could decide between the two, they stand if the drive takes
+    ways of equal length in different times: what follows time and what does not would then not look alike.
     """
     none, now = outcome.refitted, outcome.fitted
     if records.one_loop or not selection.leaves_enough(none, records):
         return None
     shown = shows_speed([*records.to_fit, *records.held])
     names = tuple(dict.fromkeys(each.name for each in outcome.found))
-    alone = _element(none, records)
-    if _borne_out(none, alone, records) and (not names or _replaces(alone, now, records, shown)):
-        return _found(none, alone, names, shown, records)
+    for base, replaced in _bases(outcome, records):
+        alone = _element(base, records)
+        if _borne_out(base, alone, records) and (not names or _replaces(alone, now, records, shown)):
+            return _found(base, alone, replaced, shown, records)
     if not names or not selection.leaves_enough(now, records):
         return None
     beside = _element(now, records)
     return _found(now, beside, (), shown, records) if _borne_out(now, beside, records) else None
 
 
-def withheld(outcome: Outcome, found: Forgets | None) -> Outcome:
+def _bases(outcome: Outcome, records: Records) -> Iterator[tuple[Fitted, tuple[str, ...]]]:
+    """Models beside whose plays the element is tried, with the names in whose place it would stand.
+
+    The refitted one; then one that has what does not depend on time: of the effects found, or, if there are none, the
+    best that was tried, since the part of a Duhem plant that forgets is seen only beside its bent middle line.
+    """
+    now = outcome.fitted
+    names = tuple(dict.fromkeys(each.name for each in outcome.found))
+    yield outcome.refitted, names
+    timed = tuple(name for name in names if name in _timed(now))
+    if timed and len(timed) < len(names):
+        yield _without(now, timed, records), timed
+    elif not names and outcome.rankings:
+        tried = [each.tried for each in outcome.rankings[0] if each.tried.name not in _timed(each.tried.fitted)]
+        best = min(tried, key=lambda each: each.held_out, default=None)
+        if best is not None:
+            yield best.fitted, ()
+
+
+def _timed(fitted: Fitted) -> frozenset[str]:
+    """Names of the effects of a model that depend on the times of samples."""
+    return frozenset(effect.name for effect in fitted.structure.effects(fitted.shape) if type(effect).timed)
+
+
+def _without(now: Fitted, names: Sequence[str], records: Records) -> Fitted:
+    """A model without some of its effects, refitted."""
+    for name in names:
+        now = selection.without_effect(now, name, records) or now
+    return now
+
+
+def withheld(outcome: Outcome, found: Forgets | None, records: Records) -> Outcome:
     """The outcome without the names in whose place the element stands."""
     if found is None or not found.in_place_of:
         return outcome
     why = Refusal("forgets", found.after)
-    ranked = [tuple(replace(each, refused=each.refused or why) for each in tried) for tried in outcome.rankings]
-    return Outcome(outcome.refitted, outcome.refitted, (), tuple(ranked))
+    ranked = tuple(tuple(replace(each, refused=each.refused or why) for each in tried) for tried in outcome.rankings)
+    rest = [each for each in outcome.found if each.name not in found.in_place_of]
+    smaller = _without(outcome.fitted, found.in_place_of, records) if rest else outcome.refitted
+    chain = selection.in_place(smaller, rest, outcome.found[0].before, records) if rest else []
+    if not chain:
+        return Outcome(outcome.refitted, outcome.refitted, (), ranked)
+    return Outcome(outcome.refitted, smaller, tuple(chain), ranked)
 
 
 def shows_speed(items: Sequence[Item]) -> bool:
@@ -143,7 +180,7 @@ def _element(now: Fitted, records: Records) -> Tried:
         return Forgetting(weight=slope * float(x[0]), width=wide * float(10.0 ** x[1]), balance=float(x[2]))
 
     ends = np.log10(acceptance.FORGETS_WITHIN)
-    starts = [np.array([0.0, place, BALANCE]) for place in np.linspace(*ends, acceptance.FORGETTING_STARTS)]
+    starts = [np.array([0.0, place, BALANCE]) for place in np.linspace(ends[0], ends[1], acceptance.FORGETTING_STARTS)]
     candidate = Candidate(
         "an element that forgets", np.array([-WEIGHT, ends[0], 0.5 + 1e-6]), np.array([0.0, ends[1], 1.0]), starts[0],
         build, None, tuple(starts[1:]), amounts=(0,),
@@ -180,11 +217,10 @@ def _replaces(alone: Tried, named: Fitted, records: Records, shown: bool) -> boo
         selection.difference(theirs, mine) <= acceptance.P_SURE for mine, theirs in both
     ):
         return True
-    return not shown and not any(
-        selection.difference(mine, theirs) <= acceptance.P_DIFFERENT
-        or not selection.no_worse(rms(mine), rms(theirs), records.noise)
-        for mine, theirs in both
-    )
+    if shown or not all(selection.no_worse(rms(mine), rms(theirs), records.noise) for mine, theirs in both):
+        return False
+    mine, theirs = ([error for pair in both for error in pair[k]] for k in (0, 1))
+    return selection.difference(mine, theirs) > acceptance.P_DIFFERENT
 
 
 def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, records: Records) -> Forgets:

@@ -692,7 +692,7 @@ def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step
         if second is not None and second.merit is not None and second.best.name != first.name:
             seconds.append((first, second))
     for first, second in sorted(seconds, key=lambda pair: pair[1].best.held_out):
-        alone = _without(second.best.fitted, first.name, records)
+        alone = without_effect(second.best.fitted, first.name, records)
         back = None if alone is None else _step(alone, gap, records, least=acceptance.FIRST_REMOVES)
         if alone is None or back is None or back.merit is None or back.best.name == second.best.name:
             continue
@@ -725,7 +725,7 @@ def _without_needless(
     """
     less: dict[str, Fitted] = {}
     for k in range(len(found) - 1):
-        fitted = _without(now, found[k].name, records)
+        fitted = without_effect(now, found[k].name, records)
         if fitted is None:
             continue
         with_it, without = records.residual(now), records.residual(fitted)
@@ -747,7 +747,7 @@ def _exchanged(
     latest = found[-1].name
     for _ in range(acceptance.MOST_EXCHANGES):
         for k, old in enumerate(found):
-            fitted = None if old.name == latest else less.get(old.name) or _without(now, old.name, records)
+            fitted = None if old.name == latest else less.get(old.name) or without_effect(now, old.name, records)
             if fitted is None:
                 continue
             start = _without_refit(now, old.name, records)  # a refit without it could move the others' numbers far off
@@ -764,7 +764,7 @@ def _exchanged(
                 continue
             step, other = better, _found(better, records)
             best = step.best.fitted
-            chain = _in_place(best, [*found[:k], other, *found[k + 1 :]], found[0].before, records)
+            chain = in_place(best, [*found[:k], other, *found[k + 1 :]], found[0].before, records)
             now, found, less = _without_needless(best, chain or [*_rest(found, k, other.before), other], records)
             latest = other.name
             break
@@ -837,7 +837,7 @@ def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Recor
         for k, old in enumerate(found[:-1]):
             if merit is None or old.name == first.name:
                 continue
-            fitted = _without(first.fitted, old.name, records)
+            fitted = without_effect(first.fitted, old.name, records)
             if fitted is None:
                 continue
             then = _step(fitted, 0.0, records, lambda option, name=old.name: option.name == name)  # type: ignore[misc]
@@ -849,17 +849,17 @@ def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Recor
             names = tuple(dict.fromkeys(each for each in (found[-1].name, *found[-1].rivals) if each != first.name))
             latest = Found(first.name, first.option.label, 0.0, 0.0, merit.p_value, names)
             earlier = replace(old, label=then.best.option.label)
-            chain = _in_place(best, [*found[:k], earlier, *found[k + 1 : -1], latest], found[0].before, records)
+            chain = in_place(best, [*found[:k], earlier, *found[k + 1 : -1], latest], found[0].before, records)
             if chain:
                 return best, chain
     return now, found
 
 
-def _in_place(now: Fitted, found: Sequence[Found], gap: float, records: Records) -> list[Found]:
+def in_place(now: Fitted, found: Sequence[Found], gap: float, records: Records) -> list[Found]:
     """The effects with the errors before and after each of them; empty if one does not lower the error."""
     residuals = [records.residual(now)]
     for each in reversed(found[1:]):
-        smaller = _without(now, each.name, records)
+        smaller = without_effect(now, each.name, records)
         if smaller is None:
             return []
         now = smaller
@@ -881,7 +881,7 @@ def _rest(found: Sequence[Found], k: int, without: float) -> list[Found]:
     return rest
 
 
-def _without(now: Fitted, name: str, records: Records) -> Fitted | None:
+def without_effect(now: Fitted, name: str, records: Records) -> Fitted | None:
     """The hypothesis without one effect, refitted."""
     smaller = _less(now, name)
     if smaller is None:

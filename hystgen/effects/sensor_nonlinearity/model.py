@@ -150,7 +150,7 @@ class SensorCurve(_Sensor):
                     name="sensor_nonlinearity", coefficients=tuple((0.1 * cubic).tolist()), scale=about.output_range
                 ).mapped(knots, Run(knots, knots))
                 rises = np.maximum(np.diff(shown), np.exp(-STEEP) * np.ptp(knots) / pieces)
-                return np.clip(np.log(rises[:-1] / rises[-1]), -STEEP, STEEP)
+                return np.asarray(np.clip(np.log(rises[:-1] / rises[-1]), -STEEP, STEEP))
 
             none = np.zeros(pieces - 1)
             label = f"sensor, curve of {pieces} pieces"
