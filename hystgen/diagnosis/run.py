@@ -17,13 +17,13 @@ from hystgen.diagnosis.data.items import Item, rms
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, noise_floor
 from hystgen.diagnosis.findings.content import result_of
-from hystgen.diagnosis.findings.kinds import NotAPlaySum, OtherHistory
+from hystgen.diagnosis.findings.kinds import NotAPlaySum, OtherHistory, WildInverse
 from hystgen.diagnosis.findings.result import Diagnosis, Errors, Inverse, Signals
-from hystgen.diagnosis.search import acceptance, fits, forgetting, hypothesis, selection
+from hystgen.diagnosis.search import acceptance, fits, forgetting, harm, hypothesis, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.forgetting import Forgets
 from hystgen.diagnosis.search.screening import Records
-from hystgen.diagnosis.search.selection import Outcome
+from hystgen.diagnosis.search.selection import Outcome, Refusal
 from hystgen.effects.base import Effect, Place
 from hystgen.identification import P0_FLOOR, quality, stage_content
 from hystgen.identification.fit import visited
@@ -108,13 +108,16 @@ def diagnose(
         found, made = selection.invertible(found, done.records, P0_FLOOR)
         ready = done.cleaned.clean
         extended = _extended(model.parameters, model.cascade, found, ready, effects)
+        found, made, extended, wild = _harmless(
+            found, made, extended, done, lambda less: _extended(model.parameters, model.cascade, less, ready, effects)
+        )
         result = result_of(
             unit,
             ready,
             done.noise,
             found,
             Errors(*(rms(first.errors(group)) for group in (ready.to_fit, ready.held))),
-            [*_of_another_kind(done.forgets), *odd, *([] if wrong is None else [wrong]), *done.cleaned.lines],
+            [*_of_another_kind(done.forgets), *wild, *odd, *([] if wrong is None else [wrong]), *done.cleaned.lines],
             done.records.one_loop,
             _inverse(extended, made),
         )
@@ -247,6 +250,28 @@ class _Task:
 def _of_another_kind(forgets: Forgets | None) -> list[NotAPlaySum]:
     """The finding about hysteresis that no play sum has."""
     return [] if forgets is None else [NotAPlaySum(**vars(forgets))]
+
+
+def _harmless(
+    found: Outcome, made: Weights, extended: Parameters, done: _Done, written: Callable[[Outcome], Parameters]
+) -> tuple[Outcome, Weights, Parameters, list[WildInverse]]:
+    """The outcome and the parameters to write, without effects whose inverse does more than records bear out."""
+    from hystgen.model import Model
+
+    if not found.found:
+        return found, made, extended, []
+    before, after = done.records.residual(found.refitted), done.records.residual(found.fitted)
+    plain = Outcome(found.refitted, found.refitted, (), found.rankings)
+    plain, plain_made = selection.invertible(plain, done.records, P0_FLOOR)
+    fewer = written(plain)
+    wild = harm.wild(
+        Model(extended), Model(fewer), done.records.held, acceptance.apart(before, after), done.noise.rms
+    )
+    if wild is None:
+        return found, made, extended, []
+    names = tuple(dict.fromkeys(each.name for each in found.found))
+    plain = selection.refused(plain, Refusal("wild", wild.moves, acceptance.BEYOND_GAIN * wild.gain))
+    return plain, plain_made, fewer, [WildInverse(names, **vars(wild))]
 
 
 def _inverse(extended: Parameters, made: Weights) -> Inverse:

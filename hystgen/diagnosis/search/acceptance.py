@@ -685,3 +685,21 @@ forgetting::test_plants_that_are_no_play_sum."""
 FORGETTING_STARTS = 5
 """[widths] Number from which it is searched for, each about three times the one before. Changed by:
 forgetting::test_plants_that_are_no_play_sum."""
+
+# Whether an inverse does more than records bear out ------------------------------------------------------------
+
+WILDER = 2.0
+"""[times] An inverse whose drive has second differences up to this times those of the plain inverse's is as calm: a
+lead or a notch rearranges a drive by as much. Changed by: harm::test_an_inverse_that_does_more_than_it_explains."""
+
+BEYOND_GAIN = 3.0
+"""[times the held-out rms that the effects explain] What an inverse with effects moves the plain model's output by, at
+most. Of a right effect it is about once that, since it takes out what it explains, and a shape that fits badly twice;
+the same factor as `MUCH_LEFT`. Changed by: harm::test_an_inverse_that_does_more_than_it_explains."""
+
+CROSSED_SAMPLES = 6_000
+"""[samples] Most of a record that is taken, from its start: as many as `SCREENED`. Changed by: run time of blind."""
+
+REFERENCE_SMOOTHED = 5
+"""[samples] A recorded output becomes a reference by two means over this many. Changed by:
+harm::test_right_effects_are_let_through."""

@@ -143,8 +143,7 @@ def withheld(outcome: Outcome, found: Forgets | None, records: Records) -> Outco
     """The outcome without the names in whose place the element stands."""
     if found is None or not found.in_place_of:
         return outcome
-    why = Refusal("forgets", found.after)
-    ranked = tuple(tuple(replace(each, refused=each.refused or why) for each in tried) for tried in outcome.rankings)
+    ranked = selection.refused(outcome, Refusal("forgets", found.after)).rankings
     rest = [each for each in outcome.found if each.name not in found.in_place_of]
     smaller = _without(outcome.fitted, found.in_place_of, records) if rest else outcome.refitted
     chain = selection.in_place(smaller, rest, outcome.found[0].before, records) if rest else []

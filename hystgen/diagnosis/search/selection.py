@@ -64,7 +64,8 @@ class Refusal:
     `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
     fitted ones], `small` [share of the gap], `most` [rms left], `given` [rms left], `few` [share of samples], `end`
     [share of the drive range], `range` [rms left], `forgets` [rms left by
-    hysteresis that is no play sum], `other`: another shape was chosen.
+    hysteresis that is no play sum], `wild` [rms by which the inverse moves the plain model's output],
+    `other`: another shape was chosen.
     """
 
     why: str
@@ -453,6 +454,12 @@ def no_worse_than(given: Fitted, outcome: Outcome, records: Records) -> Outcome:
         return replace(outcome, fitted=given)
     refused = Refusal("given", records.residual(found), least)
     return replace(_withdrawn(outcome, given, refused), withdrawn=())  # they explain something, but not enough
+
+
+def refused(outcome: Outcome, why: Refusal) -> Outcome:
+    """The outcome with a reason for each effect that was accepted in some round."""
+    ranked = [tuple(replace(each, refused=each.refused or why) for each in tried) for tried in outcome.rankings]
+    return replace(outcome, rankings=tuple(ranked))
 
 
 def _withdrawn(outcome: Outcome, fitted: Fitted, refused: Refusal) -> Outcome:
