@@ -42,6 +42,13 @@ stiffness has no inverse. One that leads is left to plays with negative weights,
 LOOP = 0.1
 """[share of the drive range] Width of the minor loop that is said to stay open, as in `docs/plants.md`."""
 
+WITHIN = 0.01, 1.0
+"""[shares of the drive range] Least and largest way over which the element forgets: below, plays of the smallest
+thresholds do as it does; above, it is a straight line and a memory of the start."""
+
+STARTS = 5
+"""[widths] Number from which it is searched for, each about three times the one before."""
+
 STEPS = 12
 """[steps] Of the search from the best width: three numbers and linear weights, which most searches settle in six."""
 
@@ -178,8 +185,8 @@ def _element(now: Fitted, records: Records) -> Tried:
     def build(x: Array) -> Forgetting:
         return Forgetting(weight=slope * float(x[0]), width=wide * float(10.0 ** x[1]), balance=float(x[2]))
 
-    ends = np.log10(acceptance.FORGETS_WITHIN)
-    starts = [np.array([0.0, place, BALANCE]) for place in np.linspace(ends[0], ends[1], acceptance.FORGETTING_STARTS)]
+    ends = np.log10(WITHIN)
+    starts = [np.array([0.0, place, BALANCE]) for place in np.linspace(ends[0], ends[1], STARTS)]
     candidate = Candidate(
         "an element that forgets", np.array([-WEIGHT, ends[0], 0.5 + 1e-6]), np.array([0.0, ends[1], 1.0]), starts[0],
         build, None, tuple(starts[1:]), amounts=(0,),

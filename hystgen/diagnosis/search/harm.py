@@ -22,6 +22,12 @@ from hystgen.model import Model
 
 Array = NDArray[np.float64]
 
+SAMPLES = 6_000
+"""Most of a record that is taken, from its start: as many as the screening of effects compares."""
+
+SMOOTHED = 5
+"""[samples] A recorded output becomes a reference by two means over this many; the noise that is left is taken off."""
+
 SEED = 1
 """Of the noise whose way through the inverse is not counted, so that the same records give the same answer."""
 
@@ -55,7 +61,7 @@ def wild(extended: Model, plain: Model, held: Sequence[Item], gain: float, noise
 
 def _over(extended: Model, plain: Model, item: Item, gain: float, noise: float) -> Wild | None:
     """The two inverses over one record; None where one of them has no answer."""
-    end = min(len(item.run.t), acceptance.CROSSED_SAMPLES)
+    end = min(len(item.run.t), SAMPLES)
     compared = np.arange(len(item.run.t))[item.compared]
     at = compared[compared < end]
     if len(at) < acceptance.COMPARED_SAMPLES:
@@ -82,7 +88,7 @@ def _over(extended: Model, plain: Model, item: Item, gain: float, noise: float) 
 
 def _smooth(y: Array) -> Array:
     """Means over a few neighbours, twice, so that noise hardly shows in second differences."""
-    n = acceptance.REFERENCE_SMOOTHED
+    n = SMOOTHED
     kernel = np.ones(n) / n
     for _ in range(2):
         y = np.convolve(np.pad(y, n // 2, mode="edge"), kernel, mode="valid")
