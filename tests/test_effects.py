@@ -69,6 +69,7 @@ EVERY = [
     make("ageing", shape="exponential", loss=0.1, travel=20.0),
     make("ageing", shape="exponentials", losses=(0.1, 0.05), travels=(20.0, 3.0)),
     make("sensor_nonlinearity", coefficients=(0.05, -0.02), scale=3.0),
+    make("sensor_nonlinearity", shape="curve", knots=(-3.0, -1.0, 0.5, 4.0), values=(-3.0, -1.5, 1.0, 3.0)),
     make("noncongruent", coefficients=((0.1,), (0.05, 0.02), (-0.1,))),
     make("noncongruent", shape="centre", amplitude=0.4, centre=0.5, width=1.2),
     make("saturation", shape="stops", lower=-0.5, upper=2.0, give=0.2),
@@ -367,6 +368,11 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
     ),
     "sensor_nonlinearity": st.builds(
         lambda a, b, s: {"coefficients": (a, b), "scale": s}, share, share, st.floats(1e-30, 1e30)
+    )
+    | st.builds(
+        lambda x, y: {"shape": "curve", "knots": tuple(sorted(x)), "values": tuple(sorted(y))},
+        st.sets(st.integers(-1000, 1000), min_size=3, max_size=3).map(lambda found: [float(k) for k in found]),
+        st.sets(st.integers(-1000, 1000), min_size=3, max_size=3).map(lambda found: [float(k) for k in found]),
     ),
     "noncongruent": st.one_of(
         st.builds(lambda a, b: {"coefficients": ((a,), (a, b), (b,))}, share, share),
