@@ -243,7 +243,8 @@ def test_linear_effects_are_linear_and_keep_rows_apart(effect: Effect) -> None:
 def test_candidates_build_effects_over_all_their_bounds(effect: Effect) -> None:
     t, v = drive(400)
     speed, travel = np.max(np.abs(np.diff(v) / np.diff(t))), np.sum(np.abs(np.diff(v)))
-    about = About((-4.0, 4.0), 8.0, t[1], 1.0, 1.0, speed, travel, tuple(THRESHOLDS), frozenset({"temperature"}))
+    columns = frozenset({"temperature"})
+    about = About((-4.0, 4.0), 8.0, t[1], 1.0, 1.0, speed, travel, tuple(THRESHOLDS), columns, output=(-5.0, 3.0))
     rng = np.random.default_rng(5)
     found = type(effect).candidates(about)
     assert found
@@ -271,7 +272,10 @@ def test_candidates_build_effects_over_all_their_bounds(effect: Effect) -> None:
 @pytest.mark.parametrize("session", [0.05, 0.15, 8.0, 1e6])
 def test_a_start_from_a_simpler_shape_lies_within_bounds(session: float) -> None:
     """However short the session, and wherever the search for the simpler shape has ended."""
-    about = About((-4.0, 4.0), 8.0, 1e-3, session, session, 50.0, 30.0, tuple(THRESHOLDS), frozenset({"temperature"}))
+    columns = frozenset({"temperature"})
+    about = About(
+        (-4.0, 4.0), 8.0, 1e-3, session, session, 50.0, 30.0, tuple(THRESHOLDS), columns, output=(-5.0, 3.0)
+    )
     found = {each.label: each for kind in dict.fromkeys(map(type, EVERY)) for each in kind.candidates(about)}
     grown = [each for each in found.values() if each.grown]
     assert len(grown) >= 8

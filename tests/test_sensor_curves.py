@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from recordings import brute_plays, noisy
+from recordings import brute_output, noisy
 from scipy.interpolate import PchipInterpolator
 
 import hystgen
@@ -73,7 +73,7 @@ def recorded(sensor: Callable[[Array], Array], number: int) -> Record:
     v = np.concatenate([
         np.linspace(a, b, max(2, int(abs(b - a) / 0.6)), endpoint=False) for a, b in itertools.pairwise(turns)
     ])  # fmt: skip
-    y = P @ brute_plays(v, R, np.zeros(len(R)))
+    y = brute_output(v, R, P, 0.0)
     x = y / (0.5 * float(np.sum(P)) * 100.0) - 1.0
     t = np.arange(len(v)) * 1e-3 + 10.0 * number
     return Record(f"record {number}", t, v, noisy(50.0 * sensor(x), NOISE, number), sample_time=1e-3)

@@ -683,5 +683,6 @@ hysteresis alone turns a drive that often. Changed by: acceptance::TestWild::tes
 
 BEYOND_GAIN = 3.0
 """[times the gain] What an inverse with effects moves the plain model's output by, at most, in held-out rms that the
-effects explain or in noise if that is more. It takes out what the effects explain: 0.85 to 0.97 times that for creep, a lag and relaxing plays
-at three speeds, noise at 0.1 % of the output. Changed by: acceptance::TestWild::test_an_output_that_moves_further."""
+effects explain, or in noise if that is more. It takes out what they explain: 0.85 to 0.97 times that for creep, a lag
+and relaxing plays at three speeds, noise at 0.1 % of the output. Changed by:
+acceptance::TestWild::test_an_output_that_moves_further."""

@@ -17,8 +17,8 @@ BENT = 1.0
 
 PIECES = (6, 12)
 """Pieces of the monotone curves that are tried where a cubic helps. Of a root over the range six leave 1.3 times the
-noise and twelve 1.03; of an arctangent, or a tanh that ends at a sixth of its middle slope, six 9 to 10 times and twelve
-1.3 (`test_sensor_curves`, noise 0.02 % of the output)."""
+noise and twelve 1.03; of an arctangent, or a tanh that ends at a sixth of its middle slope, six leave 9 to 10 times the
+noise and twelve 1.3 (`test_sensor_curves`, noise 0.02 % of the output)."""
 
 STEEP = 3.0
 """Largest logarithm of the ratio of two pieces' slopes: twenty, beyond which a sensor measures nothing on one side."""
