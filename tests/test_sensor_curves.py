@@ -80,10 +80,13 @@ def recorded(sensor: Callable[[Array], Array], number: int) -> Record:
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", SENSORS)
-def test_a_sensor_with_any_curve_is_named(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "named"), [("tanh", "saturation"), ("arctangent", "sensor_nonlinearity"), ("root", "sensor_nonlinearity")]
+)
+def test_a_sensor_with_any_curve_is_named(name: str, named: str) -> None:
+    """A tanh is the catalogue's own limit, which a sensor may have too; nothing is said to bend the plays."""
     made = [recorded(SENSORS[name], number) for number in range(4)]
     found = hystgen.diagnose(hystgen.identify(made[:3], holdout=made[3:], model="pi"), made[:3], holdout=made[3:])
-    assert [each["name"] for each in found.content["effects"]] == ["sensor_nonlinearity"]
+    assert [each["name"] for each in found.content["effects"]] == [named]
     assert found.content["gap"]["refitted"]["holdout"] > 20.0 * NOISE
     assert found.content["gap"]["after"]["holdout"] < 1.5 * NOISE
