@@ -30,7 +30,7 @@ from hystgen.diagnosis.data.preparing import Prepared, prepare
 from hystgen.diagnosis.data.signals import noise_floor
 from hystgen.diagnosis.findings import content
 from hystgen.diagnosis.findings.kinds import Line, Ripple, Saturated
-from hystgen.diagnosis.search import acceptance, fits, hypothesis, screening, selection
+from hystgen.diagnosis.search import acceptance, fits, harm, hypothesis, screening, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Actuator, Structure
 from hystgen.diagnosis.search.screening import Option
@@ -1413,3 +1413,23 @@ def test_surroundings_of_ringing_that_fades(first: int, last: int, seen: bool) -
     spectrum[1020:1028] *= 40.0
     found = signals._fading(ramp(4096), np.fft.irfft(spectrum, 4096))
     assert any(abs(frequency - 250.0) < 3.0 for _, frequency in found) is seen
+
+
+class TestWild:
+    """An inverse that does more than recordings bear out, by figures of one record."""
+
+    @staticmethod
+    def judged(monkeypatch: pytest.MonkeyPatch, moves: float, wilder: float) -> bool:
+        gain, noise = 0.5, 0.1
+        found = harm.Wild(moves, moves, gain, wilder)
+        monkeypatch.setattr(harm, "_over", lambda *_: found)
+        model: Any = None
+        return harm.wild(model, model, [model], gain, noise) is not None
+
+    @pytest.mark.parametrize(("wilder", "wild"), [(2.2, True), (1.8, False)])
+    def test_a_drive_that_is_rougher(self, monkeypatch: pytest.MonkeyPatch, wilder: float, wild: bool) -> None:
+        assert self.judged(monkeypatch, 50.0, wilder) == wild
+
+    @pytest.mark.parametrize(("times", "wild"), [(3.3, True), (2.7, False)])
+    def test_an_output_that_moves_further(self, monkeypatch: pytest.MonkeyPatch, times: float, wild: bool) -> None:
+        assert self.judged(monkeypatch, times * 0.5, 50.0) == wild

@@ -69,6 +69,7 @@ EVERY = [
     make("ageing", shape="exponential", loss=0.1, travel=20.0),
     make("ageing", shape="exponentials", losses=(0.1, 0.05), travels=(20.0, 3.0)),
     make("sensor_nonlinearity", coefficients=(0.05, -0.02), scale=3.0),
+    make("sensor_nonlinearity", shape="curve", knots=(-3.0, -1.0, 0.5, 4.0), values=(-3.0, -1.5, 1.0, 3.0)),
     make("noncongruent", coefficients=((0.1,), (0.05, 0.02), (-0.1,))),
     make("noncongruent", shape="centre", amplitude=0.4, centre=0.5, width=1.2),
     make("saturation", shape="stops", lower=-0.5, upper=2.0, give=0.2),
@@ -242,7 +243,8 @@ def test_linear_effects_are_linear_and_keep_rows_apart(effect: Effect) -> None:
 def test_candidates_build_effects_over_all_their_bounds(effect: Effect) -> None:
     t, v = drive(400)
     speed, travel = np.max(np.abs(np.diff(v) / np.diff(t))), np.sum(np.abs(np.diff(v)))
-    about = About((-4.0, 4.0), 8.0, t[1], 1.0, 1.0, speed, travel, tuple(THRESHOLDS), frozenset({"temperature"}))
+    columns = frozenset({"temperature"})
+    about = About((-4.0, 4.0), 8.0, t[1], 1.0, 1.0, speed, travel, tuple(THRESHOLDS), columns, output=(-5.0, 3.0))
     rng = np.random.default_rng(5)
     found = type(effect).candidates(about)
     assert found
@@ -270,7 +272,10 @@ def test_candidates_build_effects_over_all_their_bounds(effect: Effect) -> None:
 @pytest.mark.parametrize("session", [0.05, 0.15, 8.0, 1e6])
 def test_a_start_from_a_simpler_shape_lies_within_bounds(session: float) -> None:
     """However short the session, and wherever the search for the simpler shape has ended."""
-    about = About((-4.0, 4.0), 8.0, 1e-3, session, session, 50.0, 30.0, tuple(THRESHOLDS), frozenset({"temperature"}))
+    columns = frozenset({"temperature"})
+    about = About(
+        (-4.0, 4.0), 8.0, 1e-3, session, session, 50.0, 30.0, tuple(THRESHOLDS), columns, output=(-5.0, 3.0)
+    )
     found = {each.label: each for kind in dict.fromkeys(map(type, EVERY)) for each in kind.candidates(about)}
     grown = [each for each in found.values() if each.grown]
     assert len(grown) >= 8
@@ -367,6 +372,11 @@ VALID: dict[str, st.SearchStrategy[dict[str, Any]]] = {
     ),
     "sensor_nonlinearity": st.builds(
         lambda a, b, s: {"coefficients": (a, b), "scale": s}, share, share, st.floats(1e-30, 1e30)
+    )
+    | st.builds(
+        lambda x, y: {"shape": "curve", "knots": tuple(sorted(x)), "values": tuple(sorted(y))},
+        st.sets(st.integers(-1000, 1000), min_size=3, max_size=3).map(lambda found: [float(k) for k in found]),
+        st.sets(st.integers(-1000, 1000), min_size=3, max_size=3).map(lambda found: [float(k) for k in found]),
     ),
     "noncongruent": st.one_of(
         st.builds(lambda a, b: {"coefficients": ((a,), (a, b), (b,))}, share, share),

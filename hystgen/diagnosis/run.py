@@ -17,13 +17,14 @@ from hystgen.diagnosis.data.items import Item, rms
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, noise_floor
 from hystgen.diagnosis.findings.content import result_of
-from hystgen.diagnosis.findings.kinds import OtherHistory
+from hystgen.diagnosis.findings.kinds import NotAPlaySum, OtherHistory, WildInverse
 from hystgen.diagnosis.findings.result import WRITTEN, Diagnosis, Errors, Inverse, Signals
-from hystgen.diagnosis.search import acceptance, fits, hypothesis, selection
+from hystgen.diagnosis.search import acceptance, fits, forgetting, harm, hypothesis, selection
 from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.forgetting import Forgets
 from hystgen.diagnosis.search.hypothesis import Structure
 from hystgen.diagnosis.search.screening import Records
-from hystgen.diagnosis.search.selection import Outcome
+from hystgen.diagnosis.search.selection import Outcome, Refusal
 from hystgen.effects.base import Effect, Place
 from hystgen.identification import P0_FLOOR, auto, quality, stage_content
 from hystgen.identification.fit import visited
@@ -109,9 +110,10 @@ def diagnose(
         )
         done, wrong = task.with_history(before, unit)
         found = selection.no_worse_than(first, done.found, done.records)
+        ready = done.cleaned.clean
+        found, wild = _harmless(found, done, lambda each: _extended(nominal, model.cascade, each, ready, effects))
         found, by_itself = _no_worse_than_identified(found, done.records, unit)
         found, made = selection.invertible(found, done.records, P0_FLOOR)
-        ready = done.cleaned.clean
         extended = _extended(nominal, model.cascade, found, ready, effects)
         result = result_of(
             unit,
@@ -119,7 +121,7 @@ def diagnose(
             done.noise,
             found,
             Errors(*(rms(first.errors(group)) for group in (ready.to_fit, ready.held))),
-            [*odd, *([] if wrong is None else [wrong]), *done.cleaned.lines],
+            [*_of_another_kind(done.forgets), *wild, *odd, *([] if wrong is None else [wrong]), *done.cleaned.lines],
             done.records.one_loop,
             _inverse(extended, made),
         )
@@ -146,6 +148,7 @@ class _Done:
     noise: NoiseFloor
     records: Records
     found: Outcome
+    forgets: Forgets | None = None
     notes: tuple[str, ...] = ()
 
     def noting(self, note: str) -> _Done:
@@ -228,7 +231,7 @@ class _Task:
         """
         done = self._search(ready, refit)
         left = rms(done.found.fitted.errors(done.records.to_fit))
-        if done.found.found or acceptance.is_noise(left, done.noise.rms):
+        if done.found.found or done.forgets is not None or acceptance.is_noise(left, done.noise.rms):
             return done
         more = preparing.with_ends(ready)
         again = None if more is None else self._search(more, refit)
@@ -246,7 +249,8 @@ class _Task:
             refitted = refit(cleaned.clean)
             noise, records = self._records(cleaned.clean, refitted)
             found = selection.select(records, refitted)
-        return _Done(cleaned, noise, records, found)
+        forgets = forgetting.forgets(found, records)
+        return _Done(cleaned, noise, records, forgetting.withheld(found, forgets, records), forgets)
 
     def _records(self, clean: Prepared, refitted: Fitted) -> tuple[NoiseFloor, Records]:
         noise = noise_floor([*clean.to_fit, *clean.held])
@@ -276,6 +280,32 @@ def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None
         f"{WRITTEN[selection.IDENTIFIED]} is written, since it leaves {records.residual(other):.4g}{u} rms on held-out "
         f"records, and {WRITTEN[found.written]} {left:.4g}{u}"
     ]
+
+
+def _of_another_kind(forgets: Forgets | None) -> list[NotAPlaySum]:
+    """The finding about hysteresis that no play sum has."""
+    return [] if forgets is None else [NotAPlaySum(**vars(forgets))]
+
+
+def _harmless(
+    found: Outcome, done: _Done, written: Callable[[Outcome], Parameters]
+) -> tuple[Outcome, list[WildInverse]]:
+    """The outcome without effects whose inverse does more than records bear out, and that finding."""
+    from hystgen.model import Model
+
+    if not found.found:
+        return found, []
+    records = done.records
+    plain = Outcome(found.refitted, found.refitted, (), found.rankings)
+    with_effects, without = (selection.invertible(each, records, P0_FLOOR)[0] for each in (found, plain))
+    gain = acceptance.apart(records.residual(without.fitted), records.residual(with_effects.fitted))
+    models = (Model(written(each)) for each in (with_effects, without))
+    wild = harm.wild(*models, records.held, gain, done.noise.rms)
+    if wild is None:
+        return found, []
+    names = tuple(dict.fromkeys(each.name for each in found.found))
+    why = Refusal("wild", wild.moves, acceptance.BEYOND_GAIN * wild.gain)
+    return replace(plain, rankings=selection.refused(found.rankings, why)), [WildInverse(names, **vars(wild))]
 
 
 def _inverse(extended: Parameters, made: Weights) -> Inverse:

@@ -151,6 +151,8 @@ class About:
     """frequencies at which the error so far has narrow peaks of its own, Hz, the strongest first"""
     timed: bool = True
     """whether the times of the records are known"""
+    output: tuple[float, float] = (0.0, 0.0)
+    """least and largest measured output of all records"""
 
 
 @dataclass(frozen=True)

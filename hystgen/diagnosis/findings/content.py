@@ -146,6 +146,8 @@ REFUSALS = {
     "end": "it acts on {value:.1%} of the drive range at an end, and a limit needs {limit:.1%}",
     "range": "with a number at an end of its range the effects found leave {value:.0%} of the gap above the noise, and "
     "then at most {limit:.0%} supports a name",
+    "forgets": "hysteresis that is no play sum explains the error better or as well, and leaves {value:.3g}{unit} rms",
+    "wild": "its inverse moves the output of the plain model by {value:.3g}{unit} rms, more than {limit:.3g}{unit}",
     "other": "another shape does better, or as well with fewer numbers",
 }
 """Why an effect that was tried has no name, in words."""

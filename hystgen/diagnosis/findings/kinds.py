@@ -270,6 +270,73 @@ class StickSlip(Finding):
         return f"{self.record}: stick-slip, {jumps} after standing still, the first at {self.first:.6g} s"
 
 
+# The hysteresis itself ---------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class NotAPlaySum(Finding):
+    """Hysteresis that forgets on all of the drive's way, not only where minor loops close.
+
+    `before`, `after`: held-out rms that plays and named effects leave, and with an element beside them that forgets
+    over `way`, a share of the drive range; `open`: how far a minor loop over a tenth of the range is from closing, of
+    its height; `in_place_of`: effects that would explain as much, or less; `shows_speed`: whether the drive takes ways
+    of equal length in different times.
+    """
+
+    kind = "not_a_play_sum"
+    before: float
+    after: float
+    way: float
+    open: float
+    in_place_of: tuple[str, ...]
+    shows_speed: bool
+
+    def sentence(self, unit: str | None) -> str:
+        named = " and ".join(self.in_place_of)
+        instead = (
+            "" if not named else f"; {named} would explain less of it" if self.shows_speed else
+            f"; {named} would explain about as much, but the drive takes equal ways in equal times throughout"
+        )  # fmt: skip
+        return (
+            f"the hysteresis is no play sum: minor loops stay open, by {100.0 * self.open:.0f} % of their height where "
+            f"they pass a tenth of the drive range, and depend on what was before. A part that forgets over "
+            f"{100.0 * self.way:.2g} % of the range takes the held-out rms error from {self.before:.4g} to "
+            f"{self.after:.4g}{_unit(unit)}{instead}"
+        )
+
+    def advice(self) -> list[str]:
+        """What a play sum leaves of such a stage, and how speed would show."""
+        page = "docs/plants.md shows what a play sum leaves of a stage with such hysteresis"
+        if self.shows_speed:
+            return [page]
+        return [page, "record the same path at two speeds: a lag, creep and rate dependence then differ from it"]
+
+
+@dataclass(frozen=True)
+class WildInverse(Finding):
+    """Effects that were found and are not written, since their inverse does more than the recordings bear out.
+
+    `moves`: rms by which the inverse with them, over recorded outputs, moves the output of the plain model, and `other`
+    the same the other way round; `gain`: held-out rms that they explain; `wilder`: second differences of its drive over
+    those of the plain inverse's.
+    """
+
+    kind = "wild_inverse"
+    names: tuple[str, ...]
+    moves: float
+    other: float
+    gain: float
+    wilder: float
+
+    def sentence(self, unit: str | None) -> str:
+        u = _unit(unit)
+        return (
+            f"{' and '.join(self.names)} would explain {self.gain:.3g}{u} rms of held-out records and is not written: "
+            f"over the recorded outputs the inverse with it moves the output of the plain model by {self.moves:.3g}{u} "
+            f"rms, with a drive {self.wilder:.2g} times as rough as the plain inverse's"
+        )
+
+
 # The remaining error -----------------------------------------------------------------------------------------
 
 VARIABLE_NAMES = {

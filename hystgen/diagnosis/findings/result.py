@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics import arguments, display, drawing
 from hystgen.diagnosis.findings import kinds
-from hystgen.diagnosis.findings.kinds import Fault, Finding, Structure
+from hystgen.diagnosis.findings.kinds import Fault, Finding, NotAPlaySum, Structure
 from hystgen.diagnosis.search import acceptance
 
 if TYPE_CHECKING:
@@ -258,8 +258,9 @@ class Diagnosis:
         return self.result.verdict
 
     def sentence(self) -> str:
-        """The verdict in a few sentences, its limits first."""
-        parts = [*self._limits(), self._finding()]
+        """The verdict in a few sentences: first that the hysteresis is of another kind, then its limits."""
+        parts = [_capital(each.sentence(self.result.unit)) for each in self._of_another_kind()]
+        parts += [*self._limits(), self._finding()]
         if any(effect.at_an_end for effect in self.result.effects):
             parts.append(f"The shape is not certain: {'; '.join(self.uncertain())}")
         wrong = kinds.faults(self.result.unexplained)
@@ -275,6 +276,9 @@ class Diagnosis:
             if effect.at_an_end and not effect.ends:
                 said.append(f"two time constants of {effect.name} are practically equal")
         return list(dict.fromkeys(said))
+
+    def _of_another_kind(self) -> list[NotAPlaySum]:
+        return [each for each in self.result.unexplained if isinstance(each, NotAPlaySum)]
 
     def _limits(self) -> list[str]:
         """Warnings that come before any name: how few samples were compared, how much error remains."""
@@ -308,7 +312,7 @@ class Diagnosis:
         if acceptance.is_noise(left, result.noise_floor):  # the held-out records do not show it
             where, left = " of the fitted records", gap.after.fit
         missing = f"{self._missing()}: {self._rms(left)} rms is left{where}{self._nearest()}"
-        disturbing = [each for each in seen if not isinstance(each, Fault | Structure)]
+        disturbing = [each for each in seen if not isinstance(each, Fault | Structure | NotAPlaySum)]
         if not disturbing:
             return missing
         first = disturbing[0].sentence(unit)
@@ -320,6 +324,8 @@ class Diagnosis:
 
     def _missing(self) -> str:
         """The subject of a verdict without a name."""
+        if self._of_another_kind():
+            return "No effect is named"
         if self._closest() is None:
             return "Something is missing that the catalogue does not hold or the records cannot show"
         return "Something is missing, and no effect is named"
@@ -327,7 +333,7 @@ class Diagnosis:
     def _nearest(self) -> str:
         """The candidate with the smallest error, and why it has no name; empty if none removes anything."""
         closest = self._closest()
-        if closest is None:
+        if closest is None or self._of_another_kind():
             return ""
         if self.result.withdrawn is not None and not self._limits():
             return f". {self._withdrawn(self.result.withdrawn)}"
@@ -395,6 +401,10 @@ class Diagnosis:
         names = self.FILES if pages else (self.FILES[0], self.FILES[2])
         made = zip(names, (self.to_json(), *pages, text), strict=True)
         return writing.write_files(Path(folder), {name: content.encode("utf-8") for name, content in made})
+
+
+def _capital(text: str) -> str:
+    return text[0].upper() + text[1:]
 
 
 def plain(value: Any) -> Any:

@@ -691,3 +691,15 @@ many samples. Changed by: acceptance::TestDescription::test_parity."""
 PARITY_SHARE = 0.05
 """[share of the error's variance] Parity means something only if the mean over drive and direction has at least this:
 half of `VARIABLE_SHARE`. Derived."""
+
+# Whether an inverse does more than records bear out ------------------------------------------------------------
+
+WILDER = 2.0
+"""[times] An inverse whose drive has second differences up to this times those of the plain inverse's is as calm:
+hysteresis alone turns a drive that often. Changed by: acceptance::TestWild::test_a_drive_that_is_rougher."""
+
+BEYOND_GAIN = 3.0
+"""[times the gain] What an inverse with effects moves the plain model's output by, at most, in held-out rms that the
+effects explain, or in noise if that is more. It takes out what they explain: 0.85 to 0.97 times that for creep, a lag
+and relaxing plays at three speeds, noise at 0.1 % of the output. Changed by:
+acceptance::TestWild::test_an_output_that_moves_further."""

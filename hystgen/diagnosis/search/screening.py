@@ -66,6 +66,7 @@ def about(items: Sequence[Item], thresholds: Array) -> About:
     columns = set(items[0].run.extra)
     for item in items:
         columns &= set(item.run.extra)
+    outputs = [item.y[item.known] for item in items if item.known.any()]
     begin, end = min(float(item.run.t[0]) for item in items), max(float(item.run.t[-1]) for item in items)
     return About(
         (low, high),
@@ -78,6 +79,7 @@ def about(items: Sequence[Item], thresholds: Array) -> About:
         tuple(float(r) for r in thresholds),
         frozenset(columns),
         timed=all(item.timed for item in items),
+        output=(min(float(y.min()) for y in outputs), max(float(y.max()) for y in outputs)) if outputs else (0.0, 0.0),
     )
 
 

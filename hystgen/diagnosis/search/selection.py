@@ -68,7 +68,8 @@ class Refusal:
     `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
     fitted ones], `small` [share of the gap], `most` [rms left], `above` [rms left of records of one loop], `given` and
     `identified` [rms left], `few` [share of samples], `end` [share of the drive range], `range` [share of the gap
-    left], `other`: another shape was chosen.
+    left], `forgets` [rms left by hysteresis that is no play sum], `wild` [rms by which the inverse moves the plain
+    model's output], `other`: another shape was chosen.
     """
 
     why: str
@@ -495,13 +496,13 @@ def no_worse_than(other: Fitted, outcome: Outcome, records: Records, written: st
         return outcome
     if not outcome.found:
         return replace(outcome, fitted=other, written=written)
-    refused = Refusal(written, left, least)
-    return Outcome(outcome.refitted, other, (), _refused(outcome.rankings, refused), written=written)
+    why = Refusal(written, left, least)
+    return Outcome(outcome.refitted, other, (), refused(outcome.rankings, why), written=written)
 
 
-def _refused(rankings: Sequence[Sequence[Ranked]], refused: Refusal) -> tuple[tuple[Ranked, ...], ...]:
+def refused(rankings: Sequence[Sequence[Ranked]], why: Refusal) -> tuple[tuple[Ranked, ...], ...]:
     """The rankings without an accepted effect."""
-    return tuple(tuple(replace(each, refused=each.refused or refused) for each in tried) for tried in rankings)
+    return tuple(tuple(replace(each, refused=each.refused or why) for each in tried) for tried in rankings)
 
 
 def better(one: Fitted, other: Fitted, items: Sequence[Item]) -> bool:
@@ -578,12 +579,12 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
         return Outcome(refitted, now, (), tuple(rankings))
     now, found, leaves = _finished(now, found, records)
     ends = ranges.ends(now, leaves, is_noise(records.residual(now), records.noise))
-    refused = borne_out(now, none, records)
-    if refused is None:
+    why = borne_out(now, none, records)
+    if why is None:
         return Outcome(refitted, now, tuple(found), tuple(rankings), ends=ends, written=EXTENDED)
     of_them = tuple(dict.fromkeys(each.name for each in found))
-    withdrawn = Withdrawn(of_them, refused, *explained(now, none, records), ends)
-    return Outcome(refitted, none, (), _refused(rankings, refused), withdrawn)
+    withdrawn = Withdrawn(of_them, why, *explained(now, none, records), ends)
+    return Outcome(refitted, none, (), refused(rankings, why), withdrawn)
 
 
 def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found], float | None]:
@@ -765,7 +766,7 @@ def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step
         if second is not None and second.merit is not None and second.best.name != first.name:
             seconds.append((first, second))
     for first, second in sorted(seconds, key=lambda pair: pair[1].best.held_out):
-        alone = _without(second.best.fitted, first.name, records)
+        alone = without_effect(second.best.fitted, first.name, records)
         back = None if alone is None else _step(alone, gap, records, least=acceptance.FIRST_REMOVES)
         if alone is None or back is None or back.merit is None or back.best.name == second.best.name:
             continue
@@ -798,7 +799,7 @@ def _without_needless(
     """
     less: dict[str, Fitted] = {}
     for k in range(len(found) - 1):
-        fitted = _without(now, found[k].name, records)
+        fitted = without_effect(now, found[k].name, records)
         if fitted is None:
             continue
         with_it, without = records.residual(now), records.residual(fitted)
@@ -820,7 +821,7 @@ def _exchanged(
     latest = found[-1].name
     for _ in range(acceptance.MOST_EXCHANGES):
         for k, old in enumerate(found):
-            fitted = None if old.name == latest else less.get(old.name) or _without(now, old.name, records)
+            fitted = None if old.name == latest else less.get(old.name) or without_effect(now, old.name, records)
             if fitted is None:
                 continue
             start = _without_refit(now, old.name, records)  # a refit without it could move the others' numbers far off
@@ -837,7 +838,7 @@ def _exchanged(
                 continue
             step, other = better, _found(better, records)
             best = step.best.fitted
-            chain = _in_place(best, [*found[:k], other, *found[k + 1 :]], found[0].before, records)
+            chain = in_place(best, [*found[:k], other, *found[k + 1 :]], found[0].before, records)
             now, found, less = _without_needless(best, chain or [*_rest(found, k, other.before), other], records)
             latest = other.name
             break
@@ -910,7 +911,7 @@ def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Recor
         for k, old in enumerate(found[:-1]):
             if merit is None or old.name == first.name:
                 continue
-            fitted = _without(first.fitted, old.name, records)
+            fitted = without_effect(first.fitted, old.name, records)
             if fitted is None:
                 continue
             then = _step(fitted, 0.0, records, lambda option, name=old.name: option.name == name)  # type: ignore[misc]
@@ -922,17 +923,17 @@ def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Recor
             names = tuple(dict.fromkeys(each for each in (found[-1].name, *found[-1].rivals) if each != first.name))
             latest = Found(first.name, first.option.label, 0.0, 0.0, merit.p_value, names)
             earlier = replace(old, label=then.best.option.label)
-            chain = _in_place(best, [*found[:k], earlier, *found[k + 1 : -1], latest], found[0].before, records)
+            chain = in_place(best, [*found[:k], earlier, *found[k + 1 : -1], latest], found[0].before, records)
             if chain:
                 return best, chain
     return now, found
 
 
-def _in_place(now: Fitted, found: Sequence[Found], gap: float, records: Records) -> list[Found]:
+def in_place(now: Fitted, found: Sequence[Found], gap: float, records: Records) -> list[Found]:
     """The effects with the errors before and after each of them; empty if one does not lower the error."""
     residuals = [records.residual(now)]
     for each in reversed(found[1:]):
-        smaller = _without(now, each.name, records)
+        smaller = without_effect(now, each.name, records)
         if smaller is None:
             return []
         now = smaller
@@ -954,7 +955,7 @@ def _rest(found: Sequence[Found], k: int, without: float) -> list[Found]:
     return rest
 
 
-def _without(now: Fitted, name: str, records: Records) -> Fitted | None:
+def without_effect(now: Fitted, name: str, records: Records) -> Fitted | None:
     """The hypothesis without one effect, refitted."""
     smaller = _less(now, name)
     if smaller is None:

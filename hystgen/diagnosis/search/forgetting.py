@@ -1,0 +1,249 @@
+"""Whether the hysteresis itself is no play sum: minor loops stay open, and depend on what was before, at any speed.
+
+A play sum forgets a minor loop when it closes, and nothing else. Friction, Bouc-Wen and Duhem plants forget a little on
+all of the drive's way. An element of such a kind is fitted beside the plays, as an effect is, and judged by the same
+rules; it has no name in the catalogue and is written nowhere. At one speed way and time are the same: there it can
+take the place of creep, of a lag or of a rate dependence, and those the place of it.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.diagnosis.data import signals
+from hystgen.diagnosis.data.items import Item, rms
+from hystgen.diagnosis.search import acceptance, fits, selection
+from hystgen.diagnosis.search.fits import Fitted
+from hystgen.diagnosis.search.hypothesis import Part, Structure
+from hystgen.diagnosis.search.screening import Option, Records, Tried
+from hystgen.diagnosis.search.selection import Outcome, Refusal
+from hystgen.effects.base import Candidate, Effect, Place, Run
+from hystgen.plants import BoucWen
+from hystgen.plays import operators
+
+Array = NDArray[np.float64]
+
+NAME = "forgetting"
+
+BALANCE = 0.9
+"""Balance from which a search starts: between Dahl's element, 1, and one that turns back as it went, 0.5."""
+
+WEIGHT = 5.0
+"""[mean slopes of the records] Largest weight of the element, with which it lags: a friction of five times the stage's
+stiffness has no inverse. One that leads is left to plays with negative weights, which a play sum does not have."""
+
+LOOP = 0.1
+"""[share of the drive range] Width of the minor loop that is said to stay open, as in `docs/plants.md`."""
+
+WITHIN = 0.01, 1.0
+"""[shares of the drive range] Least and largest way over which the element forgets: below, plays of the smallest
+thresholds do as it does; above, it is a straight line and a memory of the start."""
+
+STARTS = 5
+"""[widths] Number from which it is searched for, each about three times the one before."""
+
+STEPS = 12
+"""[steps] Of the search from the best width: three numbers and linear weights, which most searches settle in six."""
+
+
+class Forgetting(Effect):
+    """Bouc-Wen's element beside the plays: `y + weight z`, `dz = dv (1 - (b sgn(z dv) + 1 - b) |z|/width)`.
+
+    With the balance b = 1 it is Dahl's friction element, the average over the drive's way of its direction.
+    """
+
+    name: Literal["forgetting"] = "forgetting"
+    weight: float
+    width: float
+    balance: float
+
+    place: ClassVar[Place] = Place.ADDED
+    timed: ClassVar[bool] = False
+
+    def added(self, run: Run) -> Array:
+        """`weight z`, from z = 0."""
+        return self.weight * run.remembered((NAME, self.width, self.balance), partial(self._element, run))
+
+    def _element(self, run: Run) -> Array:
+        made = BoucWen(0.0, 1.0, D=self.width, beta=self.balance, gamma=1.0 - self.balance)
+        return np.asarray(self.width * made.hysteretic(run.v))
+
+
+@dataclass(frozen=True)
+class Forgets:
+    """An element that forgets, fitted beside the plays, in place of names or beside them.
+
+    `before`, `after`: held-out rms without it and with it; `way`: of the drive over which it forgets, and `open`: how
+    far a minor loop over a tenth of the drive range is from closing, of its height, both as shares; `in_place_of`:
+    names that it explains better, or as well where the records show no speed; `shows_speed`: whether they do.
+    """
+
+    before: float
+    after: float
+    way: float
+    open: float
+    in_place_of: tuple[str, ...]
+    shows_speed: bool
+
+
+def forgets(outcome: Outcome, records: Records) -> Forgets | None:
+    """The element, where records bear it out beside the effects that were found, or better than these; else None.
+
+    The element is first tried in place of all names of the `outcome`, then of those that depend on time, then beside
+    them. Names that explain more stand. Where chance alone could decide between the two, they stand if the drive takes
+    ways of equal length in different times: what follows time and what does not would then not look alike.
+    """
+    none, now = outcome.refitted, outcome.fitted
+    if records.one_loop or not selection.leaves_enough(none, records):
+        return None
+    shown = shows_speed([*records.to_fit, *records.held])
+    names = tuple(dict.fromkeys(each.name for each in outcome.found))
+    for base, replaced in _bases(outcome, records):
+        alone = _element(base, records)
+        if _borne_out(base, alone, records) and (not names or _replaces(alone, now, records, shown)):
+            return _found(base, alone, replaced, shown, records)
+    if not names or not selection.leaves_enough(now, records):
+        return None
+    beside = _element(now, records)
+    return _found(now, beside, (), shown, records) if _borne_out(now, beside, records) else None
+
+
+def _bases(outcome: Outcome, records: Records) -> Iterator[tuple[Fitted, tuple[str, ...]]]:
+    """Models beside whose plays the element is tried, with the names in whose place it would stand.
+
+    The refitted one; then one that has what does not depend on time: of the effects found, or, if there are none, the
+    best that was tried, since the part of a Duhem plant that forgets is seen only beside its bent middle line.
+    """
+    now = outcome.fitted
+    names = tuple(dict.fromkeys(each.name for each in outcome.found))
+    yield outcome.refitted, names
+    timed = tuple(name for name in names if name in _timed(now))
+    if timed and len(timed) < len(names):
+        yield _without(now, timed, records), timed
+    elif not names and outcome.rankings:
+        tried = [each.tried for each in outcome.rankings[0] if each.tried.name not in _timed(each.tried.fitted)]
+        best = min(tried, key=lambda each: each.held_out, default=None)
+        if best is not None:
+            yield best.fitted, ()
+
+
+def _timed(fitted: Fitted) -> frozenset[str]:
+    """Names of the effects of a model that depend on the times of samples."""
+    return frozenset(effect.name for effect in fitted.structure.effects(fitted.shape) if type(effect).timed)
+
+
+def _without(now: Fitted, names: Sequence[str], records: Records) -> Fitted:
+    """A model without some of its effects, refitted."""
+    for name in names:
+        now = selection.without_effect(now, name, records) or now
+    return now
+
+
+def withheld(outcome: Outcome, found: Forgets | None, records: Records) -> Outcome:
+    """The outcome without the names in whose place the element stands."""
+    if found is None or not found.in_place_of:
+        return outcome
+    ranked = selection.refused(outcome, Refusal("forgets", found.after)).rankings
+    rest = [each for each in outcome.found if each.name not in found.in_place_of]
+    smaller = _without(outcome.fitted, found.in_place_of, records) if rest else outcome.refitted
+    chain = selection.in_place(smaller, rest, outcome.found[0].before, records) if rest else []
+    if not chain:
+        return Outcome(outcome.refitted, outcome.refitted, (), ranked)
+    return Outcome(outcome.refitted, smaller, tuple(chain), ranked)
+
+
+def shows_speed(items: Sequence[Item]) -> bool:
+    """Whether the drive takes ways of about the same length, from one turn to the next, in different times."""
+    moves = []
+    for item in items:
+        at = signals.reversals(item.run.v)
+        for a, b in itertools.pairwise(at):
+            moves.append((abs(float(item.run.v[b] - item.run.v[a])), float(item.run.t[b] - item.run.t[a])))
+    moves.sort()
+    widest = moves[-1][0] if moves else 0.0
+    for k, (length, seconds) in enumerate(moves):
+        for other, more in moves[k + 1 :]:
+            if other - length > acceptance.LOOP_ENDS * min(length, widest):
+                break
+            if max(seconds, more) > acceptance.LOOP_SPEEDS * min(seconds, more):
+                return True
+    return False
+
+
+def _element(now: Fitted, records: Records) -> Tried:
+    """The hypothesis with the element, from the best of several widths, fitted as far as ranking needs."""
+    low, high = records.known.drive
+    wide, slope = high - low, records.known.output_range / (high - low)
+
+    def build(x: Array) -> Forgetting:
+        return Forgetting(weight=slope * float(x[0]), width=wide * float(10.0 ** x[1]), balance=float(x[2]))
+
+    ends = np.log10(WITHIN)
+    starts = [np.array([0.0, place, BALANCE]) for place in np.linspace(ends[0], ends[1], STARTS)]
+    candidate = Candidate(
+        "an element that forgets", np.array([-WEIGHT, ends[0], 0.5 + 1e-6]), np.array([0.0, ends[1], 1.0]), starts[0],
+        build, None, tuple(starts[1:]), amounts=(0,),
+    )  # fmt: skip
+
+    def structure(part: Candidate) -> Structure:
+        return replace(now.structure, parts=(*now.structure.parts, Part(NAME, part)))
+
+    def amount(start: Array) -> fits.Search:
+        shape = np.concatenate([now.shape, start])
+        return fits.begun(structure(candidate.at(start)), records.quick, shape, now.weights).further(1, fits.COARSE)
+
+    begun = min(map(amount, starts), key=lambda each: each.now.rms)
+    whole = structure(candidate)
+    fitted = fits.begun(whole, records.quick, begun.now.shape, begun.now.best).further(STEPS).found(now.weights)
+    errors = fitted.errors(records.held)
+    option = Option(candidate.label, NAME, whole, whole, tuple(starts))
+    return Tried(option, fitted, (NAME,), rms(errors), errors)
+
+
+def _borne_out(now: Fitted, tried: Tried, records: Records) -> bool:
+    """Whether the element has the merit of a name, and takes most of what it finds."""
+    merit = selection.merit_of(now, tried, records)
+    if merit is None or not merit.worth(records.gap, records):
+        return False
+    both = ((rms(tried.fitted.errors(items)), rms(now.errors(items))) for items in (records.held, records.to_fit))
+    return all(selection.takes_most(left, gap, records.noise) for left, gap in both)
+
+
+def _replaces(alone: Tried, named: Fitted, records: Records, shown: bool) -> bool:
+    """Whether the element stands in place of what was named."""
+    both = [(alone.fitted.errors(items), named.errors(items)) for items in (records.held, records.to_fit)]
+    if all(rms(mine) <= (1.0 - acceptance.BETTER) * rms(theirs) for mine, theirs in both) and any(
+        selection.difference(theirs, mine) <= acceptance.P_SURE for mine, theirs in both
+    ):
+        return True
+    if shown or not all(selection.no_worse(rms(mine), rms(theirs), records.noise) for mine, theirs in both):
+        return False
+    mine, theirs = ([error for pair in both for error in pair[k]] for k in (0, 1))
+    return selection.difference(mine, theirs) > acceptance.P_DIFFERENT
+
+
+def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, records: Records) -> Forgets:
+    element = tried.fitted.structure.effects(tried.fitted.shape)[-1]
+    assert isinstance(element, Forgetting)
+    low, high = records.known.drive
+    return Forgets(
+        records.residual(now), tried.held_out, element.width / (high - low), _open(tried.fitted, element, low, high),
+        names, shown,
+    )  # fmt: skip
+
+
+def _open(fitted: Fitted, element: Forgetting, low: float, high: float) -> float:
+    """How far a minor loop in the middle of the drive is from closing, as a share of its height; the plays close."""
+    begin = 0.5 * (low + high)
+    end = begin + LOOP * (high - low)
+    v = np.array([low, high, low, end, begin, end])
+    r = fitted.structure.thresholds
+    y = fitted.weights @ operators.plays(v, r, np.full(len(r), low)) + element.added(Run(np.arange(6.0), v))
+    return abs(float((y[5] - y[3]) / (y[3] - y[4])))

@@ -1,0 +1,110 @@
+"""Whether the inverse of a model with effects does more than the recordings bear out.
+
+Each inverse gets the recorded outputs as its reference. The drive that the effects make of them goes into the plain
+model, and that of the plain inverse into the model with effects: if either model were the stage, this is the error that
+the compensator of the other would leave. A right effect changes the output by about as much as it explains.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.basics.problems import EffectsError, NotInvertibleError
+from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.search import acceptance
+from hystgen.diagnosis.search.acceptance import apart
+from hystgen.model import Model
+
+Array = NDArray[np.float64]
+
+SAMPLES = 6_000
+"""Most of a record that is taken, from its start: as many as the screening of effects compares."""
+
+SMOOTHED = 5
+"""[samples] A recorded output becomes a reference by two means over this many; the noise that is left is taken off."""
+
+SEED = 1
+"""Of the noise whose way through the inverse is not counted, so that the same records give the same answer."""
+
+
+@dataclass(frozen=True)
+class Wild:
+    """An inverse that does more than recordings bear out.
+
+    `moves`: rms output of the plain model behind it, less the reference, and `other` the same the other way round;
+    `gain`: held-out rms that the effects explain, all in output units; `wilder`: second differences of its drive, rms,
+    over those of the plain inverse's.
+    """
+
+    moves: float
+    other: float
+    gain: float
+    wilder: float
+
+
+def wild(extended: Model, plain: Model, held: Sequence[Item], gain: float, noise: float) -> Wild | None:
+    """What the inverse with the effects does beyond their `gain`, in the worst held-out record; None if it does not.
+
+    What the noise of the reference, let through by both inverses, moves the output by is taken off.
+    """
+    found = [each for item in held if (each := _over(extended, plain, item, gain, noise)) is not None]
+    worst = max(found, key=lambda each: each.moves, default=None)
+    if worst is None or worst.wilder <= acceptance.WILDER:
+        return None
+    return worst if worst.moves > acceptance.BEYOND_GAIN * max(gain, noise) else None
+
+
+def _over(extended: Model, plain: Model, item: Item, gain: float, noise: float) -> Wild | None:
+    """The two inverses over one record; None where one of them has no answer."""
+    end = min(len(item.run.t), SAMPLES)
+    compared = np.arange(len(item.run.t))[item.compared]
+    at = compared[compared < end]
+    if len(at) < acceptance.COMPARED_SAMPLES:
+        return None
+    t, extra = item.run.t[:end], {name: column[:end] for name, column in item.run.extra.items()}
+    known = np.flatnonzero(item.known)
+    y = np.interp(np.arange(end), known, item.y[known])
+    reference = _smooth(y)
+    try:
+        level = float(np.mean((_moved(extended, item.run.v[:end], t, extra) - y)[at]))
+        reference = reference + level
+        shaken = reference + _smooth(noise * np.random.default_rng(SEED).standard_normal(end))
+        ours, noisy = (_drive(extended, u, t, extra) for u in (reference, shaken))
+        theirs = _drive(plain, reference, t, extra)
+        behind, behind_noisy = (_moved(plain, v, t, extra) for v in (ours, noisy))
+        other = _moved(extended, theirs, t, extra)
+    except (EffectsError, NotInvertibleError):
+        return None
+    moves = apart(_rms(behind, reference, at), _rms(behind_noisy, behind, at))
+    rough = [float(np.sqrt(np.mean(np.diff(v, 2) ** 2))) for v in (ours, theirs)]
+    wilder = rough[0] / rough[1] if rough[1] > 0.0 else math.inf
+    return Wild(moves, _rms(other, reference, at), gain, wilder)
+
+
+def _moved(model: Model, v: Array, t: Array, extra: dict[str, Array]) -> Array:
+    """The output for a drive, wherever that goes."""
+    return np.asarray(model.answers(v, t=t, extra=extra)[0])
+
+
+def _drive(model: Model, u: Array, t: Array, extra: dict[str, Array]) -> Array:
+    """The drive for a reference, without an end of its range."""
+    return np.asarray(model.inverse().answers(u, clamp=False, t=t, extra=extra)[0])
+
+
+def _smooth(y: Array) -> Array:
+    """Means over a few neighbours, twice, so that noise hardly shows in second differences."""
+    n = SMOOTHED
+    kernel = np.ones(n) / n
+    for _ in range(2):
+        y = np.convolve(np.pad(y, n // 2, mode="edge"), kernel, mode="valid")
+    return y
+
+
+def _rms(one: Array, other: Array, at: NDArray[np.intp]) -> float:
+    """rms difference at samples, with a free offset."""
+    return float(np.std((one - other)[at]))
