@@ -299,8 +299,8 @@ def _harmless(
     plain = Outcome(found.refitted, found.refitted, (), found.rankings)
     with_effects, without = (selection.invertible(each, records, P0_FLOOR)[0] for each in (found, plain))
     gain = acceptance.apart(records.residual(without.fitted), records.residual(with_effects.fitted))
-    models = (Model(written(each)) for each in (with_effects, without))
-    wild = harm.wild(*models, records.held, gain, done.noise.rms)
+    extended, shorter = (Model(written(each)) for each in (with_effects, without))
+    wild = harm.wild(extended, shorter, records.held, gain, done.noise.rms)
     if wild is None:
         return found, []
     names = tuple(dict.fromkeys(each.name for each in found.found))

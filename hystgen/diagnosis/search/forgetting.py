@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from hystgen.diagnosis.data import signals
 from hystgen.diagnosis.data.items import Item, rms
-from hystgen.diagnosis.search import acceptance, fits, selection
+from hystgen.diagnosis.search import acceptance, fits, ranges, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Part, Structure
 from hystgen.diagnosis.search.screening import Option, Records, Tried
@@ -150,13 +150,14 @@ def withheld(outcome: Outcome, found: Forgets | None, records: Records) -> Outco
     """The outcome without the names in whose place the element stands."""
     if found is None or not found.in_place_of:
         return outcome
-    ranked = selection.refused(outcome, Refusal("forgets", found.after)).rankings
+    ranked = selection.refused(outcome.rankings, Refusal("forgets", found.after))
     rest = [each for each in outcome.found if each.name not in found.in_place_of]
     smaller = _without(outcome.fitted, found.in_place_of, records) if rest else outcome.refitted
     chain = selection.in_place(smaller, rest, outcome.found[0].before, records) if rest else []
     if not chain:
         return Outcome(outcome.refitted, outcome.refitted, (), ranked)
-    return Outcome(outcome.refitted, smaller, tuple(chain), ranked)
+    ends = ranges.ends(smaller, None, acceptance.is_noise(records.residual(smaller), records.noise))
+    return Outcome(outcome.refitted, smaller, tuple(chain), ranked, ends=ends, written=selection.EXTENDED)
 
 
 def shows_speed(items: Sequence[Item]) -> bool:
