@@ -131,8 +131,8 @@ class Bounds:
     `ahead`, `behind`: blocks of the user's own in front of the plays and behind; `bends`: the curve and inverse curve
     of each tanh; `ends`: of the output; `slewed`: drive codes that rounding takes from a drive at a limited rate;
     `drifted`: error of drifts in units of signals; `reached`: whether the lag can be led to every input asked of the
-    plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in front of the plays below their input; `bumps`: of
-    bent plays; `heats`: errors of temperatures of own heat, degrees.
+    plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in front of the plays below their input;
+    `bumps`: of bent plays; `heats`: errors of temperatures of own heat, degrees.
     """
 
     static: StaticModel
@@ -392,7 +392,7 @@ class Bounds:
         """Bound of the forward operator, in output codes."""
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         waited = 0.5 * 2.0**self._fine * bool(self.tables.delay.samples and self.tables.delay.share[0])
-        error = self._plays(self._arrival()[0] + short + waited)
+        error = self._plays(self._arrival()[0] + short + waited + self.slewed * 2.0**self._fine)
         if (self.lags or self.ahead) and self.static.branches_differ:  # the front may settle on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)
         for j, numbers in enumerate(self.creeps):

@@ -88,7 +88,8 @@ class ChainState(NamedTuple):
     the drive at a limited rate, of a quiet drive what arrived in front of the plays and the last reference, in front of
     two branches the last moves of what a lag is led to, and what rounding took from the drive at a limited rate;
     `flags`: whether any drive has been applied yet, 1 for the inverse operator, the number of equal references, and
-    whether a lag arrives at two branches from below; `corners`: the plays of engine corners, `()` in engine loop, which has them in `plays`."""
+    whether a lag arrives at two branches from below; `corners`: the plays of engine corners, `()` in engine loop, which
+    has them in `plays`."""
 
     plays: State
     lost: Reals  # (n + 1,), what rounding took from each play that a nonlinear dashpot moves
