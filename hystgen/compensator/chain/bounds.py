@@ -216,6 +216,8 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
     moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.lag.block)
     moved += 4.0 * u * sizes.drive * (t.delay.samples > 0)
     moved += _slewed(compiled, kind)
+    if not emitted:  # in double precision each step of such a drive is rounded
+        moved += u * sizes.drive * crossing(compiled.static, compiled.parts, compiled.seconds)
     moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own[: t.own.ahead])
     static = compiled.static
     forward = static.front_slopes[1] * math.fsum(abs(p) for p in static.pi.weights) * moved
@@ -286,12 +288,11 @@ def _kept(compiled: Compiled) -> float:
 
 
 def _slewed(compiled: Compiled, kind: str) -> float:
-    """How far a drive at a limited rate can be from that in double precision, in drive units: two roundings, of the
-    drive and of the one before where it is committed, and what they add up to while it crosses its range. In double
-    precision a step of it is a sum."""
+    """How far a drive at a limited rate can be from an exact one, in drive units: roundings of the drive, of the one
+    before where it is committed, and of the rate, and what they add up to while it crosses its range."""
     steps = crossing(compiled.static, compiled.parts, compiled.seconds)
-    u, double = float(np.finfo(kind).eps) / 2, float(np.finfo("float64").eps) / 2
-    return _sizes(compiled).drive * (2.0 * u * (steps > 0.0) + steps * (2.0 * u * u + double))
+    u = float(np.finfo(kind).eps) / 2
+    return _sizes(compiled).drive * (3.0 * u * (steps > 0.0) + steps * 2.0 * u * u)
 
 
 CELLS = 4096
@@ -389,7 +390,7 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     forward, asked = (sum(each) for each in zip(*ways, strict=True))
     whole = static.input_range[1] - static.input_range[0]
     seen = 1.0 if same else _seen(compiled)
-    kept = _slewed(compiled, arithmetic)
+    kept = _slewed(compiled, arithmetic) + _slewed(compiled, "float64")
     if compiled.tables.quiet and not same:  # the plays have seen the drive that was kept
         kept += _kept(compiled)
     if kept > 0.0:
