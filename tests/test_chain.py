@@ -300,9 +300,10 @@ def test_a_held_sample_stays_within_the_slew_limit(text: str, arithmetic: str) -
         if op[i] != step:
             applied = float(x[i])
             continue
+        limited = not -down <= last - applied <= up
         last = applied + min(max(last - applied, -down), up)
         assert abs(float(found[i]) - last) <= 2 * np.finfo(found.dtype).eps * max(abs(low), abs(high))
-        assert status[i] == slots.HELD | slots.SLEW_LIMITED * int(op[i - 1] != step)
+        assert status[i] == slots.HELD | slots.SLEW_LIMITED * limited
         applied = float(found[i])
 
 
