@@ -1,7 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* The drive nearest to v that the amplifier reaches in one step from `before`, of which rounding has
-   left `rest`. */
+/* The drive nearest to v that the amplifier reaches in one step from `before`, of which rounding
+   has left `rest`. */
 HYSTGEN_APART_IN_FIXED hystgen_ramp_t hystgen_nearest_ramp(hystgen_reach_t before,
                                                            hystgen_play_t rest, hystgen_reach_t v) {
     const hystgen_ramp_t reached = {v, 0};
@@ -33,8 +33,7 @@ static hystgen_reach_t hystgen_forward_slewed(hystgen_forward_t *self, hystgen_r
    where the answer led to, with what rounding has left of it, unless another one was applied. */
 HYSTGEN_APART_IN_FIXED hystgen_ramp_t hystgen_inverse_within(const hystgen_inverse_t *self,
                                                              hystgen_reach_t v) {
-    const bool other =
-        self->applied < self->reached.drive || self->applied > self->reached.drive;
+    const bool other = self->applied < self->reached.drive || self->applied > self->reached.drive;
     return hystgen_nearest_ramp(self->applied, other ? 0 : self->reached.rest, v);
 }
 

@@ -970,9 +970,11 @@ def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
         emit_options(model("creeping", text))
     with pytest.raises(UnsupportedEffectsError, match=r"of the 62010 codes .* moves the drive by 5.3 % of its range"):
         emit_options(model("straight"), arithmetic="q15")
-    for rate, arithmetic, finer in (("1.0e-3", "q15", "q31"), ("1.0e-5", "float32", "float64")):
+    for rate, slow, arithmetic, finer in (
+        ("1.0e-3", "1.0e-7", "q15", "q31"), ("1.0e-4", "1.0e-6", "float32", "float64"),
+    ):  # fmt: skip
         compiled(model("slow", chain("slow", f"name: slew_limit, rate: {rate}")), arithmetic)
-        slower = f"name: slew_limit, rate: {float(rate) / 100!r}"
+        slower = f"name: slew_limit, rate: {slow}"
         with pytest.raises(FormatError, match=rf"its range in \S+ samples, too slow for {arithmetic}; use {finer}, or"):
             compiled(model("slow", chain("slow", slower)), arithmetic)
     with pytest.raises(FormatError, match="creep: states and constants do not fit q31"):
