@@ -331,7 +331,7 @@ void effects_inverse(const effects_model_t *m, const effects_probe_t *q, const e
         x = argument(q, x, q->output_lsb);
         x = fmin(fmax(x, q->output_min), q->output_max);
         const real u = (real)x * (real)q->output_lsb;
-        const long tick = m->drift != 0 ? references : 0;
+        const long tick = seen.tick + seen.moving + (references < ahead ? references : ahead); /* of this reference */
         const real z = unsaturated(&p, u - (real)m->offset - (real)m->drift * (real)tick * (real)m->seconds);
         ++references;
         int i;
@@ -370,8 +370,10 @@ void effects_inverse(const effects_model_t *m, const effects_probe_t *q, const e
             }
             out->limited += (status & SLEW_LIMITED) != 0;
         }
-        judge(out, &out->worst_seen, k, "with the memory of what was applied", now, right, rounding + bit);
-        judge(out, &out->worst_own, k, "against a compensator of its own", now, alone, bound);
+        if (!m->ages || fabsl(right - seen.applied) <= (real)q->fastest * (real)m->seconds) { /* ageing is a sample late */
+            judge(out, &out->worst_seen, k, "with the memory of what was applied", now, right, rounding + bit);
+            judge(out, &out->worst_own, k, "against a compensator of its own", now, alone, bound);
+        }
         pending_seen = answer = now;
         pending_own = own_answer = alone;
         has_pending = true;

@@ -12,6 +12,7 @@ typedef struct {
     int kind;
     double drive_min, drive_max, output_min, output_max; /* values of NAME_real_t */
     double drive_lsb, output_lsb;                        /* 1 for float */
+    double fastest;                                      /* drive, input units per s */
     double forward_bound, inverse_bound, rounding_bound; /* as the header states them */
     size_t forward_size, inverse_size;
     void (*forward_init)(void *);
