@@ -349,6 +349,7 @@ void effects_inverse(const effects_model_t *m, const effects_probe_t *q, const e
             continue;
         }
         const real target = ahead ? line[ahead - 1] + part * (line[ahead] - line[ahead - 1]) : z;
+        own.travelled = seen.travelled; /* rounded drives travel farther, and the actuator with them */
         const real right = solved(&p, &seen, target), alone = solved(&p, &own, target);
         const double raw = q->inverse_step(self, x);
         const unsigned status = q->inverse_status(self);
