@@ -251,7 +251,8 @@ def _shim(case: Case) -> str:
     numbers = [
         str(KINDS[case.arithmetic]), f"{macro}_DRIVE_MIN", f"{macro}_DRIVE_MAX", f"{macro}_OUTPUT_MIN",
         f"{macro}_OUTPUT_MAX", *([f"{macro}_DRIVE_LSB", f"{macro}_OUTPUT_LSB"] if fixed else ["1", "1"]),
-        f"{macro}_MAX_RATE", *bounds, f"ROUNDING_{macro}", f"sizeof({name}_forward_t)", f"sizeof({name}_inverse_t)", *forward, *inverse,
+        f"{macro}_MAX_RATE", *bounds, f"ROUNDING_{macro}", f"sizeof({name}_forward_t)",
+        f"sizeof({name}_inverse_t)", *forward, *inverse,
     ]  # fmt: skip
     lines += [
         f"#ifdef {macro}_INVERSE_ROUNDING_ERROR{ending}",
