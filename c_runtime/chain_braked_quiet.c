@@ -2,14 +2,14 @@
 
 /* The drive nearest to v that the amplifier reaches in one step, or from which the lag behind it
    does not overshoot unless the drive stands still; v itself in the first one. */
-HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(const hystgen_inverse_t *self,
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
                                                               hystgen_reach_t v) {
-    const hystgen_reach_t near = hystgen_inverse_within(self, v);
     if (!self->moving) {
         return v;
     }
-    if (hystgen_quiet_still(&self->quiet)) {
-        return near;
-    }
-    return hystgen_inverse_within(self, hystgen_inverse_braked(self, v, near));
+    const hystgen_ramp_t near = hystgen_inverse_within(self, v);
+    self->reached = hystgen_quiet_still(&self->quiet)
+                        ? near
+                        : hystgen_inverse_within(self, hystgen_inverse_braked(self, v, near.drive));
+    return self->reached.drive;
 }

@@ -10,12 +10,13 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_kept(const hystgen_invers
 
 /* The drive nearest to v that the amplifier reaches in one step, or from which the lag behind it
    neither overshoots nor leaves its branch; v itself in the first one. */
-HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(const hystgen_inverse_t *self,
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
                                                               hystgen_reach_t v) {
-    const hystgen_reach_t near = hystgen_inverse_within(self, v);
     if (!self->moving) {
         return v;
     }
-    return hystgen_inverse_within(
+    const hystgen_reach_t near = hystgen_inverse_within(self, v).drive;
+    self->reached = hystgen_inverse_within(
         self, hystgen_inverse_kept(self, hystgen_inverse_braked(self, v, near)));
+    return self->reached.drive;
 }

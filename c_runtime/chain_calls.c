@@ -191,7 +191,7 @@ HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_next(hystgen_inverse_t *se
                                                            hystgen_real_t u) {
     hystgen_real_t level = u;
     if (!hystgen_inverse_entered(self, u, &level)) {
-        return hystgen_inverse_answer(self, self->stepped ? self->answer : self->applied);
+        return hystgen_inverse_answer(self, hystgen_inverse_held(self));
     }
     const hystgen_signal_t h = hystgen_inverse_wanted(self, hystgen_inverse_put(self, level));
     const hystgen_reach_t w = hystgen_inverse_input(self, h);

@@ -1,8 +1,10 @@
 #include "hystgen_runtime.h"
 
 /* The drive nearest to v that the amplifier reaches in one step; v itself in the first one. */
-static hystgen_reach_t hystgen_inverse_slewed(const hystgen_inverse_t *self, hystgen_reach_t v) {
-    const hystgen_reach_t highest = (hystgen_reach_t)self->applied + HYSTGEN_SLEW_RISING;
-    const hystgen_reach_t lowest = (hystgen_reach_t)self->applied - HYSTGEN_SLEW_FALLING;
-    return !self->moving ? v : v > highest ? highest : v < lowest ? lowest : v;
+static hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self, hystgen_reach_t v) {
+    if (!self->moving) {
+        return v;
+    }
+    self->reached = hystgen_inverse_within(self, v);
+    return self->reached.drive;
 }

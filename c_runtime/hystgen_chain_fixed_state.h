@@ -2,6 +2,12 @@
 #ifndef HYSTGEN_CHAIN_FIXED_STATE_H
 #define HYSTGEN_CHAIN_FIXED_STATE_H
 
+/* A drive on its way at a limited rate: as it is sent, and what rounding took from it. */
+typedef struct {
+    hystgen_reach_t drive;
+    hystgen_play_t rest;
+} hystgen_ramp_t;
+
 typedef struct {
     int64_t next; /* at the next sample for an unchanged input */
 } hystgen_creep_state_t;

@@ -2,6 +2,12 @@
 #ifndef HYSTGEN_CHAIN_STATE_H
 #define HYSTGEN_CHAIN_STATE_H
 
+/* A drive on its way at a limited rate: as it is sent, and what rounding took from it. */
+typedef struct {
+    hystgen_reach_t drive;
+    hystgen_play_t rest;
+} hystgen_ramp_t;
+
 /* A number in two parts, since it grows in steps far below its last bit. */
 typedef struct {
     hystgen_real_t high;

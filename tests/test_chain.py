@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import BRANCHES, CALM, CHAINS, CREEP, FILES, INVERSE_ALONE, STEADY, TANH, chain
+from modelfiles import BRAKED, BRANCHES, CALM, CHAINS, CREEP, FILES, INVERSE_ALONE, STEADY, TANH, chain
 from scipy import signal
 from scipy.integrate import solve_ivp
 
@@ -277,6 +277,36 @@ def test_a_lag_behind_a_slew_limit_does_not_overshoot(arithmetic: str) -> None:
         assert np.max(np.abs(y[end - 50 : end] - u[end - 1])) < 1e-3 * step, "it has arrived"
 
 
+SLEWED = chain("slewed", CREEP, "name: slew_limit, rate: 500, falling_rate: 300")
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "float64"])
+@pytest.mark.parametrize("text", [SLEWED, BRAKED, STEADY, CALM], ids=["slewed", "braked", "steady", "calm"])
+def test_a_held_sample_stays_within_the_slew_limit(text: str, arithmetic: str) -> None:
+    """After a commit and after `settle` the last drive is far away: the answers go there at the amplifier's rate."""
+    one = model("held", text)
+    numbers = compiled(one, arithmetic)
+    slew = next(effect for effect in one.effects if effect.name == "slew_limit")
+    up, down, (low, high) = slew.rate * T, slew.falling_rate * T, one.cascade.input_range
+    step, commit, settle = slots.OP_STEP, slots.OP_COMMIT, slots.OP_SETTLE
+    calls = [(step, 2.0)] * 60
+    far, near = low + 0.1 * (high - low), low + 0.9 * (high - low)
+    for op, drive in ((commit, near), (settle, far), (commit, near), (settle, far)):
+        calls += [(op, drive), (step, math.nan), (step, math.nan)]
+    op, x = (np.array(each) for each in zip(*calls, strict=True))
+    found, status = reference.answers(numbers.tables, True, op.astype(np.uint8), x)
+    last, applied = float(found[59]), 0.0
+    for i in range(60, len(calls)):
+        if op[i] != step:
+            applied = float(x[i])
+            continue
+        limited = not -down <= last - applied <= up
+        last = applied + min(max(last - applied, -down), up)
+        assert abs(float(found[i]) - last) <= 2 * np.finfo(found.dtype).eps * max(abs(low), abs(high))
+        assert status[i] == slots.HELD | slots.SLEW_LIMITED * limited
+        applied = float(found[i])
+
+
 @pytest.mark.parametrize("name", ["late", "straight", "everything"])
 def test_the_forward_operator_waits_and_rings_like_the_model(name: str) -> None:
     """Jumps and holds, to which a mode rings longest."""
@@ -487,7 +517,8 @@ def test_stays_within_its_bounds(name: str, seed: int) -> None:
     if operator(name) == "both":
         forward = answers(numbers, Run(run.t, v, run.extra), False).astype(float)
         slew = [effect.rate * T for effect in one.effects if effect.name == "slew_limit"]
-        assert not slew or np.max(np.abs(np.diff(v))) <= max(slew) * (1 + 1e-6)
+        last_bit = float(np.finfo(np.float32).eps) * max(map(abs, ends))
+        assert not slew or np.max(np.abs(np.diff(v))) <= max(slew) + last_bit
         assert np.max(np.abs(forward - one.simulate(v, t=run.t, extra=run.extra))) <= bound.forward
 
 
@@ -939,8 +970,13 @@ def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
         emit_options(model("creeping", text))
     with pytest.raises(UnsupportedEffectsError, match=r"of the 62010 codes .* moves the drive by 5.3 % of its range"):
         emit_options(model("straight"), arithmetic="q15")
-    with pytest.raises(FormatError, match=r"slew_limit: 0\.819 drive codes per sample are less than one"):
-        compiled(model("slow", chain("slow", "name: slew_limit, rate: 0.1")), "q15")
+    for rate, slow, arithmetic, finer in (
+        ("1.0e-3", "1.0e-7", "q15", "q31"), ("1.0e-4", "1.0e-6", "float32", "float64"),
+    ):  # fmt: skip
+        compiled(model("slow", chain("slow", f"name: slew_limit, rate: {rate}")), arithmetic)
+        slower = f"name: slew_limit, rate: {slow}"
+        with pytest.raises(FormatError, match=rf"its range in \S+ samples, too slow for {arithmetic}; use {finer}, or"):
+            compiled(model("slow", chain("slow", slower)), arithmetic)
     with pytest.raises(FormatError, match="creep: states and constants do not fit q31"):
         compiled(model("slow", chain("slow", "name: creep, time_constants: [1.0e+7], weights: [9.0]")), "q31")
     with pytest.raises(FormatError, match="a lag: states and constants do not fit q31"):

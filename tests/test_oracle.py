@@ -14,7 +14,7 @@ from modelfiles import FILES
 import hystgen
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
-from tests.oracle import check, models
+from tests.oracle import check, effects, models
 
 pytestmark = [
     pytest.mark.thorough,
@@ -206,6 +206,59 @@ def test_bits_of_models_that_were_once_wrong(name: str, arithmetic: str, engine:
     assert report.ok, report.table()
 
 
+EFFECTS = 6
+"""Models with effects of a run in each arithmetic; `make check-bounds` takes more, and longer ones."""
+
+
+@pytest.mark.parametrize("arithmetic", check.KINDS)
+def test_models_with_effects_keep_their_bounds_and_rates(arithmetic: str) -> None:
+    tally = effects.run(EFFECTS, 0, (arithmetic,))[arithmetic]
+    assert not tally.sentences, "\n".join(tally.sentences)
+    assert tally.models + tally.refused == EFFECTS
+    assert tally.refused <= 0.4 * EFFECTS
+    assert tally.limited > 0.1 * tally.samples
+    assert min(tally.worst.values()) > 0.0
+
+
+SLOW = """
+hystgen: 1
+name: m
+sample_time: 1.0e-5
+input_range: [0.0, 100.0]
+model:
+  pi: {thresholds: [0, 5, 10, 20], weights: [0.1, 0.02, 0.01, 0.005]}
+  effects: [{name: slew_limit, rate: 0.1}]
+"""
+
+# What goes wrong with a drive at a limited rate: a pattern in the emitted C, and the text in its place, with a number
+# of the arithmetic: a step that is a five hundredth too large
+AT_A_RATE = {
+    "its rounding adds up": (r"other \? 0 : self->reached\.rest", "0"),
+    "it is too fast": (r"(#define M_SLEW_RISING_REST) (\S+)", r"\1 (\2 + {})"),
+    "a held sample leaves it": (r"self->reached = m_inverse_within\(self, last\);", "self->reached.drive = last;"),
+}
+FASTER = {"float32": "2.0e-9f", "q31": "80000"}
+
+
+@pytest.mark.parametrize("arithmetic", FASTER)
+def test_a_drive_that_leaves_its_rate_is_noticed(arithmetic: str, tmp_path: Path) -> None:
+    (tmp_path / "slow.yaml").write_text(SLOW)
+    case = effects.read(tmp_path / "slow.yaml", arithmetic)
+    for change in ("", *AT_A_RATE):
+        folder = tmp_path / (change or "right").replace(" ", "_")  # a library is loaded once from a path
+        folder.mkdir()
+        assert effects.emit(case, folder)
+        if change:
+            old, new = AT_A_RATE[change]
+            text, count = re.subn(old, new.format(FASTER[arithmetic]), (folder / "m.c").read_text())
+            assert count
+            (folder / "m.c").write_text(text)
+        found = {operator: result for _, operator, result in effects.follow([case], folder, 1, 200_000)}
+        none = not change or ("held" in change and arithmetic == "q31")  # where every code is a number
+        assert (found["inverse"].faults == 0) == none, change
+        assert found["forward"].faults == 0 or change == "it is too fast"
+
+
 def test_models_are_of_every_kind() -> None:
     kinds: Counter[str] = Counter()
     for seed in range(400):
@@ -249,3 +302,5 @@ def test_numbers_are_read_without_the_package() -> None:
     assert list(model.stage[1].a) == [6.0, 0.1, 0.1, 0.2, 6.0, 0.1, 0.1, 0.5]
     names = (check.HERE / "oracle.c").read_text()
     assert set(re.findall(r'#include "(.*)"', names)) == {"oracle.h"}
+    alone = (check.HERE / "effects.c").read_text()
+    assert set(re.findall(r'#include "(.*)"', alone)) == {"effects.h"}

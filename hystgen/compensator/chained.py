@@ -268,6 +268,7 @@ class Compensator:
         self.actuator = Actuator(static, plays, arriving_slack(static, effects))
         self.blocks: list[Block] = [*drives, self.actuator, *outputs]
         self.slew = self._called("slew_limit")
+        self.rest = 0.0
         lags = [block for block in drives if isinstance(block, lag.LagBlock)]
         self.braked = lags[0] if self.slew and len(lags) == 1 else None
         self.parts = Parts.of(effects)
@@ -306,7 +307,7 @@ class Compensator:
         ageing_effects = self._called("ageing")
         heating = [Heating(effect, n) for effect in self.effects if isinstance(effect, OwnHeat)]
         v, beyond = np.empty(n), np.zeros(n)
-        travelled = 0.0
+        travelled = self.rest = 0.0
         for k in range(n):
             seconds = float(t[k] - t[k - 1]) if k else 0.0
             if k:
@@ -338,6 +339,7 @@ class Compensator:
             travelled += abs(drive - before) if k else 0.0
             for each in heating:
                 each.move(before, drive, seconds)
+            self.rest = self._rest(drive, before, seconds) if self.slew and seconds > 0.0 else 0.0
             v[k] = drive
         return v, beyond
 
@@ -355,10 +357,18 @@ class Compensator:
             return drive
         falling: float = min(effect.falling_rate for effect in self.slew) * seconds
         rising: float = min(effect.rate for effect in self.slew) * seconds
-        near = min(max(drive, before - falling), before + rising)
+        lowest, highest = (math.fsum((before, self.rest, move)) for move in (-falling, rising))
+        near = min(max(drive, lowest), highest)
         if self.braked is not None and not self.braked.exact:
             near = self.braked.steady(self.braked.braked(near, abs(drive - near), falling, rising))
-        return min(max(near, before - falling), before + rising)
+        return min(max(near, lowest), highest)
+
+    def _rest(self, drive: float, before: float, seconds: float) -> float:
+        """What rounding takes from a drive that the amplifier's rate has limited: millions of steps would add it up."""
+        for rate in (min(effect.rate for effect in self.slew), -min(effect.falling_rate for effect in self.slew)):
+            if drive == math.fsum((before, self.rest, rate * seconds)):
+                return math.fsum((before, self.rest, rate * seconds, -drive))
+        return 0.0
 
     def _gains(self, reference: Run) -> list[tuple[Array, Array]]:
         """Gain and offset (N,) by each logged temperature, at the time when the drive of a sample takes effect."""

@@ -329,12 +329,15 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
             constant(f"{prefix}_factor_t {prefix}_tap[{len(t.tap)}]", [f"    {_entries(row, 'f')}," for row in t.tap])
             if t.fixed else table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap))
         )  # fmt: skip
-    number = dict(zip(("OUTPUT_OFFSET", "FARTHEST_OFFSET", "SLEW_RISING", "SLEW_FALLING"), t.number, strict=False))
+    names = ("OUTPUT_OFFSET", "FARTHEST_OFFSET", "SLEW_RISING", "SLEW_FALLING", "SLEW_RISING_REST", "SLEW_FALLING_REST")
+    number = dict(zip(names, t.number, strict=False))
     words = {
         "OUTPUT_OFFSET": "part of every displacement",
         "FARTHEST_OFFSET": "largest that can be set beside it",
         "SLEW_RISING": "largest move of the drive in a step",
         "SLEW_FALLING": "",
+        "SLEW_RISING_REST": "and what rounding took from that",
+        "SLEW_FALLING_REST": "",
     }
     constants = [(name, operand(value), words[name]) for name, value in number.items()]
     farthest = (drift_fixed if t.fixed else drift).MOST_AHEAD
@@ -388,11 +391,11 @@ _KEPT = "; behind them what each has lost"
 def instance(op: str, t: ChainTables, blocks: Sequence[Block], plays: int, kept: int, moving: bool) -> list[Field]:
     """The memory of one operator, field by field."""
     inverse, taps = op == "inverse", len(t.tap)
-    slew, waiting = t.slew and not inverse, 0 if inverse else t.delay.samples
+    waiting = 0 if inverse else t.delay.samples
     return [
         *([Field("real", "pending", "drive sent but not yet part of the memory")] if inverse else []),
         Field("real", "applied", "drive seen last"),
-        *([Field("real", "reached", "what the amplifier made of it")] if slew else []),
+        *([Field("ramp", "reached", "drive at a limited rate")] if t.slew else []),
         Field("fine", "drive", "what arrived of it in front of the plays"),
         Field("signal", "level", "sum of the plays"),
         Field("signal", "output", "what the output side made of it"),
@@ -567,7 +570,7 @@ def _functions(
         f"static void hystgen_{op}_settings_init({self_t})",
         [
             "self->offset = 0;",
-            *(["self->reached = 0;"] if t.slew and not inverse else []),
+            *(["self->reached.drive = 0;", "self->reached.rest = 0;"] if t.slew else []),
             *(["hystgen_delay_rest(self->waiting, &self->oldest, 0);"] if t.delay.samples and not inverse else []),
             *(f"hystgen_clock_start(&self->{each.name});" for each in clocks),
             *(f"self->{each.name}.lead = 0;" for each in clocks),

@@ -235,10 +235,10 @@ class Variant:
         """The files of a model with effects, apart from its blocks."""
         front = "branches" if self.branches else "front" if self.fronts else "plain"
         kind, loops = "fixed" if self.fixed else "float", self.engine == "loop"
-        slew = ("chain_slew.c",) if self.braked else ("chain_slew.c", "chain_unbraked.c")
+        slew = (f"slew_{kind}.c", "chain_slew.c", *(() if self.braked else ("chain_unbraked.c",)))
         slew = slew if self.slew else ("chain_free.c",)
         braked = f"chain_braked{'_quiet' * self.quiet}{'_steady' * self.turning}.c"
-        brake = ("chain_within.c", "chain_brake.c", braked) if self.braked else ()
+        brake = ("chain_brake.c", braked) if self.braked else ()
         delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
         solve = f"chain_solve_{kind}.c"
         if not self.moves:

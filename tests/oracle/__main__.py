@@ -9,7 +9,7 @@ import time
 import warnings
 from pathlib import Path
 
-from tests.oracle import check
+from tests.oracle import check, effects
 
 
 def main() -> int:
@@ -22,6 +22,8 @@ def main() -> int:
     parser.add_argument("--seeds", type=int, default=8, help="runs of each parameter file")
     parser.add_argument("--arithmetic", choices=sorted(check.KINDS))
     parser.add_argument("--engine", choices=("corners", "loop"))
+    parser.add_argument("--effects", type=int, default=8, help="number of random models with effects, an arithmetic")
+    parser.add_argument("--samples", type=int, default=1_000_000, help="samples of each operator of such a model")
     parser.add_argument("--keep", type=Path, default=Path("build/oracle"), help="folder for models with faults")
     asked = parser.parse_args()
     combinations = tuple(
@@ -36,10 +38,16 @@ def main() -> int:
     else:
         tallies, faults = check.run(asked.models, asked.first, combinations, asked.calls)
     print(check.table(tallies))
+    sentences = check.keep(faults, asked.keep) if faults else []
+    if asked.effects and not asked.files:
+        arithmetics = tuple(dict.fromkeys(arithmetic for arithmetic, _ in combinations))
+        long = effects.run(asked.effects, asked.first, arithmetics, asked.samples)
+        print(effects.table(long))
+        sentences += [sentence for tally in long.values() for sentence in tally.sentences]
     print(f"{time.perf_counter() - begun:.0f} s")
-    for sentence in check.keep(faults, asked.keep) if faults else ():
+    for sentence in sentences:
         print(sentence)
-    return 1 if faults else 0
+    return 1 if sentences else 0
 
 
 def files(

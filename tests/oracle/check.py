@@ -117,7 +117,7 @@ class Finding:
 def _oracle() -> ctypes.CDLL:
     folder = tempfile.mkdtemp(prefix="hystgen-oracle-")
     library = Path(folder) / "oracle.so"
-    _compile([HERE / "oracle.c"], library, "-O2", "-Wall", "-Wextra", "-Werror")
+    compiled_library([HERE / "oracle.c"], library, "-O2", "-Wall", "-Wextra", "-Werror")
     loaded = ctypes.CDLL(str(library))
     shutil.rmtree(folder)
     for function in (loaded.oracle_forward, loaded.oracle_inverse):
@@ -129,15 +129,18 @@ def _oracle() -> ctypes.CDLL:
     return loaded
 
 
-def _compile(sources: list[Path], library: Path, *flags: str) -> None:
+def compiled_library(sources: list[Path], library: Path, *flags: str) -> Path:
+    """Compile a library against the headers of the oracle."""
     quad = [] if platform.machine() in ("aarch64", "arm64") else ["-lquadmath"]  # there long double has 113 bits
     command = ["gcc", "-std=gnu11", "-shared", "-fPIC", *flags, f"-I{HERE}", "-o", library, *sources, *quad, "-lm"]
     done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
     if done.returncode:
         raise RuntimeError(f"gcc failed:\n{done.stderr}")
+    return library
 
 
-def _doubles(values: Iterable[Any]) -> Any:
+def doubles(values: Iterable[Any]) -> Any:
+    """An array of C doubles."""
     listed = [float(x) for x in values]
     return (ctypes.c_double * max(len(listed), 1))(*listed)
 
@@ -154,15 +157,15 @@ def model_of(yaml: str) -> _Model:
     for place, stage in zip(made, stages, strict=False):
         if stage["kind"] == "dead_zone":
             place.count = len(stage["thresholds"])
-            place.threshold, place.weight = _doubles(stage["thresholds"]), _doubles(stage["weights"])
+            place.threshold, place.weight = doubles(stage["thresholds"]), doubles(stage["weights"])
         else:
             up, down = stage["ascending"], stage.get("descending", stage["ascending"])
             place.a = (ctypes.c_double * 8)(*(float(b[k]) for b in (up, down) for k in ("a0", "a1", "a2", "a3")))
     listed = isinstance(start, list)
     low, high = data["input_range"]
     return _Model(
-        len(pi["thresholds"]) - 1, _doubles(pi["thresholds"]), _doubles(pi["weights"]), int(listed),
-        _doubles(start if listed else [start]), len(stages), made, float(part.get("output_offset", 0.0)),
+        len(pi["thresholds"]) - 1, doubles(pi["thresholds"]), doubles(pi["weights"]), int(listed),
+        doubles(start if listed else [start]), len(stages), made, float(part.get("output_offset", 0.0)),
         float(low), float(high),
     )  # fmt: skip
 
@@ -232,7 +235,7 @@ def follow(cases: list[Case], folder: Path, calls: int = CALLS, shrink: float = 
     """Compile emitted cases into one library and run the oracle on each; `shrink` scales every stated bound."""
     source, library = folder / "batch.c", folder / "batch.so"
     source.write_text("".join(map(_shim, cases)))
-    _compile([source], library, "-O0", f"-I{folder}")  # what counts is the time to compile
+    compiled_library([source], library, "-O0", f"-I{folder}")  # what counts is the time to compile
     loaded = ctypes.CDLL(str(library))
     oracle = _oracle()
     for case in cases:
@@ -265,7 +268,7 @@ def trace(case: Case, operator: str, calls: int) -> list[Call]:
         folder = Path(name)
         emit(case, folder)
         (folder / "one.c").write_text(_shim(case))
-        _compile([folder / "one.c"], folder / "one.so", "-O0", f"-I{folder}")
+        compiled_library([folder / "one.c"], folder / "one.so", "-O0", f"-I{folder}")
         loaded = ctypes.CDLL(str(folder / "one.so"))
         log = (Call * calls)()
         oracle = _oracle()

@@ -29,7 +29,7 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, LoopRoundings, error_bounds
 from hystgen.compensator.chain import moving, own
-from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, lead
+from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, crossing, lead
 from hystgen.compensator.chain.parts import Parts
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import TABLE_ERROR
@@ -215,6 +215,9 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
     inverse += misjudged / least
     moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.lag.block)
     moved += 4.0 * u * sizes.drive * (t.delay.samples > 0)
+    moved += _slewed(compiled, kind)
+    if not emitted:  # in double precision each step of such a drive is rounded
+        moved += u * sizes.drive * crossing(compiled.static, compiled.parts, compiled.seconds)
     moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own[: t.own.ahead])
     static = compiled.static
     forward = static.front_slopes[1] * math.fsum(abs(p) for p in static.pi.weights) * moved
@@ -282,6 +285,14 @@ def _kept(compiled: Compiled) -> float:
     """How far the input of the plays can be from the one that is sought while the drive stands still, and a drive that
     keeps a lag on its branch from the state of that lag, with which the model in double precision keeps it."""
     return 2.0 * float(compiled.tables.number[DITHER])
+
+
+def _slewed(compiled: Compiled, kind: str) -> float:
+    """How far a drive at a limited rate can be from an exact one, in drive units: roundings of the drive, of the one
+    before where it is committed, and of the rate, and what they add up to while it crosses its range."""
+    steps = crossing(compiled.static, compiled.parts, compiled.seconds)
+    u = float(np.finfo(kind).eps) / 2
+    return _sizes(compiled).drive * (3.0 * u * (steps > 0.0) + steps * 2.0 * u * u)
 
 
 CELLS = 4096
@@ -379,8 +390,10 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     forward, asked = (sum(each) for each in zip(*ways, strict=True))
     whole = static.input_range[1] - static.input_range[0]
     seen = 1.0 if same else _seen(compiled)
+    kept = _slewed(compiled, arithmetic) + _slewed(compiled, "float64")
     if compiled.tables.quiet and not same:  # the plays have seen the drive that was kept
-        kept = _kept(compiled)
+        kept += _kept(compiled)
+    if kept > 0.0:
         apart = gain * pi.slopes[-1] * static.front_slopes[1] * kept
         plays = ErrorBounds(plays.forward, plays.inverse + kept + apart, plays.rounding + kept + apart)
     inverse, rounding = (

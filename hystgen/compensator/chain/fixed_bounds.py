@@ -129,10 +129,10 @@ class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
     `ahead`, `behind`: blocks of the user's own in front of the plays and behind; `bends`: the curve and inverse curve
-    of each tanh; `ends`: of the output; `slowed`: share of its rates that a slew limit loses in whole codes; `drifted`:
-    error of drifts in units of signals; `reached`: whether the lag can be led to every input asked of the plays;
-    `largest_step`: as in `Compiled`; `finer`: bits of a signal in front of the plays below their input; `bumps`: of
-    bent plays; `heats`: errors of temperatures of own heat, degrees.
+    of each tanh; `ends`: of the output; `slewed`: drive codes that rounding takes from a drive at a limited rate;
+    `drifted`: error of drifts in units of signals; `reached`: whether the lag can be led to every input asked of the
+    plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in front of the plays below their input;
+    `bumps`: of bent plays; `heats`: errors of temperatures of own heat, degrees.
     """
 
     static: StaticModel
@@ -151,7 +151,7 @@ class Bounds:
     taps: list[float]
     bends: list[Bend]
     ends: tuple[float, float]
-    slowed: float
+    slewed: float
     reached: bool
     largest_step: float
     finer: int
@@ -392,7 +392,7 @@ class Bounds:
         """Bound of the forward operator, in output codes."""
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
         waited = 0.5 * 2.0**self._fine * bool(self.tables.delay.samples and self.tables.delay.share[0])
-        error = self._plays(self._arrival()[0] + short + waited)
+        error = self._plays(self._arrival()[0] + short + waited + self.slewed * 2.0**self._fine)
         if (self.lags or self.ahead) and self.static.branches_differ:  # the front may settle on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)
         for j, numbers in enumerate(self.creeps):
@@ -420,8 +420,7 @@ class Bounds:
             error = error * math.fsum(map(abs, self.taps)) + own
         for gain in reversed(self._gains):
             error = error / gain.least + gain.back + 0.5 * self._signal * (1.0 + 1.0 / gain.least)
-        whole = float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
-        apart = self._plays(self.slowed * whole) if self.slowed else 0.0  # states behind a slew limit in whole codes
+        apart = self._plays(self.slewed * 2.0**self._fine) if self.slewed else 0.0  # states behind a slew limit
         seen = apart * math.prod(numbers.rest for numbers in self.creeps)
         seen *= math.prod(max(each.linear.forward.largest, 1.0) for each in self.behind)
         for each in reversed(self.behind):
@@ -460,9 +459,9 @@ class Bounds:
         """Error of the signal that the inverse asks for in front of the memoryless part, in units of signals."""
         code, steep = self._arrival(), self.static.front_slopes[1]
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
-        slowed = self.slowed * float(self.inner.drive[1] - self.inner.drive[0]) * 2.0**self._fine
         solved = self._solution() + steep * float(self.inner.back())
-        solved += steep * (code[0] if self.condition else sum(code) + short + slowed)  # both have seen it, or not
+        apart = sum(code) + short + self.slewed * 2.0**self._fine
+        solved += steep * (code[0] if self.condition else apart)  # both have seen it, or not
         return self._gain() * self._residual(way, solved) / self._arriving
 
     def _found_error(self, way: float) -> float:
@@ -548,11 +547,8 @@ class Bounds:
         return max(own, self._limits_off()) if self.condition else own
 
     def _limits_off(self) -> float:
-        """How far the limits of the drive are off because they are whole codes."""
-        lsb = self.inner.drive_lsb
-        rates = (rate for each in self.parts.slew for rate in (each.rate, each.falling_rate))
-        slew = [steps - math.floor(steps) for steps in (Fraction(rate * self.seconds) / lsb for rate in rates)]
-        return upward(max([self.inner.drive_short() / lsb, *slew]))
+        """How far the limits of the drive are off because drives are whole codes: a limited one and the one before."""
+        return upward(max(self.inner.drive_short() / self.inner.drive_lsb, Fraction(2.0 * self.slewed)))
 
     def inverse(self) -> float:
         """Bound of the inverse in drive codes, with the effect of another branch and of limits."""

@@ -29,12 +29,18 @@ from hystgen.compensator.chain.layout import (
     BRAKED_DROP,
     DITHER,
     DRIVE_BITS,
+    FALLING_REST,
+    FARTHEST,
     LARGEST_LEVEL,
     LEAST_CODE,
     LEVEL_BITS,
     LEVEL_DROP,
     MOST_CODE,
+    MOST_SLEWED,
     OFFSET,
+    REST_BITS,
+    RISING,
+    SHARE,
     SHARE_BITS,
     VERIFIED_SHARE,
     ChainTables,
@@ -42,12 +48,15 @@ from hystgen.compensator.chain.layout import (
     Compiled,
     OwnChainTables,
     braked,
+    crossing,
     fastest,
     hold,
     lead,
     output_range,
     quiet,
+    rates,
     read,
+    too_slow,
 )
 from hystgen.compensator.chain.moving import Bumps
 from hystgen.compensator.chain.own_fixed import Formats
@@ -186,13 +195,13 @@ class _Builder:
         if self.parts.own_drives or self.parts.own_outputs:
             tables = OwnChainTables(*tables)
             tables.own_effects = tuple(map(type, (*self.parts.own_drives, *self.parts.own_outputs)))
-        slowed = max((1.0 - math.floor(rate) / float(rate) for rate in self.rates()), default=0.0)
-        max_rate = self._max_rate()
+        slewed = (0.5 + self._slewed) * bool(self.parts.slew)
+        max_rate = fastest(static, self.parts, self.seconds, self.how)
         weights = self.taps.weights.tolist() if self.taps else []
         bounds = Bounds(
             static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags,
             self.ahead, self.behind, self.modes, sum(each.error for each in self.clocks), weights,
-            self.bends, (self.low, self.high), slowed, self.reached, self._largest_step(), self.finer,
+            self.bends, (self.low, self.high), slewed, self.reached, self._largest_step(), self.finer,
             self.seconds, self.bumps, [one.error for one in self.heats],
         )  # fmt: skip
         if static.branches_differ:
@@ -363,11 +372,11 @@ class _Builder:
 
     def _numbers(self) -> list[int]:
         span = self.inner.drive[1] - self.inner.drive[0]
-        found = [0] * 15
+        found = [0] * 17
         found[OFFSET] = self.signal(self.static.output_offset)
-        found[1] = self.signal(self.high - self.low)
-        found[2], found[3] = self.slew(span)
-        found[4] = round(VERIFIED_SHARE * (self.about.code_max + 1))
+        found[FARTHEST] = self.signal(self.high - self.low)
+        found[RISING : FALLING_REST + 1] = self.slew(span)
+        found[SHARE] = round(VERIFIED_SHARE * (self.about.code_max + 1))
         found[LEVEL_BITS], found[LEVEL_DROP] = self.bits, self.drop
         most = self._farthest + math.ceil(self.bumps.largest)
         found[LARGEST_LEVEL] = min(self.inner.slope[-1] * most >> self.drop, LARGEST)
@@ -379,34 +388,27 @@ class _Builder:
         found[BRAKED_DROP] = max((span << found[DRIVE_BITS]).bit_length() + 2 - COARSE.bit_length(), 0)
         return found
 
-    def _max_rate(self) -> float:
-        """`Compiled.max_rate`, for slew limits in whole codes."""
-        found = fastest(self.static, self.parts, self.seconds, self.how)
-        whole = (math.floor(rate) * float(self.drive_lsb) / self.seconds for rate in self.rates())
-        return min(found, *whole) if self.parts.slew else found
-
     def _largest_step(self) -> float:
-        """`Compiled.largest_step`."""
+        """`Compiled.largest_step`, and a code that a limited drive makes up for at once."""
         low, high = self.static.input_range
-        return min(self._max_rate() * self.seconds, high - low)
+        max_rate = fastest(self.static, self.parts, self.seconds, self.how)
+        return min(max_rate * self.seconds + float(self.drive_lsb) * bool(self.parts.slew), high - low)
 
-    def rates(self) -> tuple[Fraction, ...]:
-        """Drive codes by which the drive may rise and fall in one step; empty without a slew limit."""
+    def slew(self, span: int) -> list[int]:
+        """Whole drive codes by which the drive may rise and fall in one step, and the fractions beside them."""
         if not self.parts.slew:
-            return ()
-        pairs = [(each.rate, each.falling_rate) for each in self.parts.slew]
-        rising, falling = (min(each) for each in zip(*pairs, strict=True))
-        return tuple(Fraction(x * self.seconds) / self.drive_lsb for x in (rising, falling))
+            return [0, 0, 0, 0]
+        if self._slewed > MOST_SLEWED:
+            steps = crossing(self.static, self.parts, self.seconds)
+            raise FormatError((("model", "effects"), too_slow(steps, self.arithmetic, self.about.finer)))
+        fractions = (math.floor(rate / self.drive_lsb * 2**REST_BITS) for rate in rates(self.parts, self.seconds))
+        inside = [divmod(min(rate, (span + 1) << REST_BITS), 1 << REST_BITS) for rate in fractions]
+        return [*(whole for whole, _ in inside), *(rest for _, rest in inside)]
 
-    def slew(self, span: int) -> tuple[int, int]:
-        """`rates` in whole codes."""
-        if not self.parts.slew:
-            return 0, 0
-        whole = [math.floor(rate) for rate in self.rates()]
-        if min(whole) < 1:
-            code = f"{float(min(self.rates())):.3g} drive codes per sample"
-            self._refuse(f"slew_limit: {code} are less than one, too slow")
-        return min(whole[0], span + 1), min(whole[1], span + 1)
+    @property
+    def _slewed(self) -> float:
+        """Codes that rounding a limited rate adds up to while the drive crosses its range."""
+        return crossing(self.static, self.parts, self.seconds) * 2.0**-REST_BITS
 
     def _lags(self) -> Any:
         wanted = self._finest()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -15,18 +16,22 @@ from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
 from hystgen.compensator.chain import moving, own
 from hystgen.compensator.chain.layout import (
+    MOST_SLEWED,
     VERIFIED_SHARE,
     ChainTables,
     Compiled,
     OwnChainTables,
     Stages,
     braked,
+    crossing,
     fastest,
     hold,
     lead,
     output_range,
     quiet,
+    rates,
     read,
+    too_slow,
 )
 from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.float_tables import build_float, inward
@@ -114,6 +119,22 @@ def _heat(
     )
 
 
+def _in_two(x: Fraction, dtype: Any) -> tuple[float, float]:
+    """A number that is at least 0 as one of the arithmetic and what rounding took from that, together no larger."""
+    whole = dtype(min(float(x), float(np.finfo(dtype).max) / 32))
+    rest = dtype(float(x - Fraction(float(whole))))
+    if Fraction(float(whole)) + Fraction(float(rest)) > x:
+        rest = np.nextafter(rest, dtype(-np.inf))
+    return float(whole), float(rest)
+
+
+def slewed(steps: float, dtype: Any) -> float:
+    """What rounding a drive at a limited rate adds up to in that many steps, share of the range's end: in each half a
+    last bit of what is kept beside the drive, and of the rate."""
+    u = float(np.finfo(dtype).eps) / 2
+    return steps * 2.0 * u * u
+
+
 def build(
     chain: Chain, arithmetic: str, seconds: float, how: Compensation, engine: str, drive_lsb: float | None
 ) -> Compiled:
@@ -147,8 +168,10 @@ def build(
     span, drive_span = float(high) - float(low), static.input_range[1] - static.input_range[0]
     reading = read(static, parts, seconds, how)
     taps, ahead = reading.taps, reading.ahead(how.preview)
-    rates = [(each.rate * seconds, each.falling_rate * seconds) for each in parts.slew]
-    rising, falling = (min(each) for each in zip(*rates, strict=True)) if rates else (0.0, 0.0)
+    slew = [rate for move in rates(parts, seconds) or (Fraction(0), Fraction(0)) for rate in _in_two(move, dtype)]
+    steps = crossing(static, parts, seconds)
+    if slewed(steps, dtype) > MOST_SLEWED * float(np.finfo(dtype).eps):
+        raise FormatError((("model", "effects"), too_slow(steps, arithmetic, "float64")))
     lead_room = math.prod((2.0 / row[lag.LATE if exact else lag.RATE] for exact, row in lags), start=8.0)
     steepest = 1.0 / (min(static.pi.weights) if parts.lags and min(static.pi.weights) > 0.0 else 1.0)
     weights = float(np.sum(np.abs(taps.weights))) if taps else 1.0
@@ -185,8 +208,8 @@ def build(
         own.build(drives, outputs, reals),
         _behind(parts, arithmetic),
         reals(taps.weights if taps else [], "weights of the preview"),
-        reals([static.output_offset, span, rising, falling, VERIFIED_SHARE, dither], "offset or rates"),
-        int(bool(rates)),
+        reals([static.output_offset, span, *slew[::2], *slew[1::2], VERIFIED_SHARE, dither], "offset or rates"),
+        int(bool(parts.slew)),
         braked(parts, [exact for exact, _ in lags]),
         quiet(how, taps),
         int(turning),

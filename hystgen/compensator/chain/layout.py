@@ -32,13 +32,13 @@ from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import MOST_REFERENCES, Compensation
 from hystgen.plays.slots import Counts, Reals
 
-OFFSET, FARTHEST, RISING, FALLING, SHARE, DITHER = range(6)
+OFFSET, FARTHEST, RISING, FALLING, RISING_REST, FALLING_REST, SHARE, DITHER = range(8)
 """Places in `ChainTables.number`: output offset, the largest offset that may be set, how far the drive may rise and
-fall in a step, the share with which verification corrects, and how far a drive at rest goes to and fro, as a signal in
-front of the plays."""
+fall in a step, what rounding took from these two, the share with which verification corrects, and how far a drive at
+rest goes to and fro, as a signal in front of the plays."""
 
 LEVEL_BITS, LEVEL_DROP, LARGEST_LEVEL, LEAST_CODE, MOST_CODE, SHARE_BITS, DRIVE_BITS, ARRIVING_BITS, BRAKED_DROP = (
-    range(6, 15)
+    range(8, 17)
 )
 """Further places in fixed point: bits of a signal behind the plays below an output code, bits of a sum of the plays
 below those of a signal, the largest sum asked of the plays, the least and largest code of a drive before it is limited,
@@ -47,6 +47,13 @@ bits of such a signal below the numbers with which the lead of a braked lag is s
 
 TRAVEL_BITS = 16
 """In fixed point, verification sets travels in multiples of 2^16 drive codes."""
+
+REST_BITS = 30
+"""In fixed point, bits below a code of what rounding takes from a drive at a limited rate, and from that rate."""
+
+MOST_SLEWED = 16.0
+"""[last bits of the range's end] What rounding may add up to while a drive crosses its range at a limited rate; slower
+rates are refused. Derived: a bound of float32 is some 100 of them, so that a tenth of it goes to the rate."""
 
 VERIFIED_SHARE = 0.125
 """The share with which verification corrects: a number of every arithmetic."""
@@ -222,6 +229,28 @@ def lead(lags: Sequence[tuple[bool, tuple[float, float, float, float]]], ahead: 
 def braked(parts: Parts, exact: Sequence[bool]) -> int:
     """1 where a slew limit has one lag behind it that is led; `exact`: whether each lag is inverted exactly."""
     return int(bool(parts.slew) and list(exact) == [False])
+
+
+def rates(parts: Parts, seconds: float) -> tuple[Fraction, ...]:
+    """How far the drive may rise and fall in a step, in drive units; empty without a slew limit."""
+    if not parts.slew:
+        return ()
+    pairs = [(each.rate, each.falling_rate) for each in parts.slew]
+    return tuple(Fraction(min(each)) * Fraction(seconds) for each in zip(*pairs, strict=True))
+
+
+def crossing(static: StaticModel, parts: Parts, seconds: float) -> float:
+    """Steps in which a drive at its limited rate crosses its range; 0 without a slew limit."""
+    low, high = static.input_range
+    return max((float(Fraction(high - low) / rate) for rate in rates(parts, seconds)), default=0.0)
+
+
+def too_slow(steps: float, arithmetic: str, finer: str) -> str:
+    """Refusal of a rate at which the drive crosses its range in that many steps."""
+    return (
+        f"slew_limit: the drive crosses its range in {steps:.2g} samples, too slow for {arithmetic}; use {finer}, or a "
+        "longer sample_time"
+    )
 
 
 HELD_CODES = 3

@@ -35,6 +35,7 @@ class Blocks(NamedTuple):
     plays: tuple[Function, Function, Function, Function]  # start, follow, started, inverse input
     finer: Function  # the signal in front of the plays, with bits below their input
     braked: Function  # the drive within reach from which a lag does not overshoot
+    ramp: Function  # a drive at a limited rate one step later, and what rounding took from it
     own: tuple[Function, Function, Function]  # of the user's own: product, signal into a block, signal out of it
 
 

@@ -13,7 +13,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.chain.layout import DITHER, FALLING, FARTHEST, OFFSET, RISING, SHARE, ChainTables
+from hystgen.compensator.chain.layout import (
+    DITHER,
+    FALLING,
+    FALLING_REST,
+    FARTHEST,
+    OFFSET,
+    RISING,
+    RISING_REST,
+    SHARE,
+    ChainTables,
+)
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat
 from hystgen.compensator.chain.sides import Blocks, sides_of
 from hystgen.compensator.layout import clamp_drive, inverse_clamp
@@ -69,16 +79,17 @@ from hystgen.plays.slots import (
     Reals,
 )
 
-SET, OUTPUT, APPLIED, REACHED, ARRIVED, REFERENCE, WAY, MOVED = range(8)
+SET, OUTPUT, APPLIED, REACHED, ARRIVED, REFERENCE, WAY, MOVED, REST = range(9)
 MOVING, OPERATOR, EQUAL, RISES = range(4)
 
 
 class ChainState(NamedTuple):
     """One instance. `real`: the offset set from outside, the last result of the output side, the last applied drive,
-    the drive behind a slew limit of the forward operator, of a quiet drive what arrived in front of the plays and the
-    last reference, and in front of two branches the last moves of what a lag is led to; `flags`: whether any drive has
-    been applied yet, 1 for the inverse operator, the number of equal references, and whether a lag arrives at two
-    branches from below; `corners`: the plays of engine corners, `()` in engine loop, which has them in `plays`."""
+    the drive at a limited rate, of a quiet drive what arrived in front of the plays and the last reference, in front of
+    two branches the last moves of what a lag is led to, and what rounding took from the drive at a limited rate;
+    `flags`: whether any drive has been applied yet, 1 for the inverse operator, the number of equal references, and
+    whether a lag arrives at two branches from below; `corners`: the plays of engine corners, `()` in engine loop, which
+    has them in `plays`."""
 
     plays: State
     lost: Reals  # (n + 1,), what rounding took from each play that a nonlinear dashpot moves
@@ -120,7 +131,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         Waiting(np.zeros(waiting, dtype), np.zeros(1, np.int64)),
         np.zeros(t.own.place[-1], dtype),
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
-        np.zeros(8, dtype),
+        np.zeros(9, dtype),
         np.array([0, int(inverse), 0, 1], np.int64),
         memory(len(t.threshold) - 1, dtype) if corners else (),
         np.zeros(4 * corners, dtype),
@@ -156,7 +167,7 @@ def made_of(
     preview_target, delayed = blocks.target, blocks.delayed
     front_forward, front_inverse = blocks.front
     start, follow, started, inverse_input = blocks.plays
-    finer, braked = blocks.finer, blocks.braked
+    finer, braked, ramp = blocks.finer, blocks.braked, blocks.ramp
     steady_solve, steady_kept, steady_absorb = blocks.lag.steady_solve, blocks.lag.steady_kept, blocks.lag.steady_absorb
     steady_missed = blocks.lag.steady_missed
     finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared = codes
@@ -198,6 +209,8 @@ def made_of(
     def settings_reset(t: ChainTables, s: ChainState) -> None:
         """Offset and gains as in the parameter file."""
         s.real[SET] = t.limits[ZERO]
+        s.real[REACHED] = t.limits[ZERO]
+        s.real[REST] = t.limits[ZERO]
         for j in range(len(t.clock)):
             clock_start(s.clock, j)
         for j in range(len(t.heat.turns)):
@@ -384,27 +397,64 @@ def made_of(
         s.real[APPLIED] = v
         s.flags[MOVING] = 1
 
+    # ---------------------------------------------------------------- chain_slew.c
+
     @jit
-    def slewed(t: ChainTables, s: ChainState, before: Any, v: Any) -> Any:
-        """The drive nearest to v that the amplifier can reach from `before` in one step."""
-        if not t.slew or not s.flags[MOVING]:
+    def nearest_ramp(t: ChainTables, before: Any, rest: Any, v: Any) -> tuple[Any, Any]:
+        """The drive nearest to v that the amplifier reaches in one step from `before`, of which rounding has left
+        `rest`, and what rounding leaves of it."""
+        highest, above = ramp(before, rest, t.number[RISING], t.number[RISING_REST])
+        if v > highest or (v == highest and above < 0):
+            return highest, above
+        lowest, below = ramp(before, rest, -t.number[FALLING], -t.number[FALLING_REST])
+        if v < lowest or (v == lowest and below > 0):
+            return lowest, below
+        return v, t.limits[ZERO]
+
+    @jit
+    def forward_slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
+        """The drive nearest to v that the amplifier reaches in one step; v itself in the first one."""
+        if not t.slew:
             return v
-        if v > before + t.number[RISING]:
-            return before + t.number[RISING]
-        if v < before - t.number[FALLING]:
-            return before - t.number[FALLING]
-        return v
+        drive, rest = v, t.limits[ZERO]
+        if s.flags[MOVING]:
+            drive, rest = nearest_ramp(t, s.real[REACHED], s.real[REST], v)
+        s.real[REACHED], s.real[REST] = drive, rest
+        return drive
+
+    @jit
+    def inverse_within(t: ChainTables, s: ChainState, v: Any) -> tuple[Any, Any]:
+        """The drive nearest to v that the amplifier reaches in one step from the one applied last. That is where the
+        answer led to, with what rounding has left of it, unless another one was applied."""
+        rest = s.real[REST] if s.real[APPLIED] == s.real[REACHED] else t.limits[ZERO]
+        return nearest_ramp(t, s.real[APPLIED], rest, v)
+
+    @jit
+    def inverse_held(t: ChainTables, s: ChainState) -> Any:
+        """The last answer once more, or the drive nearest to it that the amplifier reaches in one step."""
+        last = s.plays.real[ANSWER] if s.plays.counts[STEPPED] else s.real[APPLIED]
+        if not t.slew or not s.flags[MOVING]:
+            return last
+        s.real[REACHED], s.real[REST] = inverse_within(t, s, last)
+        if s.real[REACHED] != last:
+            s.plays.counts[STATUS] |= SLEW_LIMITED
+        return s.real[REACHED]
+
+    # ---------------------------------------------------------------- chain_unbraked.c or one of chain_braked*.c
 
     @jit
     def inverse_slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
         """The drive in reach that is nearest to v, or from which a lag does not overshoot."""
-        near = slewed(t, s, s.real[APPLIED], v)
-        if not t.braked or not s.flags[MOVING] or (t.quiet and s.flags[EQUAL] >= t.quiet):
-            return near
-        drive = braked(t, s, v, near)
-        if t.turning:
-            drive = drive_code(t, steady_hold(t, s, entered_drive(t, drive)))
-        return slewed(t, s, s.real[APPLIED], drive)
+        if not t.slew or not s.flags[MOVING]:
+            return v
+        near, rest = inverse_within(t, s, v)
+        if t.braked and not (t.quiet and s.flags[EQUAL] >= t.quiet):
+            drive = braked(t, s, v, near)
+            if t.turning:
+                drive = drive_code(t, steady_hold(t, s, entered_drive(t, drive)))
+            near, rest = inverse_within(t, s, drive)
+        s.real[REACHED], s.real[REST] = near, rest
+        return near
 
     @jit
     def forward_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
@@ -416,10 +466,9 @@ def made_of(
             else:
                 delay_rest(s.waiting, v)
             late = delayed(t.delay, s.waiting)
-        reached = slewed(t, s, s.real[REACHED], late)
+        reached = forward_slewed(t, s, late)
         if reached != late:
             s.plays.counts[STATUS] |= SLEW_LIMITED
-        s.real[REACHED] = reached
         absorb(t, s, v, reached)
 
     @jit
@@ -498,7 +547,7 @@ def made_of(
         if not finite(t, u):
             s.plays.counts[STATUS] |= HELD
             preview_repeat(s.line)
-            return inverse_answer(s.plays, s.plays.real[ANSWER] if s.plays.counts[STEPPED] else s.real[APPLIED])
+            return inverse_answer(s.plays, inverse_held(t, s))
         y = inverse_put(t, s, u)
         moving = s.flags[MOVING] != 0
         h = output_side_solve(t, s, y) if moving else output_side_resting(t, s, y)

@@ -21,6 +21,7 @@ from hystgen.compensator.chain.layout import (
     LEVEL_BITS,
     LEVEL_DROP,
     MOST_CODE,
+    REST_BITS,
     RISING,
     SHARE_BITS,
     TRAVEL_BITS,
@@ -176,9 +177,21 @@ def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
     return drive_code(t, drive)
 
 
+# ---------------------------------------------------------------- slew_fixed.c
+
+
+@jit
+def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
+    """The drive `before`, of which rounding has left `rest`, one step of `move` and `more` later, and what rounding
+    leaves of it."""
+    left = rest + more
+    whole = (left + (1 << (REST_BITS - 1))) >> REST_BITS
+    return before + move + whole, left - (whole << REST_BITS)
+
+
 BLOCKS = Blocks(
     lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, fixed_delayed,
-    (front_forward, front_inverse), moving_fixed.PLAYS, finer, braked,
+    (front_forward, front_inverse), moving_fixed.PLAYS, finer, braked, ramp,
     (own_fixed.product, own_fixed.entered, own_fixed.left),
 )  # fmt: skip
 CORNERS = BLOCKS._replace(plays=corners_fixed.PLAYS, finer=corners_fixed.finer)

@@ -70,9 +70,23 @@ def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
     return lag_braked(t.lag, s.lag, near, beyond, t.number[FALLING], t.number[RISING])
 
 
+# ---------------------------------------------------------------- slew_float.c
+
+
+@jit
+def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
+    """The drive `before`, of which rounding has left `rest`, one step of `move` and `more` later, and what rounding
+    leaves of it."""
+    following = before + move
+    moved = following - before
+    left = ((before - (following - moved)) + (move - moved)) + (rest + more)
+    drive = following + left
+    return drive, left - (drive - following)
+
+
 BLOCKS = Blocks(
     lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, delayed,
-    (front_forward, front_inverse), moving_float.PLAYS, finer, braked, (own.product, own.passed, own.passed),
+    (front_forward, front_inverse), moving_float.PLAYS, finer, braked, ramp, (own.product, own.passed, own.passed),
 )  # fmt: skip
 CORNERS = BLOCKS._replace(plays=corners_float.PLAYS)
 CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)
