@@ -10,11 +10,14 @@ int main(void)
     {name}_real_t x;
     {name}_{op}_init(&self);
     while ((call = getchar()) != EOF && fread(&x, sizeof x, 1, stdin) == 1) {{
-        switch (call) {{
+        switch (call & 127) {{
         case 0: (void){name}_{op}_step(&self, x); break;
         case 1: {commit} break;
         case 2: {name}_{op}_reset(&self, x); break;
         default: {name}_{op}_init(&self); break;
+        }}
+        if (call < 128) {{
+            (void){name}_{op}_status(&self);
         }}
     }}
     return 0;
@@ -23,6 +26,7 @@ int main(void)
 
 
 def c_main(name: str, op: str) -> str:
-    """Its text for operator `op` of the model `name`; reads a byte for the call and a number for its argument, each."""
+    """Its text for operator `op` of the model `name`; of each call it reads a byte, from 128 on with the status unread,
+    and a number for the argument."""
     commit = f"{name}_{op}_commit(&self, x);" if op == "inverse" else ""
     return _MAIN.format(name=name, op=op, commit=commit)

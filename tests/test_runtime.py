@@ -177,7 +177,7 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
             own = (getattr(library, f"hystgen_{op}_{word}") for word in ("init", "reset", "step", "status"))
             init, reset, step, read = own
             init(self)
-            for i, (kind, value) in enumerate(zip(call, values.tolist(), strict=True)):
+            for i, (kind, value) in enumerate(zip(call & slots.OP_CALL, values.tolist(), strict=True)):
                 if kind == slots.OP_STEP:
                     found[i] = step(self, value)
                 elif kind == slots.OP_COMMIT:
@@ -186,7 +186,7 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
                     reset(self, value)
                 else:
                     init(self)
-                status[i] = read(self)
+                status[i] = 0 if call[i] & slots.OP_UNREAD else read(self)
             assert found.tobytes() == expected.astype(real).tobytes(), (compiler, op)
             assert status.tolist() == bits.tolist(), (compiler, op)
 

@@ -42,6 +42,7 @@ from hystgen.plays.slots import (
     DRIVE_MAX,
     DRIVE_MIN,
     LOOP,
+    OP_CALL,
     OP_COMMIT,
     OP_INIT,
     OP_RESET,
@@ -49,6 +50,7 @@ from hystgen.plays.slots import (
     ZERO,
     Bytes,
     Reals,
+    read,
 )
 
 
@@ -107,24 +109,25 @@ def _corner_operations(
 
     @jit.jit
     def run(t: Any, m: Any, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
-        """Run op[i] with argument x[i]. answers[i] is the answer of a step, else 0; status[i] is read and cleared."""
+        """Run op[i] with argument x[i]. answers[i] is the answer of a step, else 0; status[i] is read and cleared, or
+        left for a later call."""
         for i in range(len(op)):
+            call = op[i] & OP_CALL
             answers[i] = t.limits[ZERO]
-            if op[i] == OP_INIT:
+            if call == OP_INIT:
                 init(t, m, inverse)
-            elif op[i] == OP_COMMIT:
+            elif call == OP_COMMIT:
                 inverse_commit(t, m, x[i])
             elif inverse:
-                if op[i] == OP_RESET:
+                if call == OP_RESET:
                     inverse_reset(t, m, x[i])
                 else:
                     answers[i] = inverse_step(t, m, x[i])
-            elif op[i] == OP_RESET:
+            elif call == OP_RESET:
                 forward_reset(t, m, x[i])
             else:
                 answers[i] = forward_step(t, m, x[i])
-            status[i] = m.counts[STATUS]
-            m.counts[STATUS] = 0
+            status[i] = read(m.counts, STATUS, op[i])
 
     return Operations(init, visit, run, forward_step, inverse_step, front_forward, front_inverse)
 

@@ -34,6 +34,7 @@ from hystgen.plays.slots import (
     HELD,
     HOLD,
     INPUT_CLAMPED,
+    OP_CALL,
     OP_COMMIT,
     OP_INIT,
     OP_RESET,
@@ -42,6 +43,7 @@ from hystgen.plays.slots import (
     ZERO,
     Bytes,
     Reals,
+    read,
 )
 
 
@@ -258,21 +260,22 @@ def made_of(
     def run(
         t: Tables | FixedTables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes
     ) -> None:
-        """Run op[i] with argument x[i]. answers[i] is the answer of a step, else 0; status[i] is read and cleared."""
+        """Run op[i] with argument x[i]. answers[i] is the answer of a step, else 0; status[i] is read and cleared, or
+        left for a later call."""
         for i in range(len(op)):
-            if op[i] == OP_INIT:
+            call = op[i] & OP_CALL
+            if call == OP_INIT:
                 init(t, s, inverse)
-            elif op[i] == OP_COMMIT:
+            elif call == OP_COMMIT:
                 inverse_commit(t, s, x[i])
             else:
-                if op[i] == OP_RESET:
+                if call == OP_RESET:
                     reset(t, s, inverse)
                 if inverse:
                     inverse_step(t, s, x[i])
                 else:
                     forward_step(t, s, x[i])
-            answers[i] = s.real[ANSWER] if op[i] == OP_STEP else t.limits[ZERO]
-            status[i] = s.counts[STATUS]
-            s.counts[STATUS] = 0
+            answers[i] = s.real[ANSWER] if call == OP_STEP else t.limits[ZERO]
+            status[i] = read(s.counts, STATUS, op[i])
 
     return Operations(init, visit, run, forward_step, inverse_step, front_forward, front_inverse)

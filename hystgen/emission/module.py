@@ -28,6 +28,7 @@ from hystgen.emission.options import OPTIONS, Options, seal
 from hystgen.emission.text import WIDTH, comment_text, define, fit, literal
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters, parameters_sha256
+from hystgen.plays import slots
 
 PERIODS = (50, 200)
 """[samples] Periods for which the header states what is lost of a sine: a fast one, as long as the fastest sweep for
@@ -93,7 +94,7 @@ def emitted(
     ):
         file = f"{name}_selftest{ending}"
         top = banner_of(values, file, about, details)
-        made[file] = render(f"selftest{ending}.j2", values, banner=top, operators=operators)
+        made[file] = render(f"selftest{ending}.j2", values, banner=top, operators=operators, unread=slots.OP_UNREAD)
     return {file: seal(_tidy(fit(text))) for file, text in made.items()}, values.doubts
 
 

@@ -120,7 +120,10 @@ def _samples(
             argument = _setting(numbers, call, i // 11 // len(settings))
             arguments.append(code(argument) if numbers.fixed else argument)
     x = np.array(arguments, dtype=numbers.threshold.dtype)
-    answers, status = reference.answers(numbers, inverse, calls, x, compiled=False)
+    op = np.array(calls, dtype=np.uint8)
+    op[:-1:2] |= slots.OP_UNREAD  # so that bits have to stay until they are read
+    answers, status = reference.answers(numbers, inverse, op, x, compiled=False)
+    status[op >= slots.OP_UNREAD] = slots.OP_UNREAD
     letters = {**CALLS, **{SETTINGS[call]: LETTERS[call] for call in settings}}
     return [
         {"call": letters[c], "argument": literal(a), "answer": literal(y), "status": int(s)}

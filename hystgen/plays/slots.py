@@ -25,8 +25,19 @@ INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN, SLEW_LIMITED, LIMITED_SETTING = 1, 
 OP_STEP, OP_COMMIT, OP_RESET, OP_INIT = 0, 1, 2, 3
 # further calls of models with effects
 OP_PUSH, OP_SETTLE, OP_OFFSET, OP_GAIN, OP_TEMPERATURE, OP_TRAVEL, OP_CORRECT, OP_EXPECTED, OP_TRAVELLED = range(4, 13)
+# the bits of a call that say which it is, and one for status bits that stay for a later call to read with its own
+OP_CALL, OP_UNREAD = 127, 128
 # more places in `limits`, of fixed point
 PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SATURATED, SHY = range(10, 18)
+
+
+@jit(inline=True)
+def read(counts: Counts, status: int, op: Any) -> Any:
+    """The status bits in counts[status] behind a call, then cleared; 0 if the call leaves them there."""
+    left = counts[status] if op & OP_UNREAD else 0
+    bits = counts[status] - left
+    counts[status] = left
+    return bits
 
 
 @jit(inline=True)

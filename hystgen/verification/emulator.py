@@ -209,7 +209,7 @@ class Core:
         self._uc.mem_write(places[0], call.tobytes())
         self._uc.mem_write(places[1], x.tobytes())
         code = slots.OP_STEP if counted == "step" else slots.OP_COMMIT
-        with_counter = self._counting(f"{name}_{op}_{counted}", op, int(np.count_nonzero(call == code)))
+        with_counter = self._counting(f"{name}_{op}_{counted}", op, int(np.count_nonzero(call & slots.OP_CALL == code)))
         with_counter(lambda: self.call(f"hystgen_harness_{op}", *places, len(x)))
         answer = np.frombuffer(bytes(self._uc.mem_read(places[2], x.nbytes)), dtype=x.dtype)
         status = np.frombuffer(bytes(self._uc.mem_read(places[3], len(x))), dtype=np.uint8)

@@ -18,6 +18,9 @@ from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 from hystgen.verification import kinks
 
+# In each part of a record of so many calls, the status of this share of them stays unread
+PART, UNREAD = 100, (0.0, 0.5, 0.9)
+
 Calls = tuple[str, Bytes, NDArray[np.float64]]
 
 
@@ -117,13 +120,17 @@ def suite(
 ) -> Iterator[Calls]:
     """Records of `length` calls: name, operations and arguments, numbers of type `real`; the same ones every time.
 
-    Of a model with effects those of its plays, and calls of its settings among them.
+    Of a model with effects those of its plays, and calls of its settings among them. Status is read behind each call,
+    and elsewhere behind one of several, since its bits have to stay until they are read.
     """
     plays = tables.plays._replace(limits=tables.limits) if isinstance(tables, ChainTables) else tables
     records = _suite(plays, real, inverse, length)
     if isinstance(tables, ChainTables):
         records = itertools.chain(records, _settings(tables, inverse, length))
+    rng = np.random.default_rng(20261203)
     for name, op, x in records:
+        chance = np.repeat(rng.choice(UNREAD, -(-length // PART)), PART)[:length]
+        op = np.where(rng.random(length) < chance, op | slots.OP_UNREAD, op).astype(np.uint8)
         with np.errstate(over="ignore"):
             if real.kind == "i":
                 x = np.clip(np.rint(x), np.iinfo(real).min, np.iinfo(real).max)

@@ -47,7 +47,10 @@ def harness(
     """The C that runs recorded calls of NAME_OP_step and the like; `more`: by operator, what it has beside those of
     every model."""
     chain = {op: list(_chain_calls(name, op, more.get(op, ()), arithmetic)) for op in operators}
-    return module.render("harness.c.j2", SimpleNamespace(name=name, operators=operators, calls=CALLS, chain=chain))
+    values = SimpleNamespace(
+        name=name, operators=operators, calls=CALLS, call_bits=slots.OP_CALL, unread=slots.OP_UNREAD, chain=chain
+    )
+    return module.render("harness.c.j2", values)
 
 
 def _chain_calls(name: str, op: str, more: Sequence[str], arithmetic: Arithmetic) -> Iterator[tuple[int, str]]:

@@ -58,6 +58,7 @@ from hystgen.plays.slots import (
     HOLD,
     INPUT_CLAMPED,
     LIMITED_SETTING,
+    OP_CALL,
     OP_COMMIT,
     OP_CORRECT,
     OP_EXPECTED,
@@ -77,6 +78,7 @@ from hystgen.plays.slots import (
     Bytes,
     Counts,
     Reals,
+    read,
 )
 
 SET, OUTPUT, APPLIED, REACHED, ARRIVED, REFERENCE, WAY, MOVED, REST = range(9)
@@ -635,43 +637,43 @@ def made_of(
     @jit
     def run(t: ChainTables, s: ChainState, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
         """Run op[i] with argument x[i]. answers[i] is the answer of a step or of `expected`, else 0; status[i] is read
-        and cleared."""
+        and cleared, or left for a later call."""
         for i in range(len(op)):
+            call = op[i] & OP_CALL
             answers[i] = t.limits[ZERO]
-            if op[i] == OP_INIT:
+            if call == OP_INIT:
                 init(t, s, inverse)
-            elif op[i] == OP_COMMIT:
+            elif call == OP_COMMIT:
                 inverse_commit(t, s, x[i])
-            elif op[i] == OP_PUSH:
+            elif call == OP_PUSH:
                 inverse_push(t, s, x[i])
-            elif op[i] == OP_SETTLE:
+            elif call == OP_SETTLE:
                 inverse_take(t, s)
                 settle(t, s, inverse, x[i])
-            elif op[i] == OP_OFFSET:
+            elif call == OP_OFFSET:
                 set_offset(t, s, entered_level(t, x[i]))
-            elif op[i] == OP_TEMPERATURE:
+            elif call == OP_TEMPERATURE:
                 set_temperature(t, s, x[i])
-            elif op[i] == OP_GAIN:
+            elif call == OP_GAIN:
                 set_gain(t, s, x[i])
-            elif op[i] == OP_TRAVEL:
+            elif call == OP_TRAVEL:
                 set_travel(t, s, entered_travel(t, x[i]))
-            elif op[i] == OP_TRAVELLED:
+            elif call == OP_TRAVELLED:
                 answers[i] = s.ageing.block[0, AGEING_HIGH]
-            elif op[i] == OP_CORRECT:
+            elif call == OP_CORRECT:
                 correct(t, s, x[i], t.number[SHARE])
-            elif op[i] == OP_EXPECTED:
+            elif call == OP_EXPECTED:
                 answers[i] = expected(t, s)
             else:
-                if op[i] == OP_RESET:
+                if call == OP_RESET:
                     reset(t, s, inverse)
                 if inverse:
                     inverse_step(t, s, x[i])
                 else:
                     forward_step(t, s, x[i])
-            if op[i] == OP_STEP:
+            if call == OP_STEP:
                 answers[i] = s.plays.real[ANSWER]
-            status[i] = s.plays.counts[STATUS]
-            s.plays.counts[STATUS] = 0
+            status[i] = read(s.plays.counts, STATUS, op[i])
 
     @jit
     def visit(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
