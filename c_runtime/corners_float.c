@@ -51,15 +51,16 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m,
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x, a way or a reach; `step`: segment 1's. */
-static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k,
-                                         unsigned int last, hystgen_real_t x) {
-    while (k < last) {
-        const unsigned int middle = (k + last) / 2;
-        const unsigned int at = 4u * middle;
-        const bool before = x > step[at];
-        k = before ? middle + 1u : k;
-        last = before ? last : middle;
+/* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k does. */
+static inline unsigned int hystgen_find_segment(const hystgen_segment_t *segment, unsigned int k,
+                                                unsigned int end, hystgen_real_t x, bool by_reach) {
+    unsigned int middle = (k + end) / 2;
+    while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
+        const hystgen_segment_t *s = &segment[middle];
+        const bool before = x > (by_reach ? s->reach : s->way);
+        k = before ? middle : k;
+        end = before ? end : middle;
+        middle = (k + end) / 2;
     }
     return k;
 }
@@ -73,7 +74,7 @@ HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_play
     hystgen_real_t x = c->pass[m->here.rising];
     unsigned int k = m->here.k;
     if (c->rose != m->here.rising) {
-        k = hystgen_find_segment(&t->segment[1].reach, k, c->top - 1u, reach);
+        k = hystgen_find_segment(t->segment, k, c->top, reach, true);
         reach = reach - t->segment[k].reach;
         x = t->segment[k].way - c->pass[!m->here.rising];
     }
@@ -135,7 +136,7 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     if (c->rose != rising) { /* plays follow one by one, and not all of the block at the corner */
         const hystgen_real_t from = c->pass[!rising];
         const hystgen_real_t room = t->inside[rising] - start;
-        k = hystgen_find_segment(&t->segment[1].way, k, c->top - 1u, x + from);
+        k = hystgen_find_segment(t->segment, k, c->top, x + from, false);
         const hystgen_segment_t *s = &t->segment[k];
         begin = s->way - from;
         start = start + s->reach;

@@ -5,16 +5,20 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 364a59e4b21d07d7d529f8890bc14aa06218a9fd3b0b40520496e0f421030303, without this line
+ * Text: sha256 3a243c73bb0412c05df10686813586e90e4eef3a2aa757911378daeaaef5c4c2, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
 
-/* Products are rounded before they are added, whatever the compiler's default is. */
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("fp-contract=off")
-#else
+/* Products are rounded before they are added, whatever the compiler's default is. clang and others
+   have the pragma of C99 for it. gcc does not, and fuses a product and a sum across statements,
+   assignments, casts and inline functions alike: short of a volatile object or a call for each
+   product, no wording of the arithmetic keeps the bits. GCC's manual means its own pragma for
+   debugging; it stands here only where the target has a fused instruction. */
+#if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
+#elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
+#pragma GCC optimize("fp-contract=off")
 #endif
 
 #if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
@@ -100,15 +104,16 @@ static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corn
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x, a way or a reach; `step`: segment 1's. */
-static unsigned int plain_find_segment(const plain_real_t *step, unsigned int k,
-                                       unsigned int last, plain_real_t x) {
-    while (k < last) {
-        const unsigned int middle = (k + last) / 2;
-        const unsigned int at = 4u * middle;
-        const bool before = x > step[at];
-        k = before ? middle + 1u : k;
-        last = before ? last : middle;
+/* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k does. */
+static inline unsigned int plain_find_segment(const plain_segment_t *segment, unsigned int k,
+                                              unsigned int end, plain_real_t x, bool by_reach) {
+    unsigned int middle = (k + end) / 2;
+    while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
+        const plain_segment_t *s = &segment[middle];
+        const bool before = x > (by_reach ? s->reach : s->way);
+        k = before ? middle : k;
+        end = before ? end : middle;
+        middle = (k + end) / 2;
     }
     return k;
 }
@@ -122,7 +127,7 @@ PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
     plain_real_t x = c->pass[m->here.rising];
     unsigned int k = m->here.k;
     if (c->rose != m->here.rising) {
-        k = plain_find_segment(&t->segment[1].reach, k, c->top - 1u, reach);
+        k = plain_find_segment(t->segment, k, c->top, reach, true);
         reach = reach - t->segment[k].reach;
         x = t->segment[k].way - c->pass[!m->here.rising];
     }
@@ -184,7 +189,7 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
     if (c->rose != rising) { /* plays follow one by one, and not all of the block at the corner */
         const plain_real_t from = c->pass[!rising];
         const plain_real_t room = t->inside[rising] - start;
-        k = plain_find_segment(&t->segment[1].way, k, c->top - 1u, x + from);
+        k = plain_find_segment(t->segment, k, c->top, x + from, false);
         const plain_segment_t *s = &t->segment[k];
         begin = s->way - from;
         start = start + s->reach;

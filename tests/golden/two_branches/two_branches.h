@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 525f0d2ea2a306268bb3d1c0ab4af5863520a728dffea26d3275156d927fcb5d, without this line
+ * Text: sha256 123d4a0a6607fa84b19327ff417d86b95fd4dba7b64bbf3d585873d3604c98f7, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -166,15 +166,19 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #if defined(TWO_BRANCHES_IMPLEMENTATION) && !defined(TWO_BRANCHES_IMPLEMENTED)
 #define TWO_BRANCHES_IMPLEMENTED
 
-#if defined(__GNUC__) && !defined(__clang__)
+#if defined(__GNUC__) && !defined(__clang__) && (defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF))
 #pragma GCC push_options
 #endif
 
-/* Products are rounded before they are added, whatever the compiler's default is. */
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("fp-contract=off")
-#else
+/* Products are rounded before they are added, whatever the compiler's default is. clang and others
+   have the pragma of C99 for it. gcc does not, and fuses a product and a sum across statements,
+   assignments, casts and inline functions alike: short of a volatile object or a call for each
+   product, no wording of the arithmetic keeps the bits. GCC's manual means its own pragma for
+   debugging; it stands here only where the target has a fused instruction. */
+#if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
+#elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
+#pragma GCC optimize("fp-contract=off")
 #endif
 
 #if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
@@ -440,15 +444,17 @@ static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_p
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x, a way or a reach; `step`: segment 1's. */
-static unsigned int two_branches_find_segment(const two_branches_real_t *step, unsigned int k,
-                                              unsigned int last, two_branches_real_t x) {
-    while (k < last) {
-        const unsigned int middle = (k + last) / 2;
-        const unsigned int at = 4u * middle;
-        const bool before = x > step[at];
-        k = before ? middle + 1u : k;
-        last = before ? last : middle;
+/* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k does. */
+static inline unsigned int two_branches_find_segment(const two_branches_segment_t *segment,
+                                                     unsigned int k, unsigned int end,
+                                                     two_branches_real_t x, bool by_reach) {
+    unsigned int middle = (k + end) / 2;
+    while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
+        const two_branches_segment_t *s = &segment[middle];
+        const bool before = x > (by_reach ? s->reach : s->way);
+        k = before ? middle : k;
+        end = before ? end : middle;
+        middle = (k + end) / 2;
     }
     return k;
 }
@@ -464,7 +470,7 @@ TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t
     two_branches_real_t x = c->pass[m->here.rising];
     unsigned int k = m->here.k;
     if (c->rose != m->here.rising) {
-        k = two_branches_find_segment(&t->segment[1].reach, k, c->top - 1u, reach);
+        k = two_branches_find_segment(t->segment, k, c->top, reach, true);
         reach = reach - t->segment[k].reach;
         x = t->segment[k].way - c->pass[!m->here.rising];
     }
@@ -530,7 +536,7 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
     if (c->rose != rising) { /* plays follow one by one, and not all of the block at the corner */
         const two_branches_real_t from = c->pass[!rising];
         const two_branches_real_t room = t->inside[rising] - start;
-        k = two_branches_find_segment(&t->segment[1].way, k, c->top - 1u, x + from);
+        k = two_branches_find_segment(t->segment, k, c->top, x + from, false);
         const two_branches_segment_t *s = &t->segment[k];
         begin = s->way - from;
         start = start + s->reach;
@@ -846,10 +852,10 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self) {
     return status;
 }
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC pop_options
-#else
+#if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT DEFAULT
+#elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
+#pragma GCC pop_options
 #endif
 
 #endif /* TWO_BRANCHES_IMPLEMENTATION */
