@@ -60,7 +60,9 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
         const hystgen_real_t v = hystgen_inverse_choose(self, level, w, &self->limited);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
         const bool clamped = inside < v || inside > v;
-        self->bits |= self->limited ? HYSTGEN_STATUS_DOMAIN : 0u;
+        if (self->limited) {
+            self->bits |= HYSTGEN_STATUS_DOMAIN;
+        }
         if (clamped || (inside <= self->drive && inside >= self->drive)) {
             /* this drive does not give w: the plays are elsewhere */
             self->bits |= clamped ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u;

@@ -137,7 +137,8 @@ def gcc(tool: str, sources: Sequence[Path], more: Sequence[str] = ()) -> Iterato
 
 
 EXTENSION = re.compile(
-    r"# *pragma (?!STDC )(\w+ \w+)|_Pragma\(\"(?!STDC )(\w+ \w+)|__(attribute)__ *\(\((\w+)|\b(__builtin_\w+|(?:__)?asm(?:__)?)\b"
+    r"# *pragma (?!STDC )(\w+ \w+)|_Pragma\(\"(?!STDC )(\w+ \w+)|"
+    r"__(attribute)__ *\(\((\w+)|\b(__builtin_\w+|(?:__)?asm(?:__)?)\b"
 )
 
 

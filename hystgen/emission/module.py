@@ -248,7 +248,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.functions = front + "\n" + glue.functions if glue else front
     values.calls = calls = glue.calls if glue else {}
     own_types, own_functions = own.pieces(compiled.tables) if compiled else ([], [])
-    pieces = runtime.operator_pieces(values.variant, operators, values.functions, calls, own_functions)
+    pieces = runtime.operator_pieces(values.variant, family, operators, values.functions, calls, own_functions)
     kernels = runtime.needed(
         [*runtime.table_pieces(family), *runtime.kernel_pieces(family)], sorted(runtime.used(pieces))
     )
@@ -256,16 +256,19 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family, carried)
     values.types = ""
     if glue:
+        glue = values.glue = chain.with_fields(glue, {op: runtime.fields(pieces, op) for op in operators})
         types = runtime.chain_types(own_types, "\n".join(glue.states.values()), family)
         states = runtime.needed(types, [f"hystgen_{op}_t" for op in operators])
         tabled = runtime.needed(types, sorted(runtime.used(pieces)))
         tables = [piece for piece in tabled if piece not in states]
         values.types = runtime.render_operators(tables, name, 0, prefix, family)
     else:
-        states = runtime.state_pieces(values.variant, operators)
+        states = runtime.state_pieces(values.variant, operators, pieces)
     values.states = runtime.render_operators(states, name, values.corners, prefix, family)
     if corners and not shared:
         values.states = runtime.all_types(family.states, prefix, family) + "\n" + values.states
+    for kind in ("arrays", "beside"):
+        setattr(values, kind, _named_by(getattr(values, kind), values.operators, [*values.arrays, *values.beside]))
     values.api = runtime.api(operators, name, prefix, family, calls)
     values.build = runtime.verbatim(family.build, name, family, name)
     values.typedefs = _typedefs(values)
@@ -278,6 +281,17 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.cost = _cost(cascade, options, values, text, types)
     values.details = _details(parameters, cascade, options, values)
     return values
+
+
+def _named_by(tables: Sequence[str], operators: str, every: Sequence[str]) -> list[str]:
+    """The tables that functions name, or another of `every` that they name."""
+    name = re.compile(r"(\w+)(?:\[\w+\])* = \{")
+    named = set(re.findall(r"\w+", operators))
+    for text in reversed(every):  # those that others name stand before them
+        found = name.search(text)
+        if found is None or found[1] in named:
+            named |= set(re.findall(r"\w+", text))
+    return [text for text in tables if (found := name.search(text)) is None or found[1] in named]
 
 
 def _typedefs(values: SimpleNamespace) -> list[str]:

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 8c8155ad31b2c7410ebc4f3b98ff0a01ee6e10c85385b6428e986b698244eea9, without this line
+ * Text: sha256 ea279cd5d92d78cf5b09aef3e7e172a3ad7b65bfa0dbe2dcee41a4aef3f27d13, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -21,10 +21,10 @@
  *     code at -O2       about 3409 bytes on a Cortex-M0+, 3201 on a Cortex-M4F, as measured for
  *         such a model
  *     constant tables   2094 bytes
- *     inverse instance  176 bytes of RAM
+ *     inverse instance  168 bytes of RAM
  *     inverse step, worst case: 13 multiplications of 32 by 32 bits, 47 comparisons (35 + 4 b, b =
  *         3 the bits of n)
- * On an 8-bit AVR constants lie in RAM too: at most 2201 bytes of RAM in all, 33 of them for each
+ * On an 8-bit AVR constants lie in RAM too: at most 2197 bytes of RAM in all, 33 of them for each
  * play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
@@ -106,12 +106,9 @@ typedef struct {
     curved_real_t drive; /* where the plays are */
     curved_real_t undo_drive;
     curved_real_t reference; /* of the last step */
-    curved_real_t level;     /* the same, limited: the next reference moves up or down from here */
-    bool ascending;          /* direction of the drive's last move */
-    bool undo_ascending;
-    bool repeat;        /* the last answer still stands for `reference` */
-    bool limited;       /* no drive gives it; here rather than on the stack */
-    uint_least8_t bits; /* status of that answer */
+    bool repeat;             /* the last answer still stands for `reference` */
+    bool limited;            /* no drive gives it; here rather than on the stack */
+    uint_least8_t bits;      /* status of that answer */
     unsigned int status;
     curved_place_t undo; /* where the plays were before the last step */
     curved_kink_t kink;  /* of the present step; here rather than on the stack */

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 123d4a0a6607fa84b19327ff417d86b95fd4dba7b64bbf3d585873d3604c98f7, without this line
+ * Text: sha256 4c910ab451c6a30c38a90cacdddc8a31664c18314c0a1a46f00c7f6d725bd189, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -783,7 +783,9 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
         const two_branches_real_t v = two_branches_inverse_choose(self, level, w, &self->limited);
         const two_branches_real_t inside = two_branches_clamp_drive(v);
         const bool clamped = inside < v || inside > v;
-        self->bits |= self->limited ? TWO_BRANCHES_STATUS_DOMAIN : 0u;
+        if (self->limited) {
+            self->bits |= TWO_BRANCHES_STATUS_DOMAIN;
+        }
         if (clamped || (inside <= self->drive && inside >= self->drive)) {
             /* this drive does not give w: the plays are elsewhere */
             self->bits |= clamped ? TWO_BRANCHES_STATUS_OUTPUT_CLAMPED : 0u;
