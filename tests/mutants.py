@@ -127,7 +127,7 @@ KILLED = (
     ),
     Mutant(
         "a line leads back beyond the range", FLOAT,
-        "k == 0 && from <= t->range[!rising] ? m->from",
+        "k == 0 && from <= t->range[other] ? m->from",
         "k == 0 ? m->from",
         "outside", "float32",
     ),
@@ -157,8 +157,8 @@ KILLED = (
     ),
     Mutant(
         "a corner is passed only beyond it", FLOAT,
-        "if (m->here.depth > 1u && x >= c->pass[rising]) {",
-        "if (m->here.depth > 1u && x > c->pass[rising]) {",
+        "if (m->here.depth > 1u && x >= c->pass[on]) {",
+        "if (m->here.depth > 1u && x > c->pass[on]) {",
         "plain", "float32",
     ),
     Mutant("no shy", USUAL, ">> HYSTGEN_FRACTION) - HYSTGEN_SHY;", ">> HYSTGEN_FRACTION);", "coarse", "q15"),

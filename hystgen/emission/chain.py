@@ -501,7 +501,12 @@ def _functions(
                 [f"return hystgen_steady_missed({block.table}, way);"],
             )
             lines = [
-                "const bool rises = a > self->drive ? true : a < self->drive ? false : self->ascending;",
+                "bool rises = self->ascending;",
+                "if (a > self->drive) {",
+                "    rises = true;",
+                "} else if (a < self->drive) {",
+                "    rises = false;",
+                "}",
                 f"return hystgen_steady_{'braked' if t.braked else 'solve'}(&self->steady, {block.table}, "
                 f"&self->{block.name}, a, rises,",
                 "    hystgen_entered_drive(self->applied), HYSTGEN_DITHER);",

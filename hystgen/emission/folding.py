@@ -282,7 +282,7 @@ class _Folding:
         while more := {each for field in read for each in reads.get(field, ())} - read:
             read |= more
         addressed = {each for function in mine.values() for each in re.findall(r"&self->(\w+)", function.body)}
-        asked = {each for function in mine.values() for each in re.findall(r"\bif \(self->(\w+)\)", function.body)}
+        asked = {each for function in mine.values() for each in re.findall(_ASKED, function.body)}
         false = {field for field in asked if values.get(field, set()) <= {"false"}} - addressed
         for name, function in mine.items():
             body = function.body
@@ -290,11 +290,14 @@ class _Folding:
                 if (found[1] not in read or found[1] in false) and _pure(found[2]):
                     body = body.replace(found[0], "", 1)
             for field in false:
+                body = re.sub(rf"^ *[\w>-]+ \|= self->{field} \? \w+ : 0u;\n", "", body, flags=re.MULTILINE)
                 body = body.replace(f"if (self->{field})", "if (false)")
             if body != function.body:
                 self._change(name, body)
 
 
+_ASKED = r"(?:\bif \(|\|= )self->(\w+)(?:\)| \? \w+ : 0u;)"
+"""A field that decides alone."""
 _STORE = re.compile(r"^ *self->(\w+) = ([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
 
 
@@ -377,12 +380,12 @@ def _without_branches(body: str) -> str:
             return _without_branches(before + indent + (chained or "") + rest[otherwise.end() :])
         if condition == "true" and alone and not chained:
             return _without_branches(before + re.sub("^    ", "", inside, flags=re.MULTILINE) + behind)
-        if alone and not chained and not inside.strip() and re.fullmatch(_LOOKS, condition):
-            return _without_branches(before + behind)
+        if alone and not inside.strip() and re.fullmatch(_LOOKS, condition):
+            return _without_branches(before + (f"{indent}}}\n" if chained else "") + behind)
     return _choices(body)
 
 
-_LOOKS = r"[\w>.-]+|!?hystgen_finite\(\w+\)"
+_LOOKS = r"[^()]+|!?hystgen_finite\(\w+\)"
 """A condition that changes nothing."""
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -511,11 +511,17 @@ def render_operators(
 
 
 def api(
-    operators: Iterable[str], name: str, prefix: str, family: Family, calls: Mapping[str, Iterable[str]]
+    operators: Iterable[str],
+    name: str,
+    prefix: str,
+    family: Family,
+    calls: Mapping[str, Iterable[str]],
+    documented: Callable[[Sequence[Piece]], Iterable[Piece]],
 ) -> str:
-    """Prototypes of a model's functions; `calls`: by operator, the functions it has in addition."""
-    text = "\n".join("".join(piece.text for piece in _calls(op, calls.get(op, ()))) for op in operators)
-    return _named(text, prefix, family, name)
+    """Prototypes of a model's functions; `calls`: by operator, the functions it has in addition; `documented`: puts
+    above each what there is to know of it."""
+    every = [piece for op in operators for piece in documented(_calls(op, calls.get(op, ())))]
+    return _named("\n".join(piece.text for piece in every), prefix, family, name)
 
 
 def verbatim(files: Iterable[str], owner: str, family: Family, name: str) -> str:
@@ -528,7 +534,9 @@ def verbatim(files: Iterable[str], owner: str, family: Family, name: str) -> str
 def _own(family: Family) -> frozenset[str]:
     """The names that a run time defines."""
     pieces = [*kernel_pieces(family), *_pieces((*family.tables, *family.states))]
-    return frozenset([*(piece.name for piece in pieces), *(f"hystgen_{kind}" for kind in family.types)])
+    enums = [piece.code for piece in pieces if "typedef enum" in piece.code]
+    listed = [name for code in enums for name in re.findall(r"HYSTGEN_\w+", code)]
+    return frozenset([*(piece.name for piece in pieces), *listed, *(f"hystgen_{kind}" for kind in family.types)])
 
 
 def _named(

@@ -5,10 +5,17 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 5f051da25099cbeb59e87abe210ea63e2810754ec033a805e4d64ff7057dfc99, without this line
+ * Text: sha256 414d24d54b22d73fd2c753120ec4dd3210eb41f7c2a8ead169e89b814307b457, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
+
+/* Words of this file
+
+   play: holds its value until its input is a threshold away, and then follows at that distance.
+   pending: the drive answered last: part of the memory only when the next call absorbs it, or the
+       drive committed in its place.
+*/
 
 /* Products are rounded before they are added, whatever the compiler's default is. clang and others
    have the pragma of C99 for it. gcc does not, and fuses a product and a sum across statements,
@@ -129,7 +136,8 @@ static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *pl
         const bent_real_t w =
             (output - (rising ? tail - t->lift[k] : tail + t->lift[k])) * t->inverse_slope[k];
         if (rising ? w >= first : w <= first) {
-            return k <= t->n && (rising ? w > next : w < next) ? next : w;
+            const bool beyond = rising ? w > next : w < next;
+            return k <= t->n && beyond ? next : w;
         }
         tail = tail + t->weight[last] * play[last];
         next = first;

@@ -5,10 +5,26 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 16533dfeb09a9746f37673baaa089c65a2ea1a30fe0d337aadd4a15cccb420c3, without this line
+ * Text: sha256 10641de4d5e4ce37e8103e94c6118dcaf7fc28d476cf321a7cff2a602631520a, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
+
+/* Words of this file
+
+   play: holds its value until its input is a threshold away, and then follows at that distance.
+   move: what the input does from one turning point to the next: it rises, or it falls. Lengths are
+       taken along the move, so that a falling one is a rising one with all signs changed.
+   corner: a turning point that some plays still hold their values from; corners are a stack, the
+       newest one on top.
+   block: the plays that one corner holds: those with larger thresholds than the corner above it
+       has, up to its `top`.
+   way: how far the input has gone from a turning point.
+   reach: how far the output has gone from there; a reach_t also holds inputs and drives beyond
+       every code.
+   segment: the curve of output over input from where one more play follows to where the next does.
+   kink: a place along the move where another play begins to follow.
+*/
 
 #if defined(__GNUC__)
 #define CURVED_APART __attribute__((noinline)) static /* has several callers, or rarely runs */
@@ -34,7 +50,7 @@ typedef struct {
 typedef struct {
     const curved_segment_t *segment; /* plays 0 .. n, and one that never follows */
     int64_t offset;                   /* part of every output */
-    int64_t range[2]; /* inputs at the end of falling [0] moves, sign changed, and of rising [1] */
+    int64_t range[2]; /* inputs at the end of falling moves, sign changed, and of rising ones */
     uint_least16_t n; /* plays without play 0 */
 } curved_curve_t;
 
@@ -98,6 +114,11 @@ static void curved_copy_place(curved_place_t *to, const curved_place_t *from) {
     to->rising = from->rising;
 }
 
+/* The direction of a move that rises, or falls. */
+static inline curved_direction_t curved_direction(bool rising) {
+    return rising ? CURVED_RISING : CURVED_FALLING;
+}
+
 /* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline int64_t curved_along(const curved_place_t *here, int64_t x) {
     return here->rising ? x : -x;
@@ -118,8 +139,8 @@ static inline int64_t curved_begins(const curved_place_t *here, const curved_cor
                                     const curved_segment_t *s, bool by_output) {
     const int64_t output = (int64_t)c->high * CURVED_HIGH_STEP + (int64_t)c->low;
     const int64_t whole = by_output ? s->reach : (int64_t)s->way;
-    return curved_along(here, by_output ? output : c->input) +
-           (c->rose == here->rising ? 0 : whole);
+    const int64_t held = curved_along(here, by_output ? output : c->input);
+    return held + (c->rose == here->rising ? 0 : whole);
 }
 
 /* A corner stays where plays have followed. */
@@ -214,7 +235,7 @@ CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t
                                    const curved_kink_t *kink, int64_t to) {
     const curved_segment_t *s = &t->segment[kink->k];
     const int64_t x = kink->input + curved_over_slope(to - kink->output, s->reciprocal, s->shift);
-    const int64_t most = t->range[here->rising];
+    const int64_t most = t->range[curved_direction(here->rising)];
     return curved_along(here, x > most ? most : x);
 }
 
