@@ -203,23 +203,23 @@ HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_play
     return true;
 }
 
-/* Whether a move to x stays short of `end`. */
-static inline bool hystgen_short_of(bool rising, hystgen_real_t x, hystgen_real_t end) {
-    return rising ? x < end : x > end;
-}
-
 /* The sum of the plays for the next input; a NaN moves nothing. */
 HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_plays_t *m,
                                               hystgen_corner_t *corner, hystgen_real_t input) {
-    const bool rising = m->here.rising;
-    const bool on = hystgen_short_of(rising, m->here.input, input);
-    if (on ? hystgen_short_of(rising, input, m->next)
-           : m->here.k == 0 && hystgen_short_of(rising, m->behind, input)) {
+    const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
+    bool same = false; /* the same plays follow */
+    if (on) {
+        same = m->here.rising ? input < m->next : input > m->next;
+    } else if (m->here.k == 0) {
+        same = m->here.rising ? input > m->behind : input < m->behind;
+    }
+    if (same) {
         m->here.input = input;
         m->here.output = m->start + (input - m->begin) * m->gain;
         return m->here.output;
     }
-    if (on && hystgen_short_of(rising, input, m->cap) && hystgen_move_in_block(t, m, input)) {
+    if (on && (m->here.rising ? input < m->cap : input > m->cap) &&
+        hystgen_move_in_block(t, m, input)) {
         return m->here.output;
     }
     if (input < m->here.input || input > m->here.input) {

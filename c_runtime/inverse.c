@@ -44,18 +44,21 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
 hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_plays_t *m = &self->plays;
     const hystgen_real_t x = u - HYSTGEN_OFFSET;
-    const bool rising = m->here.rising;
-    const bool on = hystgen_short_of(rising, m->here.input, x);
-    if (on ? hystgen_short_of(rising, x, m->next)
-           : m->here.k == 0 && hystgen_short_of(rising, m->behind, x) &&
-                 hystgen_short_of(rising, x, m->here.input)) {
-        /* the usual sample: the same plays follow */
+    const bool on = m->here.rising ? x > m->here.input : x < m->here.input;
+    bool same = false; /* the same plays follow */
+    if (on) {
+        same = m->here.rising ? x < m->next : x > m->next;
+    } else if (m->here.k == 0) {
+        same = m->here.rising ? x > m->behind && x < m->here.input
+                              : x < m->behind && x > m->here.input;
+    }
+    if (same) { /* the usual sample */
         self->before = m->here.input;
         m->here.input = x;
         m->here.output = m->start + (x - m->begin) * m->gain;
         return m->here.output;
     }
-    if (on && hystgen_short_of(rising, x, m->cap)) {
+    if (on && (m->here.rising ? x < m->cap : x > m->cap)) {
         hystgen_copy_place(&self->undo, &m->here);
         self->before = x;
         if (hystgen_move_in_block(&hystgen_inverse_curve, m, x)) {
