@@ -23,7 +23,12 @@ static hystgen_real_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, hystg
 /* Sets the travel. Returns whether it had to be limited. */
 static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                       hystgen_real_t travel) {
-    const hystgen_real_t inside = travel < 0 ? 0 : travel > t->last ? t->last : travel;
+    hystgen_real_t inside = travel;
+    if (travel < 0) {
+        inside = 0;
+    } else if (travel > t->last) {
+        inside = t->last;
+    }
     self->high = inside;
     self->low = 0;
     self->own = true;
@@ -35,9 +40,12 @@ static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_a
 /* Sets a gain in place of the one that follows the travel. Returns whether it had to be limited. */
 static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                hystgen_real_t gain) {
-    const hystgen_real_t inside = gain < t->least     ? t->least
-                                  : gain > t->largest ? t->largest
-                                                      : gain;
+    hystgen_real_t inside = gain;
+    if (gain < t->least) {
+        inside = t->least;
+    } else if (gain > t->largest) {
+        inside = t->largest;
+    }
     self->own = false;
     self->gain = inside;
     self->inverse = 1 / inside;

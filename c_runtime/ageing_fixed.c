@@ -33,7 +33,12 @@ static int32_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, int64_t trav
 /* Sets the travel. Returns whether it had to be limited. */
 static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                       int64_t travel) {
-    const int64_t inside = travel < 0 ? 0 : travel > t->last ? t->last : travel;
+    int64_t inside = travel;
+    if (travel < 0) {
+        inside = 0;
+    } else if (travel > t->last) {
+        inside = t->last;
+    }
     self->high = inside;
     self->own = true;
     self->gain = hystgen_ageing_gain(t, inside);

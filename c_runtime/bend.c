@@ -5,7 +5,12 @@
 /* The value of a curve at x; sets `limited` if x lies beyond its ends. */
 static int64_t hystgen_bend(const hystgen_bend_curve_t *c, int64_t x, bool *limited) {
     const int64_t argument = hystgen_nearest(x, c->drop);
-    const int64_t inside = argument < c->least ? c->least : argument > c->most ? c->most : argument;
+    int64_t inside = argument;
+    if (argument < c->least) {
+        inside = c->least;
+    } else if (argument > c->most) {
+        inside = c->most;
+    }
     if (inside != argument) {
         *limited = true;
     }

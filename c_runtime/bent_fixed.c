@@ -3,9 +3,12 @@
 /* What a play bent by curve c contributes at z, in fixed point: z and the value of the curve.
    Beyond where plays can be a curve stays at its end. */
 HYSTGEN_APART int64_t hystgen_bent_by(const hystgen_bump_t *c, int32_t z) {
-    const int32_t inside = z < -HYSTGEN_BUMP_END  ? -HYSTGEN_BUMP_END
-                           : z > HYSTGEN_BUMP_END ? HYSTGEN_BUMP_END
-                                                  : z;
+    int32_t inside = z;
+    if (z < -HYSTGEN_BUMP_END) {
+        inside = -HYSTGEN_BUMP_END;
+    } else if (z > HYSTGEN_BUMP_END) {
+        inside = HYSTGEN_BUMP_END;
+    }
     const int64_t value =
         hystgen_curve(c->knot, c->scale, c->coefficient, c->pieces, HYSTGEN_BUMP_DEGREE, inside);
     return z + hystgen_nearest(value * ((int64_t)1 << HYSTGEN_BUMP_LIFT), HYSTGEN_BUMP_BITS);

@@ -21,13 +21,6 @@
 
    Signals between the blocks have a type of their own; chain_float.c and chain_fixed.c convert. */
 
-/* An offset, limited to the span of the displacement. */
-static hystgen_signal_t hystgen_inside_offset(hystgen_signal_t d) {
-    return d > HYSTGEN_FARTHEST_OFFSET    ? HYSTGEN_FARTHEST_OFFSET
-           : d < -HYSTGEN_FARTHEST_OFFSET ? -HYSTGEN_FARTHEST_OFFSET
-                                          : d;
-}
-
 /* Drive v has passed through the drive side and moved the plays. */
 static void hystgen_forward_played(hystgen_forward_t *self, hystgen_real_t v) {
     const hystgen_reach_t late = hystgen_forward_waited(self, v);

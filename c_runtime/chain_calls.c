@@ -18,8 +18,8 @@ void hystgen_forward_settle(hystgen_forward_t *self, hystgen_real_t v) {
     hystgen_forward_absorb(self, inside);
 }
 
-/* The actuator has settled at drive v; the memory is up to date. */
-HYSTGEN_APART_IN_FIXED void hystgen_inverse_settled(hystgen_inverse_t *self, hystgen_real_t v) {
+void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v) {
+    hystgen_inverse_take(self);
     if (!hystgen_finite(v)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return;
@@ -35,22 +35,21 @@ HYSTGEN_APART_IN_FIXED void hystgen_inverse_settled(hystgen_inverse_t *self, hys
     hystgen_inverse_absorb(self, inside);
 }
 
-void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v) {
-    hystgen_inverse_take(self);
-    hystgen_inverse_settled(self, v);
-}
-
-/* Sets the offset, within its limits. */
+/* Sets the offset, limited to the span of the displacement. */
 static void hystgen_forward_put_offset(hystgen_forward_t *self, hystgen_signal_t d) {
     if (!hystgen_finite(d)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return;
     }
-    const hystgen_signal_t inside = hystgen_inside_offset(d);
-    if (inside < d || inside > d) {
+    self->offset = d;
+    if (d > HYSTGEN_FARTHEST_OFFSET) {
+        self->offset = HYSTGEN_FARTHEST_OFFSET;
         self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
     }
-    self->offset = inside;
+    if (d < -HYSTGEN_FARTHEST_OFFSET) {
+        self->offset = -HYSTGEN_FARTHEST_OFFSET;
+        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
+    }
 }
 
 void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d) {
@@ -61,17 +60,21 @@ void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d) {
     }
 }
 
-/* Sets the offset, within its limits. */
+/* Sets the offset, limited to the span of the displacement. */
 static void hystgen_inverse_put_offset(hystgen_inverse_t *self, hystgen_signal_t d) {
     if (!hystgen_finite(d)) {
         self->status |= HYSTGEN_STATUS_HELD;
         return;
     }
-    const hystgen_signal_t inside = hystgen_inside_offset(d);
-    if (inside < d || inside > d) {
+    self->offset = d;
+    if (d > HYSTGEN_FARTHEST_OFFSET) {
+        self->offset = HYSTGEN_FARTHEST_OFFSET;
         self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
     }
-    self->offset = inside;
+    if (d < -HYSTGEN_FARTHEST_OFFSET) {
+        self->offset = -HYSTGEN_FARTHEST_OFFSET;
+        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
+    }
 }
 
 void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d) {

@@ -20,7 +20,12 @@ static hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *self, hys
         const hystgen_reach_t low = w - t->threshold[i];
         const hystgen_reach_t high = w + t->threshold[i];
         const hystgen_reach_t play = self->play[i];
-        const hystgen_reach_t z = play > high ? high : play < low ? low : play;
+        hystgen_reach_t z = play;
+        if (play > high) {
+            z = high;
+        } else if (play < low) {
+            z = low;
+        }
         k = z != play ? i + 1u : k;
         left -= t->weight[i] * z;
     }

@@ -20,9 +20,13 @@ static inline hystgen_signal_t hystgen_entered_level(hystgen_real_t u) {
 /* Drive code of a signal, limited to two spans beyond the range. */
 static hystgen_reach_t hystgen_drive_code(hystgen_signal_t v) {
     const hystgen_signal_t code = hystgen_nearest(v, HYSTGEN_DRIVE_BITS);
-    return (hystgen_reach_t)(code > HYSTGEN_MOST_CODE    ? HYSTGEN_MOST_CODE
-                             : code < HYSTGEN_LEAST_CODE ? HYSTGEN_LEAST_CODE
-                                                         : code);
+    if (code > HYSTGEN_MOST_CODE) {
+        return (hystgen_reach_t)HYSTGEN_MOST_CODE;
+    }
+    if (code < HYSTGEN_LEAST_CODE) {
+        return (hystgen_reach_t)HYSTGEN_LEAST_CODE;
+    }
+    return (hystgen_reach_t)code;
 }
 
 static inline bool hystgen_is_drive(hystgen_real_t v) {
@@ -44,9 +48,13 @@ static hystgen_real_t hystgen_output_code(hystgen_signal_t y, unsigned int *stat
     if (code > HYSTGEN_CODE_MAX || code < -HYSTGEN_CODE_MAX) {
         *status |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
     }
-    return (hystgen_real_t)(code > HYSTGEN_CODE_MAX    ? HYSTGEN_CODE_MAX
-                            : code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX
-                                                       : code);
+    if (code > HYSTGEN_CODE_MAX) {
+        return (hystgen_real_t)HYSTGEN_CODE_MAX;
+    }
+    if (code < -HYSTGEN_CODE_MAX) {
+        return (hystgen_real_t)-HYSTGEN_CODE_MAX;
+    }
+    return (hystgen_real_t)code;
 }
 
 /* A share of x. The largest code is the share just below 1. */
@@ -62,9 +70,12 @@ static inline hystgen_signal_t hystgen_level(hystgen_sum_t sum) {
 
 /* The sum of the plays that a signal asks for, limited to what they can give. */
 static inline hystgen_sum_t hystgen_asked(hystgen_signal_t h) {
-    const hystgen_signal_t inside = h > HYSTGEN_LARGEST_LEVEL    ? HYSTGEN_LARGEST_LEVEL
-                                    : h < -HYSTGEN_LARGEST_LEVEL ? -HYSTGEN_LARGEST_LEVEL
-                                                                 : h;
+    hystgen_signal_t inside = h;
+    if (h > HYSTGEN_LARGEST_LEVEL) {
+        inside = HYSTGEN_LARGEST_LEVEL;
+    } else if (h < -HYSTGEN_LARGEST_LEVEL) {
+        inside = -HYSTGEN_LARGEST_LEVEL;
+    }
     return inside * ((hystgen_sum_t)1 << HYSTGEN_LEVEL_DROP);
 }
 

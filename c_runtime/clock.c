@@ -21,5 +21,11 @@ static hystgen_real_t hystgen_clock_drift(const hystgen_clock_table_t *t,
                                           const hystgen_clock_t *self, hystgen_real_t ahead) {
     const hystgen_real_t time = self->high * t->block + (self->low + ahead) * t->sample;
     const hystgen_real_t drift = (t->rate + t->half_change * time) * time;
-    return drift > t->farthest ? t->farthest : drift < -t->farthest ? -t->farthest : drift;
+    if (drift > t->farthest) {
+        return t->farthest;
+    }
+    if (drift < -t->farthest) {
+        return -t->farthest;
+    }
+    return drift;
 }

@@ -27,5 +27,11 @@ static int64_t hystgen_clock_drift(const hystgen_clock_table_t *t, const hystgen
                                    int64_t ahead) {
     const int64_t more = (t->slope + self->gained) * ahead + t->change * (ahead * (ahead - 1) / 2);
     const int64_t drift = self->whole + ((self->part + more) >> t->bits);
-    return drift > t->farthest ? t->farthest : drift < -t->farthest ? -t->farthest : drift;
+    if (drift > t->farthest) {
+        return t->farthest;
+    }
+    if (drift < -t->farthest) {
+        return -t->farthest;
+    }
+    return drift;
 }

@@ -4,7 +4,11 @@
 static hystgen_real_t hystgen_code(hystgen_sum_t sum, unsigned int *status) {
     const hystgen_sum_t code = hystgen_nearest(sum, HYSTGEN_FRACTION);
     (void)status;
-    return (hystgen_real_t)(code > HYSTGEN_CODE_MAX    ? HYSTGEN_CODE_MAX
-                            : code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX
-                                                       : code);
+    if (code > HYSTGEN_CODE_MAX) {
+        return (hystgen_real_t)HYSTGEN_CODE_MAX;
+    }
+    if (code < -HYSTGEN_CODE_MAX) {
+        return (hystgen_real_t)-HYSTGEN_CODE_MAX;
+    }
+    return (hystgen_real_t)code;
 }

@@ -11,6 +11,11 @@ HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *
     to->rising = from->rising;
 }
 
+/* The direction of a move that rises, or falls. */
+static inline hystgen_direction_t hystgen_direction(bool rising) {
+    return rising ? HYSTGEN_RISING : HYSTGEN_FALLING;
+}
+
 /* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline int64_t hystgen_along(const hystgen_place_t *here, int64_t x) {
     return here->rising ? x : -x;
@@ -31,8 +36,8 @@ static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_
                                      const hystgen_segment_t *s, bool by_output) {
     const int64_t output = (int64_t)c->high * HYSTGEN_HIGH_STEP + (int64_t)c->low;
     const int64_t whole = by_output ? s->reach : (int64_t)s->way;
-    return hystgen_along(here, by_output ? output : c->input) +
-           (c->rose == here->rising ? 0 : whole);
+    const int64_t held = hystgen_along(here, by_output ? output : c->input);
+    return held + (c->rose == here->rising ? 0 : whole);
 }
 
 /* A corner stays where plays have followed. */
@@ -159,7 +164,7 @@ HYSTGEN_APART int64_t hystgen_solved(const hystgen_curve_t *t, const hystgen_pla
                                      const hystgen_kink_t *kink, int64_t to) {
     const hystgen_segment_t *s = &t->segment[kink->k];
     const int64_t x = kink->input + hystgen_over_slope(to - kink->output, s->reciprocal, s->shift);
-    const int64_t most = t->range[here->rising];
+    const int64_t most = t->range[hystgen_direction(here->rising)];
     return hystgen_along(here, x > most ? most : x);
 }
 

@@ -8,6 +8,11 @@ HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *
     to->rising = from->rising;
 }
 
+/* The direction of a move that rises, or falls. */
+static inline hystgen_direction_t hystgen_direction(bool rising) {
+    return rising ? HYSTGEN_RISING : HYSTGEN_FALLING;
+}
+
 /* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_real_t x) {
 #ifdef HYSTGEN_SOFT_FLOAT
@@ -29,14 +34,15 @@ HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m) {
 HYSTGEN_APART void hystgen_leave_corner(const hystgen_curve_t *t, hystgen_plays_t *m,
                                         hystgen_corner_t *corner) {
     const hystgen_segment_t *s = &t->segment[m->here.k];
-    const hystgen_real_t room = t->limit[!m->here.rising] + hystgen_along(m, m->here.output);
+    const hystgen_direction_t on = hystgen_direction(m->here.rising);
+    const hystgen_direction_t back = hystgen_direction(!m->here.rising);
+    const hystgen_real_t room = t->limit[back] + hystgen_along(m, m->here.output);
     hystgen_corner_t *c = &corner[m->here.depth];
     c->output = m->here.output;
-    c->pass[m->here.rising] = hystgen_along(m, m->here.input);
-    c->pass[!m->here.rising] =
-        s->reach > room ? HYSTGEN_REAL_MAX : s->way - c->pass[m->here.rising];
+    c->pass[on] = hystgen_along(m, m->here.input);
+    c->pass[back] = s->reach > room ? HYSTGEN_REAL_MAX : s->way - c->pass[on];
     c->top = m->here.k;
-    c->rose = m->here.rising;
+    c->rose = (uint_least8_t)on;
     m->here.depth = (uint_least16_t)(m->here.depth + 1u);
 }
 
@@ -51,15 +57,16 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m,
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x, a way or a reach; `step`: segment 1's. */
-static unsigned int hystgen_find_segment(const hystgen_real_t *step, unsigned int k,
-                                         unsigned int last, hystgen_real_t x) {
-    while (k < last) {
-        const unsigned int middle = (k + last) / 2;
-        const unsigned int at = 4u * middle;
-        const bool before = x > step[at];
-        k = before ? middle + 1u : k;
-        last = before ? last : middle;
+/* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k does. */
+static inline unsigned int hystgen_find_segment(const hystgen_segment_t *segment, unsigned int k,
+                                                unsigned int end, hystgen_real_t x, bool by_reach) {
+    unsigned int middle = (k + end) / 2;
+    while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
+        const hystgen_segment_t *s = &segment[middle];
+        const bool before = x > (by_reach ? s->reach : s->way);
+        k = before ? middle : k;
+        end = before ? end : middle;
+        middle = (k + end) / 2;
     }
     return k;
 }
@@ -70,12 +77,13 @@ HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_play
                                           hystgen_real_t input) {
     const hystgen_corner_t *c = &corner[m->here.depth - 1u];
     hystgen_real_t reach = hystgen_along(m, output - c->output);
-    hystgen_real_t x = c->pass[m->here.rising];
+    const hystgen_direction_t on = hystgen_direction(m->here.rising);
+    hystgen_real_t x = c->pass[on];
     unsigned int k = m->here.k;
-    if (c->rose != m->here.rising) {
-        k = hystgen_find_segment(&t->segment[1].reach, k, c->top - 1u, reach);
+    if (c->rose != on) {
+        k = hystgen_find_segment(t->segment, k, c->top, reach, true);
         reach = reach - t->segment[k].reach;
-        x = t->segment[k].way - c->pass[!m->here.rising];
+        x = t->segment[k].way - c->pass[hystgen_direction(!m->here.rising)];
     }
     x = x + reach * t->segment[k].slope;
     m->here.input = x < hystgen_along(m, input) ? hystgen_along(m, x) : input;
@@ -90,11 +98,12 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
     if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) {
         hystgen_turn_back(t, m, corner);
     }
+    const hystgen_direction_t on = hystgen_direction(m->here.rising);
     unsigned int kept = 0; /* bisect: `here.depth` is passed, `kept` is not */
     while (m->here.depth - kept > 1u) {
         const unsigned int middle = (kept + m->here.depth) / 2;
         const hystgen_real_t reach =
-            corner[middle].rose == m->here.rising ? 0 : t->segment[corner[middle].top].reach;
+            corner[middle].rose == on ? 0 : t->segment[corner[middle].top].reach;
         const bool passed = hystgen_along(m, output - corner[middle].output) >= reach;
         m->here.depth = passed ? (uint_least16_t)middle : m->here.depth;
         m->here.k = passed ? corner[middle].top : m->here.k;
@@ -111,14 +120,15 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
         hystgen_turn_back(t, m, corner);
     }
     const hystgen_real_t x = hystgen_along(m, input);
-    const bool rising = m->here.rising;
+    const hystgen_direction_t on = hystgen_direction(m->here.rising);
+    const hystgen_direction_t other = hystgen_direction(!m->here.rising);
     const hystgen_corner_t *c = &corner[m->here.depth - 1u];
-    if (m->here.depth > 1u && x >= c->pass[rising]) {
+    if (m->here.depth > 1u && x >= c->pass[on]) {
         unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
         unsigned int passed = m->here.depth - 1u;
         while (passed - kept > 1u) {
             const unsigned int middle = (kept + passed) / 2;
-            const bool beyond = x >= corner[middle].pass[rising];
+            const bool beyond = x >= corner[middle].pass[on];
             passed = beyond ? middle : passed;
             kept = beyond ? kept : middle;
         }
@@ -126,16 +136,16 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
         m->here.depth = (uint_least16_t)passed;
         c = &corner[kept];
     }
-    hystgen_real_t cap = c->pass[rising];
+    hystgen_real_t cap = c->pass[on];
     hystgen_real_t next = cap;
     hystgen_real_t begin = cap;
     hystgen_real_t start = hystgen_along(m, c->output);
     unsigned int k = m->here.k;
     m->behind = input;
-    if (c->rose != rising) { /* plays follow one by one, and not all of the block at the corner */
-        const hystgen_real_t from = c->pass[!rising];
-        const hystgen_real_t room = t->inside[rising] - start;
-        k = hystgen_find_segment(&t->segment[1].way, k, c->top - 1u, x + from);
+    if (c->rose != on) { /* plays follow one by one, and not all of the block at the corner */
+        const hystgen_real_t from = c->pass[other];
+        const hystgen_real_t room = t->inside[on] - start;
+        k = hystgen_find_segment(t->segment, k, c->top, x + from, false);
         const hystgen_segment_t *s = &t->segment[k];
         begin = s->way - from;
         start = start + s->reach;
@@ -145,18 +155,22 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
         }
         m->from = -hystgen_along(m, from);
         m->base = c->output;
-        m->behind = k == 0 && from <= t->range[!rising] ? m->from : input; /* the same line back */
+        m->behind = k == 0 && from <= t->range[other] ? m->from : input; /* the same line back */
     }
     m->begin = hystgen_along(m, begin);
     m->start = hystgen_along(m, start);
     m->gain = t->segment[k].gain;
     const hystgen_real_t output = m->start + (input - m->begin) * m->gain;
-    if (hystgen_along(m, output) > t->limit[rising]) {
+    if (hystgen_along(m, output) > t->limit[on]) {
         return false;
     }
     const bool back = hystgen_along(m, output) < hystgen_along(m, m->here.output); /* by rounding */
     m->here.output = back ? m->here.output : output;
-    cap = back ? x : t->range[rising] < cap ? t->range[rising] : cap;
+    if (back) {
+        cap = x;
+    } else if (t->range[on] < cap) {
+        cap = t->range[on];
+    }
     m->cap = hystgen_along(m, cap);
     m->next = hystgen_along(m, next < cap ? next : cap);
     m->here.k = (uint_least16_t)k;
@@ -193,8 +207,13 @@ HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_play
 HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_plays_t *m,
                                               hystgen_corner_t *corner, hystgen_real_t input) {
     const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
-    if (on ? (m->here.rising ? input < m->next : input > m->next)
-           : m->here.k == 0 && (m->here.rising ? input > m->behind : input < m->behind)) {
+    bool same = false; /* the same plays follow */
+    if (on) {
+        same = m->here.rising ? input < m->next : input > m->next;
+    } else if (m->here.k == 0) {
+        same = m->here.rising ? input > m->behind : input < m->behind;
+    }
+    if (same) {
         m->here.input = input;
         m->here.output = m->start + (input - m->begin) * m->gain;
         return m->here.output;
@@ -214,8 +233,8 @@ HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m,
                                   hystgen_corner_t *corner, const hystgen_start_t *start) {
     unsigned int k;
     corner[0].output = start->bottom.output;
-    corner[0].pass[0] = start->bottom.pass[0];
-    corner[0].pass[1] = start->bottom.pass[1];
+    corner[0].pass[HYSTGEN_FALLING] = start->bottom.pass[HYSTGEN_FALLING];
+    corner[0].pass[HYSTGEN_RISING] = start->bottom.pass[HYSTGEN_RISING];
     corner[0].top = start->bottom.top;
     corner[0].rose = start->bottom.rose;
     m->here.depth = 1;

@@ -10,7 +10,11 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
         v = v < HYSTGEN_DRIVE_MIN ? HYSTGEN_DRIVE_MIN : HYSTGEN_DRIVE_MAX;
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
+    if (v > self->drive) {
+        self->ascending = true;
+    } else if (v < self->drive) {
+        self->ascending = false;
+    }
     self->drive = v;
     return hystgen_plays_step(&hystgen_forward_curve, &self->plays, self->corner,
                               hystgen_front_forward(v, self->ascending)) +

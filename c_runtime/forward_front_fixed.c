@@ -6,7 +6,11 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
     if (inside != v) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    self->ascending = inside > self->drive ? true : inside < self->drive ? false : self->ascending;
+    if (inside > self->drive) {
+        self->ascending = true;
+    } else if (inside < self->drive) {
+        self->ascending = false;
+    }
     self->drive = inside;
     const int32_t to = hystgen_front_forward(inside, self->ascending);
     const int64_t sum = hystgen_plays_step(&hystgen_model_curve, &self->here, self->corner,

@@ -32,7 +32,12 @@ HYSTGEN_APART int64_t hystgen_friction_move(const hystgen_friction_table_t *t,
     for (i = 0; i < t->n; ++i) {
         const int64_t r = t->play[i].threshold;
         const int64_t at = state[i].at;
-        const int64_t to = x - r > at ? x - r : x + r < at ? x + r : at;
+        int64_t to = at;
+        if (x - r > at) {
+            to = x - r;
+        } else if (x + r < at) {
+            to = x + r;
+        }
         const int64_t way = to >= at ? to - at : at - to;
         if (way == 0) {
             break;

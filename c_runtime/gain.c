@@ -11,9 +11,12 @@ static void hystgen_gain_init(hystgen_gain_t *self) {
 /* Sets the gain. Returns whether it had to be limited. */
 static bool hystgen_gain_set(const hystgen_gain_table_t *t, hystgen_gain_t *self,
                              hystgen_real_t gain) {
-    const hystgen_real_t inside = gain < t->least     ? t->least
-                                  : gain > t->largest ? t->largest
-                                                      : gain;
+    hystgen_real_t inside = gain;
+    if (gain < t->least) {
+        inside = t->least;
+    } else if (gain > t->largest) {
+        inside = t->largest;
+    }
     self->gain = inside;
     self->inverse = 1 / inside;
     return inside < gain || inside > gain;
@@ -22,9 +25,12 @@ static bool hystgen_gain_set(const hystgen_gain_table_t *t, hystgen_gain_t *self
 /* Sets gain and offset by a temperature. Returns whether one of them had to be limited. */
 static bool hystgen_gain_heat(const hystgen_gain_table_t *t, hystgen_gain_t *self,
                               hystgen_real_t temperature) {
-    const hystgen_real_t inside = temperature < t->coldest   ? t->coldest
-                                  : temperature > t->hottest ? t->hottest
-                                                             : temperature;
+    hystgen_real_t inside = temperature;
+    if (temperature < t->coldest) {
+        inside = t->coldest;
+    } else if (temperature > t->hottest) {
+        inside = t->hottest;
+    }
     const hystgen_real_t above = inside - t->reference;
     self->offset = t->offset_per_degree * above;
     return hystgen_gain_set(t, self, 1 + t->per_degree * above) || inside < temperature ||

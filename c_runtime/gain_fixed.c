@@ -10,9 +10,13 @@
 
 /* A gain within its limits. */
 static int32_t hystgen_gain_inside(int64_t gain) {
-    return (int32_t)(gain < HYSTGEN_GAIN_LEAST     ? HYSTGEN_GAIN_LEAST
-                     : gain > HYSTGEN_GAIN_LARGEST ? HYSTGEN_GAIN_LARGEST
-                                                   : gain);
+    if (gain < HYSTGEN_GAIN_LEAST) {
+        return (int32_t)HYSTGEN_GAIN_LEAST;
+    }
+    if (gain > HYSTGEN_GAIN_LARGEST) {
+        return (int32_t)HYSTGEN_GAIN_LARGEST;
+    }
+    return (int32_t)gain;
 }
 
 /* The reciprocal of a gain within its limits. */
@@ -49,9 +53,12 @@ static void hystgen_gain_init(hystgen_gain_t *self) {
 static bool hystgen_gain_heat(const hystgen_gain_table_t *t, hystgen_gain_t *self,
                               hystgen_real_t temperature) {
     const int64_t given = (int64_t)temperature * ((int64_t)1 << t->bits);
-    const int64_t inside = given < t->coldest   ? t->coldest
-                           : given > t->hottest ? t->hottest
-                                                : given;
+    int64_t inside = given;
+    if (given < t->coldest) {
+        inside = t->coldest;
+    } else if (given > t->hottest) {
+        inside = t->hottest;
+    }
     const int64_t above = inside - t->reference;
     const int64_t wanted = HYSTGEN_GAIN_ONE + hystgen_times(above, &t->per_degree);
     self->offset = hystgen_times(above, &t->offset_per_degree);

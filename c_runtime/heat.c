@@ -12,8 +12,9 @@ static void hystgen_heat_init(hystgen_heat_t *self) {
 
 /* How far the square of the drive, with its sign, has moved. */
 static hystgen_real_t hystgen_heat_way(hystgen_real_t before, hystgen_real_t v) {
-    const hystgen_real_t way =
-        (v >= 0 ? v * v : -(v * v)) - (before >= 0 ? before * before : -(before * before));
+    const hystgen_real_t to = v >= 0 ? v * v : -(v * v);
+    const hystgen_real_t from = before >= 0 ? before * before : -(before * before);
+    const hystgen_real_t way = to - from;
     return way >= 0 ? way : -way;
 }
 

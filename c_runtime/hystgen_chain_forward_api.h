@@ -13,6 +13,7 @@ void hystgen_forward_set_gain(hystgen_forward_t *self, hystgen_real_t gain);
 /* Distance that the drive has travelled: store it where it survives a power cycle, and set it again
    after init. */
 hystgen_travel_t hystgen_forward_travel(const hystgen_forward_t *self);
+/* The distance travelled so far, and the gain that belongs to it. */
 void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_travel_t travel);
 
 #endif

@@ -16,6 +16,7 @@ void hystgen_inverse_set_gain(hystgen_inverse_t *self, hystgen_real_t gain);
 /* Distance that the drive has travelled: store it where it survives a power cycle, and set it again
    after init. */
 hystgen_travel_t hystgen_inverse_travel(const hystgen_inverse_t *self);
+/* The distance travelled so far, and the gain that belongs to it. */
 void hystgen_inverse_set_travel(hystgen_inverse_t *self, hystgen_travel_t travel);
 /* The displacement that the model expects from the last applied drive. */
 hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self);

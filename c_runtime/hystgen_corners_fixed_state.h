@@ -1,6 +1,12 @@
 #ifndef HYSTGEN_CORNERS_FIXED_STATE_H
 #define HYSTGEN_CORNERS_FIXED_STATE_H
 
+/* The direction of a move, which has an entry of its own where both directions are listed. */
+typedef enum {
+    HYSTGEN_FALLING = 0,
+    HYSTGEN_RISING = 1
+} hystgen_direction_t;
+
 /* Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others. */
 typedef struct {
     int64_t output; /* sum of the plays and the offset, not rounded to a code */

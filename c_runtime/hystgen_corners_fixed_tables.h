@@ -19,7 +19,7 @@ typedef struct {
 typedef struct {
     const hystgen_segment_t *segment; /* plays 0 .. n, and one that never follows */
     int64_t offset;                   /* part of every output */
-    int64_t range[2]; /* inputs at the end of falling [0] moves, sign changed, and of rising [1] */
+    int64_t range[2]; /* inputs at the end of falling moves, sign changed, and of rising ones */
     uint_least16_t n; /* plays without play 0 */
 } hystgen_curve_t;
 

@@ -1,6 +1,13 @@
 #ifndef HYSTGEN_CORNERS_STATE_H
 #define HYSTGEN_CORNERS_STATE_H
 
+/* The direction of a move, which has an entry of its own where both directions are listed. */
+typedef enum {
+    HYSTGEN_FALLING = 0,
+    HYSTGEN_RISING = 1,
+    HYSTGEN_BOTTOM = 2 /* no move: what holds the plays that never follow */
+} hystgen_direction_t;
+
 /* Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others. */
 typedef struct {
     hystgen_real_t input; /* of the play sum (forward: drive, inverse: output) */
@@ -11,13 +18,13 @@ typedef struct {
 } hystgen_place_t;
 
 /* A turning point. It holds the plays of its block: those above the plays of the next corner, up to
-   play `top`. `pass`: input at which a falling [0] or rising [1] move has taken the whole block
-   along, sign changed for falling; one of the two is the input at the turning point itself. */
+   play `top`. `pass`: input at which a falling or a rising move has taken the whole block along,
+   sign changed for falling; one of the two is the input at the turning point itself. */
 typedef struct {
     hystgen_real_t output; /* at the turning point */
     hystgen_real_t pass[2];
     uint_least16_t top;
-    uint_least8_t rose; /* 1: a rising move ended here, 0: a falling one, 2: the bottom */
+    uint_least8_t rose; /* a hystgen_direction_t: that of the move that ended here */
 } hystgen_corner_t;
 
 /* The place of the play sum, and the line that its next outputs lie on. */

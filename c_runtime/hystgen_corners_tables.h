@@ -9,7 +9,8 @@ typedef struct {
     hystgen_real_t slope; /* 1 / gain */
 } hystgen_segment_t;
 
-/* One operator; [0] is for falling moves, with signs changed, [1] for rising ones. */
+/* One operator; of two entries one is for falling moves, with signs changed, one for rising ones.
+ */
 typedef struct {
     const hystgen_segment_t *segment; /* plays 0 .. n, and one that never follows */
     hystgen_real_t limit[2];          /* of the output */

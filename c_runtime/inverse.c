@@ -45,10 +45,14 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_plays_t *m = &self->plays;
     const hystgen_real_t x = u - HYSTGEN_OFFSET;
     const bool on = m->here.rising ? x > m->here.input : x < m->here.input;
-    if (on ? (m->here.rising ? x < m->next : x > m->next)
-           : m->here.k == 0 && (m->here.rising ? x > m->behind && x < m->here.input
-                                               : x < m->behind && x > m->here.input)) {
-        /* the usual sample: the same plays follow */
+    bool same = false; /* the same plays follow */
+    if (on) {
+        same = m->here.rising ? x < m->next : x > m->next;
+    } else if (m->here.k == 0) {
+        same = m->here.rising ? x > m->behind && x < m->here.input
+                              : x < m->behind && x > m->here.input;
+    }
+    if (same) { /* the usual sample */
         self->before = m->here.input;
         m->here.input = x;
         m->here.output = m->start + (x - m->begin) * m->gain;

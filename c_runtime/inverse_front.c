@@ -9,7 +9,11 @@ static void hystgen_inverse_keep(hystgen_inverse_t *self) {
 
 /* The actuator is at drive v; its move sets the direction. */
 static void hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v) {
-    self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
+    if (v > self->drive) {
+        self->ascending = true;
+    } else if (v < self->drive) {
+        self->ascending = false;
+    }
     self->drive = v;
 }
 
@@ -50,9 +54,12 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
     }
     hystgen_inverse_keep(self);
     if (!self->repeat || u < self->reference || u > self->reference) {
-        const hystgen_real_t level = u < HYSTGEN_OUTPUT_MIN   ? HYSTGEN_OUTPUT_MIN
-                                     : u > HYSTGEN_OUTPUT_MAX ? HYSTGEN_OUTPUT_MAX
-                                                              : u;
+        hystgen_real_t level = u;
+        if (u < HYSTGEN_OUTPUT_MIN) {
+            level = HYSTGEN_OUTPUT_MIN;
+        } else if (u > HYSTGEN_OUTPUT_MAX) {
+            level = HYSTGEN_OUTPUT_MAX;
+        }
         self->bits = level < u || level > u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
         self->reference = u;
         const hystgen_real_t w = hystgen_plays_step(&hystgen_inverse_curve, &self->plays,

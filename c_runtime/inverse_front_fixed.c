@@ -9,7 +9,11 @@ HYSTGEN_APART void hystgen_inverse_keep(hystgen_inverse_t *self) {
 
 /* The actuator is at drive v; its move sets the direction. Returns the input of the plays. */
 HYSTGEN_APART int32_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v) {
-    self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
+    if (v > self->drive) {
+        self->ascending = true;
+    } else if (v < self->drive) {
+        self->ascending = false;
+    }
     self->drive = v;
     return hystgen_front_forward(v, self->ascending);
 }

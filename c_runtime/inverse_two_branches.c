@@ -3,9 +3,13 @@
 /* Whether the move to v belongs to the branch that v was computed on. */
 static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t v, bool ascending) {
     const hystgen_fine_t inside = hystgen_clamp_fine(v);
-    return inside > self->drive   ? ascending
-           : inside < self->drive ? !ascending
-                                  : self->ascending == ascending;
+    if (inside > self->drive) {
+        return ascending;
+    }
+    if (inside < self->drive) {
+        return !ascending;
+    }
+    return self->ascending == ascending;
 }
 
 /* The drive that gives w on the branch of its own move. Tries the branch of the reference's move,
@@ -14,7 +18,12 @@ HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hyst
                                                                       hystgen_signal_t level,
                                                                       hystgen_reach_t w,
                                                                       bool *limited) {
-    const bool up = level > self->level ? true : level < self->level ? false : self->ascending;
+    bool up = self->ascending;
+    if (level > self->level) {
+        up = true;
+    } else if (level < self->level) {
+        up = false;
+    }
     hystgen_reach_t v = hystgen_front_inverse(w, up, limited);
     if (!hystgen_inverse_fits(self, v, up)) {
         const hystgen_reach_t back = (hystgen_reach_t)hystgen_clamp_fine(v) - self->drive;

@@ -20,7 +20,13 @@ static hystgen_real_t hystgen_steady_led(hystgen_real_t way, hystgen_real_t move
     const hystgen_real_t twice = moved + moved;
     const hystgen_real_t least = twice < 0 ? twice : 0;
     const hystgen_real_t most = twice < 0 ? 0 : twice;
-    return way < least ? least : way > most ? most : way;
+    if (way < least) {
+        return least;
+    }
+    if (way > most) {
+        return most;
+    }
+    return way;
 }
 
 /* The input v if it is ahead of x by `little` or more. Else one with which x comes to rest without
@@ -72,7 +78,8 @@ static void hystgen_steady_absorb(hystgen_steady_t *self, hystgen_lag_t *lag,
     const hystgen_real_t way = lag->high - before;
     self->moved = self->way;
     self->way = 0;
-    if ((way < 0 ? -way : way) >= (before < 0 ? -before : before)) {
+    const hystgen_real_t size = before < 0 ? -before : before;
+    if ((way < 0 ? -way : way) >= size) {
         lag->low = 0;
     }
 }

@@ -21,7 +21,13 @@ static int64_t hystgen_steady_led(int64_t way, int64_t moved) {
     const int64_t twice = moved + moved;
     const int64_t least = twice < 0 ? twice : 0;
     const int64_t most = twice < 0 ? 0 : twice;
-    return way < least ? least : way > most ? most : way;
+    if (way < least) {
+        return least;
+    }
+    if (way > most) {
+        return most;
+    }
+    return way;
 }
 
 /* The input v if it is ahead of x by `little` or more. Else one with which x comes to rest without

@@ -11,7 +11,13 @@ static hystgen_play_t hystgen_beside(const hystgen_play_t *play, unsigned int i,
         const int64_t room = (int64_t)t->threshold[i] - t->threshold[i - 1u];
         const int64_t low = play[i - 1u] - room;
         const int64_t high = play[i - 1u] + room;
-        return (hystgen_play_t)(rest < low ? low : rest > high ? high : rest);
+        if (rest < low) {
+            return (hystgen_play_t)low;
+        }
+        if (rest > high) {
+            return (hystgen_play_t)high;
+        }
+        return (hystgen_play_t)rest;
     }
     return (hystgen_play_t)rest;
 }

@@ -12,7 +12,10 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_nearer(const hystgen_inverse_t *se
     if (above < 0) {
         return (hystgen_reach_t)low - 1;
     }
-    return (hystgen_reach_t)low + (below < 0 ? 2 : above > below ? 1 : 0);
+    if (below < 0) {
+        return (hystgen_reach_t)low + 2;
+    }
+    return (hystgen_reach_t)low + (above > below ? 1 : 0);
 }
 
 /* Input of the plays at which their sum is h, by halves between where it is and the farthest: the

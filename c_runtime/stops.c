@@ -5,7 +5,12 @@
 /* x between the stops, and a slope of f beyond them. */
 static int64_t hystgen_stops_beyond(const hystgen_stops_t *t, int64_t x,
                                     const hystgen_factor_t *f) {
-    const int64_t inside = x < t->lower ? t->lower : x > t->upper ? t->upper : x;
+    int64_t inside = x;
+    if (x < t->lower) {
+        inside = t->lower;
+    } else if (x > t->upper) {
+        inside = t->upper;
+    }
     return inside + hystgen_times(x - inside, f);
 }
 

@@ -103,8 +103,8 @@ KILLED = (
     ),
     Mutant(
         "a step back by rounding goes on", FLOAT,
-        "    cap = back ? x : t->range",
-        "    cap = t->range",
+        "    if (back) {\n        cap = x;\n    } else if (t->range[on] < cap) {",
+        "    if (t->range[on] < cap) {",
         "listed", "float32",
     ),
     Mutant(
@@ -115,19 +115,19 @@ KILLED = (
     ),
     Mutant(
         "a line leads back where plays follow", INVERSE,
-        "           : m->here.k == 0 && (m->here.rising",
-        "           : (m->here.rising",
+        "    } else if (m->here.k == 0) {\n        same =",
+        "    } else {\n        same =",
         "plain", "float32",
     ),
     Mutant(
         "a line leads back where plays follow, forward", FLOAT,
-        "           : m->here.k == 0 && (m->here.rising",
-        "           : (m->here.rising",
+        "    } else if (m->here.k == 0) {\n        same =",
+        "    } else {\n        same =",
         "plain", "float32",
     ),
     Mutant(
         "a line leads back beyond the range", FLOAT,
-        "k == 0 && from <= t->range[!rising] ? m->from",
+        "k == 0 && from <= t->range[other] ? m->from",
         "k == 0 ? m->from",
         "outside", "float32",
     ),
@@ -157,8 +157,8 @@ KILLED = (
     ),
     Mutant(
         "a corner is passed only beyond it", FLOAT,
-        "if (m->here.depth > 1u && x >= c->pass[rising]) {",
-        "if (m->here.depth > 1u && x > c->pass[rising]) {",
+        "if (m->here.depth > 1u && x >= c->pass[on]) {",
+        "if (m->here.depth > 1u && x > c->pass[on]) {",
         "plain", "float32",
     ),
     Mutant("no shy", USUAL, ">> HYSTGEN_FRACTION) - HYSTGEN_SHY;", ">> HYSTGEN_FRACTION);", "coarse", "q15"),
@@ -188,15 +188,15 @@ KILLED = (
         "    hystgen_move", "two_branches", "q31",
     ),
     Mutant(
-        "the low saturation code", CODES, "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX",
-        "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX - 1", "far_low", "q15",
+        "the low saturation code", CODES, "return (hystgen_real_t)-HYSTGEN_CODE_MAX;",
+        "return (hystgen_real_t)(-HYSTGEN_CODE_MAX - 1);", "far_low", "q15",
     ),
     Mutant(
         "halves of codes are rounded up on either side of 0", FINER, " - (w < 0 ? 1 : 0)) >>", ") >>", "listed", "q15",
     ),
     Mutant(
-        "no saturation below", CODES, "code < -HYSTGEN_CODE_MAX ? -HYSTGEN_CODE_MAX",
-        "code < -HYSTGEN_CODE_MAX ? code", "far_low", "q15",
+        "no saturation below", CODES, "return (hystgen_real_t)-HYSTGEN_CODE_MAX;",
+        "return (hystgen_real_t)code;", "far_low", "q15",
     ),
     Mutant(
         "no number before the first step", STEP, "self->stepped ? self->answer : self->drive", "self->answer",

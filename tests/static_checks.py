@@ -136,6 +136,21 @@ def gcc(tool: str, sources: Sequence[Path], more: Sequence[str] = ()) -> Iterato
             yield Finding("gcc", None, done.stderr)
 
 
+EXTENSION = re.compile(
+    r"# *pragma (?!STDC )(\w+ \w+)|_Pragma\(\"(?!STDC )(\w+ \w+)|"
+    r"__(attribute)__ *\(\((\w+)|\b(__builtin_\w+|(?:__)?asm(?:__)?)\b"
+)
+
+
+def extensions(sources: Sequence[Path]) -> Iterator[Finding]:
+    """Extensions of the language in these files and their headers, MISRA rule 1.2: no tool of those here has it."""
+    files = {each for source in sources for each in (source, *source.parent.glob("*.h"))}
+    for file in sorted(files):
+        for number, line in enumerate(file.read_text(encoding="ascii").splitlines(), 1):
+            for found in EXTENSION.finditer(line):
+                yield Finding("extension", " ".join(filter(None, found.groups())), f"{file}:{number}: {line.strip()}")
+
+
 def clang_format(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
     """Files that are formatted otherwise than the `.clang-format` beside them says."""
     done = _run([tool, "--dry-run", "--Werror", *sources])
@@ -193,6 +208,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="hystgen-static-") as name, ThreadPoolExecutor(os.cpu_count()) as pool:
         emitted = [emit(Path(name) / "-".join(module), *module) for module in MODULES]
         jobs = [pool.submit(lambda t, s: list(RUN[t](tools[t], s)), tool, files) for files in emitted for tool in RUN]
+        jobs += [pool.submit(lambda s: list(extensions(s)), files) for files in emitted]
         jobs += [pool.submit(lambda u: list(standing(tools, Path(name), u)), unit) for unit in units.UNITS]
         files = sorted(units.RUNTIME.glob("*.[ch]"))
         jobs.append(pool.submit(lambda: list(clang_format(tools["clang-format"], files))))

@@ -40,6 +40,17 @@ def test_a_defect_is_found(tool: str, tmp_path: Path) -> None:
     assert any("defect.c" in line for line in problems(found, static_checks.deviations(), complete=False))
 
 
+def test_an_extension_is_found(tmp_path: Path) -> None:
+    source = tmp_path / "defect.c"
+    source.write_text('#pragma STDC FP_CONTRACT OFF\n#pragma GCC optimize("O3")\n#include "defect.h"\n')
+    (tmp_path / "defect.h").write_text("static int f(void) __attribute__((pure));\n#define A __builtin_trap()\n")
+    found = list(static_checks.extensions([source]))
+    rules = [finding.rule for finding in found]
+    assert rules == ["GCC optimize", "attribute pure", "__builtin_trap"]
+    said = problems(found, static_checks.deviations(), complete=False)
+    assert [line.partition(": ")[2].partition(":")[0] for line in said] == [str(tmp_path / "defect.h")] * 2
+
+
 def test_what_cannot_be_analysed_is_a_problem(tmp_path: Path) -> None:
     path = static_checks.find("cppcheck")
     if path is None:

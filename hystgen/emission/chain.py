@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import textwrap
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from hystgen.compensator.chain import blocks, moving
@@ -366,6 +366,12 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     )  # fmt: skip
 
 
+def with_fields(made: Glue, named: Mapping[str, Collection[str]]) -> Glue:
+    """The glue with the fields alone that the functions of each operator name."""
+    fields = {op: [each for each in found if each.name in named[op]] for op, found in made.fields.items()}
+    return replace(made, fields=fields, states={op: _state(op, found) for op, found in fields.items()})
+
+
 def _fixed_constants(t: ChainTables) -> list[tuple[str, str, str]]:
     """Numbers that functions name in fixed point alone."""
     low, high = t.plays.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
@@ -464,11 +470,12 @@ def _functions(
         blocks: Sequence[Block], verb: str, x: str, side: str, comment: str, more: Sequence[str] = (),
         first: Sequence[str] = (),
     ) -> str:
-        lines = [*first, *(f"{x} = {block.call(verb, x)};" for block in blocks), *more] or ["(void)self;"]
-        if verb == "resting" and not any("self" in line for line in lines):
-            lines = ["(void)self;", *lines]
+        lines = [*first, *(f"{x} = {block.call(verb, x)};" for block in blocks), *more]
+        last = f"return {x};"
+        if blocks and not more:
+            last = lines.pop().replace(f"{x} =", "return", 1)
         head = f"static hystgen_signal_t hystgen_{op}_{side}_{verb}({self_t}, hystgen_signal_t {x})"
-        return _function(comment, head, [*lines, f"return {x};"])
+        return _function(comment, head, [*lines, last])
 
     quiet = inverse and bool(t.quiet)
     rest, absorb = (["hystgen_quiet_rest(&self->quiet, v);"], ["self->quiet.arrived = v;"]) if quiet else ([], [])
@@ -497,7 +504,12 @@ def _functions(
                 [f"return hystgen_steady_missed({block.table}, way);"],
             )
             lines = [
-                "const bool rises = a > self->drive ? true : a < self->drive ? false : self->ascending;",
+                "bool rises = self->ascending;",
+                "if (a > self->drive) {",
+                "    rises = true;",
+                "} else if (a < self->drive) {",
+                "    rises = false;",
+                "}",
                 f"return hystgen_steady_{'braked' if t.braked else 'solve'}(&self->steady, {block.table}, "
                 f"&self->{block.name}, a, rises,",
                 "    hystgen_entered_drive(self->applied), HYSTGEN_DITHER);",
@@ -530,17 +542,20 @@ def _functions(
     if inverse:
         lead = f"self->filled ? self->{clocks[0].name}.lead : 0" if clocks and ahead else "0"
         lines = [f"const hystgen_signal_t lead = {lead};"] * len(clocks)
-        lines.append(f"hystgen_signal_t y = u - ({offsets}{drifts('self->moving ? lead + 1 : lead')});")
-        lines += [
-            f"y = hystgen_{stage['kind']}_inverse({stage['table']}, y{stage['limited']});" for stage in reversed(behind)
-        ]
-        unused = [] if any(stage["limited"] for stage in behind) else ["(void)limited;"]
         counted = ["hystgen_quiet_count(&self->quiet, u);"] * quiet
+        y = f"u - ({offsets}{drifts('self->moving ? lead + 1 : lead')})"
+        lines += counted
+        if behind:
+            lines.append(f"hystgen_signal_t y = {y};")
+        for stage in reversed(behind):
+            y = f"hystgen_{stage['kind']}_inverse({stage['table']}, y{stage['limited']})"
+            lines.append(f"y = {y};")
+        lines = lines[: len(lines) - bool(behind)]
         yield _function(
             "The output of the chain that gives the displacement u; `limited` tells whether none does.",
             f"static hystgen_signal_t hystgen_inverse_undisplaced({'' if quiet else 'const '}{self_t}, "
             "hystgen_signal_t u, bool *limited)",
-            [*lines, *unused, *counted, "return y;"],
+            [*lines, f"return {y};"],
         )
         put = [
             line for each in clocks
@@ -552,12 +567,12 @@ def _functions(
             "What has to be given now for the newest reference, y once it is undisplaced.",
             f"static hystgen_signal_t hystgen_inverse_ahead({self_t}, hystgen_signal_t y)",
             [*put, "return hystgen_preview_target(hystgen_tap, self->line);"] if ahead
-            else ["(void)self;", "return y;"],
+            else ["return y;"],
         )
         yield _function(
             "No new reference: the newest one once more.",
             f"static void hystgen_inverse_repeat({self_t})",
-            ["hystgen_preview_repeat(self->line, &self->filled);"] if ahead else ["(void)self;"],
+            ["hystgen_preview_repeat(self->line, &self->filled);"] if ahead else [],
         )  # fmt: skip
     gains = [block for block in after if block.kind.name == "gain"]
     ageing = [block for block in after if block.kind.name == "ageing"]
@@ -590,19 +605,17 @@ def _functions(
                 for each, amount in zip(heat, warming, strict=True)
             ),
             *(f"hystgen_ageing_move({each.table}, &self->{each.name}, {way});" for each in ageing),
-            *(["(void)self;"] if not (clocks or heat or ageing) else []),
-            *(["(void)v;"] if not (heat or ageing) else []),
         ],
     )
     yield _function(
         "Drift begins anew, at the drive absorbed last.",
         f"static void hystgen_{op}_clock_start({self_t})",
-        [f"hystgen_clock_start(&self->{each.name});" for each in clocks] or ["(void)self;"],
+        [f"hystgen_clock_start(&self->{each.name});" for each in clocks],
     )
     heats = [f"hystgen_gain_heat({block.table}, &self->{block.name}, temperature)" for block in gains]
     yield _function(
         "Gains and offsets of a temperature. Returns whether it had to be limited.",
         f"static bool hystgen_{op}_heat({self_t}, hystgen_real_t temperature)",
         ["bool limited = false;", *(f"limited = {heat} || limited;" for heat in heats), "return limited;"]
-        if heats else ["(void)self;", "(void)temperature;", "return false;"],
+        if heats else ["return false;"],
     )  # fmt: skip

@@ -23,7 +23,7 @@ from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, LEAST_LATE, SHARE_BITS, Compiled
 from hystgen.effects import own as own_effects
 from hystgen.effects.base import USER
-from hystgen.emission import chain, cost, doubts, numbers, own, runtime, selftest
+from hystgen.emission import chain, cost, doubts, interface, numbers, own, runtime, selftest, words
 from hystgen.emission.options import OPTIONS, Options, seal
 from hystgen.emission.text import WIDTH, comment_text, define, fit, literal
 from hystgen.front.tanh.model import TanhEnvelope
@@ -111,8 +111,8 @@ def _implementation(values: SimpleNamespace) -> str:
         )
     )
     tables = render("tables.c.j2", values)
-    parts = (opening, apart, values.kernels, values.types, tables, values.operators, closing)
-    return "\n".join(parts)
+    code = (values.kernels, values.types, tables, values.operators)
+    return "\n".join((words.overview("\n".join(code)), opening, apart, *code, closing))
 
 
 def _tidy(text: str) -> str:
@@ -184,7 +184,9 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
             "runtime.c.j2",
             values,
             banner=banner_of(values, f"{file}.c", f"see {file}.h"),
-            implementation="\n".join([whole(*family.opening), whole(*family.soft(kernels), "apart.h"), kernels]),
+            implementation="\n".join(
+                [words.overview(kernels), whole(*family.opening), whole(*family.soft(kernels), "apart.h"), kernels]
+            ),
         ),
     }
 
@@ -224,6 +226,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         shared=shared,
         single_header=options.layout == "single-header",
         version=__version__,
+        version_number=_version_number(),
         command=_command(parameters, options),
         units=_units(parameters),
         n=n,
@@ -242,7 +245,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         compiled is not None and bool(compiled.parts.ageing), *(chain.plays(compiled.tables) if compiled else ()),
     )  # fmt: skip
     glue: chain.Glue | None = getattr(values, "glue", None)
-    values.timing = _timing(parameters, compiled) if compiled else []
+    values.timing = _timing(parameters, compiled, about["family"])
     reading = [*_reading(compiled), *_branches(compiled, parameters), *_quiet(values)] if compiled else []
     values.reading = reading if options.inverse else []
     values.doubts = doubts.found(parameters, compiled, values) if options.inverse else []
@@ -252,7 +255,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.functions = front + "\n" + glue.functions if glue else front
     values.calls = calls = glue.calls if glue else {}
     own_types, own_functions = own.pieces(compiled.tables) if compiled else ([], [])
-    pieces = runtime.operator_pieces(values.variant, operators, values.functions, calls, own_functions)
+    pieces = runtime.operator_pieces(values.variant, family, operators, values.functions, calls, own_functions)
     kernels = runtime.needed(
         [*runtime.table_pieces(family), *runtime.kernel_pieces(family)], sorted(runtime.used(pieces))
     )
@@ -260,17 +263,19 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family, carried)
     values.types = ""
     if glue:
+        glue = values.glue = chain.with_fields(glue, {op: runtime.fields(pieces, op) for op in operators})
         types = runtime.chain_types(own_types, "\n".join(glue.states.values()), family)
         states = runtime.needed(types, [f"hystgen_{op}_t" for op in operators])
         tabled = runtime.needed(types, sorted(runtime.used(pieces)))
         tables = [piece for piece in tabled if piece not in states]
         values.types = runtime.render_operators(tables, name, 0, prefix, family)
     else:
-        states = runtime.state_pieces(values.variant, operators)
+        states = runtime.state_pieces(values.variant, operators, pieces)
     values.states = runtime.render_operators(states, name, values.corners, prefix, family)
     if corners and not shared:
         values.states = runtime.all_types(family.states, prefix, family) + "\n" + values.states
-    values.api = runtime.api(operators, name, prefix, family, calls)
+    for kind in ("arrays", "beside"):
+        setattr(values, kind, _named_by(getattr(values, kind), values.operators, [*values.arrays, *values.beside]))
     values.build = runtime.verbatim(family.build, name, family, name)
     values.typedefs = _typedefs(values)
     values.limits = _limits(values)
@@ -280,8 +285,22 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.kernels = runtime.render_carried(carried, name, prefix, family) if shared else text
     types = [*runtime.memory_pieces(family), *runtime.table_pieces(family), *([] if glue else states)]
     values.cost = _cost(cascade, options, values, text, types)
+    values.api = runtime.api(
+        operators, name, prefix, family, calls, lambda pieces: interface.documented(pieces, values)
+    )
     values.details = _details(parameters, cascade, options, values)
     return values
+
+
+def _named_by(tables: Sequence[str], operators: str, every: Sequence[str]) -> list[str]:
+    """The tables that functions name, or another of `every` that they name."""
+    name = re.compile(r"(\w+)(?:\[\w+\])* = \{")
+    named = set(re.findall(r"\w+", operators))
+    for text in reversed(every):  # those that others name stand before them
+        found = name.search(text)
+        if found is None or found[1] in named:
+            named |= set(re.findall(r"\w+", text))
+    return [text for text in tables if (found := name.search(text)) is None or found[1] in named]
 
 
 def _typedefs(values: SimpleNamespace) -> list[str]:
@@ -327,14 +346,28 @@ def _limits(values: SimpleNamespace) -> list[str]:
     return [define(f"{values.NAME}_{name}", value, comment) for name, value, comment in found]
 
 
-def _timing(parameters: Parameters, compiled: Compiled) -> list[tuple[str, str, str]]:
+def _version_number() -> int:
+    """The version as a number that the preprocessor can compare; what is not final counts as its release."""
+    major, minor, patch = map(int, re.findall(r"\d+", __version__)[:3])
+    return 10000 * major + 100 * minor + patch
+
+
+def _timing(
+    parameters: Parameters, compiled: Compiled | None, family: runtime.Family
+) -> list[tuple[str, str, str]]:
+    """Macros about time: its sample time, and of a model with effects what follows from it."""
+    kind = np.float64 if family.fixed else np.dtype(family.arithmetic.number).type
+    period = parameters.sample_time
+    found = [] if period is None else [("SAMPLE_TIME", literal(kind(period)), "s, from step to step")]
+    return [*found, *_times(compiled, kind)] if compiled else found
+
+
+def _times(compiled: Compiled, kind: type[np.floating[Any]]) -> list[tuple[str, str, str]]:
     """Macros of a model with effects about time."""
-    kind = np.float64 if compiled.tables.fixed else compiled.tables.threshold.dtype.type
     ahead = "samples that the argument of step is ahead of the motion"
     if compiled.late > LEAST_LATE:
         ahead += f", which is {compiled.late:.4g} late"
     return [
-        ("SAMPLE_TIME", literal(kind(parameters.sample_time)), "s, from step to step"),
         ("PREVIEW", str(compiled.ahead), ahead),
         ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest gain from reference to drive over that at rest"),
         ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, a second, for which the errors below hold"),

@@ -25,7 +25,7 @@ from hystgen.front.stage import StageTables
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters
 from hystgen.plays import slots
-from hystgen.plays.corners.corners_float import BOTTOM, Curve, Start
+from hystgen.plays.corners.corners_float import Curve, Start
 
 
 def fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
@@ -260,7 +260,7 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], own: str, prefix: s
         output, falling, rising = map(literal, start.bottom)
         memories.append(
             f"{{{before[text]}, {start.step}, {start.risen}, "
-            f"{{{output}, {{{falling}, {rising}}}, {start.top}, {BOTTOM}}}}}"
+            f"{{{output}, {{{falling}, {rising}}}, {start.top}, {prefix.upper()}_BOTTOM}}}}"
         )
     found.append(
         f"static const {prefix}_start_t {own}_start[2] = {{\n" + ",\n".join(_lines([m]) for m in memories) + "\n};\n"

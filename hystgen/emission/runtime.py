@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
 from hystgen.arithmetic import ARITHMETICS, Arithmetic
 from hystgen.compensator.chain.blocks import KINDS
+from hystgen.emission import folding
 
 VERSION = 2  # of the interface between emitted models and a shared run time
 
@@ -202,6 +203,14 @@ class Variant:
     moves: str = ""
     bends: str = ""
 
+    @property
+    def apart(self) -> tuple[str, ...]:
+        """How functions begin that the compiler keeps apart here, as `render_operators` has it."""
+        corners = self.engine == "corners"
+        found = ["HYSTGEN_APART ", "HYSTGEN_APART_IN_FIXED " if self.fixed else "HYSTGEN_APART_IN_FLOAT "]
+        found += ["HYSTGEN_APART_IN_FLOAT_CORNERS "] * (corners and not self.fixed)
+        return (*found, *["HYSTGEN_APART_BUT_IN_FLOAT_LOOP "] * (corners or self.fixed))
+
     def state(self, operator: str) -> str:
         """The header with the type of an instance."""
         if self.engine == "loop":
@@ -330,9 +339,7 @@ def split_pieces(source: str) -> list[Piece]:
         lines.append(line)
         depth += code.count("{") - code.count("}")
         if constant or (not depth and re.search(r"[};]\s*$", code)):
-            text = "\n".join(lines) + "\n"
-            own = _defined_name(text)
-            pieces.append(Piece(own, text, frozenset(_NAME.findall(_COMMENT.sub("", text))) - {own}))
+            pieces.append(_piece("\n".join(lines) + "\n"))
             lines = []
     return pieces
 
@@ -380,16 +387,42 @@ def memory_pieces(family: Family) -> list[Piece]:
 
 def operator_pieces(
     variant: Variant,
+    family: Family,
     operators: Iterable[str],
     glue: str,
     calls: Mapping[str, Iterable[str]] = MappingProxyType({}),
-    own: Iterable[Piece] = (),
+    own: Sequence[Piece] = (),
 ) -> list[Piece]:
-    """The functions of a model's operators, with those that `glue` defines for it; `calls` as for `api`; `own`: of
-    blocks that are the user's own."""
+    """The functions of a model's operators, with those that `glue` defines for it, without what does nothing; `calls`
+    as for `api`; `own`: of blocks that are the user's own, which stay as they are."""
     blocks = (FIXED_CHAIN_BLOCKS if variant.fixed else CHAIN_BLOCKS) if variant.chain else ()
-    wanted = [piece.name for op in operators for piece in _calls(op, calls.get(op, ()))]
-    return needed([*_pieces(blocks), *own, *split_pieces(glue), *_pieces(variant.sources())], wanted)
+    roots = [piece.name for op in operators for piece in _calls(op, calls.get(op, ()))]
+    pieces = needed([*_pieces(blocks), *own, *split_pieces(glue), *_pieces(variant.sources())], roots)
+    parsed = [(piece, None if piece in own else folding.parsed(piece.text)) for piece in pieces]
+    kernels = [found for piece in (*kernel_pieces(family), *own) if (found := folding.parsed(piece.text))]
+
+    def put(functions: Mapping[str, folding.Function]) -> list[Piece]:
+        made = [
+            piece if each is None or each == functions.get(piece.name) else _piece(functions[piece.name].text())
+            for piece, each in parsed if each is None or piece.name in functions
+        ]  # fmt: skip
+        return needed(made, roots)
+
+    functions = folding.folded(
+        [each for _, each in parsed if each], kernels, lambda functions: {each.name for each in put(functions)},
+        family.fixed, variant.apart,
+    )  # fmt: skip
+    return put(functions)
+
+
+def fields(pieces: Iterable[Piece], operator: str) -> frozenset[str]:
+    """The fields of an operator's instance that these functions name."""
+    return folding.fields([found for piece in pieces if (found := folding.parsed(piece.text))], operator)
+
+
+def _piece(text: str) -> Piece:
+    own = _defined_name(text)
+    return Piece(own, text, frozenset(_NAME.findall(_COMMENT.sub("", text))) - {own})
 
 
 def chain_types(own: Iterable[Piece], glue: str, family: Family) -> list[Piece]:
@@ -404,9 +437,17 @@ def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
     return [*_pieces([f"hystgen_{operator}_api.h"]), *beside]
 
 
-def state_pieces(variant: Variant, operators: Iterable[str]) -> list[Piece]:
-    """The types of instances."""
-    return _pieces(variant.state(op) for op in operators)
+def state_pieces(variant: Variant, operators: Iterable[str], functions: Sequence[Piece]) -> list[Piece]:
+    """The types of instances, with the fields that these functions name."""
+    made = []
+    for op in operators:
+        named = fields(functions, op)
+        for piece in _pieces([variant.state(op)]):
+            lines = piece.text.split("\n")
+            member = re.compile(r"^    [\w ]+?(\w+)(?:\[.*\])?;")
+            kept = [line for line in lines if not (found := member.match(line)) or found[1] in named]
+            made.append(_piece("\n".join(kept)))
+    return made
 
 
 def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
@@ -470,11 +511,17 @@ def render_operators(
 
 
 def api(
-    operators: Iterable[str], name: str, prefix: str, family: Family, calls: Mapping[str, Iterable[str]]
+    operators: Iterable[str],
+    name: str,
+    prefix: str,
+    family: Family,
+    calls: Mapping[str, Iterable[str]],
+    documented: Callable[[Sequence[Piece]], Iterable[Piece]],
 ) -> str:
-    """Prototypes of a model's functions; `calls`: by operator, the functions it has in addition."""
-    text = "\n".join("".join(piece.text for piece in _calls(op, calls.get(op, ()))) for op in operators)
-    return _named(text, prefix, family, name)
+    """Prototypes of a model's functions; `calls`: by operator, the functions it has in addition; `documented`: puts
+    above each what there is to know of it."""
+    every = [piece for op in operators for piece in documented(_calls(op, calls.get(op, ())))]
+    return _named("\n".join(piece.text for piece in every), prefix, family, name)
 
 
 def verbatim(files: Iterable[str], owner: str, family: Family, name: str) -> str:
@@ -487,7 +534,9 @@ def verbatim(files: Iterable[str], owner: str, family: Family, name: str) -> str
 def _own(family: Family) -> frozenset[str]:
     """The names that a run time defines."""
     pieces = [*kernel_pieces(family), *_pieces((*family.tables, *family.states))]
-    return frozenset([*(piece.name for piece in pieces), *(f"hystgen_{kind}" for kind in family.types)])
+    enums = [piece.code for piece in pieces if "typedef enum" in piece.code]
+    listed = [name for code in enums for name in re.findall(r"HYSTGEN_\w+", code)]
+    return frozenset([*(piece.name for piece in pieces), *listed, *(f"hystgen_{kind}" for kind in family.types)])
 
 
 def _named(

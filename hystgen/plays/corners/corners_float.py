@@ -120,14 +120,16 @@ def turn_back(t: Curve, m: Memory) -> None:
 
 
 @jit
-def find_segment(step: Reals, k: int, last: int, way: Any) -> int:
-    """The last of segments k .. last that begins before `way`; `step` are all ways, or all reaches."""
-    while k < last:
-        middle = (k + last) // 2
-        if way > step[middle + 1]:
-            k = middle + 1
+def find_segment(step: Reals, k: int, end: int, way: Any) -> int:
+    """The last of segments k .. end - 1 that begins before `way`, as segment k does; `step` are all ways, or all
+    reaches."""
+    middle = (k + end) // 2
+    while middle > k:
+        if way > step[middle]:
+            k = middle
         else:
-            last = middle
+            end = middle
+        middle = (k + end) // 2
     return k
 
 
@@ -140,7 +142,7 @@ def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
     x = m.passed[c, rising]
     k = m.counts[K]
     if m.rose[c] != rising:
-        k = find_segment(t.reach, k, m.top[c] - 1, reach)
+        k = find_segment(t.reach, k, m.top[c], reach)
         reach = reach - t.reach[k]
         x = t.way[k] - m.passed[c, 1 - rising]
     x = x + reach * t.slope[k]
@@ -198,7 +200,7 @@ def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
         top = m.top[c]
         origin = m.passed[c, 1 - rising]
         room = t.inside[rising] - y
-        k = find_segment(t.way, k, top - 1, x + origin)
+        k = find_segment(t.way, k, top, x + origin)
         begin = t.way[k] - origin
         y = y + t.reach[k]
         after = t.way[k + 1] - origin

@@ -5,16 +5,27 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 6eb42b61e2b68e3ac26d8a52bfc0a18f361f64219bb006c89c1fd8608d089442, without this line
+ * Text: sha256 414d24d54b22d73fd2c753120ec4dd3210eb41f7c2a8ead169e89b814307b457, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
 
-/* Products are rounded before they are added, whatever the compiler's default is. */
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("fp-contract=off")
-#else
+/* Words of this file
+
+   play: holds its value until its input is a threshold away, and then follows at that distance.
+   pending: the drive answered last: part of the memory only when the next call absorbs it, or the
+       drive committed in its place.
+*/
+
+/* Products are rounded before they are added, whatever the compiler's default is. clang and others
+   have the pragma of C99 for it. gcc does not, and fuses a product and a sum across statements,
+   assignments, casts and inline functions alike: short of a volatile object or a call for each
+   product, no wording of the arithmetic keeps the bits. GCC's manual means its own pragma for
+   debugging; it stands here only where the target has a fused instruction. */
+#if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
+#elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
+#pragma GCC optimize("fp-contract=off")
 #endif
 
 /* With -fsingle-precision-constant the literals below would lose bits. */
@@ -125,7 +136,8 @@ static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *pl
         const bent_real_t w =
             (output - (rising ? tail - t->lift[k] : tail + t->lift[k])) * t->inverse_slope[k];
         if (rising ? w >= first : w <= first) {
-            return k <= t->n && (rising ? w > next : w < next) ? next : w;
+            const bool beyond = rising ? w > next : w < next;
+            return k <= t->n && beyond ? next : w;
         }
         tail = tail + t->weight[last] * play[last];
         next = first;
@@ -179,18 +191,15 @@ static const bent_dead_zone_t bent_stage_1 = {
 #define BENT_INVERSE_RESET_DRIVE 0.0 /* that the plays stand for then */
 
 /* Input of the plays: w = G[v]. */
-static bent_real_t bent_front_forward(bent_real_t v, bool ascending) {
+static bent_real_t bent_front_forward(bent_real_t v) {
     bent_real_t w = v;
-    (void)ascending;
     w = bent_dead_zone_forward(&bent_stage_1, w);
     return w;
 }
 
 /* v = G^-1[w]; sets `limited` if no drive gives w. */
-static bent_real_t bent_front_inverse(bent_real_t w, bool ascending, bool *limited) {
+static bent_real_t bent_front_inverse(bent_real_t w) {
     bent_real_t v = w;
-    (void)ascending;
-    *limited = false;
     v = bent_dead_zone_inverse(&bent_stage_1, v);
     return v;
 }
@@ -205,39 +214,10 @@ static bent_real_t bent_inverse_clamp(bent_real_t u) {
     return (bent_real_t)(least > BENT_OUTPUT_MAX ? BENT_OUTPUT_MAX : least);
 }
 
-/* The drive that gives w; sets `limited` if there is none. */
-static bent_real_t bent_inverse_choose(const bent_inverse_t *self, bent_real_t level, bent_real_t w,
-                                       bool *limited) {
-    (void)self;
-    (void)level;
-    return bent_front_inverse(w, true, limited);
-}
-
-/* Start memory: all plays hold the same value. */
-static void bent_loop_init(bent_real_t *play) {
-    bent_loop_rest(&bent_model_tables, play, BENT_START);
-}
-
-/* The actuator is at drive v. Returns the input of the plays. */
-static bent_real_t bent_forward_arrive(bent_forward_t *self, bent_real_t v) {
-    (void)self;
-    return bent_front_forward(v, true);
-}
-
 /* The actuator is at drive v. Returns the input of the plays. */
 static bent_real_t bent_inverse_arrive(bent_inverse_t *self, bent_real_t v) {
     self->drive = v;
-    return bent_front_forward(v, true);
-}
-
-/* The drive that gives w. */
-static bent_real_t bent_inverse_drive(bent_inverse_t *self, bent_real_t level, bent_real_t w) {
-    bool limited;
-    const bent_real_t v = bent_inverse_choose(self, level, w, &limited);
-    if (limited) {
-        self->bits |= BENT_STATUS_DOMAIN;
-    }
-    return v;
+    return bent_front_forward(v);
 }
 
 static bent_real_t bent_forward_output(const bent_forward_t *self) {
@@ -257,7 +237,7 @@ static bent_real_t bent_inverse_solve(const bent_inverse_t *self, bent_real_t le
 
 /* The actuator has seen drive v. */
 static void bent_forward_absorb(bent_forward_t *self, bent_real_t v) {
-    bent_loop_absorb(&bent_model_tables, self->play, bent_forward_arrive(self, v));
+    bent_loop_absorb(&bent_model_tables, self->play, bent_front_forward(v));
 }
 
 /* The actuator has seen drive v. */
@@ -293,7 +273,7 @@ static bent_real_t bent_inverse_search(bent_inverse_t *self, bent_real_t u, bent
     self->reference = u;
     self->repeat = true;
     self->bits = bits;
-    const bent_real_t v = bent_inverse_drive(self, level, bent_inverse_solve(self, level));
+    const bent_real_t v = bent_front_inverse(bent_inverse_solve(self, level));
     const bent_real_t inside = bent_clamp_drive(v);
     if (inside < v || inside > v) {
         self->bits |= BENT_STATUS_OUTPUT_CLAMPED;
@@ -369,7 +349,7 @@ void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied) {
 }
 
 void bent_forward_init(bent_forward_t *self) {
-    bent_loop_init(self->play);
+    bent_loop_rest(&bent_model_tables, self->play, BENT_START);
     bent_forward_begin(self);
 }
 
@@ -380,7 +360,7 @@ void bent_forward_reset(bent_forward_t *self, bent_real_t v) {
 }
 
 void bent_inverse_init(bent_inverse_t *self) {
-    bent_loop_init(self->play);
+    bent_loop_rest(&bent_model_tables, self->play, BENT_START);
     bent_inverse_begin(self, BENT_INVERSE_INIT_DRIVE);
 }
 

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 67ba4461d7578fa1cb2acb0b88c803d2167553358f8c64acf20d6b40f7e0f02d, without this line
+ * Text: sha256 857d74a85a48b78e02d1eabb10c78fc760a5bb4b700114fef5768669af63a576, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -68,6 +68,7 @@ typedef double bent_real_t;
 
 /* The version that generated this header, and the hash of its parameters */
 #define BENT_HYSTGEN_VERSION "0.1.0"
+#define BENT_HYSTGEN_VERSION_NUMBER 100 /* 10000 major + 100 minor + patch */
 #define BENT_PARAMS_SHA256 "9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3"
 
 #define BENT_N_PLAYS 6
@@ -105,24 +106,104 @@ typedef struct {
     bent_real_t play[BENT_N_PLAYS + 1]; /* play 0 is the input of the plays */
 } bent_inverse_t;
 
-/* Start memory of the parameter file. */
+/**
+ * Start memory of the parameter file.
+ *
+ * @param self the instance
+ * @pre before every other call; at any time again
+ * @note Status bits: none
+ * @note Cost: once through the plays
+ */
 void bent_forward_init(bent_forward_t *self);
-/* All plays 0, status cleared, then one ordinary step to drive v. */
+
+/**
+ * All plays 0, status cleared, then one ordinary step to drive v.
+ *
+ * @param self the instance
+ * @param v drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: held
+ * @pre after init; at any time
+ * @note Status bits: cleared, then those of the step
+ * @note Cost: that of init and of a step
+ */
 void bent_forward_reset(bent_forward_t *self, bent_real_t v);
-/* One sample: drive v in, output out. Cannot fail. */
+
+/**
+ * One sample: drive v in, output out. Cannot fail.
+ *
+ * @param self the instance
+ * @param v drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: held
+ * @return displacement, um
+ * @pre after init; once every sample time, from one context
+ * @note Status bits: BENT_STATUS_INPUT_CLAMPED, BENT_STATUS_HELD
+ * @note Cost: at most 8 multiplications (2 + 1 n), 22 comparisons (10 + 2 n)
+ */
 bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v);
-/* BENT_STATUS_* bits since the last call; reading clears them. */
+
+/**
+ * BENT_STATUS_* bits since the last call; reading clears them.
+ *
+ * @param self the instance
+ * @return BENT_STATUS_* bits, 0 for none
+ * @pre after init; at any time
+ * @note Status bits: all of them are cleared
+ * @note Cost: one load and one store
+ */
 unsigned int bent_forward_status(bent_forward_t *self);
 
-/* Start memory of the parameter file. */
+/**
+ * Start memory of the parameter file.
+ *
+ * @param self the instance
+ * @pre before every other call; at any time again
+ * @note Status bits: none
+ * @note Cost: once through the plays
+ */
 void bent_inverse_init(bent_inverse_t *self);
-/* All plays 0, status cleared, then one ordinary step to reference u. */
+
+/**
+ * All plays 0, status cleared, then one ordinary step to reference u.
+ *
+ * @param self the instance
+ * @param u reference, um; limited to BENT_OUTPUT_MIN .. MAX; NaN and infinite: held
+ * @pre after init; at any time
+ * @note Status bits: cleared, then those of the step
+ * @note Cost: that of init and of a step
+ */
 void bent_inverse_reset(bent_inverse_t *self, bent_real_t u);
-/* One sample: reference u in, drive out, inside BENT_DRIVE_MIN .. MAX. Cannot fail. */
+
+/**
+ * One sample: reference u in, drive out, inside BENT_DRIVE_MIN .. MAX. Cannot fail.
+ *
+ * @param self the instance
+ * @param u reference, um; limited to BENT_OUTPUT_MIN .. MAX; NaN and infinite: held
+ * @return drive, V
+ * @pre after init; once every sample time, from one context
+ * @note Status bits: BENT_STATUS_INPUT_CLAMPED, BENT_STATUS_HELD, BENT_STATUS_OUTPUT_CLAMPED
+ * @note Cost: at most 23 multiplications (5 + 3 n), 38 comparisons (20 + 3 n)
+ */
 bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u);
-/* After a step: the drive that was really applied in place of the one returned. */
+
+/**
+ * After a step: the drive that was really applied in place of the one returned.
+ *
+ * @param self the instance
+ * @param applied drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: ignored
+ * @pre after a step and before the next one, any number of times; before the first step it is a
+ *     first drive
+ * @note Status bits: BENT_STATUS_INPUT_CLAMPED, BENT_STATUS_HELD
+ * @note Cost: a few comparisons: the next step takes the drive over
+ */
 void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied);
-/* BENT_STATUS_* bits since the last call; reading clears them. */
+
+/**
+ * BENT_STATUS_* bits since the last call; reading clears them.
+ *
+ * @param self the instance
+ * @return BENT_STATUS_* bits, 0 for none
+ * @pre after init; at any time
+ * @note Status bits: all of them are cleared
+ * @note Cost: one load and one store
+ */
 unsigned int bent_inverse_status(bent_inverse_t *self);
 
 #ifdef __cplusplus

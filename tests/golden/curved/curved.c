@@ -5,10 +5,26 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 5108803a14e1f3e7b9ad260f0756947f05adb7bf175f0b5ecc525b5650b9f2c1, without this line
+ * Text: sha256 10641de4d5e4ce37e8103e94c6118dcaf7fc28d476cf321a7cff2a602631520a, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
+
+/* Words of this file
+
+   play: holds its value until its input is a threshold away, and then follows at that distance.
+   move: what the input does from one turning point to the next: it rises, or it falls. Lengths are
+       taken along the move, so that a falling one is a rising one with all signs changed.
+   corner: a turning point that some plays still hold their values from; corners are a stack, the
+       newest one on top.
+   block: the plays that one corner holds: those with larger thresholds than the corner above it
+       has, up to its `top`.
+   way: how far the input has gone from a turning point.
+   reach: how far the output has gone from there; a reach_t also holds inputs and drives beyond
+       every code.
+   segment: the curve of output over input from where one more play follows to where the next does.
+   kink: a place along the move where another play begins to follow.
+*/
 
 #if defined(__GNUC__)
 #define CURVED_APART __attribute__((noinline)) static /* has several callers, or rarely runs */
@@ -34,7 +50,7 @@ typedef struct {
 typedef struct {
     const curved_segment_t *segment; /* plays 0 .. n, and one that never follows */
     int64_t offset;                   /* part of every output */
-    int64_t range[2]; /* inputs at the end of falling [0] moves, sign changed, and of rising [1] */
+    int64_t range[2]; /* inputs at the end of falling moves, sign changed, and of rising ones */
     uint_least16_t n; /* plays without play 0 */
 } curved_curve_t;
 
@@ -98,6 +114,11 @@ static void curved_copy_place(curved_place_t *to, const curved_place_t *from) {
     to->rising = from->rising;
 }
 
+/* The direction of a move that rises, or falls. */
+static inline curved_direction_t curved_direction(bool rising) {
+    return rising ? CURVED_RISING : CURVED_FALLING;
+}
+
 /* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline int64_t curved_along(const curved_place_t *here, int64_t x) {
     return here->rising ? x : -x;
@@ -118,8 +139,8 @@ static inline int64_t curved_begins(const curved_place_t *here, const curved_cor
                                     const curved_segment_t *s, bool by_output) {
     const int64_t output = (int64_t)c->high * CURVED_HIGH_STEP + (int64_t)c->low;
     const int64_t whole = by_output ? s->reach : (int64_t)s->way;
-    return curved_along(here, by_output ? output : c->input) +
-           (c->rose == here->rising ? 0 : whole);
+    const int64_t held = curved_along(here, by_output ? output : c->input);
+    return held + (c->rose == here->rising ? 0 : whole);
 }
 
 /* A corner stays where plays have followed. */
@@ -214,7 +235,7 @@ CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t
                                    const curved_kink_t *kink, int64_t to) {
     const curved_segment_t *s = &t->segment[kink->k];
     const int64_t x = kink->input + curved_over_slope(to - kink->output, s->reciprocal, s->shift);
-    const int64_t most = t->range[here->rising];
+    const int64_t most = t->range[curved_direction(here->rising)];
     return curved_along(here, x > most ? most : x);
 }
 
@@ -413,11 +434,10 @@ static const curved_ends_t curved_back_ends = {
     -24326964, 26004684, -21940052, 24379278, -21939941, 24379201
 };
 
-#define CURVED_START 0        /* what each play holds after init */
-#define CURVED_START_STEP 0   /* entries from play to play; reset takes 0 for each */
-#define CURVED_CODE_MAX 32767 /* the largest code of either sign */
-#define CURVED_FRACTION 31u   /* bits of a sum below an output code */
-#define CURVED_DEGREE 3u      /* of the polynomials of every curve */
+#define CURVED_START 0      /* what each play holds after init */
+#define CURVED_START_STEP 0 /* entries from play to play; reset takes 0 for each */
+#define CURVED_FRACTION 31u /* bits of a sum below an output code */
+#define CURVED_DEGREE 3u    /* of the polynomials of every curve */
 #define CURVED_FRONT_PIECES 42u
 #define CURVED_BACK_PIECES 44u
 #define CURVED_BELOW 11u /* bits of a curve back below a drive code */
@@ -432,27 +452,17 @@ static curved_real_t curved_inverse_clamp(curved_reach_t u) {
     return (curved_real_t)(least > CURVED_OUTPUT_MAX ? CURVED_OUTPUT_MAX : least);
 }
 
-/* Output code of a sum. */
-static curved_real_t curved_code(curved_sum_t sum, unsigned int *status) {
-    const curved_sum_t code = curved_nearest(sum, CURVED_FRACTION);
-    (void)status;
-    return (curved_real_t)(code > CURVED_CODE_MAX ? CURVED_CODE_MAX : code < -CURVED_CODE_MAX
-                           ? -CURVED_CODE_MAX : code);
-}
-
 /* Input of the plays: w = G[v]. */
-CURVED_APART curved_play_t curved_front_forward(curved_real_t v, bool ascending) {
-    (void)ascending;
+CURVED_APART curved_play_t curved_front_forward(curved_real_t v) {
     return (curved_play_t)curved_curve(curved_front_knot, curved_front_scale,
                                        curved_front_coefficient, CURVED_FRONT_PIECES,
                                        CURVED_DEGREE, v);
 }
 
 /* v = G^-1[w]; sets `limited` if no drive gives w. */
-CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool ascending, bool *limited) {
+CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool *limited) {
     const curved_ends_t *ends = &curved_back_ends;
     int64_t v;
-    (void)ascending;
     if (w < ends->first || w > ends->last) {
         return curved_beyond(ends, w, CURVED_DRIVE_MIN, CURVED_DRIVE_MAX, limited);
     }
@@ -462,26 +472,16 @@ CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool ascendin
     return (curved_reach_t)curved_nearest(v, CURVED_BELOW);
 }
 
-/* The drive that gives w; sets `limited` if there is none. */
-static curved_reach_t curved_inverse_choose(const curved_inverse_t *self, curved_real_t level,
-                                            curved_reach_t w, bool *limited) {
-    (void)self;
-    (void)level;
-    return curved_front_inverse(w, true, limited);
-}
-
 /* Keeps the place for a commit to go back to. */
 CURVED_APART void curved_inverse_keep(curved_inverse_t *self) {
     curved_copy_place(&self->undo, &self->here);
     self->undo_drive = self->drive;
-    self->undo_ascending = self->ascending;
 }
 
 /* The actuator is at drive v; its move sets the direction. Returns the input of the plays. */
 CURVED_APART int32_t curved_inverse_arrive(curved_inverse_t *self, curved_real_t v) {
-    self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
     self->drive = v;
-    return curved_front_forward(v, self->ascending);
+    return curved_front_forward(v);
 }
 
 /* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
@@ -501,10 +501,8 @@ curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u) {
         self->bits = level != u ? CURVED_STATUS_INPUT_CLAMPED : 0u;
         const int64_t w = curved_solve(&curved_model_curve, &self->here, self->corner, output,
                                        self->next, &self->kink);
-        const curved_reach_t v =
-            curved_inverse_choose(self, level, (curved_reach_t)w, &self->limited);
+        const curved_reach_t v = curved_front_inverse((curved_reach_t)w, &self->limited);
         const curved_real_t inside = curved_clamp_drive(v);
-        self->level = level;
         if (self->limited) {
             self->bits |= CURVED_STATUS_DOMAIN;
         }
@@ -526,7 +524,6 @@ void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied) {
     }
     curved_copy_place(&self->here, &self->undo);
     self->drive = self->undo_drive;
-    self->ascending = self->undo_ascending;
     self->repeat = false;
     self->next = -CURVED_FAR;
     curved_move_to_input(&curved_model_curve, &self->here, self->corner, &self->kink,
@@ -535,13 +532,10 @@ void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied) {
 
 static void curved_inverse_begin(curved_inverse_t *self, const int32_t *play, unsigned int step,
                                  const curved_drive_t *first) {
-    unsigned int status = 0; /* not reported: this is no step */
     curved_start(&curved_model_curve, &self->here, self->corner, play, step);
     self->drive = (curved_real_t)first->drive;
-    self->ascending = first->ascending;
     curved_inverse_keep(self);
     self->reference = 0;
-    self->level = curved_code(self->here.output, &status);
     self->repeat = false;
     self->next = -CURVED_FAR;
     self->bits = 0;

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 8c8155ad31b2c7410ebc4f3b98ff0a01ee6e10c85385b6428e986b698244eea9, without this line
+ * Text: sha256 9d1f6eaedf1e3b8bc0c17d1a43a41d5d635c8c8dad3c92d00b8b0fbfa3c085fc, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -21,10 +21,10 @@
  *     code at -O2       about 3409 bytes on a Cortex-M0+, 3201 on a Cortex-M4F, as measured for
  *         such a model
  *     constant tables   2094 bytes
- *     inverse instance  176 bytes of RAM
+ *     inverse instance  168 bytes of RAM
  *     inverse step, worst case: 13 multiplications of 32 by 32 bits, 47 comparisons (35 + 4 b, b =
  *         3 the bits of n)
- * On an 8-bit AVR constants lie in RAM too: at most 2201 bytes of RAM in all, 33 of them for each
+ * On an 8-bit AVR constants lie in RAM too: at most 2197 bytes of RAM in all, 33 of them for each
  * play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
@@ -54,6 +54,7 @@ typedef int64_t curved_sum_t;
 
 /* The version that generated this header, and the hash of its parameters */
 #define CURVED_HYSTGEN_VERSION "0.1.0"
+#define CURVED_HYSTGEN_VERSION_NUMBER 100 /* 10000 major + 100 minor + patch */
 #define CURVED_PARAMS_SHA256 "0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e"
 
 #define CURVED_N_PLAYS 6
@@ -70,6 +71,10 @@ typedef int64_t curved_sum_t;
 #define CURVED_STATUS_OUTPUT_CLAMPED 2u /* inverse: the drive was limited to the drive range */
 #define CURVED_STATUS_HELD 4u           /* never set: every code is a number */
 #define CURVED_STATUS_DOMAIN 8u         /* inverse: the argument of an envelope was limited */
+
+/* The direction of a move, which has an entry of its own where both directions are listed. */
+typedef enum {
+    CURVED_FALLING = 0, CURVED_RISING = 1 } curved_direction_t;
 
 /* Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others. */
 typedef struct {
@@ -106,27 +111,71 @@ typedef struct {
     curved_real_t drive; /* where the plays are */
     curved_real_t undo_drive;
     curved_real_t reference; /* of the last step */
-    curved_real_t level;     /* the same, limited: the next reference moves up or down from here */
-    bool ascending;          /* direction of the drive's last move */
-    bool undo_ascending;
-    bool repeat;        /* the last answer still stands for `reference` */
-    bool limited;       /* no drive gives it; here rather than on the stack */
-    uint_least8_t bits; /* status of that answer */
+    bool repeat;             /* the last answer still stands for `reference` */
+    bool limited;            /* no drive gives it; here rather than on the stack */
+    uint_least8_t bits;      /* status of that answer */
     unsigned int status;
     curved_place_t undo; /* where the plays were before the last step */
     curved_kink_t kink;  /* of the present step; here rather than on the stack */
     curved_corner_t corner[6];
 } curved_inverse_t;
 
-/* Start memory of the parameter file. */
+/**
+ * Start memory of the parameter file.
+ *
+ * @param self the instance
+ * @pre before every other call; at any time again
+ * @note Status bits: none
+ * @note Cost: once through the plays
+ */
 void curved_inverse_init(curved_inverse_t *self);
-/* All plays 0, status cleared, then one ordinary step to reference u. */
+
+/**
+ * All plays 0, status cleared, then one ordinary step to reference u.
+ *
+ * @param self the instance
+ * @param u reference, in codes of CURVED_OUTPUT_LSB um; limited to CURVED_OUTPUT_MIN .. MAX
+ * @pre after init; at any time
+ * @note Status bits: cleared, then those of the step
+ * @note Cost: that of init and of a step
+ */
 void curved_inverse_reset(curved_inverse_t *self, curved_real_t u);
-/* One sample: reference u in, drive out, inside CURVED_DRIVE_MIN .. MAX. Cannot fail. */
+
+/**
+ * One sample: reference u in, drive out, inside CURVED_DRIVE_MIN .. MAX. Cannot fail.
+ *
+ * @param self the instance
+ * @param u reference, in codes of CURVED_OUTPUT_LSB um; limited to CURVED_OUTPUT_MIN .. MAX
+ * @return drive, in codes of CURVED_DRIVE_LSB V
+ * @pre after init; once every sample time, from one context
+ * @note Status bits: CURVED_STATUS_INPUT_CLAMPED, CURVED_STATUS_OUTPUT_CLAMPED,
+ *     CURVED_STATUS_DOMAIN
+ * @note Cost: at most 13 multiplications of 32 by 32 bits, 47 comparisons (35 + 4 b, b = 3 the bits
+ *     of n)
+ */
 curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u);
-/* After a step: the drive that was really applied in place of the one returned. */
+
+/**
+ * After a step: the drive that was really applied in place of the one returned.
+ *
+ * @param self the instance
+ * @param applied drive, in codes of CURVED_DRIVE_LSB V; limited to CURVED_DRIVE_MIN .. MAX
+ * @pre after a step and before the next one, any number of times; before the first step it is a
+ *     first drive
+ * @note Status bits: CURVED_STATUS_INPUT_CLAMPED
+ * @note Cost: at most that of a step
+ */
 void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied);
-/* CURVED_STATUS_* bits since the last call; reading clears them. */
+
+/**
+ * CURVED_STATUS_* bits since the last call; reading clears them.
+ *
+ * @param self the instance
+ * @return CURVED_STATUS_* bits, 0 for none
+ * @pre after init; at any time
+ * @note Status bits: all of them are cleared
+ * @note Cost: one load and one store
+ */
 unsigned int curved_inverse_status(curved_inverse_t *self);
 
 #ifdef __cplusplus

@@ -5,16 +5,37 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 364a59e4b21d07d7d529f8890bc14aa06218a9fd3b0b40520496e0f421030303, without this line
+ * Text: sha256 3c50bb2761808d6dd225a7ce7c947d7d7e495c921682f55282538fd8d601f111, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
 
-/* Products are rounded before they are added, whatever the compiler's default is. */
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("fp-contract=off")
-#else
+/* Words of this file
+
+   play: holds its value until its input is a threshold away, and then follows at that distance.
+   move: what the input does from one turning point to the next: it rises, or it falls. Lengths are
+       taken along the move, so that a falling one is a rising one with all signs changed.
+   corner: a turning point that some plays still hold their values from; corners are a stack, the
+       newest one on top.
+   block: the plays that one corner holds: those with larger thresholds than the corner above it
+       has, up to its `top`.
+   way: how far the input has gone from a turning point.
+   reach: how far the output has gone from there; a reach_t also holds inputs and drives beyond
+       every code.
+   segment: the curve of output over input from where one more play follows to where the next does.
+   pass: the input at which a move has taken a whole block along: the corner is passed, and
+       forgotten.
+*/
+
+/* Products are rounded before they are added, whatever the compiler's default is. clang and others
+   have the pragma of C99 for it. gcc does not, and fuses a product and a sum across statements,
+   assignments, casts and inline functions alike: short of a volatile object or a call for each
+   product, no wording of the arithmetic keeps the bits. GCC's manual means its own pragma for
+   debugging; it stands here only where the target has a fused instruction. */
+#if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
+#elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
+#pragma GCC optimize("fp-contract=off")
 #endif
 
 #if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
@@ -35,7 +56,8 @@ typedef struct {
     plain_real_t slope; /* 1 / gain */
 } plain_segment_t;
 
-/* One operator; [0] is for falling moves, with signs changed, [1] for rising ones. */
+/* One operator; of two entries one is for falling moves, with signs changed, one for rising ones.
+ */
 typedef struct {
     const plain_segment_t *segment; /* plays 0 .. n, and one that never follows */
     plain_real_t limit[2];          /* of the output */
@@ -59,6 +81,11 @@ static void plain_copy_place(plain_place_t *to, const plain_place_t *from) {
     to->rising = from->rising;
 }
 
+/* The direction of a move that rises, or falls. */
+static inline plain_direction_t plain_direction(bool rising) {
+    return rising ? PLAIN_RISING : PLAIN_FALLING;
+}
+
 /* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline plain_real_t plain_along(const plain_plays_t *m, plain_real_t x) {
 #ifdef PLAIN_SOFT_FLOAT
@@ -80,13 +107,15 @@ static void plain_forget_line(plain_plays_t *m) {
 PLAIN_APART void plain_leave_corner(const plain_curve_t *t, plain_plays_t *m,
                                     plain_corner_t *corner) {
     const plain_segment_t *s = &t->segment[m->here.k];
-    const plain_real_t room = t->limit[!m->here.rising] + plain_along(m, m->here.output);
+    const plain_direction_t on = plain_direction(m->here.rising);
+    const plain_direction_t back = plain_direction(!m->here.rising);
+    const plain_real_t room = t->limit[back] + plain_along(m, m->here.output);
     plain_corner_t *c = &corner[m->here.depth];
     c->output = m->here.output;
-    c->pass[m->here.rising] = plain_along(m, m->here.input);
-    c->pass[!m->here.rising] = s->reach > room ? FLT_MAX : s->way - c->pass[m->here.rising];
+    c->pass[on] = plain_along(m, m->here.input);
+    c->pass[back] = s->reach > room ? FLT_MAX : s->way - c->pass[on];
     c->top = m->here.k;
-    c->rose = m->here.rising;
+    c->rose = (uint_least8_t)on;
     m->here.depth = (uint_least16_t)(m->here.depth + 1u);
 }
 
@@ -100,15 +129,16 @@ static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corn
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x, a way or a reach; `step`: segment 1's. */
-static unsigned int plain_find_segment(const plain_real_t *step, unsigned int k,
-                                       unsigned int last, plain_real_t x) {
-    while (k < last) {
-        const unsigned int middle = (k + last) / 2;
-        const unsigned int at = 4u * middle;
-        const bool before = x > step[at];
-        k = before ? middle + 1u : k;
-        last = before ? last : middle;
+/* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k does. */
+static inline unsigned int plain_find_segment(const plain_segment_t *segment, unsigned int k,
+                                              unsigned int end, plain_real_t x, bool by_reach) {
+    unsigned int middle = (k + end) / 2;
+    while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
+        const plain_segment_t *s = &segment[middle];
+        const bool before = x > (by_reach ? s->reach : s->way);
+        k = before ? middle : k;
+        end = before ? end : middle;
+        middle = (k + end) / 2;
     }
     return k;
 }
@@ -119,12 +149,13 @@ PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
                                      plain_real_t input) {
     const plain_corner_t *c = &corner[m->here.depth - 1u];
     plain_real_t reach = plain_along(m, output - c->output);
-    plain_real_t x = c->pass[m->here.rising];
+    const plain_direction_t on = plain_direction(m->here.rising);
+    plain_real_t x = c->pass[on];
     unsigned int k = m->here.k;
-    if (c->rose != m->here.rising) {
-        k = plain_find_segment(&t->segment[1].reach, k, c->top - 1u, reach);
+    if (c->rose != on) {
+        k = plain_find_segment(t->segment, k, c->top, reach, true);
         reach = reach - t->segment[k].reach;
-        x = t->segment[k].way - c->pass[!m->here.rising];
+        x = t->segment[k].way - c->pass[plain_direction(!m->here.rising)];
     }
     x = x + reach * t->segment[k].slope;
     m->here.input = x < plain_along(m, input) ? plain_along(m, x) : input;
@@ -139,11 +170,12 @@ PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
     if (plain_along(m, output) < plain_along(m, m->here.output)) {
         plain_turn_back(t, m, corner);
     }
+    const plain_direction_t on = plain_direction(m->here.rising);
     unsigned int kept = 0; /* bisect: `here.depth` is passed, `kept` is not */
     while (m->here.depth - kept > 1u) {
         const unsigned int middle = (kept + m->here.depth) / 2;
         const plain_real_t reach =
-            corner[middle].rose == m->here.rising ? 0 : t->segment[corner[middle].top].reach;
+            corner[middle].rose == on ? 0 : t->segment[corner[middle].top].reach;
         const bool passed = plain_along(m, output - corner[middle].output) >= reach;
         m->here.depth = passed ? (uint_least16_t)middle : m->here.depth;
         m->here.k = passed ? corner[middle].top : m->here.k;
@@ -160,14 +192,15 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
         plain_turn_back(t, m, corner);
     }
     const plain_real_t x = plain_along(m, input);
-    const bool rising = m->here.rising;
+    const plain_direction_t on = plain_direction(m->here.rising);
+    const plain_direction_t other = plain_direction(!m->here.rising);
     const plain_corner_t *c = &corner[m->here.depth - 1u];
-    if (m->here.depth > 1u && x >= c->pass[rising]) {
+    if (m->here.depth > 1u && x >= c->pass[on]) {
         unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
         unsigned int passed = m->here.depth - 1u;
         while (passed - kept > 1u) {
             const unsigned int middle = (kept + passed) / 2;
-            const bool beyond = x >= corner[middle].pass[rising];
+            const bool beyond = x >= corner[middle].pass[on];
             passed = beyond ? middle : passed;
             kept = beyond ? kept : middle;
         }
@@ -175,16 +208,16 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
         m->here.depth = (uint_least16_t)passed;
         c = &corner[kept];
     }
-    plain_real_t cap = c->pass[rising];
+    plain_real_t cap = c->pass[on];
     plain_real_t next = cap;
     plain_real_t begin = cap;
     plain_real_t start = plain_along(m, c->output);
     unsigned int k = m->here.k;
     m->behind = input;
-    if (c->rose != rising) { /* plays follow one by one, and not all of the block at the corner */
-        const plain_real_t from = c->pass[!rising];
-        const plain_real_t room = t->inside[rising] - start;
-        k = plain_find_segment(&t->segment[1].way, k, c->top - 1u, x + from);
+    if (c->rose != on) { /* plays follow one by one, and not all of the block at the corner */
+        const plain_real_t from = c->pass[other];
+        const plain_real_t room = t->inside[on] - start;
+        k = plain_find_segment(t->segment, k, c->top, x + from, false);
         const plain_segment_t *s = &t->segment[k];
         begin = s->way - from;
         start = start + s->reach;
@@ -194,18 +227,22 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
         }
         m->from = -plain_along(m, from);
         m->base = c->output;
-        m->behind = k == 0 && from <= t->range[!rising] ? m->from : input; /* the same line back */
+        m->behind = k == 0 && from <= t->range[other] ? m->from : input; /* the same line back */
     }
     m->begin = plain_along(m, begin);
     m->start = plain_along(m, start);
     m->gain = t->segment[k].gain;
     const plain_real_t output = m->start + (input - m->begin) * m->gain;
-    if (plain_along(m, output) > t->limit[rising]) {
+    if (plain_along(m, output) > t->limit[on]) {
         return false;
     }
     const bool back = plain_along(m, output) < plain_along(m, m->here.output); /* by rounding */
     m->here.output = back ? m->here.output : output;
-    cap = back ? x : t->range[rising] < cap ? t->range[rising] : cap;
+    if (back) {
+        cap = x;
+    } else if (t->range[on] < cap) {
+        cap = t->range[on];
+    }
     m->cap = plain_along(m, cap);
     m->next = plain_along(m, next < cap ? next : cap);
     m->here.k = (uint_least16_t)k;
@@ -237,13 +274,18 @@ PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, p
     return true;
 }
 
+/* Whether a move to x stays short of `end`. */
+static inline bool plain_short_of(bool rising, plain_real_t x, plain_real_t end) {
+    return rising ? x < end : x > end;
+}
+
 /* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
 PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m,
                              plain_corner_t *corner, const plain_start_t *start) {
     unsigned int k;
     corner[0].output = start->bottom.output;
-    corner[0].pass[0] = start->bottom.pass[0];
-    corner[0].pass[1] = start->bottom.pass[1];
+    corner[0].pass[PLAIN_FALLING] = start->bottom.pass[PLAIN_FALLING];
+    corner[0].pass[PLAIN_RISING] = start->bottom.pass[PLAIN_RISING];
     corner[0].top = start->bottom.top;
     corner[0].rose = start->bottom.rose;
     m->here.depth = 1;
@@ -274,8 +316,8 @@ static const plain_curve_t plain_inverse_curve = {
 };
 static const plain_real_t plain_inverse_init_center[1][2] = {{0.0f, 0.0f}};
 static const plain_start_t plain_inverse_start[2] = {
-    {plain_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, 2}},
-    {plain_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, 2}}
+    {plain_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, PLAIN_BOTTOM}},
+    {plain_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, PLAIN_BOTTOM}}
 };
 
 #define PLAIN_OFFSET 0.0f /* part of every output */
@@ -328,17 +370,18 @@ PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u) {
     plain_plays_t *m = &self->plays;
     const plain_real_t x = u - PLAIN_OFFSET;
-    const bool on = m->here.rising ? x > m->here.input : x < m->here.input;
-    if (on ? (m->here.rising ? x < m->next : x > m->next)
-        : m->here.k == 0 && (m->here.rising ? x > m->behind && x < m->here.input
-                             : x < m->behind && x > m->here.input)) {
+    const bool rising = m->here.rising;
+    const bool on = plain_short_of(rising, m->here.input, x);
+    if (on ? plain_short_of(rising, x, m->next)
+        : m->here.k == 0 && plain_short_of(rising, m->behind, x) &&
+              plain_short_of(rising, x, m->here.input)) {
         /* the usual sample: the same plays follow */
         self->before = m->here.input;
         m->here.input = x;
         m->here.output = m->start + (x - m->begin) * m->gain;
         return m->here.output;
     }
-    if (on && (m->here.rising ? x < m->cap : x > m->cap)) {
+    if (on && plain_short_of(rising, x, m->cap)) {
         plain_copy_place(&self->undo, &m->here);
         self->before = x;
         if (plain_move_in_block(&plain_inverse_curve, m, x)) {

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 9cac075ec452e51ab1456d7ba7a0a7c6ef002a604c0da063feb9da7426bb7fed, without this line
+ * Text: sha256 7e5566544cab584bebf6a8ef91eafbeb85ef73bd2d532f3cd88ae359827b0a6e, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -67,6 +67,7 @@ typedef float plain_real_t;
 
 /* The version that generated this header, and the hash of its parameters */
 #define PLAIN_HYSTGEN_VERSION "0.1.0"
+#define PLAIN_HYSTGEN_VERSION_NUMBER 100 /* 10000 major + 100 minor + patch */
 #define PLAIN_PARAMS_SHA256 "37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e"
 
 #define PLAIN_N_PLAYS 6
@@ -82,6 +83,13 @@ typedef float plain_real_t;
 #define PLAIN_STATUS_HELD 4u           /* NaN or infinite input: the last answer was held */
 #define PLAIN_STATUS_DOMAIN 8u         /* never set: no envelope limits an argument */
 
+/* The direction of a move, which has an entry of its own where both directions are listed. */
+typedef enum {
+    PLAIN_FALLING = 0,
+    PLAIN_RISING = 1,
+    PLAIN_BOTTOM = 2 /* no move: what holds the plays that never follow */
+} plain_direction_t;
+
 /* Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others. */
 typedef struct {
     plain_real_t input; /* of the play sum (forward: drive, inverse: output) */
@@ -92,13 +100,13 @@ typedef struct {
 } plain_place_t;
 
 /* A turning point. It holds the plays of its block: those above the plays of the next corner, up to
-   play `top`. `pass`: input at which a falling [0] or rising [1] move has taken the whole block
-   along, sign changed for falling; one of the two is the input at the turning point itself. */
+   play `top`. `pass`: input at which a falling or a rising move has taken the whole block along,
+   sign changed for falling; one of the two is the input at the turning point itself. */
 typedef struct {
     plain_real_t output; /* at the turning point */
     plain_real_t pass[2];
     uint_least16_t top;
-    uint_least8_t rose; /* 1: a rising move ended here, 0: a falling one, 2: the bottom */
+    uint_least8_t rose; /* a plain_direction_t: that of the move that ended here */
 } plain_corner_t;
 
 /* The place of the play sum, and the line that its next outputs lie on. */
@@ -128,15 +136,60 @@ typedef struct {
     plain_corner_t corner[7];
 } plain_inverse_t;
 
-/* Start memory of the parameter file. */
+/**
+ * Start memory of the parameter file.
+ *
+ * @param self the instance
+ * @pre before every other call; at any time again
+ * @note Status bits: none
+ * @note Cost: once through the plays
+ */
 void plain_inverse_init(plain_inverse_t *self);
-/* All plays 0, status cleared, then one ordinary step to reference u. */
+
+/**
+ * All plays 0, status cleared, then one ordinary step to reference u.
+ *
+ * @param self the instance
+ * @param u reference, um; limited to PLAIN_OUTPUT_MIN .. MAX; NaN and infinite: held
+ * @pre after init; at any time
+ * @note Status bits: cleared, then those of the step
+ * @note Cost: that of init and of a step
+ */
 void plain_inverse_reset(plain_inverse_t *self, plain_real_t u);
-/* One sample: reference u in, drive out, inside PLAIN_DRIVE_MIN .. MAX. Cannot fail. */
+
+/**
+ * One sample: reference u in, drive out, inside PLAIN_DRIVE_MIN .. MAX. Cannot fail.
+ *
+ * @param self the instance
+ * @param u reference, um; limited to PLAIN_OUTPUT_MIN .. MAX; NaN and infinite: held
+ * @return drive, V
+ * @pre after init; once every sample time, from one context
+ * @note Status bits: PLAIN_STATUS_INPUT_CLAMPED, PLAIN_STATUS_HELD, PLAIN_STATUS_OUTPUT_CLAMPED
+ * @note Cost: at most 17 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)
+ */
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u);
-/* After a step: the drive that was really applied in place of the one returned. */
+
+/**
+ * After a step: the drive that was really applied in place of the one returned.
+ *
+ * @param self the instance
+ * @param applied drive, V; limited to PLAIN_DRIVE_MIN .. MAX; NaN and infinite: ignored
+ * @pre after a step and before the next one, any number of times; before the first step it is a
+ *     first drive
+ * @note Status bits: PLAIN_STATUS_INPUT_CLAMPED, PLAIN_STATUS_HELD
+ * @note Cost: at most that of a step
+ */
 void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied);
-/* PLAIN_STATUS_* bits since the last call; reading clears them. */
+
+/**
+ * PLAIN_STATUS_* bits since the last call; reading clears them.
+ *
+ * @param self the instance
+ * @return PLAIN_STATUS_* bits, 0 for none
+ * @pre after init; at any time
+ * @note Status bits: all of them are cleared
+ * @note Cost: one load and one store
+ */
 unsigned int plain_inverse_status(plain_inverse_t *self);
 
 #ifdef __cplusplus

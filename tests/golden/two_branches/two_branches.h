@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 525f0d2ea2a306268bb3d1c0ab4af5863520a728dffea26d3275156d927fcb5d, without this line
+ * Text: sha256 c75b72f0d50a8564735e18529640fe10ae89669af639009d62e0e8e1a7cb7e80, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -71,6 +71,7 @@ typedef float two_branches_real_t;
 
 /* The version that generated this header, and the hash of its parameters */
 #define TWO_BRANCHES_HYSTGEN_VERSION "0.1.0"
+#define TWO_BRANCHES_HYSTGEN_VERSION_NUMBER 100 /* 10000 major + 100 minor + patch */
 #define TWO_BRANCHES_PARAMS_SHA256 \
     "41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2"
 
@@ -90,6 +91,13 @@ typedef float two_branches_real_t;
 #define TWO_BRANCHES_STATUS_HELD 4u   /* NaN or infinite input: the last answer was held */
 #define TWO_BRANCHES_STATUS_DOMAIN 8u /* inverse: the argument of an envelope was limited */
 
+/* The direction of a move, which has an entry of its own where both directions are listed. */
+typedef enum {
+    TWO_BRANCHES_FALLING = 0,
+    TWO_BRANCHES_RISING = 1,
+    TWO_BRANCHES_BOTTOM = 2 /* no move: what holds the plays that never follow */
+} two_branches_direction_t;
+
 /* Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others. */
 typedef struct {
     two_branches_real_t input; /* of the play sum (forward: drive, inverse: output) */
@@ -100,13 +108,13 @@ typedef struct {
 } two_branches_place_t;
 
 /* A turning point. It holds the plays of its block: those above the plays of the next corner, up to
-   play `top`. `pass`: input at which a falling [0] or rising [1] move has taken the whole block
-   along, sign changed for falling; one of the two is the input at the turning point itself. */
+   play `top`. `pass`: input at which a falling or a rising move has taken the whole block along,
+   sign changed for falling; one of the two is the input at the turning point itself. */
 typedef struct {
     two_branches_real_t output; /* at the turning point */
     two_branches_real_t pass[2];
     uint_least16_t top;
-    uint_least8_t rose; /* 1: a rising move ended here, 0: a falling one, 2: the bottom */
+    uint_least8_t rose; /* a two_branches_direction_t: that of the move that ended here */
 } two_branches_corner_t;
 
 /* The place of the play sum, and the line that its next outputs lie on. */
@@ -146,15 +154,62 @@ typedef struct {
     two_branches_corner_t corner[7];
 } two_branches_inverse_t;
 
-/* Start memory of the parameter file. */
+/**
+ * Start memory of the parameter file.
+ *
+ * @param self the instance
+ * @pre before every other call; at any time again
+ * @note Status bits: none
+ * @note Cost: once through the plays
+ */
 void two_branches_inverse_init(two_branches_inverse_t *self);
-/* All plays 0, status cleared, then one ordinary step to reference u. */
+
+/**
+ * All plays 0, status cleared, then one ordinary step to reference u.
+ *
+ * @param self the instance
+ * @param u reference, um; limited to TWO_BRANCHES_OUTPUT_MIN .. MAX; NaN and infinite: held
+ * @pre after init; at any time
+ * @note Status bits: cleared, then those of the step
+ * @note Cost: that of init and of a step
+ */
 void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_t u);
-/* One sample: reference u in, drive out, inside TWO_BRANCHES_DRIVE_MIN .. MAX. Cannot fail. */
+
+/**
+ * One sample: reference u in, drive out, inside TWO_BRANCHES_DRIVE_MIN .. MAX. Cannot fail.
+ *
+ * @param self the instance
+ * @param u reference, um; limited to TWO_BRANCHES_OUTPUT_MIN .. MAX; NaN and infinite: held
+ * @return drive, V
+ * @pre after init; once every sample time, from one context
+ * @note Status bits: TWO_BRANCHES_STATUS_INPUT_CLAMPED, TWO_BRANCHES_STATUS_HELD,
+ *     TWO_BRANCHES_STATUS_OUTPUT_CLAMPED, TWO_BRANCHES_STATUS_DOMAIN
+ * @note Cost: at most 32 multiplications, 58 comparisons (46 + 4 b, b = 3 the bits of n), 1 tanh, 2
+ *     atanh
+ */
 two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_branches_real_t u);
-/* After a step: the drive that was really applied in place of the one returned. */
+
+/**
+ * After a step: the drive that was really applied in place of the one returned.
+ *
+ * @param self the instance
+ * @param applied drive, V; limited to TWO_BRANCHES_DRIVE_MIN .. MAX; NaN and infinite: ignored
+ * @pre after a step and before the next one, any number of times; before the first step it is a
+ *     first drive
+ * @note Status bits: TWO_BRANCHES_STATUS_INPUT_CLAMPED, TWO_BRANCHES_STATUS_HELD
+ * @note Cost: at most that of a step
+ */
 void two_branches_inverse_commit(two_branches_inverse_t *self, two_branches_real_t applied);
-/* TWO_BRANCHES_STATUS_* bits since the last call; reading clears them. */
+
+/**
+ * TWO_BRANCHES_STATUS_* bits since the last call; reading clears them.
+ *
+ * @param self the instance
+ * @return TWO_BRANCHES_STATUS_* bits, 0 for none
+ * @pre after init; at any time
+ * @note Status bits: all of them are cleared
+ * @note Cost: one load and one store
+ */
 unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 
 #ifdef __cplusplus
@@ -166,15 +221,36 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #if defined(TWO_BRANCHES_IMPLEMENTATION) && !defined(TWO_BRANCHES_IMPLEMENTED)
 #define TWO_BRANCHES_IMPLEMENTED
 
-#if defined(__GNUC__) && !defined(__clang__)
+/* Words of this file
+
+   play: holds its value until its input is a threshold away, and then follows at that distance.
+   move: what the input does from one turning point to the next: it rises, or it falls. Lengths are
+       taken along the move, so that a falling one is a rising one with all signs changed.
+   corner: a turning point that some plays still hold their values from; corners are a stack, the
+       newest one on top.
+   block: the plays that one corner holds: those with larger thresholds than the corner above it
+       has, up to its `top`.
+   way: how far the input has gone from a turning point.
+   reach: how far the output has gone from there; a reach_t also holds inputs and drives beyond
+       every code.
+   segment: the curve of output over input from where one more play follows to where the next does.
+   pass: the input at which a move has taken a whole block along: the corner is passed, and
+       forgotten.
+*/
+
+#if defined(__GNUC__) && !defined(__clang__) && (defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF))
 #pragma GCC push_options
 #endif
 
-/* Products are rounded before they are added, whatever the compiler's default is. */
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC optimize("fp-contract=off")
-#else
+/* Products are rounded before they are added, whatever the compiler's default is. clang and others
+   have the pragma of C99 for it. gcc does not, and fuses a product and a sum across statements,
+   assignments, casts and inline functions alike: short of a volatile object or a call for each
+   product, no wording of the arithmetic keeps the bits. GCC's manual means its own pragma for
+   debugging; it stands here only where the target has a fused instruction. */
+#if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
+#elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
+#pragma GCC optimize("fp-contract=off")
 #endif
 
 #if defined(__SOFTFP__) || defined(__AVR__) || (defined(__riscv) && !defined(__riscv_flen))
@@ -197,7 +273,8 @@ typedef struct {
     two_branches_real_t slope; /* 1 / gain */
 } two_branches_segment_t;
 
-/* One operator; [0] is for falling moves, with signs changed, [1] for rising ones. */
+/* One operator; of two entries one is for falling moves, with signs changed, one for rising ones.
+ */
 typedef struct {
     const two_branches_segment_t *segment; /* plays 0 .. n, and one that never follows */
     two_branches_real_t limit[2];          /* of the output */
@@ -395,6 +472,11 @@ static void two_branches_copy_place(two_branches_place_t *to, const two_branches
     to->rising = from->rising;
 }
 
+/* The direction of a move that rises, or falls. */
+static inline two_branches_direction_t two_branches_direction(bool rising) {
+    return rising ? TWO_BRANCHES_RISING : TWO_BRANCHES_FALLING;
+}
+
 /* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline two_branches_real_t two_branches_along(const two_branches_plays_t *m,
                                                      two_branches_real_t x) {
@@ -418,14 +500,15 @@ TWO_BRANCHES_APART void two_branches_leave_corner(const two_branches_curve_t *t,
                                                   two_branches_plays_t *m,
                                                   two_branches_corner_t *corner) {
     const two_branches_segment_t *s = &t->segment[m->here.k];
-    const two_branches_real_t room =
-        t->limit[!m->here.rising] + two_branches_along(m, m->here.output);
+    const two_branches_direction_t on = two_branches_direction(m->here.rising);
+    const two_branches_direction_t back = two_branches_direction(!m->here.rising);
+    const two_branches_real_t room = t->limit[back] + two_branches_along(m, m->here.output);
     two_branches_corner_t *c = &corner[m->here.depth];
     c->output = m->here.output;
-    c->pass[m->here.rising] = two_branches_along(m, m->here.input);
-    c->pass[!m->here.rising] = s->reach > room ? FLT_MAX : s->way - c->pass[m->here.rising];
+    c->pass[on] = two_branches_along(m, m->here.input);
+    c->pass[back] = s->reach > room ? FLT_MAX : s->way - c->pass[on];
     c->top = m->here.k;
-    c->rose = m->here.rising;
+    c->rose = (uint_least8_t)on;
     m->here.depth = (uint_least16_t)(m->here.depth + 1u);
 }
 
@@ -440,15 +523,17 @@ static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_p
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. last that begins before x, a way or a reach; `step`: segment 1's. */
-static unsigned int two_branches_find_segment(const two_branches_real_t *step, unsigned int k,
-                                              unsigned int last, two_branches_real_t x) {
-    while (k < last) {
-        const unsigned int middle = (k + last) / 2;
-        const unsigned int at = 4u * middle;
-        const bool before = x > step[at];
-        k = before ? middle + 1u : k;
-        last = before ? last : middle;
+/* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k does. */
+static inline unsigned int two_branches_find_segment(const two_branches_segment_t *segment,
+                                                     unsigned int k, unsigned int end,
+                                                     two_branches_real_t x, bool by_reach) {
+    unsigned int middle = (k + end) / 2;
+    while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
+        const two_branches_segment_t *s = &segment[middle];
+        const bool before = x > (by_reach ? s->reach : s->way);
+        k = before ? middle : k;
+        end = before ? end : middle;
+        middle = (k + end) / 2;
     }
     return k;
 }
@@ -461,12 +546,13 @@ TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t
                                                    two_branches_real_t input) {
     const two_branches_corner_t *c = &corner[m->here.depth - 1u];
     two_branches_real_t reach = two_branches_along(m, output - c->output);
-    two_branches_real_t x = c->pass[m->here.rising];
+    const two_branches_direction_t on = two_branches_direction(m->here.rising);
+    two_branches_real_t x = c->pass[on];
     unsigned int k = m->here.k;
-    if (c->rose != m->here.rising) {
-        k = two_branches_find_segment(&t->segment[1].reach, k, c->top - 1u, reach);
+    if (c->rose != on) {
+        k = two_branches_find_segment(t->segment, k, c->top, reach, true);
         reach = reach - t->segment[k].reach;
-        x = t->segment[k].way - c->pass[!m->here.rising];
+        x = t->segment[k].way - c->pass[two_branches_direction(!m->here.rising)];
     }
     x = x + reach * t->segment[k].slope;
     m->here.input = x < two_branches_along(m, input) ? two_branches_along(m, x) : input;
@@ -483,11 +569,12 @@ TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *
     if (two_branches_along(m, output) < two_branches_along(m, m->here.output)) {
         two_branches_turn_back(t, m, corner);
     }
+    const two_branches_direction_t on = two_branches_direction(m->here.rising);
     unsigned int kept = 0; /* bisect: `here.depth` is passed, `kept` is not */
     while (m->here.depth - kept > 1u) {
         const unsigned int middle = (kept + m->here.depth) / 2;
         const two_branches_real_t reach =
-            corner[middle].rose == m->here.rising ? 0 : t->segment[corner[middle].top].reach;
+            corner[middle].rose == on ? 0 : t->segment[corner[middle].top].reach;
         const bool passed = two_branches_along(m, output - corner[middle].output) >= reach;
         m->here.depth = passed ? (uint_least16_t)middle : m->here.depth;
         m->here.k = passed ? corner[middle].top : m->here.k;
@@ -506,14 +593,15 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
         two_branches_turn_back(t, m, corner);
     }
     const two_branches_real_t x = two_branches_along(m, input);
-    const bool rising = m->here.rising;
+    const two_branches_direction_t on = two_branches_direction(m->here.rising);
+    const two_branches_direction_t other = two_branches_direction(!m->here.rising);
     const two_branches_corner_t *c = &corner[m->here.depth - 1u];
-    if (m->here.depth > 1u && x >= c->pass[rising]) {
+    if (m->here.depth > 1u && x >= c->pass[on]) {
         unsigned int kept = 0; /* bisect: `passed` is passed, `kept` is not */
         unsigned int passed = m->here.depth - 1u;
         while (passed - kept > 1u) {
             const unsigned int middle = (kept + passed) / 2;
-            const bool beyond = x >= corner[middle].pass[rising];
+            const bool beyond = x >= corner[middle].pass[on];
             passed = beyond ? middle : passed;
             kept = beyond ? kept : middle;
         }
@@ -521,16 +609,16 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
         m->here.depth = (uint_least16_t)passed;
         c = &corner[kept];
     }
-    two_branches_real_t cap = c->pass[rising];
+    two_branches_real_t cap = c->pass[on];
     two_branches_real_t next = cap;
     two_branches_real_t begin = cap;
     two_branches_real_t start = two_branches_along(m, c->output);
     unsigned int k = m->here.k;
     m->behind = input;
-    if (c->rose != rising) { /* plays follow one by one, and not all of the block at the corner */
-        const two_branches_real_t from = c->pass[!rising];
-        const two_branches_real_t room = t->inside[rising] - start;
-        k = two_branches_find_segment(&t->segment[1].way, k, c->top - 1u, x + from);
+    if (c->rose != on) { /* plays follow one by one, and not all of the block at the corner */
+        const two_branches_real_t from = c->pass[other];
+        const two_branches_real_t room = t->inside[on] - start;
+        k = two_branches_find_segment(t->segment, k, c->top, x + from, false);
         const two_branches_segment_t *s = &t->segment[k];
         begin = s->way - from;
         start = start + s->reach;
@@ -540,19 +628,23 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
         }
         m->from = -two_branches_along(m, from);
         m->base = c->output;
-        m->behind = k == 0 && from <= t->range[!rising] ? m->from : input; /* the same line back */
+        m->behind = k == 0 && from <= t->range[other] ? m->from : input; /* the same line back */
     }
     m->begin = two_branches_along(m, begin);
     m->start = two_branches_along(m, start);
     m->gain = t->segment[k].gain;
     const two_branches_real_t output = m->start + (input - m->begin) * m->gain;
-    if (two_branches_along(m, output) > t->limit[rising]) {
+    if (two_branches_along(m, output) > t->limit[on]) {
         return false;
     }
     /* by rounding */
     const bool back = two_branches_along(m, output) < two_branches_along(m, m->here.output);
     m->here.output = back ? m->here.output : output;
-    cap = back ? x : t->range[rising] < cap ? t->range[rising] : cap;
+    if (back) {
+        cap = x;
+    } else if (t->range[on] < cap) {
+        cap = t->range[on];
+    }
     m->cap = two_branches_along(m, cap);
     m->next = two_branches_along(m, next < cap ? next : cap);
     m->here.k = (uint_least16_t)k;
@@ -586,19 +678,26 @@ TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t
     return true;
 }
 
+/* Whether a move to x stays short of `end`. */
+static inline bool two_branches_short_of(bool rising, two_branches_real_t x,
+                                         two_branches_real_t end) {
+    return rising ? x < end : x > end;
+}
+
 /* The sum of the plays for the next input; a NaN moves nothing. */
 static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t,
                                                    two_branches_plays_t *m,
                                                    two_branches_corner_t *corner,
                                                    two_branches_real_t input) {
-    const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
-    if (on ? (m->here.rising ? input < m->next : input > m->next)
-        : m->here.k == 0 && (m->here.rising ? input > m->behind : input < m->behind)) {
+    const bool rising = m->here.rising;
+    const bool on = two_branches_short_of(rising, m->here.input, input);
+    if (on ? two_branches_short_of(rising, input, m->next)
+        : m->here.k == 0 && two_branches_short_of(rising, m->behind, input)) {
         m->here.input = input;
         m->here.output = m->start + (input - m->begin) * m->gain;
         return m->here.output;
     }
-    if (on && (m->here.rising ? input < m->cap : input > m->cap) &&
+    if (on && two_branches_short_of(rising, input, m->cap) &&
         two_branches_move_in_block(t, m, input)) {
         return m->here.output;
     }
@@ -614,8 +713,8 @@ TWO_BRANCHES_APART void two_branches_start(const two_branches_curve_t *t, two_br
                                            const two_branches_start_t *start) {
     unsigned int k;
     corner[0].output = start->bottom.output;
-    corner[0].pass[0] = start->bottom.pass[0];
-    corner[0].pass[1] = start->bottom.pass[1];
+    corner[0].pass[TWO_BRANCHES_FALLING] = start->bottom.pass[TWO_BRANCHES_FALLING];
+    corner[0].pass[TWO_BRANCHES_RISING] = start->bottom.pass[TWO_BRANCHES_RISING];
     corner[0].top = start->bottom.top;
     corner[0].rose = start->bottom.rose;
     m->here.depth = 1;
@@ -647,8 +746,8 @@ static const two_branches_curve_t two_branches_inverse_curve = {
 };
 static const two_branches_real_t two_branches_inverse_init_center[1][2] = {{0.0f, 0.0f}};
 static const two_branches_start_t two_branches_inverse_start[2] = {
-    {two_branches_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, 2}},
-    {two_branches_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, 2}}
+    {two_branches_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, TWO_BRANCHES_BOTTOM}},
+    {two_branches_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, TWO_BRANCHES_BOTTOM}}
 };
 static const two_branches_drive_t two_branches_inverse_drive[2] = {{-0.33336422f, 0.0f, true},
                                                                    {-0.33336422f, 0.0f, true}};
@@ -691,8 +790,13 @@ static two_branches_real_t two_branches_clamp_drive(two_branches_real_t v) {
 static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_branches_real_t v,
                                       bool ascending) {
     const two_branches_real_t inside = two_branches_clamp_drive(v);
-    return inside > self->drive ? ascending : inside < self->drive ? !ascending
-        : self->ascending == ascending;
+    if (inside > self->drive) {
+        return ascending;
+    }
+    if (inside < self->drive) {
+        return !ascending;
+    }
+    return self->ascending == ascending;
 }
 
 /* The drive that gives w on the branch of its own move. Tries the branch of the reference's move,
@@ -700,7 +804,12 @@ static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_br
 TWO_BRANCHES_APART two_branches_real_t
     two_branches_inverse_choose(const two_branches_inverse_t *self, two_branches_real_t level,
                                 two_branches_real_t w, bool *limited) {
-    const bool up = level > self->level ? true : level < self->level ? false : self->ascending;
+    bool up = self->ascending;
+    if (level > self->level) {
+        up = true;
+    } else if (level < self->level) {
+        up = false;
+    }
     two_branches_real_t v = two_branches_front_inverse(w, up, limited);
     if (!two_branches_inverse_fits(self, v, up)) {
         const two_branches_real_t back = two_branches_clamp_drive(v) - self->drive;
@@ -724,7 +833,11 @@ static void two_branches_inverse_keep(two_branches_inverse_t *self) {
 
 /* The actuator is at drive v; its move sets the direction. */
 static void two_branches_inverse_arrive(two_branches_inverse_t *self, two_branches_real_t v) {
-    self->ascending = v > self->drive ? true : v < self->drive ? false : self->ascending;
+    if (v > self->drive) {
+        self->ascending = true;
+    } else if (v < self->drive) {
+        self->ascending = false;
+    }
     self->drive = v;
 }
 
@@ -767,8 +880,12 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
     }
     two_branches_inverse_keep(self);
     if (!self->repeat || u < self->reference || u > self->reference) {
-        const two_branches_real_t level = u < TWO_BRANCHES_OUTPUT_MIN ? TWO_BRANCHES_OUTPUT_MIN
-            : u > TWO_BRANCHES_OUTPUT_MAX ? TWO_BRANCHES_OUTPUT_MAX : u;
+        two_branches_real_t level = u;
+        if (u < TWO_BRANCHES_OUTPUT_MIN) {
+            level = TWO_BRANCHES_OUTPUT_MIN;
+        } else if (u > TWO_BRANCHES_OUTPUT_MAX) {
+            level = TWO_BRANCHES_OUTPUT_MAX;
+        }
         self->bits = level < u || level > u ? TWO_BRANCHES_STATUS_INPUT_CLAMPED : 0u;
         self->reference = u;
         const two_branches_real_t w = two_branches_plays_step(&two_branches_inverse_curve,
@@ -846,10 +963,10 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self) {
     return status;
 }
 
-#if defined(__GNUC__) && !defined(__clang__)
-#pragma GCC pop_options
-#else
+#if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT DEFAULT
+#elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
+#pragma GCC pop_options
 #endif
 
 #endif /* TWO_BRANCHES_IMPLEMENTATION */

@@ -1,0 +1,400 @@
+"""Leaves out of the C of a model what does nothing in it.
+
+The run time is written for every model: it calls a hook where some model has a slew limit, a preview or a front. In a
+model without them the hook returns its argument, and what depends on it is decided: parameters that nothing uses,
+conditions that cannot hold, fields that nothing reads. This takes such functions, statements and fields out, so that
+what a reviewer reads is what the model does. It changes no operation on numbers.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+_HEAD = re.compile(r"(?P<before>(?:[\w*]+\s+\**)+?)(?P<name>hystgen_\w+)\((?P<parameters>[^(){};]*)\)\s*\{\n")
+_OWN = ("static ", "HYSTGEN_APART_IN_FLOAT ", "HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ",
+        "HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART ")  # fmt: skip
+"""How functions begin that only the model itself calls."""
+_DELIMITED = (re.compile(r"(?:[(,?:]|(?<![=!<>])=|\breturn)\s*$"), re.compile(r"\s*[),;:]"))
+"""What stands before and behind a whole argument, initializer or answer."""
+_MARK = re.compile(r"^ *\(void\)(\w+);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
+"""A statement that marks a parameter as not used."""
+_NUMBERS = ("real", "signal", "fine", "travel", "play", "reach", "sum")
+"""Types that are one in floating point."""
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function: what stands before its name, its parameters as they are declared, and its body."""
+
+    above: str
+    before: str
+    name: str
+    parameters: tuple[str, ...]
+    body: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of its parameters."""
+        return tuple(re.findall(r"\w+", each)[-1] for each in self.parameters)
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """The types of its parameters."""
+        return tuple(each[: each.rindex(name)].strip() for each, name in zip(self.parameters, self.names, strict=True))
+
+    @property
+    def answer(self) -> str:
+        """The type that it returns."""
+        return re.sub(r"\b(static|inline|HYSTGEN_\w+)\b", "", self.before).strip()
+
+    @property
+    def own(self) -> bool:
+        """Whether only the model itself calls it."""
+        return self.before.startswith(_OWN)
+
+    @property
+    def operator(self) -> str:
+        """The operator whose instance `self` is, or nothing."""
+        found = re.search(r"hystgen_(forward|inverse)_t \*self\b", ", ".join(self.parameters))
+        return found[1] if found else ""
+
+    @property
+    def statements(self) -> str:
+        """Its body on one line, without those that mark parameters as not used."""
+        return " ".join(_COMMENT.sub("", _MARK.sub("", self.body)).split())
+
+    def text(self) -> str:
+        """Its C."""
+        return f"{self.above}{self.before}{self.name}({', '.join(self.parameters)}) {{\n{self.body}}}\n"
+
+
+def parsed(text: str) -> Function | None:
+    """The function that a piece is; None for another piece."""
+    start = _COMMENT.match(text)
+    above = text[: start.end() + 1] if start else ""
+    found = _HEAD.match(text[len(above) :])
+    if not found:
+        return None
+    parameters = " ".join(found["parameters"].split())
+    body = text[len(above) + found.end() : text.rindex("}")]
+    return Function(above, found["before"], found["name"], tuple(parameters.split(", ")), body)
+
+
+def folded(
+    functions: Iterable[Function],
+    kernels: Iterable[Function],
+    wanted: Callable[[dict[str, Function]], Collection[str]],
+    fixed: bool,
+    apart: Sequence[str],
+) -> dict[str, Function]:
+    """The functions of a model without what does nothing. `wanted` names those that are called; otherwise as `Folding`.
+    """
+    comments: list[str] = []
+
+    def mask(found: re.Match[str]) -> str:
+        comments.append(found[0])
+        return f"/*{len(comments) - 1}*/"
+
+    masked = [replace(each, body=_COMMENT.sub(mask, each.body)) for each in functions]
+    folding = _Folding(masked, list(kernels), fixed, apart)
+    while folding.once():
+        kept = wanted(folding.functions)
+        folding.functions = {name: each for name, each in folding.functions.items() if name in kept}
+
+    def unmask(found: re.Match[str]) -> str:
+        return comments[int(found[1])]
+
+    return {
+        name: replace(each, body=re.sub(r"/\*(\d+)\*/", unmask, each.body)) for name, each in folding.functions.items()
+    }
+
+
+class _Folding:
+    """The functions of a model's operators. `kernels`: others that they call, which stay as they are; `fixed`: numbers
+    of several types; `apart`: how functions begin that the compiler keeps apart here, for the sake of the stack."""
+
+    def __init__(
+        self, functions: Sequence[Function], kernels: Sequence[Function], fixed: bool, apart: Sequence[str]
+    ) -> None:
+        self.functions = {each.name: each for each in functions}
+        self._known = {each.name: each for each in kernels}
+        self._fixed, self._apart = fixed, tuple(apart)
+
+    def once(self) -> bool:
+        """One round. Returns whether anything has changed."""
+        before = dict(self.functions)
+        self._unused_parameters()
+        for name in list(self.functions):
+            self._fold(self.functions[name])
+        self._decided()
+        for operator in ("forward", "inverse"):
+            self._unread_fields(operator)
+        return self.functions != before
+
+    def _change(self, name: str, body: str) -> None:
+        self.functions[name] = replace(self.functions[name], body=body)
+
+    def _calls(self, name: str, changed: Callable[[str, int, int, list[str]], str | None]) -> None:
+        """Change every call of a function; `changed` takes the body, where the call begins and ends, its arguments."""
+        for caller, function in self.functions.items():
+            body, at = function.body, 0
+            while found := re.compile(rf"\b{name}\(").search(body, at):
+                end, arguments = _arguments(body, found.end())
+                new = changed(body, found.start(), end, arguments)
+                at = found.end()
+                if new is not None:
+                    body, at = new, found.start()
+            if body != function.body:
+                self._change(caller, body)
+
+    def _unused_parameters(self) -> None:
+        for name in list(self.functions):
+            function = self.functions[name]
+            used = _MARK.sub("", function.body)
+            kept = [bool(re.search(rf"(?<![.>])\b{each}\b", used)) for each in function.names]
+            for place, keep in enumerate(kept):
+                kept[place] = keep or not all(_pure(arguments[place]) for arguments in self._given(name))
+            if not function.own or all(kept) or function.parameters == ("void",):
+                continue
+            gone = [each for each, keep in zip(function.names, kept, strict=True) if not keep]
+            parameters = _where(function.parameters, kept) or ("void",)
+            self.functions[name] = replace(function, parameters=parameters, body=_unmarked(function.body, gone))
+
+            def without(
+                body: str, start: int, end: int, arguments: list[str], name: str = name, kept: Sequence[bool] = kept
+            ) -> str | None:
+                if len(arguments) != len(kept):  # done
+                    return None
+                return f"{body[:start]}{name}({', '.join(_where(arguments, kept))}){body[end:]}"
+
+            self._calls(name, without)
+
+    def _given(self, name: str) -> Iterator[list[str]]:
+        """The arguments of every call of a function."""
+        for function in self.functions.values():
+            for found in re.finditer(rf"\b{name}\(", function.body):
+                yield _arguments(function.body, found.end())[1]
+
+    def _fold(self, function: Function) -> None:
+        """Put what a function does in the place of its calls, where that is nothing, or one thing as it stands."""
+        does = function.statements
+        if not function.own or function.before.startswith(self._apart):
+            return
+        if does == "":
+            self._calls(function.name, _no_statement)
+        elif (found := re.fullmatch(r"return (\w+);", does)) and found[1] in function.names:
+            place = function.names.index(found[1])
+            same = self._same(function.types[place], function.answer)
+            self._calls(function.name, functools.partial(_argument, place=place, same=same))
+        elif does in ("return true;", "return false;"):
+            self._calls(function.name, lambda body, start, end, _: body[:start] + does[7:-1] + body[end:])
+        elif found := re.fullmatch(r"(return )?(hystgen_\w+)\((.*)\);", does):
+            self._forward(function, found[2], f"{found[3]})", bool(found[1]))
+
+    def _forward(self, function: Function, name: str, rest: str, answers: bool) -> None:
+        """A function that is a call of another one, which the callers may call themselves."""
+        other = self.functions.get(name) or self._known.get(name)
+        end, given = _arguments(rest, 0)
+        if other is None or end != len(rest) or len(given) != len(other.names):
+            return
+        if answers and not self._same(function.answer, other.answer):
+            return
+        types = dict(zip(function.names, function.types, strict=True))
+        for argument, kind in zip(given, other.types, strict=True):
+            inside = [each for each in re.findall(r"(?<![.>\w])\w+", argument) if each in types]
+            if any(argument != each and each != "self" for each in inside):
+                return
+            if argument in types and not self._same(types[argument], kind):
+                return
+        if any(sum(argument == each for argument in given) > 1 for each in types if each != "self"):
+            return
+
+        def called(body: str, start: int, stop: int, arguments: list[str]) -> str | None:
+            put = dict(zip(function.names, arguments, strict=True))
+            if put.get("self", "self") != "self":
+                return None
+            new = [put.get(each, each) for each in given]
+            return f"{body[:start]}{name}({', '.join(new)}){body[stop:]}"
+
+        self._calls(function.name, called)
+
+    def _same(self, one: str, other: str) -> bool:
+        """Whether two types are one."""
+        def plain(kind: str) -> str:
+            kind = " ".join(re.sub(r"\b(const|inline)\b", "", kind).split()).replace(" *", "*")
+            return kind if self._fixed else re.sub(rf"\bhystgen_({'|'.join(_NUMBERS)})_t\b", "real", kind)
+
+        return plain(one) == plain(other)
+
+    def _decided(self) -> None:
+        """Conditions that hold or cannot, and copies of what does not change."""
+        for name, function in list(self.functions.items()):
+            body = function.body
+            if function.own:
+                body = _unmarked(body, set(_MARK.findall(body)) - set(function.names))
+            body = self._copies(function, body)
+            answered = _ANSWERED.search(body)
+            if answered and self._same(answered[1], function.answer):
+                body = f"{body[: answered.start()]}    return {answered[3]};\n"
+            for found in _FLAG.finditer(body):
+                uses = len(re.findall(rf"(?<![.>\w]){found[1]}\b", body)) - 1
+                if uses == body.count(f"if ({found[1]}) {{"):  # nothing sets it
+                    body = body.replace(found[0], "").replace(f"if ({found[1]}) {{", "if (false) {")
+            for local in _UNUSED.finditer(body):
+                if len(re.findall(rf"(?<![.>\w]){local[1]}\b", body)) == 1 and _pure(local[2]):
+                    body = body.replace(local[0], "")
+            body = re.sub(r"\b(\w+) < \1 \|\| \1 > \1", "false", body)
+            body = body.replace("!true", "false").replace("!false", "true")
+            body = _without_branches(body)
+            if body != function.body:
+                self._change(name, body)
+
+    def _copies(self, function: Function, body: str) -> str:
+        """The body without constants that are another one, or a parameter, once more."""
+        types = dict(zip(function.names, function.types, strict=True))
+        types |= {each[2]: each[1] for each in re.finditer(r"^ *const (\w+) (\w+) =", body, re.MULTILINE)}
+        for found in re.finditer(r"^ *const (\w+) (\w+) = (\w+);\n", body, re.MULTILINE):
+            kind, copy, of = found.groups()
+            if of not in types or re.search(rf"(?<![.>\w]){of} [-+*|&^]?= |&{of}\b", body):
+                continue
+            rest = body.replace(found[0], "", 1)
+            uses = re.finditer(rf"(?<![.>\w]){copy}\b", rest)
+            whole = all(_delimited(rest, each.start(), each.end()) for each in uses)
+            if self._same(kind, types[of]) or whole:
+                return re.sub(rf"(?<![.>\w]){copy}\b", of, rest)
+        return body
+
+    def _unread_fields(self, operator: str) -> None:
+        """Takes out what is only ever written, and what is only ever written false."""
+        mine = {name: each for name, each in self.functions.items() if each.operator == operator}
+        reads: dict[str, set[str]] = {}
+        read: set[str] = set()
+        values: dict[str, set[str]] = {}
+        for function in mine.values():
+            for found in _STORE.finditer(function.body):
+                values.setdefault(found[1], set()).add(found[2])
+                reads.setdefault(found[1], set()).update(re.findall(r"self->(\w+)", found[2]))
+            read.update(re.findall(r"self->(\w+)", _STORE.sub("", function.body)))
+        while more := {each for field in read for each in reads.get(field, ())} - read:
+            read |= more
+        addressed = {each for function in mine.values() for each in re.findall(r"&self->(\w+)", function.body)}
+        asked = {each for function in mine.values() for each in re.findall(_ASKED, function.body)}
+        false = {field for field in asked if values.get(field, set()) <= {"false"}} - addressed
+        for name, function in mine.items():
+            body = function.body
+            for found in _STORE.finditer(function.body):
+                if (found[1] not in read or found[1] in false) and _pure(found[2]):
+                    body = body.replace(found[0], "", 1)
+            for field in false:
+                body = re.sub(rf"^ *[\w>-]+ \|= self->{field} \? \w+ : 0u;\n", "", body, flags=re.MULTILINE)
+                body = body.replace(f"if (self->{field})", "if (false)")
+            if body != function.body:
+                self._change(name, body)
+
+
+_ASKED = r"(?:\bif \(|\|= )self->(\w+)(?:\)| \? \w+ : 0u;)"
+"""A field that decides alone."""
+_STORE = re.compile(r"^ *self->(\w+) = ([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
+
+
+def _pure(expression: str) -> bool:
+    """Whether an expression changes nothing: it calls only what is given no memory."""
+    return not re.search(r"\([^()]*(?:\bself\b(?!->)|&)", expression)
+
+
+def _unmarked(body: str, gone: Collection[str]) -> str:
+    """The body without the marks of what is gone."""
+    return _MARK.sub(lambda found: "" if found[1] in gone else found[0], body)
+
+
+def _where(values: Sequence[str], kept: Sequence[bool]) -> tuple[str, ...]:
+    return tuple(value for value, keep in zip(values, kept, strict=False) if keep)
+
+
+def _arguments(text: str, start: int) -> tuple[int, list[str]]:
+    """Where a call ends whose arguments begin at `start`, and the arguments."""
+    depth, found, begin = 0, [], start
+    for at in range(start, len(text)):
+        character = text[at]
+        if character in ",)" and depth == 0:
+            found.append(" ".join(text[begin:at].split()))
+            begin = at + 1
+            if character == ")":
+                return at + 1, [each for each in found if each]
+        depth += {"(": 1, "[": 1, ")": -1, "]": -1}.get(character, 0)
+    raise AssertionError(f"a call that does not end: {text[start:]}")
+
+
+def _delimited(body: str, start: int, end: int) -> bool:
+    """Whether a part of a body is a whole argument, initializer, answer or choice."""
+    before, behind = _DELIMITED
+    return bool(before.search(body[:start])) and bool(behind.match(body[end:]))
+
+
+def _no_statement(body: str, start: int, end: int, _: list[str]) -> str | None:
+    """Without a call that is a statement."""
+    begin = body.rfind("\n", 0, start) + 1
+    stop = body.find("\n", end) + 1
+    if body[begin:start].strip() not in ("", "(void)") or body[end:stop].strip() != ";":
+        return None
+    return body[:begin] + body[stop:]
+
+
+def _argument(
+    body: str, start: int, end: int, arguments: list[str], place: int, same: bool
+) -> str | None:
+    """With an argument in the place of the call."""
+    argument, whole = arguments[place], _delimited(body, start, end)
+    if not whole and not same:
+        return None
+    single = re.fullmatch(r"[\w.>\[\]-]+", argument) or _arguments(f"{argument})", argument.find("(") + 1)[0] == len(
+        argument
+    )
+    return body[:start] + (argument if whole or single else f"({argument})") + body[end:]
+
+
+_FLAG = re.compile(r"^ *bool (\w+)(?: = false)?;(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
+"""A local flag that is false, or without a value, at first."""
+_UNUSED = re.compile(r"^ *(?:const )?(?:unsigned )?\w+ (\w+) =\s([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
+"""A local variable with its first value."""
+_ANSWERED = re.compile(r"^    const (\w+) (\w+) =\s+([^;]*);\n    return \2;\n\Z", re.MULTILINE)
+"""A constant that is the answer."""
+_IF = re.compile(r"^( *)(\} else )?if \(([^{};]*)\) \{\n", re.MULTILINE)
+
+
+def _without_branches(body: str) -> str:
+    """The body without blocks that never run and without empty ones, and with those that always run as they stand."""
+    for found in _IF.finditer(body):
+        indent, chained, condition = found.groups()
+        close = body.index(f"\n{indent}}}", found.end() - 1) + 1
+        inside, rest = body[found.end() : close], body[close + len(indent) :]
+        alone, otherwise = rest.startswith("}\n"), re.match(r"\} else (?=if )", rest)
+        before, behind = body[: found.start()], rest[2:]
+        if condition == "false" and alone:
+            return _without_branches(before + (f"{indent}}}\n" if chained else "") + behind)
+        if condition == "false" and otherwise:
+            return _without_branches(before + indent + (chained or "") + rest[otherwise.end() :])
+        if condition == "true" and alone and not chained:
+            return _without_branches(before + re.sub("^    ", "", inside, flags=re.MULTILINE) + behind)
+        if alone and not inside.strip() and re.fullmatch(_LOOKS, condition):
+            return _without_branches(before + (f"{indent}}}\n" if chained else "") + behind)
+    return _choices(body)
+
+
+_LOOKS = r"[^()]+|!?hystgen_finite\(\w+\)"
+"""A condition that changes nothing."""
+
+
+def _choices(body: str) -> str:
+    """The body without choices between the same."""
+    return re.sub(r"[\w>-]+ \? (\w+)\s+: \1(?=[;,)])", r"\1", body)
+
+
+def fields(functions: Collection[Function], operator: str) -> frozenset[str]:
+    """The fields of an instance that its functions name."""
+    mine = [each.body for each in functions if each.operator == operator]
+    return frozenset(field for body in mine for field in re.findall(r"self->(\w+)", body))

@@ -1,0 +1,185 @@
+"""What the emitted C does not need is not in it, seen by a parser of C that shares nothing with the emission."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from modelfiles import CHAINS, CREEP, FILES, chain
+from pycparser import c_ast, c_parser
+
+import hystgen
+from hystgen.emission.folding import folded, parsed
+from hystgen.model import Model
+from hystgen.parameters.files import parse_parameters
+
+HEADERS = {
+    "stdbool.h": "typedef int bool;\nenum { false, true };\n",
+    "stddef.h": "#define NULL ((void *)0)\ntypedef unsigned long size_t;\n",
+    "float.h": "#define FLT_MANT_DIG 24\n#define DBL_MANT_DIG 53\n#define FLT_MAX 1e38f\n#define DBL_MAX 1e308\n"
+    "#define FLT_EVAL_METHOD 0\n",
+    "stdint.h": "".join(
+        f"typedef {word} {sign}int{size}_t;\ntypedef {word} {sign}int_least{size}_t;\n"
+        for sign in ("", "u")
+        for size, kind in ((8, "char"), (16, "short"), (32, "int"), (64, "long"))
+        for word in [f"{'un' * bool(sign)}signed {kind}"]
+    ),
+}  # fmt: skip
+"""Of the language, in the words that the parser knows."""
+
+THREE = chain(
+    "three", "name: lag, time_constant: 0.01", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3", CREEP
+)
+"""A lag, relaxation and creep."""
+
+MODELS = {**FILES, **CHAINS, "three": THREE}
+KINDS = (
+    ("plain", "both", "float32", "loop"), ("plain", "both", "q31", "loop"), ("plain", "both", "q15", "corners"),
+    ("bent", "both", "float32", "corners"), ("bent", "both", "float32", "loop"), ("curved", "both", "q31", "corners"),
+    ("two_branches", "both", "float32", "loop"), ("two_branches", "both", "float32", "corners"),
+    ("two_branches", "both", "q31", "loop"), ("three", "inverse", "float32", "loop"),
+    ("three", "both", "q31", "loop"), ("quick", "both", "float32", "loop"), ("late", "both", "float32", "loop"),
+    ("warm", "both", "q31", "loop"), ("heated", "inverse", "q15", "loop"), ("drifting", "inverse", "float32", "loop"),
+    ("lagging", "both", "float32", "corners"), ("dashpot", "both", "float32", "loop"),
+    ("everything", "both", "q31", "loop"),
+)  # fmt: skip
+
+
+def tree(folder: Path, name: str, operator: str, arithmetic: str, engine: str) -> c_ast.FileAST:
+    """The parsed C of a module."""
+    model = Model(parse_parameters(MODELS[name], f"{name}.yaml"))
+    hystgen.emit(model, folder, operator=operator, arithmetic=arithmetic, engine=engine)
+    for file, text in HEADERS.items():
+        (folder / file).write_text(text)
+    command = ["-E", "-P", "-nostdinc", f"-I{folder}", "-D__attribute__(x)=", "-U__GNUC__", folder / f"{name}.c"]
+    done = subprocess.run(["gcc", *map(str, command)], capture_output=True, text=True, check=True)
+    text = re.sub(r"^#pragma.*$", "", done.stdout, flags=re.MULTILINE)
+    return c_parser.CParser().parse(text.replace("inline", ""))
+
+
+def below(node: c_ast.Node) -> Iterator[c_ast.Node]:
+    yield node
+    for _, child in node.children():
+        yield from below(child)
+
+
+def statements(function: c_ast.FuncDef) -> list[c_ast.Node]:
+    """Of a function, without those that only name a parameter."""
+    items = function.body.block_items or []
+    return [each for each in items if not (isinstance(each, c_ast.Cast) and isinstance(each.expr, c_ast.ID))]
+
+
+def types(function: c_ast.FuncDef) -> set[str]:
+    """The types that the head of a function names."""
+    return {word for each in below(function.decl) if isinstance(each, c_ast.IdentifierType) for word in each.names}
+
+
+def reads(node: c_ast.Node) -> Iterator[str]:
+    """Fields of `self` that are read."""
+    if isinstance(node, c_ast.Assignment) and node.op == "=":
+        field = node.lvalue
+        direct = isinstance(field, c_ast.StructRef) and isinstance(field.name, c_ast.ID) and field.name.name == "self"
+        own = {field.field.name} if direct else set()
+        yield from (each for each in reads(node.rvalue) if each not in own)
+        if not direct:
+            yield from reads(node.lvalue)
+        return
+    if isinstance(node, c_ast.StructRef) and isinstance(node.name, c_ast.ID) and node.name.name == "self":
+        yield node.field.name
+    for _, child in node.children():
+        yield from reads(child)
+
+
+needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+
+
+@needs_gcc
+@pytest.mark.parametrize(("name", "operator", "arithmetic", "engine"), KINDS, ids="-".join)
+def test_nothing_is_there_for_other_models(
+    name: str, operator: str, arithmetic: str, engine: str, tmp_path: Path
+) -> None:
+    module = tree(tmp_path, name, operator, arithmetic, engine)
+    functions = [each for each in module.ext if isinstance(each, c_ast.FuncDef)]
+    own = [each for each in functions if "static" in each.decl.storage]
+    for function in own:
+        does, called = statements(function), function.decl.name
+        assert does, f"{called} does nothing"
+        alone = does[0] if len(does) == 1 and isinstance(does[0], c_ast.Return) else None
+        assert alone is None or not isinstance(alone.expr, c_ast.ID), f"{called} returns its argument"
+        assert alone is None or not isinstance(alone.expr, c_ast.Constant), f"{called} is a constant"
+        given = [each.name for each in (function.decl.type.args.params if function.decl.type.args else ()) if each.name]
+        used = {each.name for each in below(function.body) if isinstance(each, c_ast.ID)}
+        for parameter in given:
+            assert parameter in used, f"{called} does not use {parameter}"
+    for function in functions:
+        for each in below(function.body):
+            if isinstance(each, c_ast.If):
+                assert not isinstance(each.cond, c_ast.Constant | c_ast.ID) or each.cond.name not in ("true", "false")
+    for op in ("forward", "inverse") if operator == "both" else (operator,):
+        (state,) = [each for each in module.ext if isinstance(each, c_ast.Typedef) and each.name == f"{name}_{op}_t"]
+        fields = {each.name for each in state.type.type.decls}
+        mine = [each for each in functions if f"{name}_{op}_t" in types(each)]
+        read = {field for function in mine for field in reads(function.body)}
+        assert not fields - read, f"{op} never reads {sorted(fields - read)}"
+
+
+@needs_gcc
+def test_a_lag_relaxation_and_creep_take_fifty_functions_at_most(tmp_path: Path) -> None:
+    module = tree(tmp_path, "three", "inverse", "float32", "loop")
+    assert sum(isinstance(each, c_ast.FuncDef) for each in module.ext) <= 50
+
+
+def fold(*texts: str, fixed: bool = True) -> str:
+    functions = [found for text in texts if (found := parsed(text))]
+    assert len(functions) == len(texts)
+    kept = folded(functions, [], lambda made: called(made, functions[-1].name), fixed, ["HYSTGEN_APART "])
+    return " ".join(" ".join(each.text() for each in kept.values()).split())
+
+
+def called(functions: dict[str, object], root: str) -> set[str]:
+    found, queue = set(), [root]
+    while queue:
+        name = queue.pop()
+        if name in functions and name not in found:
+            found.add(name)
+            queue += re.findall(r"hystgen_\w+(?=\()", functions[name].body)  # type: ignore[attr-defined]
+    return found
+
+
+HEAD = "int hystgen_f(hystgen_inverse_t *self, int x) {\n"
+ITSELF = "static int hystgen_g(int v) {\n    return v;\n}\n"
+DOUBLE = "static int hystgen_g(int v) {\n    return v + v;\n}\n"
+TRUE = "static bool hystgen_g(int v) {\n    (void)v;\n    return true;\n}\n"
+
+
+@pytest.mark.parametrize(
+    ("hook", "lines", "wanted"),
+    [
+        (ITSELF, ["return 2 * hystgen_g(x + 1);"], "return 2 * (x + 1);"),
+        (ITSELF, ["return hystgen_g(x + 1);"], "return x + 1;"),
+        (ITSELF.replace("int hyst", "int64_t hyst"), ["return hystgen_g(x) * x;"], None),
+        (ITSELF.replace("static", "HYSTGEN_APART"), ["return hystgen_g(x);"], None),
+        ("static void hystgen_g(int v) {\n}\n", ["if (self->moving) {", "    hystgen_g(x);", "}", "return x;"],
+         "{ return x; }"),
+        (TRUE, ["if (!hystgen_g(x)) {", "    return 1;", "}", "return x;"], "{ return x; }"),
+        (TRUE, ["if (x > 0) {", "    x = 1;", "} else if (!hystgen_g(x)) {", "    x = 2;", "}", "return x;"],
+         "{ if (x > 0) { x = 1; } return x; }"),
+        (DOUBLE.replace("int v", "int v, bool *limited"),
+         ["bool limited = false;", "const int y = hystgen_g(x, &limited);", "if (limited) {", "    self->status = 1;",
+          "}", "return y;"], "{ return hystgen_g(x); }"),
+        (ITSELF, ["const int y = hystgen_g(x);", "if (y < x || y > x) {", "    self->status |= 1u;", "}", "return y;"],
+         "{ return x; }"),
+        (DOUBLE, ["self->last = x;", "return hystgen_g(x);"], "{ return hystgen_g(x); }"),
+        (DOUBLE, ["self->last = self->last + x;", "return self->last;"], None),
+        (DOUBLE, ["self->last = hystgen_h(self, x);", "return hystgen_g(x);"], None),
+    ],
+)  # fmt: skip
+def test_what_is_folded(hook: str, lines: list[str], wanted: str | None) -> None:
+    body = "".join(f"    {line}\n" for line in lines)
+    head = HEAD if "self" in body else HEAD.replace("hystgen_inverse_t *self, ", "")
+    before, after = " ".join((head + body + "}").split()), fold(hook, f"{head}{body}}}\n")
+    assert (wanted or before) in after
