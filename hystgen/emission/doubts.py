@@ -1,17 +1,14 @@
-"""What makes an emitted inverse of little use, in the words of its banner and of the command line."""
+"""What makes an emitted inverse of a model with effects of little use, in the words of its banner and of stderr."""
 
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 from hystgen.compensator.chain import noise, own
-from hystgen.compensator.chain.bounds import UNSLEWED, together
 from hystgen.compensator.chain.layout import Compiled
 from hystgen.effects.base import Effect
 from hystgen.emission.text import comment_text
 from hystgen.parameters.files import Parameters
-from hystgen.plays import slots
 
 NOISY = 4.0
 """[times the gain at rest] Noise gain from which it is told: the drive then has two bits of noise more than the
@@ -23,12 +20,9 @@ the drive by a 50th of a sample, of the fastest sweep with a stated bound (SAMPL
 benchmarks/chosen_numbers.py fast."""
 
 
-def found(
-    parameters: Parameters, compiled: Compiled | None, values: SimpleNamespace
-) -> list[str]:
-    """A sentence for each; `compiled`: of a model with effects; `values`: bounds of the inverse as they are printed."""
-    dynamic = [*_noise(parameters, compiled), *_too_fast(parameters, compiled)] if compiled else []
-    return [*dynamic, *_unbounded(values)]
+def found(parameters: Parameters, compiled: Compiled) -> list[str]:
+    """A sentence for each."""
+    return [*_noise(parameters, compiled), *_too_fast(parameters, compiled)]
 
 
 def _noise(parameters: Parameters, compiled: Compiled) -> list[str]:
@@ -73,24 +67,3 @@ def _time_scale(effect: Effect, compiled: Compiled) -> float:
     if not 0.0 < radius < 1.0:
         return math.inf if radius else 0.0
     return -compiled.seconds / math.log(radius)
-
-
-def conditions(values: SimpleNamespace) -> tuple[str, str]:
-    """The conditions of NAME_INVERSE_ROUNDING_ERROR in words: of two branches, and of the memory; empty ones do not
-    matter."""
-    branch = "both take the same branch" if values.branches else ""
-    return branch, values.condition or UNSLEWED * values.variant.slew
-
-
-def _unbounded(values: SimpleNamespace) -> list[str]:
-    """A bound of the inverse's error that says nothing."""
-    limits = values.numbers.limits
-    whole = float(limits[slots.DRIVE_MAX]) - float(limits[slots.DRIVE_MIN])
-    bounds = [float(text.rstrip("f")) for text in (values.inverse_max_error, values.inverse_rounding_error)]
-    if bounds[0] < whole:
-        return []
-    lsb, unit = "_LSB" * values.fixed, " codes" if values.fixed else values.units.drive.replace(",", "")
-    said = f"Error: {values.NAME}_INVERSE_MAX_ERROR{lsb} is the whole range of the drive, {whole:.4g}{unit}"
-    if bounds[1] < whole:
-        return [f"{said}; at most {bounds[1]:.3g}{unit} while {together(*conditions(values))}"]
-    return [f"{said}: no drive is near the exact one for certain"]

@@ -101,9 +101,10 @@ def _unit(what: str, values: SimpleNamespace) -> str:
     """A quantity with its unit: of the drive or the output, as a code in fixed point."""
     side = "drive" if what == "drive" else "output"
     words = {"drive": "drive", "output": "displacement", "reference": "reference"}[what]
+    unit: str = getattr(values.units, side)
     if values.fixed:
-        return f"{words}, in codes of {values.NAME}_{side.upper()}_LSB{getattr(values.units, side).replace(',', '')}"
-    return words + getattr(values.units, side)
+        return f"{words}, in codes of {values.NAME}_{side.upper()}_LSB{unit.replace(',', '')}"
+    return words + unit
 
 
 def _parameter(name: str, call: str, values: SimpleNamespace) -> str:

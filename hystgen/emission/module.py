@@ -18,7 +18,7 @@ from hystgen.basics.version import __version__
 from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import tables as chain_tables
-from hystgen.compensator.chain.bounds import kept_branch, together
+from hystgen.compensator.chain.bounds import UNSLEWED, kept_branch, together
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, LEAST_LATE, SHARE_BITS, Compiled
 from hystgen.effects import own as own_effects
@@ -248,7 +248,8 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.timing = _timing(parameters, compiled, about["family"])
     reading = [*_reading(compiled), *_branches(compiled, parameters), *_quiet(values)] if compiled else []
     values.reading = reading if options.inverse else []
-    values.doubts = doubts.found(parameters, compiled, values) if options.inverse else []
+    dynamic = doubts.found(parameters, compiled) if compiled and options.inverse else []
+    values.doubts = [*dynamic, *(_unbounded(values) if options.inverse else [])]
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
     values.corners = (max(n, 1) if values.fixed else n + 1) if corners else 0
     front = render("front.c.j2", values) if values.stages else ""
@@ -338,12 +339,33 @@ def _limits(values: SimpleNamespace) -> list[str]:
         found.append((f"FORWARD_MAX_ERROR{lsb}", values.forward_max_error, bound + output))
     if values.inverse:
         found.append((f"INVERSE_MAX_ERROR{lsb}", values.inverse_max_error, bound + drive))
-    branch, condition = doubts.conditions(values)
+    branch, condition = _conditions(values)
     apart = condition and values.inverse_rounding_error != values.inverse_max_error
     if values.inverse and (values.branches or apart):
         words = f"the same while {together(branch, condition)}"
         found.append((f"INVERSE_ROUNDING_ERROR{lsb}", values.inverse_rounding_error, words))
     return [define(f"{values.NAME}_{name}", value, comment) for name, value, comment in found]
+
+
+def _conditions(values: SimpleNamespace) -> tuple[str, str]:
+    """The conditions of NAME_INVERSE_ROUNDING_ERROR in words: of two branches, and of the memory; empty ones do not
+    matter."""
+    branch = "both take the same branch" if values.branches else ""
+    return branch, values.condition or UNSLEWED * values.variant.slew
+
+
+def _unbounded(values: SimpleNamespace) -> list[str]:
+    """A bound of the inverse's error that says nothing."""
+    limits = values.numbers.limits
+    whole = float(limits[slots.DRIVE_MAX]) - float(limits[slots.DRIVE_MIN])
+    bounds = [float(text.rstrip("f")) for text in (values.inverse_max_error, values.inverse_rounding_error)]
+    if bounds[0] < whole:
+        return []
+    lsb, unit = "_LSB" * values.fixed, " codes" if values.fixed else values.units.drive.replace(",", "")
+    said = f"Error: {values.NAME}_INVERSE_MAX_ERROR{lsb} is the whole range of the drive, {whole:.4g}{unit}"
+    if bounds[1] < whole:
+        return [f"{said}; at most {bounds[1]:.3g}{unit} while {together(*_conditions(values))}"]
+    return [f"{said}: no drive is near the exact one for certain"]
 
 
 def _version_number() -> int:

@@ -170,8 +170,10 @@ def track(effect: str, seed: int, samples: int = SMALL) -> Tracked:
         for name in ("plain", "whole"):
             with (home / f"{name}.yaml").open("a") as file:
                 file.write(f"sample_time: {1.0 / rate!r}\n")
-                if name == "whole" and "thermal" in names:  # which may be the drive's own heat
-                    file.write("emit:\n  compensation: {compensate: [self_heating]}\n")
+                heated = "thermal" in names  # which may be the drive's own heat
+                if name == "whole":  # references here have no noise
+                    asked = ", compensate: [self_heating]" * heated
+                    file.write(f"emit:\n  compensation: {{noise_gain: 1.0e+9{asked}}}\n")
             _call(home, "simulate", f"{name}.yaml", "reference.csv", "--operator", "inverse", "--arithmetic", "float32",
                   "-o", f"{name}.csv")  # fmt: skip
             tried[name] = np.genfromtxt(home / f"{name}.csv", delimiter=",", names=True, deletechars="")["v"]
