@@ -20,6 +20,8 @@ from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.records import Record
 
+pytestmark = pytest.mark.thorough
+
 Array = NDArray[np.float64]
 Stage = Callable[[Array], Array]
 
@@ -131,7 +133,6 @@ def diagnosed(stage: Stage, speed: float) -> Diagnosis:
     return hystgen.diagnose(hystgen.identify(made[:3], holdout=made[3:], model="pi"), made[:3], holdout=made[3:])
 
 
-@pytest.mark.thorough
 def test_at_one_speed_no_name_takes_its_place() -> None:
     found = diagnosed(dahl, 800.0)
     assert found.content["effects"] == []
@@ -145,7 +146,6 @@ def test_at_one_speed_no_name_takes_its_place() -> None:
     assert all(refused)
 
 
-@pytest.mark.thorough
 @pytest.mark.parametrize(("stage", "name"), [(creeping, "creep"), (lagging, "lag")])
 def test_at_one_speed_right_names_stand(stage: Stage, name: str) -> None:
     found = diagnosed(stage, 800.0)
