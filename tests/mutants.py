@@ -5,9 +5,10 @@ Data to be amended with the sources: `old` has to stand in the file, once unless
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
-from modelfiles import CHAINS, FILES, LED, PLAYS, STEADY, head
+from modelfiles import BRAKED, CALM, CHAINS, FILES, LED, PLAYS, STEADY, head
 
 STEP = "c_runtime/loop_float.c"
 LOOP = "c_runtime/loop.c"
@@ -40,9 +41,11 @@ FLAT = PLAYS + "    initial_state: {}\n  memoryless: {{kind: tanh, ascending: {{
 
 MODELS = {
     **FILES,
+    **CHAINS,
     **LED,
-    "creeping": CHAINS["creeping"],
     "steady": STEADY,
+    "braked": BRAKED,
+    "calm": CALM,
     # the plays that start lowest begin to follow right at the limit
     "edge": head("edge", 1, 6) + PLAYS + "    initial_state: [0, 1.45, 1.9, 1.9, 1.9, 1.9, 1.9]\n",
     # from plays at 0, after a reset, all follow right at the limit
@@ -55,9 +58,11 @@ MODELS = {
     # the last drive code and the most that the envelope gives lie closer together than half a code
     "flat_high": head("flat_high") + FLAT.format("6") + "emit: {drive_lsb: 1.3}\n",
     "flat_low": head("flat_low") + FLAT.format("-5.7") + "emit: {drive_lsb: 1.3}\n",
-    # a reset leads beyond what output codes were chosen for
+    # a reset leads beyond what output codes were chosen for, of the second at high drives alone
     "far_low": head("far_low", 0, 1)
     + "\n  pi: {thresholds: [0, 200], weights: [1, 1], initial_state: 50}\n  output_offset: -50\n",
+    "near_high": head("near_high", 0, 10)
+    + "\n  pi: {thresholds: [0, 200], weights: [1, 1], initial_state: -5}\n  output_offset: 5\n",
 }
 
 
@@ -279,6 +284,114 @@ KILLED = (
     ),
 )  # fmt: skip
 
+
+def _of_loop(what: str, file: str, old: str, new: str, model: str, arithmetic: str, count: int = 1) -> Mutant:
+    """A mutant of a file of the run time, in engine loop."""
+    return Mutant(what, f"c_runtime/{file}", old, new, model, arithmetic, "loop", count)
+
+
+# Of the files that models with effects are made of, one at least of each
+OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
+    ("a limited output code drops status", "chain_fixed.c", "*status |= ", "*status = ", "quick", "q31"),
+    ("travel loses the remainder", "ageing.c", "self->low = change - (next - high);",
+     "self->low = change - change;", "worn", "float32"),
+    ("a set travel keeps an old remainder", "ageing.c", "    self->low = 0;\n", "", "worn", "float32"),
+    ("a set gain lasts for one move", "ageing.c", "self->own = false;", "self->own = true;", "worn", "float32"),
+    ("a travel below 0 is taken", "ageing.c", "travel < 0 ? 0 : travel >", "travel >", "worn", "float32"),
+    ("travel counts rising drives alone, fixed", "ageing_fixed.c", "way >= 0 ? way : -way",
+     "way >= 0 ? way : 0", "worn", "q31"),
+    ("a limited gain is not told, fixed", "ageing_fixed.c", "return self->gain != given;",
+     "return self->own;", "worn", "q31"),
+    ("a bump is off its centre", "bent_centre.c", "z - HYSTGEN_CENTRE", "z + HYSTGEN_CENTRE", "dilated", "float32"),
+    ("a curve goes on past its end", "bent_fixed.c", "z < -HYSTGEN_BUMP_END  ? -HYSTGEN_BUMP_END",
+     "z < -HYSTGEN_BUMP_END  ? z", "bumpy", "q31"),
+    ("a moved play contributes what it did before", "bent_known.c", "z >= play[i] && z <=",
+     "z >= play[i] || z <=", "dilated", "float32"),
+    ("a polynomial loses a term", "bent_polynomial.c", "k > 0; --k", "k > 1; --k", "viscous", "float32"),
+    ("a lead in good time is cut", "braked.c", "            return 0;\n",
+     "            return room;\n", "braked", "float32"),
+    ("the brake finds no lead", "braked.c", "                low = middle;\n",
+     "                high = middle;\n", "braked", "float32"),
+    ("the brake finds no lead, fixed", "braked_fixed.c", "low = middle;", "high = middle;", "braked", "q31"),
+    ("a limited offset is not told", "chain_calls.c", "inside < d || inside > d",
+     "inside < d && inside > d", "creeping", "float32", 2),
+    ("a settled actuator keeps moving", "chain_calls.c", "    self->moving = false;\n", "", "creeping", "q31", 2),
+    ("a reference that is no number is forgotten", "chain_calls.c", "            hystgen_inverse_repeat(self);\n",
+     "", "late", "float32"),
+    ("a set offset leaves the clock running", "chain_calls.c", "        hystgen_inverse_clock_start(self);\n",
+     "", "drifting", "float32"),
+    ("a rising drive is not slewed", "chain_slew.c", "v > highest ? highest : v",
+     "v > highest ? v : v", "quick", "float32"),
+    ("the clock stands", "clock.c", "self->low + 1", "self->low + 0", "drifting", "float32"),
+    ("drift is not foreseen", "clock.c", "(self->low + ahead)", "(self->low + 0 * ahead)", "drifting_late", "float32"),
+    ("the rate of drift does not change, fixed", "clock_fixed.c", "self->gained += t->change;",
+     "self->gained += 0;", "drifting", "q31"),
+    ("a settled state of creep keeps its remainder", "creep.c", "        state[i].low = 0;\n",
+     "", "creeping", "float32"),
+    ("creep does not see the drive come, fixed", "creep_fixed.c", "hystgen_times(change, &term->late)",
+     "hystgen_times(0 * change, &term->late)", "creeping", "q31"),
+    ("the ring is one place short", "delay.c", "oldest + 1u <", "oldest + 2u <", "late", "float32"),
+    ("a delay is whole samples", "delay_float.c", "v + HYSTGEN_WAITED *",
+     "v + 0 * HYSTGEN_WAITED *", "late", "float32"),
+    ("all plays rub alike", "friction.c", "        odd += 2;\n", "", "rubbed", "float32"),
+    ("friction begins anew in every sample", "friction.c", "self->begun = true;",
+     "self->begun = false;", "rubbed", "float32"),
+    ("all plays rub alike, fixed", "friction_fixed.c", "(2u * i + 1u)", "(0u * i + 1u)", "rubbed", "q31"),
+    ("a temperature moves no offset", "gain.c", "self->offset = t->offset_per_degree * above;",
+     "self->offset = 0 * above;", "warm", "float32"),
+    ("a limited temperature is not told", "gain.c", "inside < temperature ||",
+     "inside < t->coldest ||", "warm", "float32"),
+    ("a gain is followed with one Newton step less", "gain_fixed.c", "i < turns; ++i",
+     "i + 1u < turns; ++i", "heated", "q31"),
+    ("heat loses the remainder", "heat.c", "self->low = change - (next - high);",
+     "self->low = 0;", "heated", "float32"),
+    ("heat does not leave", "heat.c", "- t->rate * high", "+ t->rate * high", "heated", "float32"),
+    ("heat has no sign, fixed", "heat_fixed.c", "v >= 0 ? square : -square",
+     "v >= 0 ? square : square", "heated", "q31"),
+    ("a lag loses the remainder", "lag.c", "self->low = change - (next - high);",
+     "self->low = 0;", "lagging", "float32"),
+    ("a lag at rest is still asked for another output", "lag.c", "    self->asked = v;\n", "", "lagging", "float32"),
+    ("a lag at rest is still led, fixed", "lag_fixed.c", "    self->lead = 0;\n", "", "led", "q31"),
+    ("an exact lag forgets its last drive", "lag_exact.c", "    self->before = v;\n    return self->reached;",
+     "    return self->reached;", "quick", "float32"),
+    ("an exact lag forgets its last drive, fixed", "lag_exact_fixed.c",
+     "    self->before = v;\n    return hystgen_nearest", "    return hystgen_nearest", "quick", "q31"),
+    ("a lag leads back in front of two branches, fixed", "lag_steady_fixed.c", "    self->rises = rises;\n",
+     "    self->rises = !rises;\n", "steady", "q31"),
+    ("a mode at rest still swings", "mode.c", "    self->rate = 0;\n", "", "late", "float32"),
+    ("a mode at rest still swings, fixed", "mode_fixed.c", "    self->rate = 0;\n", "", "late", "q31"),
+    ("a dashpot yields to one side alone", "moved_dashpot.c", "x < 0 ? lost - gained",
+     "x < 0 ? lost + gained", "dashpot", "float32"),
+    ("a settled play keeps its remainder", "moved_dashpot.c", "    play[HYSTGEN_N_PLAYS + i] = 0;\n",
+     "", "dashpot", "float32"),
+    ("thresholds grow with rising drives alone", "moved_dilated.c", "(hystgen_sum_t)play[0] - w;",
+     "(hystgen_sum_t)0;", "dilated", "float32"),
+    ("plays never move", "moved_kept.c", "hystgen_reached(i, play, w)", "play[i] + 0 * w", "dilated", "float32"),
+    ("plays stand still while their input does", "moved_relaxing.c", "            play[i] = rest;\n",
+     "", "viscous", "float32"),
+    ("the line of references stands", "preview.c", "line[i + 1u] : x", "line[i] : x", "late", "float32"),
+    ("a reference is repeated that was never given", "preview.c", "    if (*filled) {",
+     "    if (line != 0) {", "late", "float32"),
+    ("a preview loses its last tap", "preview_float.c", "i < HYSTGEN_TAPS", "i + 1u < HYSTGEN_TAPS", "late", "float32"),
+    ("a preview loses its last tap, fixed", "preview_fixed.c", "i < HYSTGEN_TAPS",
+     "i + 1u < HYSTGEN_TAPS", "late", "q31"),
+    ("equal references are not counted", "quiet.c", "        ++self->equal;\n",
+     "        (void)self->equal;\n", "calm", "float32"),
+    ("a kept drive jumps", "quiet.c", "? last : a;", "? a : a;", "calm", "float32"),
+    ("relaxing plays gain nothing", "relaxing_float.c", "HYSTGEN_LATE *", "0 *", "relaxing", "float32"),
+    ("relaxing plays pass each other, fixed", "relaxing_fixed.c", "rest < low ? low",
+     "rest < low ? rest", "relaxing", "q31"),
+    ("a play is stretched to one side alone", "stretch.c", "x < -r ? x + r : 0", "0", "relaxing", "float32"),
+    ("the wrong half of a search is kept", "search_float.c", "sum < search->sum",
+     "sum > search->sum", "dilated", "float32"),
+    ("a search ends one below, fixed", "search_fixed.c", "above > below ? 1", "above > below ? 0", "dilated", "q31"),
+    ("stops give on one side alone", "stops.c", "x < t->lower ? t->lower : x >", "x >", "quick", "q31"),
+    ("what yields is looked up one place low", "yield_float.c", "high = before ? middle : high;",
+     "high = middle;", "dashpot", "float32"),
+    ("a play yields more than its stretch, fixed", "yield_fixed.c", "low = before ? low : middle;",
+     "low = before ? low : low;", "dashpot", "q31"),
+)))  # fmt: skip
+
 # No record can find these, for the reasons given; a difference would show that a reason is wrong.
 EQUIVALENT = (
     # The limit is a drive code itself: nothing before it is rounded to one beyond.
@@ -322,3 +435,22 @@ EQUIVALENT = (
         for name, bits in (("outside", "q15"), ("listed", "q31"), ("two_branches", "q15"))
     ),
 )  # fmt: skip
+
+# Where adding a status bit is the same as setting it, since no other can be set before. A reference that was limited
+# lies where a drive inside its range leads, so that no envelope limits it too; of a forward operator in fixed point
+# whose outputs all are codes the limit of the drive is the only bit.
+NO_DRIVE = "self->bits |= HYSTGEN_STATUS_DOMAIN;"
+LIMITED_DRIVE = ("forward_step", "self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;")
+
+# Models that add status bits wherever a file of the run time does, but chain_fixed.c
+STICKY: list[tuple[str, str, str, set[tuple[str, str]]]] = [
+    ("outside", "float32", "corners", set()),
+    ("near_high", "q15", "corners", set()),
+    ("near_high", "q15", "loop", set()),
+    ("two_branches", "float32", "corners", set()),
+    ("two_branches", "q15", "corners", {LIMITED_DRIVE, ("inverse_step", NO_DRIVE)}),
+    ("two_branches", "float32", "loop", {("inverse_drive", NO_DRIVE)}),
+    ("two_branches", "q15", "loop", {LIMITED_DRIVE, ("inverse_drive", NO_DRIVE)}),
+    ("curved", "float32", "loop", {("inverse_drive", NO_DRIVE)}),
+    ("everything", "float32", "loop", {("inverse_drive", NO_DRIVE)}),
+]

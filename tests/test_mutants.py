@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import functools
+import re
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,18 @@ from mutants import Mutant
 import hystgen
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.emission import module, runtime
+from hystgen.emission.calls import emit_options
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
-from hystgen.verification import comparison, host
+from hystgen.verification import comparison, compilers, host
 from hystgen.verification import run as verification
+from hystgen.verification import sources as verified
 from hystgen.verification.report import Report
 
 pytestmark = pytest.mark.thorough
+
+BUILD = (("quick", ["-std=c99", "-O0", "-ffp-contract=off"]),)
+"""The build that takes the least time together with its calls."""
 
 LENGTH = 20_000
 """Calls of each record, a fifth of what `verify` takes by default."""
@@ -59,23 +65,26 @@ def forget() -> None:
     runtime._read.cache_clear()
 
 
-@pytest.fixture
-def verify(monkeypatch: pytest.MonkeyPatch) -> Callable[[Mutant], Report]:
-    """`verify` on the host, with one build, of the model in which a mutant shows."""
-    monkeypatch.setattr(host, "BUILDS", host.BUILDS[:1])
+def verify(name: str, arithmetic: str, engine: str) -> Report:
+    """`verify` on the host, with one build."""
 
-    def run(mutant: Mutant) -> Report:
-        def records(_numbers: Any, _real: Any, inverse: bool, length: int) -> list[comparison.Expected]:
-            assert length == LENGTH
-            return expected(mutant.model, mutant.arithmetic, mutant.engine, inverse)
+    def records(_numbers: Any, _real: Any, inverse: bool, length: int) -> list[comparison.Expected]:
+        assert length == LENGTH
+        return expected(name, arithmetic, engine, inverse)
 
-        monkeypatch.setattr(verification, "expected_records", records)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(host, "BUILDS", BUILD)
+        patch.setattr(verification, "expected_records", records)
         return hystgen.verify(
-            model(mutant.model), operator="both", arithmetic=mutant.arithmetic, engine=mutant.engine,
-            compiler=["gcc"], length=LENGTH,
-        )  # fmt: skip
+            model(name), operator="both", arithmetic=arithmetic, engine=engine, compiler=["gcc"], length=LENGTH
+        )
 
-    return run
+
+@functools.cache
+def stands(name: str, arithmetic: str, engine: str) -> None:
+    """A model passes without a mutant."""
+    report = verify(name, arithmetic, engine)
+    assert report.ok, report.table()
 
 
 def apply(mutant: Mutant, folder: Path) -> None:
@@ -85,22 +94,57 @@ def apply(mutant: Mutant, folder: Path) -> None:
     path.write_text(text.replace(mutant.old, mutant.new))
 
 
-@pytest.mark.parametrize("mutant", mutants.KILLED, ids=lambda mutant: mutant.what)
-def test_verify_finds_a_mutant(mutant: Mutant, sources: Path, verify: Callable[[Mutant], Report]) -> None:
-    report = verify(mutant)
-    assert report.ok, report.table()
+@pytest.mark.slow(one_in=2)
+@pytest.mark.parametrize("mutant", [*mutants.KILLED, *mutants.OF_EFFECTS], ids=lambda mutant: mutant.what)
+def test_verify_finds_a_mutant(mutant: Mutant, sources: Path) -> None:
+    stands(mutant.model, mutant.arithmetic, mutant.engine)
     apply(mutant, sources)
     forget()
-    report = verify(mutant)
-    assert not report.ok
+    report = verify(mutant.model, mutant.arithmetic, mutant.engine)
     assert any(row.different for row in report.rows), report.table()
 
 
 @pytest.mark.parametrize("mutant", mutants.EQUIVALENT, ids=lambda m: f"{m.what}, {m.model}, {m.arithmetic}")
-def test_an_equivalent_mutant_changes_nothing(
-    mutant: Mutant, sources: Path, verify: Callable[[Mutant], Report]
-) -> None:
+def test_an_equivalent_mutant_changes_nothing(mutant: Mutant, sources: Path) -> None:
     apply(mutant, sources)
     forget()
-    report = verify(mutant)
+    report = verify(mutant.model, mutant.arithmetic, mutant.engine)
     assert report.ok, report.table()
+
+
+ADDED = re.compile(r"(\*?[\w>-]*(?:status|bits)) \|= ([^;]+);")
+"""Status bits that are added."""
+
+
+@pytest.mark.slow(one_in=2)
+@pytest.mark.parametrize(("name", "arithmetic", "engine", "alone"), mutants.STICKY)
+def test_verify_sees_that_status_bits_stay(
+    name: str, arithmetic: str, engine: str, alone: set[tuple[str, str]], tmp_path: Path
+) -> None:
+    """Every place that adds status bits, made to drop those that have not been read yet; all but `alone` are found.
+    One build, in which a number chooses the place."""
+    one = model(name)
+    written = verified.write(tmp_path, one, emit_options(one, "both", arithmetic, engine))
+    (path,) = written.module
+    text, places = path.read_text(), []
+
+    def dropped(found: re.Match[str]) -> str:
+        function = re.findall(r"^\w[^;{}()]*\b(\w+)\([^;{}]*\{$", text[: found.start()], flags=re.M)[-1]
+        places.append((function.removeprefix(f"{name}_"), " ".join(found[0].split()).replace(name.upper(), "HYSTGEN")))
+        return f"{found[1]} = (chosen == {len(places)} ? 0u : {found[1]}) | ({found[2]});"
+
+    path.write_text("extern int chosen;\nint chosen;\n" + ADDED.sub(dropped, text))
+    gcc = compilers.find("gcc")
+    assert gcc is not None
+    gcc.shared_library(written.all, tmp_path / "all.so", BUILD[0][1])
+    library = host._Library(tmp_path / "all.so", written, ARITHMETICS[arithmetic].number)
+    library._ffi.cdef("extern int chosen;")
+    records = [(op, each) for op in written.operators for each in expected(name, arithmetic, engine, op == "inverse")]
+    kept = []
+    for place in range(len(places) + 1):
+        library._lib.chosen = place
+        if not any(comparison.compare(functools.partial(library.run, op), [each]).different for op, each in records):
+            kept.append(place)
+    assert kept[0] == 0, "nothing dropped"
+    found = {places[place - 1] for place in kept[1:]}
+    assert found == alone, found ^ alone

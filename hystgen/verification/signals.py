@@ -167,7 +167,7 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
         x = np.where(op == slots.OP_TEMPERATURE, degree * (20.0 + rng.standard_cauchy(length) * 30.0), x)
         x = np.where(op == slots.OP_GAIN, gain * rng.uniform(0.3, 2.2, length), x)
         x = np.where(op == slots.OP_TRAVEL, 10.0 ** rng.uniform(0.0, 9.0, length), x)
-        odd = rng.random(length) < 0.01
+        odd = rng.random(length) < np.where(op == slots.OP_STEP, 0.01, 0.1)
         strange = [0.0, 1e30, -1e30] if tables.fixed else [np.nan, np.inf, -np.inf, 0.0, -0.0, 1e30, -1e30]
         x[odd] = rng.choice(strange, int(odd.sum()))
         yield name, op, x
@@ -253,8 +253,8 @@ def _suite(
             op = np.where(rng.random(length) < chance, slots.OP_COMMIT, slots.OP_STEP).astype(np.uint8)
             spread = drive_high - drive_low
             drives = rng.uniform(drive_low - 0.05 * spread, drive_high + 0.05 * spread, length)
-            odd = rng.random(length) < 0.02
+            odd = rng.random(length) < np.where(op == slots.OP_COMMIT, 0.1, 0.02)
             drives[odd] = rng.choice(special, int(odd.sum()))
-            smooth = middle + half * np.sin(walk)
+            smooth = middle + 1.1 * half * np.sin(walk)
             smooth[odd] = rng.choice(special, int(odd.sum()))
             yield name, op, np.where(op == slots.OP_COMMIT, drives, smooth)
