@@ -270,7 +270,8 @@ def _harmless(
     if wild is None:
         return found, made, extended, []
     names = tuple(dict.fromkeys(each.name for each in found.found))
-    plain = selection.refused(plain, Refusal("wild", wild.moves, acceptance.BEYOND_GAIN * max(wild.gain, done.noise.rms)))
+    most = acceptance.BEYOND_GAIN * max(wild.gain, done.noise.rms)
+    plain = selection.refused(plain, Refusal("wild", wild.moves, most))
     return plain, plain_made, fewer, [WildInverse(names, **vars(wild))]
 
 
