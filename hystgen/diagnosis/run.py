@@ -304,7 +304,7 @@ def _harmless(
     if wild is None:
         return found, []
     names = tuple(dict.fromkeys(each.name for each in found.found))
-    why = Refusal("wild", wild.moves, acceptance.BEYOND_GAIN * wild.gain)
+    why = Refusal("wild", wild.moves, acceptance.BEYOND_GAIN * max(wild.gain, done.noise.rms))
     return replace(plain, rankings=selection.refused(found.rankings, why)), [WildInverse(names, **vars(wild))]
 
 
