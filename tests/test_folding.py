@@ -13,6 +13,7 @@ from modelfiles import CHAINS, CREEP, FILES, chain
 from pycparser import c_ast, c_parser
 
 import hystgen
+from hystgen.emission.calls import emitted_files
 from hystgen.emission.folding import folded, parsed
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
@@ -47,6 +48,10 @@ KINDS = (
     ("lagging", "both", "float32", "corners"), ("dashpot", "both", "float32", "loop"),
     ("everything", "both", "q31", "loop"),
 )  # fmt: skip
+
+
+SLEWING = ("slewed", "braked", "within", "over")
+"""Functions of the slew limit, whose choices are still in one another."""
 
 
 def tree(folder: Path, name: str, operator: str, arithmetic: str, engine: str) -> c_ast.FileAST:
@@ -119,6 +124,17 @@ def test_nothing_is_there_for_other_models(
         for each in below(function.body):
             if isinstance(each, c_ast.If):
                 assert not isinstance(each.cond, c_ast.Constant | c_ast.ID) or each.cond.name not in ("true", "false")
+    for function in functions:
+        if any(word in function.decl.name for word in SLEWING):
+            continue
+        for each in below(function.body):
+            if isinstance(each, c_ast.TernaryOp):
+                within = [part for part in below(each) if isinstance(part, c_ast.TernaryOp)]
+                assert len(within) == 1, f"{function.decl.name} has one choice in another"
+            if isinstance(each, c_ast.ArrayRef) and isinstance(each.subscript, c_ast.UnaryOp | c_ast.StructRef):
+                field = each.subscript.field.name if isinstance(each.subscript, c_ast.StructRef) else ""
+                wrong = field == "rising" or getattr(each.subscript, "op", "") == "!"
+                assert not wrong, f"{function.decl.name} indexes by a bool"
     for op in ("forward", "inverse") if operator == "both" else (operator,):
         (state,) = [each for each in module.ext if isinstance(each, c_ast.Typedef) and each.name == f"{name}_{op}_t"]
         fields = {each.name for each in state.type.type.decls}
@@ -131,6 +147,41 @@ def test_nothing_is_there_for_other_models(
 def test_a_lag_relaxation_and_creep_take_fifty_functions_at_most(tmp_path: Path) -> None:
     module = tree(tmp_path, "three", "inverse", "float32", "loop")
     assert sum(isinstance(each, c_ast.FuncDef) for each in module.ext) <= 50
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q31"])
+@pytest.mark.parametrize("name", ["everything", "plain"])
+def test_the_header_says_of_every_call_what_there_is_to_know(name: str, arithmetic: str) -> None:
+    text = MODELS[name] + "sample_time: 1.0e-3\n" * (name == "plain")
+    model = Model(parse_parameters(text, f"{name}.yaml"))
+    header = emitted_files(model, operator="both" if name == "plain" else "inverse", arithmetic=arithmetic)[f"{name}.h"]
+    calls = re.findall(rf"^[\w ]+ {name}_(?:forward|inverse)_(\w+)\(([^;]*)\);$", header, re.MULTILINE)
+    above = re.findall(r"/\*\*\n(.*?) \*/\n[\w ]+?(\w+)\(([^;]*)\);", header, re.DOTALL)
+    assert len(above) == len(calls) >= 9
+    for words, call, given in above:
+        names = [re.findall(r"\w+", each)[-1] for each in given.split(",")]
+        assert re.findall(r"@param (\w+)", words) == names, call
+        assert [words.count(mark) for mark in ("@pre ", "@note Status bits: ", "@note Cost: ")] == [1, 1, 1], call
+        unit = {"u": "um", "v": "V", "applied": "V", "d": "um"}
+        for each in names:
+            said = " ".join(words.partition(f"@param {each}")[2].partition("@")[0].split())
+            assert each not in unit or re.search(rf"\b{unit[each]}\b", said), (call, each)
+            assert ("NaN" in said) == (each != "self" and arithmetic == "float32"), (call, each)
+    assert re.search(rf"^#define {name.upper()}_SAMPLE_TIME 0\.001f?\b", header, re.MULTILINE)
+    number = re.search(rf"^#define {name.upper()}_HYSTGEN_VERSION_NUMBER (\d+)\b", header, re.MULTILINE)
+    major, minor, patch = map(int, hystgen.__version__.split("."))
+    assert number
+    assert int(number[1]) == 10000 * major + 100 * minor + patch
+
+
+@pytest.mark.parametrize(
+    ("name", "engine", "words"),
+    [("plain", "corners", "play move corner block way reach segment pass"), ("plain", "loop", "play pending")],
+)
+def test_a_source_explains_its_words(name: str, engine: str, words: str) -> None:
+    source = emitted_files(Model(parse_parameters(MODELS[name], "plain.yaml")), engine=engine)["plain.c"]
+    top = source.partition("/* Words of this file")[2].partition("*/")[0]
+    assert re.findall(r"^   (\w+): ", top, re.MULTILINE) == words.split()
 
 
 def fold(*texts: str, fixed: bool = True) -> str:

@@ -451,7 +451,8 @@ def _status(values: SimpleNamespace) -> list[str]:
          else "NaN or infinite input: the last answer was held"),
         ("DOMAIN", 8, "inverse: the argument of an envelope was limited" if values.envelopes
          else "never set: no envelope limits an argument"),
-        *([("SLEW_LIMITED", 16, "the drive was kept within its rate"),
+        *([("SLEW_LIMITED", 16, "the drive was kept within its rate" if values.variant.slew
+            else "never set: nothing limits the drive's rate"),
            ("LIMITED_SETTING", 32, "an offset, gain or temperature was limited")] if values.variant.chain else []),
     ]  # fmt: skip
     return [define(f"{values.NAME}_STATUS_{name}", f"{bit}u", comment) for name, bit, comment in found]

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 3c50bb2761808d6dd225a7ce7c947d7d7e495c921682f55282538fd8d601f111, without this line
+ * Text: sha256 72e4908b730194634e3673f2fcc965524a7e15023e7306ad42a094c5dd3d8863, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -274,11 +274,6 @@ PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, p
     return true;
 }
 
-/* Whether a move to x stays short of `end`. */
-static inline bool plain_short_of(bool rising, plain_real_t x, plain_real_t end) {
-    return rising ? x < end : x > end;
-}
-
 /* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
 PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m,
                              plain_corner_t *corner, const plain_start_t *start) {
@@ -370,18 +365,21 @@ PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u) {
     plain_plays_t *m = &self->plays;
     const plain_real_t x = u - PLAIN_OFFSET;
-    const bool rising = m->here.rising;
-    const bool on = plain_short_of(rising, m->here.input, x);
-    if (on ? plain_short_of(rising, x, m->next)
-        : m->here.k == 0 && plain_short_of(rising, m->behind, x) &&
-              plain_short_of(rising, x, m->here.input)) {
-        /* the usual sample: the same plays follow */
+    const bool on = m->here.rising ? x > m->here.input : x < m->here.input;
+    bool same = false; /* the same plays follow */
+    if (on) {
+        same = m->here.rising ? x < m->next : x > m->next;
+    } else if (m->here.k == 0) {
+        same = m->here.rising ? x > m->behind && x < m->here.input
+                              : x < m->behind && x > m->here.input;
+    }
+    if (same) { /* the usual sample */
         self->before = m->here.input;
         m->here.input = x;
         m->here.output = m->start + (x - m->begin) * m->gain;
         return m->here.output;
     }
-    if (on && plain_short_of(rising, x, m->cap)) {
+    if (on && (m->here.rising ? x < m->cap : x > m->cap)) {
         plain_copy_place(&self->undo, &m->here);
         self->before = x;
         if (plain_move_in_block(&plain_inverse_curve, m, x)) {

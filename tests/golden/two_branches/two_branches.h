@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 c75b72f0d50a8564735e18529640fe10ae89669af639009d62e0e8e1a7cb7e80, without this line
+ * Text: sha256 5f1d0373b14f6e2e677735c4a63a4537c4107ad35ceead3023fae3c9652e53a1, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -678,26 +678,24 @@ TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t
     return true;
 }
 
-/* Whether a move to x stays short of `end`. */
-static inline bool two_branches_short_of(bool rising, two_branches_real_t x,
-                                         two_branches_real_t end) {
-    return rising ? x < end : x > end;
-}
-
 /* The sum of the plays for the next input; a NaN moves nothing. */
 static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t,
                                                    two_branches_plays_t *m,
                                                    two_branches_corner_t *corner,
                                                    two_branches_real_t input) {
-    const bool rising = m->here.rising;
-    const bool on = two_branches_short_of(rising, m->here.input, input);
-    if (on ? two_branches_short_of(rising, input, m->next)
-        : m->here.k == 0 && two_branches_short_of(rising, m->behind, input)) {
+    const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
+    bool same = false; /* the same plays follow */
+    if (on) {
+        same = m->here.rising ? input < m->next : input > m->next;
+    } else if (m->here.k == 0) {
+        same = m->here.rising ? input > m->behind : input < m->behind;
+    }
+    if (same) {
         m->here.input = input;
         m->here.output = m->start + (input - m->begin) * m->gain;
         return m->here.output;
     }
-    if (on && two_branches_short_of(rising, input, m->cap) &&
+    if (on && (m->here.rising ? input < m->cap : input > m->cap) &&
         two_branches_move_in_block(t, m, input)) {
         return m->here.output;
     }
