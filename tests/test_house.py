@@ -217,7 +217,7 @@ def test_the_package_itself_imports_nothing() -> None:
     ("walk", "most"),
     [
         ("a recording's column v to weights", 29),
-        ("a weight to its digit in float32 C", 27),  # of which 3 explain the C and leave out what a model has no use for
+        ("a weight to its digit in float32 C", 27),  # 3 of them explain the C and leave out what does nothing
         ("a sample through the bit reference", 5),
         ("a recording to a named effect", 70),  # 14 of them invert the model, before the name is written
     ],
