@@ -22,7 +22,7 @@
    Signals between the blocks have a type of their own; chain_float.c and chain_fixed.c convert. */
 
 /* Drive v has passed through the drive side and moved the plays. */
-static void hystgen_forward_played(hystgen_forward_t *self, hystgen_real_t v) {
+static inline void hystgen_forward_played(hystgen_forward_t *self, hystgen_real_t v) {
     const hystgen_reach_t late = hystgen_forward_waited(self, v);
     const hystgen_reach_t reached = hystgen_forward_slewed(self, late);
     if (reached < late || reached > late) {
@@ -52,7 +52,7 @@ HYSTGEN_APART_IN_FIXED void hystgen_forward_absorb(hystgen_forward_t *self, hyst
 }
 
 /* Drive v has passed through the drive side and moved the plays. */
-static void hystgen_inverse_played(hystgen_inverse_t *self, hystgen_real_t v) {
+static inline void hystgen_inverse_played(hystgen_inverse_t *self, hystgen_real_t v) {
     const hystgen_signal_t x = hystgen_entered_drive(v);
     const hystgen_signal_t a = self->moving ? hystgen_inverse_drive_side_absorb(self, x)
                                             : hystgen_inverse_drive_side_rest(self, x);

@@ -20,8 +20,10 @@ static hystgen_reach_t hystgen_input_of(const hystgen_play_t *play, hystgen_sign
         const hystgen_reach_t w =
             (h - (rising ? tail - t->lift[k] : tail + t->lift[k])) * t->inverse_slope[k];
         if (rising ? w >= first : w <= first) {
-            const bool beyond = rising ? w > next : w < next;
-            return k <= t->n && beyond ? next : w;
+            if (k <= t->n && (rising ? w > next : w < next)) {
+                return next;
+            }
+            return w;
         }
         tail = tail + t->weight[last] * play[last];
         next = first;

@@ -18,8 +18,10 @@ HYSTGEN_API hystgen_real_t hystgen_loop_solve(const hystgen_tables_t *t, const h
         const hystgen_real_t w =
             (output - (rising ? tail - t->lift[k] : tail + t->lift[k])) * t->inverse_slope[k];
         if (rising ? w >= first : w <= first) {
-            const bool beyond = rising ? w > next : w < next;
-            return k <= t->n && beyond ? next : w;
+            if (k <= t->n && (rising ? w > next : w < next)) {
+                return next;
+            }
+            return w;
         }
         tail = tail + t->weight[last] * play[last];
         next = first;

@@ -169,7 +169,7 @@ def test_the_header_says_of_every_call_what_there_is_to_know(name: str, arithmet
             assert ("NaN" in said) == (each != "self" and arithmetic == "float32"), (call, each)
     assert re.search(rf"^#define {name.upper()}_SAMPLE_TIME 0\.001f?\b", header, re.MULTILINE)
     number = re.search(rf"^#define {name.upper()}_HYSTGEN_VERSION_NUMBER (\d+)\b", header, re.MULTILINE)
-    major, minor, patch = (int(part) for part in re.findall(r"\d+", hystgen.__version__)[:3])
+    major, minor, patch = map(int, re.findall(r"\d+", hystgen.__version__)[:3])
     assert number
     assert int(number[1]) == 10000 * major + 100 * minor + patch
 

@@ -502,7 +502,7 @@ def render_operators(
     text = _joined(pieces)
     apart = corners > 0 and not family.fixed
     text = text.replace("HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART " if apart else "static ")
-    text = text.replace("HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART " if family.fixed else "static ")
+    text = text.replace("HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART " if family.fixed else "static inline ")
     text = text.replace("HYSTGEN_APART_IN_FLOAT ", "static " if family.fixed else "HYSTGEN_APART ")
     loop = corners == 0 and not family.fixed
     text = text.replace("HYSTGEN_APART_BUT_IN_FLOAT_LOOP ", "static " if loop else "HYSTGEN_APART ")

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 414d24d54b22d73fd2c753120ec4dd3210eb41f7c2a8ead169e89b814307b457, without this line
+ * Text: sha256 01507dd9598b9d83b30455371f1b5e7ec68487f456fd357731198c8ff879bf2b, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -136,8 +136,10 @@ static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *pl
         const bent_real_t w =
             (output - (rising ? tail - t->lift[k] : tail + t->lift[k])) * t->inverse_slope[k];
         if (rising ? w >= first : w <= first) {
-            const bool beyond = rising ? w > next : w < next;
-            return k <= t->n && beyond ? next : w;
+            if (k <= t->n && (rising ? w > next : w < next)) {
+                return next;
+            }
+            return w;
         }
         tail = tail + t->weight[last] * play[last];
         next = first;
@@ -264,8 +266,8 @@ static void bent_inverse_take(bent_inverse_t *self) {
 }
 
 /* Answers reference u, which is `level` after limiting; `bits` is its status so far. */
-static bent_real_t bent_inverse_search(bent_inverse_t *self, bent_real_t u, bent_real_t level,
-                                       unsigned int bits) {
+static inline bent_real_t bent_inverse_search(bent_inverse_t *self, bent_real_t u,
+                                              bent_real_t level, unsigned int bits) {
     if (self->repeat && u >= self->reference && u <= self->reference) {
         self->status |= self->bits;
         return bent_inverse_answer(self, self->answer);
