@@ -219,7 +219,7 @@ def test_the_package_itself_imports_nothing() -> None:
         ("a recording's column v to weights", 29),
         ("a weight to its digit in float32 C", 23),
         ("a sample through the bit reference", 5),
-        ("a recording to a named effect", 56),
+        ("a recording to a named effect", 59),
     ],
 )
 def test_walks_stay_short(walk: str, most: int) -> None:
