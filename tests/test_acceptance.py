@@ -267,7 +267,7 @@ class TestForwardSelection:
         prefix = {each: next((k for k, name in enumerate("abcdef") if name not in each), 6) for each in every}
         world = World({each: 0.68 ** prefix[each] for each in every}, "abcdef")
         self.now: Any = Hypothesis(world, frozenset())
-        monkeypatch.setattr(selection, "_finished", lambda now, found, _: (now, found))
+        monkeypatch.setattr(selection, "_finished", lambda now, found, _: (now, found, None))
         found = selection.select(world.records, self.now)
         assert [each.name for each in found.found] == list("abcde")
 
