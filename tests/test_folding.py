@@ -33,7 +33,7 @@ HEADERS = {
 """Of the language, in the words that the parser knows."""
 
 THREE = chain(
-    "three", "name: lag, time_constant: 0.01", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3", CREEP
+    "three", "name: lag, time_constant: 0.004", "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3", CREEP
 )
 """A lag, relaxation and creep."""
 

@@ -26,8 +26,8 @@ DEFINES = {
 }
 """What `hystgen_runtime.h` asks a build for."""
 
-FLAGS = ["-ffp-contract=off", "-Wno-unused-function"]
-"""A file has functions for every model; emission leaves out those that one model does not call."""
+FLAGS = ["-ffp-contract=off", "-Wno-unused-function", "-Wno-unused-parameter"]
+"""A file has functions and parameters for every model; emission leaves out those that one model has no use for."""
 
 UNITS = (
     ("two_branches", "float32", "loop"),
@@ -125,7 +125,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     apis = [f"hystgen_{op}_api.h" for op in operators]
     headers = [*_states(values), *([] if values.variant.chain else apis)]
     types = [] if not values.variant.chain else [
-        f'#include "{values.family.chain_types[0]}"', *values.glue.states.values(),
+        f'#include "{values.family.chain_types[0]}"', *values.instances.values(),
         *(f'#include "{header}"' for header in (*apis, *(f"hystgen_chain_{op}_api.h" for op in operators))),
     ]  # fmt: skip
     text = "\n".join(
@@ -139,8 +139,7 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
             *(f'#include "{header}"' for header in headers),
             *types,
             *(f'#include "{file}"' for file in values.family.kernel_files),
-            *values.arrays,
-            *values.beside,
+            *values.every,
             *(f'#include "{file}"' for file in _blocks(values)),
             values.functions,
             *(f'#include "{file}"' for file in values.variant.sources()),

@@ -259,7 +259,8 @@ class _Folding:
         types |= {each[2]: each[1] for each in re.finditer(r"^ *const (\w+) (\w+) =", body, re.MULTILINE)}
         for found in re.finditer(r"^ *const (\w+) (\w+) = (\w+);\n", body, re.MULTILINE):
             kind, copy, of = found.groups()
-            if of not in types or re.search(rf"(?<![.>\w]){of} [-+*|&^]?= |&{of}\b", body):
+            declared = re.sub(rf"^ *const \w+ {of} = ", "", body, flags=re.MULTILINE)
+            if of not in types or re.search(rf"(?<![.>\w]){of} [-+*|&^]?= |&{of}\b", declared):
                 continue
             rest = body.replace(found[0], "", 1)
             uses = re.finditer(rf"(?<![.>\w]){copy}\b", rest)
@@ -361,8 +362,8 @@ _FLAG = re.compile(r"^ *bool (\w+)(?: = false)?;(?: */\*[^\n]*?\*/)?\n", re.MULT
 """A local flag that is false, or without a value, at first."""
 _UNUSED = re.compile(r"^ *(?:const )?(?:unsigned )?\w+ (\w+) =\s([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
 """A local variable with its first value."""
-_ANSWERED = re.compile(r"^    const (\w+) (\w+) =\s+([^;]*);\n    return \2;\n\Z", re.MULTILINE)
-"""A constant that is the answer."""
+_ANSWERED = re.compile(r"^    const (\w+) (\w+) =\s+([^;{]*);\n    return \2;\n\Z", re.MULTILINE)
+"""A constant that is the answer; the initializer of a struct is no expression."""
 _IF = re.compile(r"^( *)(\} else )?if \(([^{};]*)\) \{\n", re.MULTILINE)
 
 
@@ -391,7 +392,7 @@ _LOOKS = r"[^()]+|!?hystgen_finite\(\w+\)"
 
 def _choices(body: str) -> str:
     """The body without choices between the same."""
-    return re.sub(r"[\w>-]+ \? (\w+)\s+: \1(?=[;,)])", r"\1", body)
+    return re.sub(r"[\w>-]+ \? ((?:self->)?\w+)\s+: \1(?=[;,)])", r"\1", body)
 
 
 def fields(functions: Collection[Function], operator: str) -> frozenset[str]:

@@ -263,6 +263,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     carried = runtime.carried(family, pieces) if shared else []
     values.operators = runtime.render_operators(pieces, name, values.corners, prefix, family, carried)
     values.types = ""
+    values.instances = glue.states if glue else {}  # whole, as the files of the run time name their fields
     if glue:
         glue = values.glue = chain.with_fields(glue, {op: runtime.fields(pieces, op) for op in operators})
         types = runtime.chain_types(own_types, "\n".join(glue.states.values()), family)
@@ -275,8 +276,9 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     values.states = runtime.render_operators(states, name, values.corners, prefix, family)
     if corners and not shared:
         values.states = runtime.all_types(family.states, prefix, family) + "\n" + values.states
+    values.every = [*values.arrays, *values.beside]
     for kind in ("arrays", "beside"):
-        setattr(values, kind, _named_by(getattr(values, kind), values.operators, [*values.arrays, *values.beside]))
+        setattr(values, kind, _named_by(getattr(values, kind), values.operators, values.every))
     values.build = runtime.verbatim(family.build, name, family, name)
     values.typedefs = _typedefs(values)
     values.limits = _limits(values)
