@@ -256,7 +256,7 @@ class TestForwardSelection:
         def without(now: Hypothesis, name: str, _: Any) -> Hypothesis:
             return Hypothesis(now.world, now.names - {name})
 
-        monkeypatch.setattr(selection, "_without", without)
+        monkeypatch.setattr(selection, "without_effect", without)
         monkeypatch.setattr(selection, "_without_refit", without)
         monkeypatch.setattr(selection.fits, "begun", lambda *_: SimpleNamespace(found=lambda _: self.now))
         monkeypatch.setattr(selection.fits, "fit", lambda *_: self.now)
