@@ -313,7 +313,7 @@ class TestForwardSelection:
         monkeypatch.setattr(selection, "_gives_way", lambda *_: True)
         monkeypatch.setattr(selection, "_found", lambda *_: selection.Found(f"n{len(seen)}", "", 1.0, 0.5, 0.0, ()))
         monkeypatch.setattr(selection, "_without_needless", lambda now, found, _: (now, found, {}))
-        monkeypatch.setattr(selection, "_in_place", lambda _, found, *__: list(found))
+        monkeypatch.setattr(selection, "in_place", lambda _, found, *__: list(found))
         found = [selection.Found(name, name, 1.0, 0.5, 0.0, ()) for name in "ab"]
         selection._exchanged(now, found, {}, {"a", "b"}, world.records)
         assert len(seen) == 4

@@ -34,7 +34,7 @@ def together(world: World, monkeypatch: pytest.MonkeyPatch, alone: dict[str, flo
         (rest,) = now.names - {name}
         return Hypothesis(world, frozenset(rest), (alone or {}).get(rest))
 
-    monkeypatch.setattr(selection, "_without", without)
+    monkeypatch.setattr(selection, "without_effect", without)
     records = world.records
     now: Any = Hypothesis(world, frozenset())
     failed = selection._step(now, world.gap(now), records)
@@ -166,7 +166,7 @@ def test_the_second_is_sought_anew_beside_the_right_first(monkeypatch: pytest.Mo
     def without(now: Hypothesis, name: str, _: Any) -> Hypothesis:
         return Hypothesis(world, now.names - {name})
 
-    monkeypatch.setattr(selection, "_without", without)
+    monkeypatch.setattr(selection, "without_effect", without)
     monkeypatch.setattr(selection, "_without_refit", without)
     now: Any = Hypothesis(world, frozenset("wc"))
     gap = world.gap(Hypothesis(world, frozenset()))
