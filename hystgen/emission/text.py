@@ -293,7 +293,7 @@ def _place(text: str, before: list[int], inside: int) -> tuple[int, list[int]] |
         return heads[-1], []
     if bracket:
         return bracket.end(), [*stacks[bracket.end() - 1][:-1], inside]
-    cast = re.compile(r"_t\)(?=\w)").search(text, start, WIDTH)
+    cast = re.compile(r"_t\)(?=[\w(-])").search(text, start, WIDTH)
     last = cast.end() if cast else max((end for _, _, end in found), default=0)
     return (last, stacks[last - 1]) if last else None
 
