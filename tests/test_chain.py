@@ -39,6 +39,7 @@ from hystgen.model import Model
 from hystgen.parameters.files import canonical_json, dump_parameters, parameters_sha256, parse_parameters
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
+from hystgen.verification import targets
 
 T, N = 1e-3, 1500
 
@@ -96,7 +97,7 @@ def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bo
 )  # fmt: skip
 def test_cores_give_the_same_bits(name: str, arithmetic: str) -> None:
     cores = ["cortex-m4f", "cortex-m0plus", "cortex-m7", "cortex-m33", "rv32imac", "mips32"]
-    known = [core for core in cores if core in hystgen.verification.targets.NAMES]
+    known = [core for core in cores if core in targets.NAMES]
     report = hystgen.verify(noisy(name), arithmetic, operator(name), "loop", targets=known, target_length=150)
     assert report.ok, report.table()
 
