@@ -642,7 +642,7 @@ def test_what_cannot_be_a_reference_or_an_operator(monkeypatch: pytest.MonkeyPat
         CompiledC(model(NOTE), compiler="ls")
     with monkeypatch.context() as patch:
         patch.setattr(compilers, "find", lambda _: None)
-        with pytest.raises(compilers.CompileError, match="clang is not installed; install gcc or clang"):
+        with pytest.raises(compilers.CompileError, match="clang is not installed; on Debian: apt install clang"):
             CompiledC(model(NOTE), compiler="clang")
     creeping = model(NOTE + "  effects: [{name: lag, time_constant: 0.01}]\n")
     for make in (CompiledC, BitReference, lambda stage: Loop(([1.0], [1.0]), 1.0, 0.1, stage)):

@@ -1311,7 +1311,7 @@ def test_commands_that_do_not_cover_effects_name_them(run: Callable[..., tuple[i
         )
         assert not out.exists()
     moved = "    - {name: rate_dependence, shape: relaxation, time_constant: 0.1}\nsample_time: 1.0e-3\n"
-    path.write_text(path.read_text() + moved)
+    path.write_text(path.read_text() + moved + "emit: {compensation: {noise_gain: 10}}\n")
     code, said, err = run("emit", path, "-o", out, "--engine", "corners")
     assert (code, said) == (1, "")
     assert err.startswith(f"{path}: error: ")

@@ -612,7 +612,9 @@ def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Pa
     lengths = {"HYSTGEN_N_PLAYS": 3, "HYSTGEN_CORNERS": 5}
     shared = [*runtime.memory_pieces(family), *runtime.table_pieces(family)]
     for number, variant in enumerate(variants):
-        pieces = [*shared, *runtime.state_pieces(variant, ["forward", "inverse"])]
+        operators = ["forward", "inverse"]
+        functions = runtime.operator_pieces(variant, family, operators, "")
+        pieces = [*shared, *runtime.state_pieces(variant, operators, functions)]
         sizes = cost.declared(pieces, ARITHMETICS[arithmetic], cost.Layout(4, 8, packed=False), lengths)
         types = [each.name for each in pieces if "typedef struct" in each.code]
         assert {"hystgen_corner_t", "hystgen_inverse_t", "hystgen_forward_t"} <= set(types)
