@@ -298,7 +298,7 @@ def test_a_recorded_session_is_cut_in_the_models_units(tmp_path: Path, run: Run)
     """Refused for its drive before any search: in mV it fits the session once it is converted."""
     (tmp_path / "session.json").write_text(
         '{"hystgen": 1, "rate": 100.0, "samples": 20000, "history": [100.0, 0.0], "rest": 0.0, "rise": 0.25, '
-        '"records": [{"name": "a.csv", "first": 0, "samples": 9999, "held_out": false}]}'
+        '"dac": null, "records": [{"name": "a.csv", "first": 0, "samples": 9999, "held_out": false}]}'
     )
     recording = write(tmp_path / "rec.csv", {"t": T, "v [mV]": V * 1e3, "y [nm]": Y})
     command = ("diagnose", model(tmp_path), recording, "--session", tmp_path / "session.json", "-o", tmp_path / "out")
