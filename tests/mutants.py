@@ -303,8 +303,7 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
     ("a limited gain is not told, fixed", "ageing_fixed.c", "return self->gain != given;",
      "return self->own;", "worn", "q31"),
     ("a bump is off its centre", "bent_centre.c", "z - HYSTGEN_CENTRE", "z + HYSTGEN_CENTRE", "dilated", "float32"),
-    ("a curve goes on past its end", "bent_fixed.c", "z < -HYSTGEN_BUMP_END  ? -HYSTGEN_BUMP_END",
-     "z < -HYSTGEN_BUMP_END  ? z", "bumpy", "q31"),
+    ("a curve bends to the other side, fixed", "bent_fixed.c", "return z + ", "return z - ", "bumpy", "q31"),
     ("a moved play contributes what it did before", "bent_known.c", "z >= play[i] && z <=",
      "z >= play[i] || z <=", "dilated", "float32"),
     ("a polynomial loses a term", "bent_polynomial.c", "k > 0; --k", "k > 1; --k", "viscous", "float32"),
@@ -388,8 +387,8 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
     ("stops give on one side alone", "stops.c", "x < t->lower ? t->lower : x >", "x >", "quick", "q31"),
     ("what yields is looked up one place low", "yield_float.c", "high = before ? middle : high;",
      "high = middle;", "dashpot", "float32"),
-    ("a play yields more than its stretch, fixed", "yield_fixed.c", "low = before ? low : middle;",
-     "low = before ? low : low;", "dashpot", "q31"),
+    ("a piece of what yields begins elsewhere, fixed", "yield_fixed.c", "(inside - piece->begin)", "(inside + piece->begin)",
+     "dashpot", "q31"),
 )))  # fmt: skip
 
 # No record can find these, for the reasons given; a difference would show that a reason is wrong.
@@ -433,6 +432,24 @@ EQUIVALENT = (
             "if (moved < 0 || moved >= 0 || kink->output", name, bits,
         )
         for name, bits in (("outside", "q15"), ("listed", "q31"), ("two_branches", "q15"))
+    ),
+    # A limit lies on either side of itself.
+    _of_loop("a drive at its rate is limited", "chain_slew.c", "v > highest ?", "v >= highest ?", "quick", "float32"),
+    # Every place of a ring at rest holds the same drive.
+    _of_loop("the ring begins elsewhere", "delay.c", "*oldest = 0;", "*oldest = 1u;", "late", "float32"),
+    # Past the last piece travel stays where it is, and every move is cut anew.
+    _of_loop("a cut move leaves all of it", "ageing.c", "        change = next - high;\n", "", "worn", "float32"),
+    # The temperature is limited to where the gain is.
+    _of_loop(
+        "a limited gain is not told", "gain.c", "return inside < gain || inside > gain;",
+        "return inside < gain && inside > gain;", "warm", "float32",
+    ),
+    # A direction is sought before any is asked for.
+    _of_loop("a lag at rest falls", "lag_steady.c", "self->rises = true;", "self->rises = false;", "steady", "float32"),
+    # Without steps that are held every drive is either solved for or settled at.
+    _of_loop(
+        "a lead is used twice, fixed", "lag_fixed.c",
+        "    self->lead -= hystgen_lag_scaled(t, change, &t->rate);\n", "", "led", "q31",
     ),
 )  # fmt: skip
 
