@@ -108,7 +108,7 @@ def test_verify_finds_a_mutant(mutant: Mutant, sources: Path) -> None:
     finds(mutant, sources)
 
 
-@pytest.mark.slow(one_in=4)
+@pytest.mark.slow(one_in=6)
 @pytest.mark.parametrize("mutant", mutants.OF_EFFECTS, ids=lambda mutant: mutant.what)
 def test_verify_finds_a_mutant_of_effects(mutant: Mutant, sources: Path) -> None:
     finds(mutant, sources)
