@@ -166,13 +166,38 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
         x = np.where(op == slots.OP_OFFSET, rng.normal(0.0, 0.3 * (high - low), length), x)
         x = np.where(op == slots.OP_TEMPERATURE, degree * (20.0 + rng.standard_cauchy(length) * 30.0), x)
         x = np.where(op == slots.OP_GAIN, gain * rng.uniform(0.3, 2.2, length), x)
-        x = np.where(op == slots.OP_TRAVEL, 10.0 ** rng.uniform(0.0, 9.0, length), x)
+        x = np.where(op == slots.OP_TRAVEL, 10.0 ** rng.uniform(-1.0, 9.0, length), x)
         odd = rng.random(length) < np.where(op == slots.OP_STEP, 0.01, 0.1)
         strange = [0.0, 1e30, -1e30] if tables.fixed else [np.nan, np.inf, -np.inf, 0.0, -0.0, 1e30, -1e30]
         x[odd] = rng.choice(strange, int(odd.sum()))
         yield name, op, x
+    if inverse:
+        yield "settled where it is", *_settled(tables, low, high, length)
     # held for a long time, from where slow states still move
     yield "held", _steps(np.empty(length)), np.where(np.arange(length) < 50, low, 0.7 * high + 0.3 * low)
+
+
+def _settled(tables: ChainTables, low: float, high: float, length: int) -> tuple[Bytes, NDArray[np.float64]]:
+    """From init to a reference, 0 among them, held long enough for a quiet drive to stand still, and settled at that
+    drive; often with another one committed right behind it, and a move on. What settling leaves of the past shows where
+    the drive stays."""
+    rng = np.random.default_rng(20261204)
+    steps = max(4, 2 * tables.quiet + 4)
+    count = -(-length // (2 * steps + 3))
+    begin, end, last = rng.uniform(low, high, (3, count, 1))
+    end = np.where(rng.random((count, 1)) < 0.25, 0.0, end)
+    begin, last = (np.where(rng.random((count, 1)) < 0.5, end, each) for each in (begin, last))
+    at = np.arange(2 * steps + 3)
+    x = begin + (end - begin) * np.minimum(at / steps, 1.0) + (last - end) * np.clip(at / steps - 1.0, 0.0, 1.0)
+    op = np.full(x.shape, slots.OP_STEP, dtype=np.uint8)
+    op[:, 0] = slots.OP_INIT
+    before = slice(0, steps + 1)
+    drives = reference.answers(tables, True, op[:, before].ravel(), x[:, before].ravel())[0].reshape(count, -1)[:, -1]
+    op[:, steps + 1], x[:, steps + 1] = slots.OP_SETTLE, drives
+    committed = rng.random(count) < 0.5
+    op[committed, steps + 2] = slots.OP_COMMIT
+    x[committed, steps + 2] = (drives * rng.uniform(0.9, 1.1, count))[committed]
+    return op.ravel()[:length], x.ravel()[:length]
 
 
 def _suite(
