@@ -48,14 +48,13 @@ static hystgen_real_t hystgen_output_code(hystgen_signal_t y, unsigned int *stat
     if (code > HYSTGEN_CODE_MAX || code < -HYSTGEN_CODE_MAX) {
         *status |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
     }
-    hystgen_signal_t inside = code;
     if (code > HYSTGEN_CODE_MAX) {
-        inside = HYSTGEN_CODE_MAX;
+        return (hystgen_real_t)HYSTGEN_CODE_MAX;
     }
     if (code < -HYSTGEN_CODE_MAX) {
-        inside = -HYSTGEN_CODE_MAX;
+        return (hystgen_real_t)-HYSTGEN_CODE_MAX;
     }
-    return (hystgen_real_t)inside;
+    return (hystgen_real_t)code;
 }
 
 /* A share of x. The largest code is the share just below 1. */

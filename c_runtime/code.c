@@ -4,12 +4,11 @@
 static hystgen_real_t hystgen_code(hystgen_sum_t sum, unsigned int *status) {
     const hystgen_sum_t code = hystgen_nearest(sum, HYSTGEN_FRACTION);
     (void)status;
-    hystgen_sum_t inside = code;
     if (code > HYSTGEN_CODE_MAX) {
-        inside = HYSTGEN_CODE_MAX;
+        return (hystgen_real_t)HYSTGEN_CODE_MAX;
     }
     if (code < -HYSTGEN_CODE_MAX) {
-        inside = -HYSTGEN_CODE_MAX;
+        return (hystgen_real_t)-HYSTGEN_CODE_MAX;
     }
-    return (hystgen_real_t)inside;
+    return (hystgen_real_t)code;
 }

@@ -6,12 +6,11 @@ static hystgen_real_t hystgen_code(hystgen_sum_t sum, unsigned int *status) {
     if (code > HYSTGEN_CODE_MAX || code < -HYSTGEN_CODE_MAX) { /* only after a reset */
         *status |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
     }
-    hystgen_sum_t inside = code;
     if (code > HYSTGEN_CODE_MAX) {
-        inside = HYSTGEN_CODE_MAX;
+        return (hystgen_real_t)HYSTGEN_CODE_MAX;
     }
     if (code < -HYSTGEN_CODE_MAX) {
-        inside = -HYSTGEN_CODE_MAX;
+        return (hystgen_real_t)-HYSTGEN_CODE_MAX;
     }
-    return (hystgen_real_t)inside;
+    return (hystgen_real_t)code;
 }

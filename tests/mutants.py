@@ -193,14 +193,15 @@ KILLED = (
         "    hystgen_move", "two_branches", "q31",
     ),
     Mutant(
-        "the low saturation code", CODES, "inside = -HYSTGEN_CODE_MAX;", "inside = -HYSTGEN_CODE_MAX - 1;",
-        "far_low", "q15",
+        "the low saturation code", CODES, "return (hystgen_real_t)-HYSTGEN_CODE_MAX;",
+        "return (hystgen_real_t)(-HYSTGEN_CODE_MAX - 1);", "far_low", "q15",
     ),
     Mutant(
         "halves of codes are rounded up on either side of 0", FINER, " - (w < 0 ? 1 : 0)) >>", ") >>", "listed", "q15",
     ),
     Mutant(
-        "no saturation below", CODES, "inside = -HYSTGEN_CODE_MAX;", "inside = code;", "far_low", "q15",
+        "no saturation below", CODES, "return (hystgen_real_t)-HYSTGEN_CODE_MAX;",
+        "return (hystgen_real_t)code;", "far_low", "q15",
     ),
     Mutant(
         "no number before the first step", STEP, "self->stepped ? self->answer : self->drive", "self->answer",
