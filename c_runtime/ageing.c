@@ -23,11 +23,13 @@ static hystgen_real_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, hystg
 /* Sets the travel. Returns whether it had to be limited. */
 static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                       hystgen_real_t travel) {
-    hystgen_real_t inside = travel;
+    hystgen_real_t inside;
     if (travel < 0) {
         inside = 0;
     } else if (travel > t->last) {
         inside = t->last;
+    } else {
+        inside = travel;
     }
     self->high = inside;
     self->low = 0;
@@ -40,11 +42,13 @@ static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_a
 /* Sets a gain in place of the one that follows the travel. Returns whether it had to be limited. */
 static bool hystgen_ageing_set(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                hystgen_real_t gain) {
-    hystgen_real_t inside = gain;
+    hystgen_real_t inside;
     if (gain < t->least) {
         inside = t->least;
     } else if (gain > t->largest) {
         inside = t->largest;
+    } else {
+        inside = gain;
     }
     self->own = false;
     self->gain = inside;

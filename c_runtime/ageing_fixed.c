@@ -33,11 +33,13 @@ static int32_t hystgen_ageing_gain(const hystgen_ageing_table_t *t, int64_t trav
 /* Sets the travel. Returns whether it had to be limited. */
 static bool hystgen_ageing_set_travel(const hystgen_ageing_table_t *t, hystgen_ageing_t *self,
                                       int64_t travel) {
-    int64_t inside = travel;
+    int64_t inside;
     if (travel < 0) {
         inside = 0;
     } else if (travel > t->last) {
         inside = t->last;
+    } else {
+        inside = travel;
     }
     self->high = inside;
     self->own = true;

@@ -5,11 +5,13 @@
 /* The value of a curve at x; sets `limited` if x lies beyond its ends. */
 static int64_t hystgen_bend(const hystgen_bend_curve_t *c, int64_t x, bool *limited) {
     const int64_t argument = hystgen_nearest(x, c->drop);
-    int64_t inside = argument;
+    int64_t inside;
     if (argument < c->least) {
         inside = c->least;
     } else if (argument > c->most) {
         inside = c->most;
+    } else {
+        inside = argument;
     }
     if (inside != argument) {
         *limited = true;

@@ -41,14 +41,14 @@ static void hystgen_forward_put_offset(hystgen_forward_t *self, hystgen_signal_t
         self->status |= HYSTGEN_STATUS_HELD;
         return;
     }
-    self->offset = d;
     if (d > HYSTGEN_FARTHEST_OFFSET) {
         self->offset = HYSTGEN_FARTHEST_OFFSET;
         self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
-    }
-    if (d < -HYSTGEN_FARTHEST_OFFSET) {
+    } else if (d < -HYSTGEN_FARTHEST_OFFSET) {
         self->offset = -HYSTGEN_FARTHEST_OFFSET;
         self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
+    } else {
+        self->offset = d;
     }
 }
 
@@ -66,14 +66,14 @@ static void hystgen_inverse_put_offset(hystgen_inverse_t *self, hystgen_signal_t
         self->status |= HYSTGEN_STATUS_HELD;
         return;
     }
-    self->offset = d;
     if (d > HYSTGEN_FARTHEST_OFFSET) {
         self->offset = HYSTGEN_FARTHEST_OFFSET;
         self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
-    }
-    if (d < -HYSTGEN_FARTHEST_OFFSET) {
+    } else if (d < -HYSTGEN_FARTHEST_OFFSET) {
         self->offset = -HYSTGEN_FARTHEST_OFFSET;
         self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
+    } else {
+        self->offset = d;
     }
 }
 

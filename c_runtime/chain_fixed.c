@@ -70,11 +70,13 @@ static inline hystgen_signal_t hystgen_level(hystgen_sum_t sum) {
 
 /* The sum of the plays that a signal asks for, limited to what they can give. */
 static inline hystgen_sum_t hystgen_asked(hystgen_signal_t h) {
-    hystgen_signal_t inside = h;
+    hystgen_signal_t inside;
     if (h > HYSTGEN_LARGEST_LEVEL) {
         inside = HYSTGEN_LARGEST_LEVEL;
     } else if (h < -HYSTGEN_LARGEST_LEVEL) {
         inside = -HYSTGEN_LARGEST_LEVEL;
+    } else {
+        inside = h;
     }
     return inside * ((hystgen_sum_t)1 << HYSTGEN_LEVEL_DROP);
 }

@@ -11,11 +11,13 @@ static void hystgen_gain_init(hystgen_gain_t *self) {
 /* Sets the gain. Returns whether it had to be limited. */
 static bool hystgen_gain_set(const hystgen_gain_table_t *t, hystgen_gain_t *self,
                              hystgen_real_t gain) {
-    hystgen_real_t inside = gain;
+    hystgen_real_t inside;
     if (gain < t->least) {
         inside = t->least;
     } else if (gain > t->largest) {
         inside = t->largest;
+    } else {
+        inside = gain;
     }
     self->gain = inside;
     self->inverse = 1 / inside;
@@ -25,11 +27,13 @@ static bool hystgen_gain_set(const hystgen_gain_table_t *t, hystgen_gain_t *self
 /* Sets gain and offset by a temperature. Returns whether one of them had to be limited. */
 static bool hystgen_gain_heat(const hystgen_gain_table_t *t, hystgen_gain_t *self,
                               hystgen_real_t temperature) {
-    hystgen_real_t inside = temperature;
+    hystgen_real_t inside;
     if (temperature < t->coldest) {
         inside = t->coldest;
     } else if (temperature > t->hottest) {
         inside = t->hottest;
+    } else {
+        inside = temperature;
     }
     const hystgen_real_t above = inside - t->reference;
     self->offset = t->offset_per_degree * above;

@@ -53,11 +53,13 @@ static void hystgen_gain_init(hystgen_gain_t *self) {
 static bool hystgen_gain_heat(const hystgen_gain_table_t *t, hystgen_gain_t *self,
                               hystgen_real_t temperature) {
     const int64_t given = (int64_t)temperature * ((int64_t)1 << t->bits);
-    int64_t inside = given;
+    int64_t inside;
     if (given < t->coldest) {
         inside = t->coldest;
     } else if (given > t->hottest) {
         inside = t->hottest;
+    } else {
+        inside = given;
     }
     const int64_t above = inside - t->reference;
     const int64_t wanted = HYSTGEN_GAIN_ONE + hystgen_times(above, &t->per_degree);

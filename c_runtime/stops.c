@@ -5,11 +5,13 @@
 /* x between the stops, and a slope of f beyond them. */
 static int64_t hystgen_stops_beyond(const hystgen_stops_t *t, int64_t x,
                                     const hystgen_factor_t *f) {
-    int64_t inside = x;
+    int64_t inside;
     if (x < t->lower) {
         inside = t->lower;
     } else if (x > t->upper) {
         inside = t->upper;
+    } else {
+        inside = x;
     }
     return inside + hystgen_times(x - inside, f);
 }

@@ -118,6 +118,7 @@ def granted(text: str, model: Model, arithmetic: str, sums: int = 1) -> str:
 # MOVED    what is asked of a lag in front of two branches moves from end to end of the drives at most
 # COARSE   numbers that a lead is searched with are cut off there, and the search begins with a size and a lead above it
 # LOST     what rounding to whole numbers leaves
+# REST     what rounding to a code leaves of a drive at a limited rate, at most half of one
 CLOCK = (
     r"    GRANTED(self->part >= 0 && self->part < PART);\n"
     r"    WITHIN(self->whole, WHOLE);\n    WITHIN(self->gained, GAINED);\n"
@@ -160,11 +161,14 @@ STATES = [
      r"\1        GRANTED(inverse > 0 && inverse <= INVERSE);\n"),
     (r"(    const int64_t size = NAME_nearest\(amount[^;]*;\n)",
      r"    GRANTED(self->rise >= 0 && self->rise < RISE);\n\1"),
-    (r"(        const int64_t to = x - r > at [^;]*;\n)", r"\1        WITHIN(to, RUBBED);\n"),
+    (r"(    const int64_t way = NAME_heat_square\(v\)[^;]*;\n)",
+     r"    WITHIN(v, CODE);\n    WITHIN(before, CODE);\n\1"),
+    (r"(            to = x \+ r;\n        \}\n)", r"\1        WITHIN(to, RUBBED);\n"),
     (r"(        amount \+= [^;]*;\n)", r"\1        GRANTED(amount >= 0 && amount <= AMOUNT);\n"),
     (r"(NAME_sum_t NAME_\w+_displaced\([^{]*\{\n)", r"\1    WITHIN(y, SIGNAL);\n"),
-    (r"        return \(NAME_play_t\)(\(rest < low[^;]*);",
-     r"        const int64_t beside = \1;\n        WITHIN(beside, PLAY);\n        return (NAME_play_t)beside;"),
+    (r"            return \(NAME_play_t\)(low|high);\n",
+     r"            WITHIN(\1, PLAY);\n            return (NAME_play_t)\1;\n"),
+    (r"(    const NAME_play_t left = rest \+ more;\n)", r"    WITHIN(rest, REST);\n\1"),
     (r"(    return \(NAME_play_t\)rest;\n)", r"    WITHIN(rest, PLAY);\n\1"),
     (r"(        const int64_t z = play\[i\] \+ NAME_times[^;]*;\n)", r"\1        WITHIN(z, PLAY);\n"),
     (r"(void NAME_put\([^{]*\{\n)", r"\1    WITHIN(z, PLAY);\n"),
@@ -174,7 +178,7 @@ STATES = [
      r"        const int64_t between = (int64_t)low + (int64_t)(size / 2u);\n        WITHIN(between, INPUT);\n"
      r"        const NAME_play_t middle = (NAME_play_t)between;\n"),
     (r"(NAME_inverse_nearer\(const [^{]*\{\n)", r"\1    WITHIN(low, INPUT);\n"),
-    (r"    return \(NAME_play_t\)\((w > play \? [^;]*|play\[(?:0\] \+ NAME_seen|i\] \+ NAME_moved_by)[^;]*)\);\n",
+    (r"    return \(NAME_play_t\)\((w > play \? [^;]*|play\[[0i]\] \+\s+NAME_[^;]*)\);\n",
      r"    const int64_t drawn = \1;\n    WITHIN(drawn, DRAWN);\n    return (NAME_play_t)drawn;\n"),
     # no facts, but where Eva is to stop widening, and what it is to look at case by case
     (r"(    while \(size > 1u\) \{\n)", r'    /*@ loop widen_hints "all", -INPUT, INPUT; */\n\1'),
@@ -212,7 +216,7 @@ def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") ->
         "RUBBED": int(t.limits[CODE_MAX]) * most(t.heat.number.tolist(), thermal.BITS_BELOW, 0),
         "AMOUNT": 2 * int(t.limits[CODE_MAX]) * most(t.heat.number.tolist(), thermal.BITS_BELOW, 0) * FRICTION_PLAYS**2,
         "INPUT": int(t.moving.farthest), "LOST": 2 ** int(t.moving.yield_bits) // 2,
-        "DRAWN": max(int(t.moving.farthest), *map(abs, ends)),
+        "REST": 2**29, "DRAWN": max(int(t.moving.farthest), *map(abs, ends)),
     }  # fmt: skip
     if wrong:
         numbers[wrong] //= 64

@@ -123,7 +123,7 @@ EFFECTS = {
     "steady": ("name: lag, time_constant: 0.01", "name: slew_limit, rate: 500, falling_rate: 300"),
     "calmed": ("name: lag, time_constant: 0.01",),
     "prompt": ("name: lag, time_constant: 4.0e-4",),
-    "rung": ("name: resonance, frequency: 30, damping: 0.05",),
+    "rung": ("name: resonance, frequency: 40, damping: 0.05",),
     "drifted": ("name: drift, shape: curved, rate: 0.05, change: 0.01",),
     "aged": ("name: ageing, loss: 0.02, travel: 50",),
     "heated": ("name: thermal, source: self_heating, time_constant: 0.5, heating: 0.05, gain_per_degree: -0.02",),
