@@ -890,8 +890,8 @@ def test_the_self_test_calls_the_settings_of_the_model(name: str) -> None:
     samples = text[f"{name}_selftest.c"].partition("_selftest_inverse[")[2].partition("};")[0]
     counts = Counter(re.findall(r"{'(\w)'", samples))
     assert all(counts[letter] >= 1 for letter in tested)
-    limited = re.findall(r"{'(\w)', [^}]*, (\d+)u}", samples)
-    assert any(int(status) & slots.LIMITED_SETTING for letter, status in limited if letter in tested)
+    # a setting alone sets the bit, which a later call may be the first to read
+    assert any(int(status) & slots.LIMITED_SETTING for status in re.findall(r", (\d+)u}", samples))
 
 
 def test_only_what_the_model_has_is_emitted() -> None:
