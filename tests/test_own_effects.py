@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -353,7 +354,9 @@ TOLD = ("\\", "\\\n", "?" "?/", "//", '"', "'", "#", "%:", "<:", "<%", "$")
 UNTOLD = ("/*", "*/", "*", "\n", " ", "evil", ";", "x", "/**/", "?", "/*", "*/")
 
 
-@pytest.mark.skipif(shutil.which("gcc") is None, reason="the oracle is gcc's preprocessor")
+@pytest.mark.skipif(
+    not os.environ.get("CI") and shutil.which("gcc") is None, reason="the oracle is gcc's preprocessor"
+)
 def test_the_check_sees_what_a_compiler_sees(tmp_path: Path) -> None:
     """Of texts put together at random, those that pass without a problem of a line have the comments of gcc -E."""
     rng = np.random.default_rng(0)

@@ -9,7 +9,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from numpy.typing import NDArray
 
@@ -56,10 +59,8 @@ def write(path: Path, columns: Mapping[str, Array]) -> Path:
 
         savemat(path, {name.replace(" [", "_").rstrip("]"): x for name, x in columns.items()})
     elif path.suffix == ".parquet":
-        pa, pq = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
         pq.write_table(pa.table({name: pa.array(x) for name, x in columns.items()}), path)
     elif path.suffix == ".h5":
-        h5py = pytest.importorskip("h5py")
         with h5py.File(path, "w") as file:
             for name, x in columns.items():
                 label, _, unit = name.rstrip("]").partition(" [")

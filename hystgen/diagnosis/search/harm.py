@@ -88,12 +88,13 @@ def _over(extended: Model, plain: Model, item: Item, gain: float, noise: float) 
 
 def _moved(model: Model, v: Array, t: Array, extra: dict[str, Array]) -> Array:
     """The output for a drive, wherever that goes."""
-    return np.asarray(model.answers(v, t=t, extra=extra)[0])
+    return model.chain.simulate([model.run(v, t, extra)])[0]
 
 
 def _drive(model: Model, u: Array, t: Array, extra: dict[str, Array]) -> Array:
     """The drive for a reference, without an end of its range."""
-    return np.asarray(model.inverse().answers(u, clamp=False, t=t, extra=extra)[0])
+    model.inverse()
+    return model.compensator.drives(model.run(u, t, extra), (-math.inf, math.inf))
 
 
 def _smooth(y: Array) -> Array:
