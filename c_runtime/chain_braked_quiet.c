@@ -7,9 +7,11 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t 
     if (!self->moving) {
         return v;
     }
-    const hystgen_ramp_t near = hystgen_inverse_within(self, v);
-    self->reached = hystgen_quiet_still(&self->quiet)
-                        ? near
-                        : hystgen_inverse_within(self, hystgen_inverse_braked(self, v, near.drive));
+    const hystgen_play_t left = hystgen_inverse_left(self);
+    hystgen_inverse_ramp(self, left, v);
+    if (!hystgen_quiet_still(&self->quiet)) {
+        const hystgen_reach_t braked = hystgen_inverse_braked(self, v, self->reached.drive);
+        hystgen_inverse_ramp(self, left, braked);
+    }
     return self->reached.drive;
 }

@@ -15,8 +15,9 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t 
     if (!self->moving) {
         return v;
     }
-    const hystgen_reach_t near = hystgen_inverse_within(self, v).drive;
-    self->reached = hystgen_inverse_within(
-        self, hystgen_inverse_kept(self, hystgen_inverse_braked(self, v, near)));
+    const hystgen_play_t left = hystgen_inverse_left(self);
+    hystgen_inverse_ramp(self, left, v);
+    const hystgen_reach_t braked = hystgen_inverse_braked(self, v, self->reached.drive);
+    hystgen_inverse_ramp(self, left, hystgen_inverse_kept(self, braked));
     return self->reached.drive;
 }

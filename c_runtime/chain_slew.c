@@ -1,27 +1,25 @@
 #include "hystgen_runtime.h"
 
-/* The drive nearest to v that the amplifier reaches in one step from `before`, of which rounding
-   has left `rest`. */
-HYSTGEN_APART_IN_FIXED hystgen_ramp_t hystgen_nearest_ramp(hystgen_reach_t before,
-                                                           hystgen_play_t rest, hystgen_reach_t v) {
-    const hystgen_ramp_t reached = {v, 0};
-    const hystgen_ramp_t highest =
-        hystgen_ramp(before, rest, HYSTGEN_SLEW_RISING, HYSTGEN_SLEW_RISING_REST);
-    const hystgen_ramp_t lowest =
-        hystgen_ramp(before, rest, -HYSTGEN_SLEW_FALLING, -HYSTGEN_SLEW_FALLING_REST);
-    if (v > highest.drive || (v >= highest.drive && highest.rest < 0)) {
-        return highest;
+/* Takes the ramp to v, or as near to it as the amplifier gets in one step. */
+HYSTGEN_APART_IN_FIXED void hystgen_ramp_towards(hystgen_ramp_t *ramp, hystgen_reach_t v) {
+    bool beyond;
+    if (v > ramp->drive || (v >= ramp->drive && ramp->rest < 0)) {
+        hystgen_ramp_on(ramp, HYSTGEN_SLEW_RISING, HYSTGEN_SLEW_RISING_REST);
+        beyond = v > ramp->drive || (v >= ramp->drive && ramp->rest < 0);
+    } else {
+        hystgen_ramp_on(ramp, -HYSTGEN_SLEW_FALLING, -HYSTGEN_SLEW_FALLING_REST);
+        beyond = v < ramp->drive || (v <= ramp->drive && ramp->rest > 0);
     }
-    if (v < lowest.drive || (v <= lowest.drive && lowest.rest > 0)) {
-        return lowest;
+    if (!beyond) {
+        ramp->drive = v;
+        ramp->rest = 0;
     }
-    return reached;
 }
 
 /* The drive nearest to v that the amplifier reaches in one step; v itself in the first one. */
 static hystgen_reach_t hystgen_forward_slewed(hystgen_forward_t *self, hystgen_reach_t v) {
     if (self->moving) {
-        self->reached = hystgen_nearest_ramp(self->reached.drive, self->reached.rest, v);
+        hystgen_ramp_towards(&self->reached, v);
     } else {
         self->reached.drive = v;
         self->reached.rest = 0;
@@ -29,12 +27,18 @@ static hystgen_reach_t hystgen_forward_slewed(hystgen_forward_t *self, hystgen_r
     return self->reached.drive;
 }
 
-/* The drive nearest to v that the amplifier reaches in one step from the one applied last. That is
-   where the answer led to, with what rounding has left of it, unless another one was applied. */
-HYSTGEN_APART_IN_FIXED hystgen_ramp_t hystgen_inverse_within(const hystgen_inverse_t *self,
-                                                             hystgen_reach_t v) {
+/* What rounding has left of the drive applied last: that is where the answer led to, unless another
+   one was applied. */
+static hystgen_play_t hystgen_inverse_left(const hystgen_inverse_t *self) {
     const bool other = self->applied < self->reached.drive || self->applied > self->reached.drive;
-    return hystgen_nearest_ramp(self->applied, other ? 0 : self->reached.rest, v);
+    return other ? 0 : self->reached.rest;
+}
+
+/* Takes the ramp from the drive applied last, of which rounding has left `rest`, towards v. */
+static void hystgen_inverse_ramp(hystgen_inverse_t *self, hystgen_play_t rest, hystgen_reach_t v) {
+    self->reached.drive = self->applied;
+    self->reached.rest = rest;
+    hystgen_ramp_towards(&self->reached, v);
 }
 
 /* The last answer once more, or the drive nearest to it that the amplifier reaches in one step. */
@@ -43,7 +47,7 @@ HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_held(hystgen_inverse_t *se
     if (!self->moving) {
         return last;
     }
-    self->reached = hystgen_inverse_within(self, last);
+    hystgen_inverse_ramp(self, hystgen_inverse_left(self), last);
     if (self->reached.drive < last || self->reached.drive > last) {
         self->status |= HYSTGEN_STATUS_SLEW_LIMITED;
     }

@@ -5,6 +5,6 @@ static hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self, hystgen_r
     if (!self->moving) {
         return v;
     }
-    self->reached = hystgen_inverse_within(self, v);
+    hystgen_inverse_ramp(self, hystgen_inverse_left(self), v);
     return self->reached.drive;
 }

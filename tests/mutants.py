@@ -321,7 +321,7 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
      "", "late", "float32"),
     ("a set offset leaves the clock running", "chain_calls.c", "        hystgen_inverse_clock_start(self);\n",
      "", "drifting", "float32"),
-    ("a rising drive is not slewed", "chain_slew.c", "        return highest;\n", "        return reached;\n",
+    ("a rising drive is not slewed", "chain_slew.c", "beyond = v > ramp->drive ||", "beyond = v > v ||",
      "quick", "float32"),
     ("the clock stands", "clock.c", "self->low + 1", "self->low + 0", "drifting", "float32"),
     ("drift is not foreseen", "clock.c", "(self->low + ahead)", "(self->low + 0 * ahead)", "drifting_late", "float32"),

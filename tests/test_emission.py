@@ -442,11 +442,12 @@ model:
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize(("arithmetic", "lines", "code"), [
-    ("float32", 400, 3600), ("q31", 450, 3500), ("q15", 450, 3500),
+@pytest.mark.parametrize(("arithmetic", "lines", "most"), [
+    ("float32", 360, 3600), ("q31", 360, 3500), ("q15", 360, 3500),
 ])  # fmt: skip
-def test_ten_plays_are_read_and_stored_easily(arithmetic: str, lines: int, code: int, tmp_path: Path) -> None:
-    """Lines of C and bytes of code, tables apart, of an inverse on two cores; both operators take 1.6 times that."""
+def test_ten_plays_are_read_and_stored_easily(arithmetic: str, lines: int, most: int, tmp_path: Path) -> None:
+    """Lines of C and bytes of code of an inverse on two cores, comments and tables apart; both operators take 1.6 times
+    that."""
     zig = next(compiler for compiler in required_compilers() if compiler.name == "zig").command
     gcc = ("arm-none-eabi-gcc", "-mthumb")
     builds = (
@@ -459,7 +460,10 @@ def test_ten_plays_are_read_and_stored_easily(arithmetic: str, lines: int, code:
         folder = tmp_path / operator
         hystgen.emit(Model(parse_parameters(TEN)), folder, operator=operator, arithmetic=arithmetic, engine="corners")
         if operator != "both":
-            assert len((folder / "stage.c").read_text().splitlines()) <= lines
+            text = (folder / "stage.c").read_text()
+            code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+            assert len([line for line in code.splitlines() if line.strip()]) <= lines
+            assert len(text.splitlines()) <= 1.35 * lines
         for number, build in enumerate(builds):
             output = folder / "one.o"
             subprocess.run([*build, "-std=c99", "-O2", "-c", str(folder / "stage.c"), "-o", str(output)], check=True)
@@ -468,7 +472,7 @@ def test_ten_plays_are_read_and_stored_easily(arithmetic: str, lines: int, code:
                 taken[operator, number] = sum(section["sh_size"] for section in sections)
     for number in range(len(builds)):
         alone = taken["inverse", number]
-        assert taken["forward", number] <= alone <= code
+        assert taken["forward", number] <= alone <= most
         assert taken["both", number] <= 1.6 * alone
 
 

@@ -350,7 +350,7 @@ def test_simulating_on_the_command_line_speaks_of_codes(tmp_path: Path) -> None:
     words = ["simulate", str(tmp_path / "plain.yaml"), "--arithmetic", "q15"]
     done = CliRunner().invoke(main, [*words, str(tmp_path / "codes.csv"), "--history", "1000,-2000"])
     assert done.exit_code == 0, done.output
-    assert "1 of 3 samples lie outside input_range -32767 to 32767, limited to it" in done.stderr
+    assert "1 of 3 samples lies outside input_range -32767 to 32767, limited to it" in done.stderr
     answers = [int(line.split(",")[2]) for line in done.stdout.splitlines()[1:]]
     session = Session(load("plain"), "forward", "q15")
     session.visit([1000, -2000])

@@ -235,7 +235,7 @@ model:
 AT_A_RATE = {
     "its rounding adds up": (r"other \? 0 : self->reached\.rest", "0"),
     "it is too fast": (r"(#define M_SLEW_RISING_REST) (\S+)", r"\1 (\2 + {})"),
-    "a held sample leaves it": (r"self->reached = m_inverse_within\(self, last\);", "self->reached.drive = last;"),
+    "a held sample leaves it": (r"m_inverse_ramp\(self, .*, last\);", "self->reached.drive = last;"),
 }
 FASTER = {"float32": "2.0e-9f", "q31": "80000"}
 

@@ -267,7 +267,7 @@ FAULTS = [
     ("loop", ".c", r"(_shift\[8\] = \{\s*1, )\d+", r"\g<1>0", "shift"),
     ("loop", ".c", r"(_front_ascending_scale\[\d+\] = \{\s*)\d+", r"\g<1>32", "shift"),
     ("loop", ".c", CLAMP, UNCLAMPED, "signed downcast"),
-    ("loop", ".c", r"return \(two_branches_real_t\)\(code > [^;]*", r"return (two_branches_real_t)code", "downcast"),
+    ("loop", ".c", r"if \(code > TWO_BRANCHES_CODE_MAX\) \{[^}]*\}", "", "downcast"),
     ("loop", ".c", r"(k = 1; k <= t->n)(; \+\+k)", r"\1 + 1u\2", "out of bounds"),
     ("loop", ".c", r"(self->has_pending = false;)\s*self->repeat = false;", r"\1", "uninitialized"),
     ("corners", ".c", CLAMP, UNCLAMPED, "signed downcast"),

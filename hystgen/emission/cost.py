@@ -274,7 +274,8 @@ def _field(
     real = (arithmetic.bytes, arithmetic.bytes)
     signal, fine = ((8, 8), (4, 4)) if arithmetic.fixed else (real, real)
     whole = (layout.integer, layout.integer)
-    one = {"flag": (1, 1), "status": whole, "signal": signal, "fine": fine, "play": fine}.get(field.kind)
+    ramp = layout.struct(known["reach_t"], known["play_t"])
+    one = {"flag": (1, 1), "status": whole, "signal": signal, "fine": fine, "play": fine, "ramp": ramp}.get(field.kind)
     one = one or known.get(f"{field.kind}_t", real)
     members = [*(_LETTERS.get(letter, real) for letter in field.members), *field.flags * [(1, 1)]]
     size, alignment = layout.struct(*members) if members else one
