@@ -33,7 +33,7 @@ class Rows:
 class Kind:
     """One kind of block, in the order of its C types.
 
-    `name`: of its functions, `hystgen_NAME_solve` and so on, and of its file; `table`: its real constants, behind a
+    `name`: of its functions, `hystgen_NAME_solve` and so on; `table`: its real constants, behind a
     pointer to `rows` where it has these; `counts`: whole numbers behind them, the first of 16 bits, others of 8;
     `state`: real numbers of its memory; `flags`: booleans of it; `reading`: the verbs that take the table; `own`: those
     that it has; without `rest` it settles as it absorbs, without `resting` it rests as it solves.
@@ -61,11 +61,6 @@ class Kind:
     def tabled(self) -> str:
         """Name of the kind whose type its table has."""
         return self.like or self.name
-
-    @property
-    def file(self) -> str:
-        """Its C file in `c_runtime/`."""
-        return f"{self.name}.c"
 
     def verb(self, asked: str) -> str:
         """The function that does this."""

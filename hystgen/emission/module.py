@@ -106,7 +106,7 @@ def _implementation(values: SimpleNamespace) -> str:
         runtime.verbatim(files, values.name, family, values.name)
         for files in (
             (*(family.opening_apart if single else ()), *family.opening),
-            (*family.soft(values.kernels), "apart.h", *(("apart_chain.h",) if family.chain else ())),
+            (*family.soft(values.kernels), "arithmetic/storage.h"),
             family.closing if single else (),
         )
     )
@@ -185,7 +185,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
             values,
             banner=banner_of(values, f"{file}.c", f"see {file}.h"),
             implementation="\n".join(
-                [words.overview(kernels), whole(*family.opening), whole(*family.soft(kernels), "apart.h"), kernels]
+                [words.overview(kernels), whole(*family.opening), whole(*family.soft(kernels), "arithmetic/storage.h"), kernels]
             ),
         ),
     }

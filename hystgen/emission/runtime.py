@@ -1,48 +1,79 @@
-"""The hand-written C of `c_runtime/`, as text to be carried by emitted files.
+"""The hand-written C of `c_runtime/` and of the folders of effects, as text to be carried by emitted files.
 
 A file is a sequence of top-level pieces (functions, tables, types, constants). Only the pieces that a model needs are
-carried. Names that a run time defines, which models may share, have its prefix; all others have the model's name.
+carried. Where a file has several forms of a piece, `#ifdef` on a fact of the model (`FACTS`) chooses one of them, as a
+compiler would. Names that a run time defines, which models may share, have its prefix; all others have the model's
+name.
 """
 
 from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 
 from hystgen.arithmetic import ARITHMETICS, Arithmetic
-from hystgen.compensator.chain.blocks import KINDS
 from hystgen.emission import folding
 
 VERSION = 2  # of the interface between emitted models and a shared run time
 
+FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")
+"""Macros that say what a model has. Conditions on them are decided when C is emitted; others are carried."""
+
 FLOAT_KERNELS = (
-    "tanh_{bits}.c",
-    "atanh_{bits}.c",
-    "envelope_forward.c",
-    "envelope_inverse.c",
-    "dead_zone_forward.c",
-    "dead_zone_inverse.c",
-    "corners_float.c",
-    "loop_absorb.c",
-    "loop_solve.c",
+    "front/tanh_{bits}.c",
+    "front/atanh_{bits}.c",
+    "front/envelope.c",
+    "front/dead_zones.c",
+    "plays/corners_float.c",
+    "plays/loop_absorb.c",
+    "plays/loop_solve.c",
 )
-CHAIN_TYPES = ("hystgen_chain_tables.h", "hystgen_chain_state.h")
+CHAIN_TYPES = ("compensator/chain/tables.h", "compensator/chain/state.h")
 CHAIN_BLOCKS = (
-    *(kind.file for kind in KINDS), "delay.c", "delay_float.c", "preview.c", "preview_float.c", "entered_float.c",
-    "quiet.c", "product_float.c", "lag_steady.c",
-)  # fmt: skip
-FIXED_CHAIN_TYPES = ("hystgen_chain_fixed_tables.h", "hystgen_chain_fixed_state.h")
+    "effects/creep/creep.c",
+    "effects/lag/lag.c",
+    "effects/lag/exact.c",
+    "effects/lag/braked.c",
+    "effects/ageing/ageing.c",
+    "effects/thermal/heat.c",
+    "effects/thermal/gain.c",
+    "effects/resonance/mode.c",
+    "effects/drift/clock.c",
+    "effects/thermal/friction.c",
+    "effects/delay/delay.c",
+    "effects/delay/preview.c",
+    "compensator/chain/drive_signal.c",
+    "effects/lag/quiet.c",
+    "arithmetic/product.c",
+    "effects/lag/steady.c",
+)
+FIXED_CHAIN_TYPES = ("compensator/chain/tables_fixed.h", "compensator/chain/state_fixed.h")
 FIXED_CHAIN_BLOCKS = (
-    "times.c", "creep_fixed.c", "lag_fixed.c", "lag_exact_fixed.c", "braked_fixed.c", "gain_fixed.c", "ageing_fixed.c",
-    "friction_fixed.c", "heat_fixed.c", "mode_fixed.c", "clock_fixed.c", "delay.c", "delay_fixed.c", "preview.c",
-    "preview_fixed.c", "entered_fixed.c", "quiet.c", "bend.c", "stops.c", "product_fixed.c",
-    "lag_steady_fixed.c",
-)  # fmt: skip
-"""Files that models with effects carry themselves, even with a shared run time."""
+    "arithmetic/factors.c",
+    "effects/creep/creep_fixed.c",
+    "effects/lag/lag_fixed.c",
+    "effects/lag/exact.c",
+    "effects/lag/braked_fixed.c",
+    "effects/thermal/gain_fixed.c",
+    "effects/ageing/ageing_fixed.c",
+    "effects/thermal/friction.c",
+    "effects/thermal/heat.c",
+    "effects/resonance/mode.c",
+    "effects/drift/clock.c",
+    "effects/delay/delay.c",
+    "effects/delay/preview.c",
+    "compensator/chain/drive_signal.c",
+    "effects/lag/quiet.c",
+    "effects/bend.c",
+    "effects/saturation/stops.c",
+    "arithmetic/product.c",
+    "effects/lag/steady_fixed.c",
+)
+"""Files that models with effects carry themselves, even with a shared run time, callees before callers."""
 
 SIGNALS = {
     "hystgen_signal_t": "hystgen_sum_t", "hystgen_fine_t": "hystgen_play_t", "hystgen_travel_t": "hystgen_sum_t",
@@ -59,11 +90,11 @@ NUMBER = "hystgen_number_t"
 """What a block of the user's own multiplies with, in floating point a number like any other."""
 
 FIXED_KERNELS = (
-    "over_slope.c",
-    "corners_fixed.c",
-    "loop_absorb.c",
-    "loop_solve_fixed.c",
-    "curve.c",
+    "arithmetic/division.c",
+    "plays/corners_fixed.c",
+    "plays/loop_absorb.c",
+    "plays/loop_solve_fixed.c",
+    "front/curve.c",
 )
 
 
@@ -89,6 +120,13 @@ class Family:
     def fixed(self) -> bool:
         """Whether it is fixed point."""
         return self.arithmetic.fixed
+
+    @property
+    def facts(self) -> frozenset[str]:
+        """What is true of every model of it."""
+        found = {"FIXED": self.fixed, "CHAIN": self.chain, "REAL_IS_DOUBLE": self.real == "double",
+                 "REAL_IS_SHORT": self.real == "int16_t"}  # fmt: skip
+        return frozenset(f"HYSTGEN_{fact}" for fact, holds in found.items() if holds)
 
     @property
     def constants(self) -> dict[str, str]:
@@ -123,16 +161,17 @@ class Family:
     @property
     def tables(self) -> tuple[str, ...]:
         """The headers of the run time that have the types of its tables."""
-        if self.fixed:
-            return ("hystgen_corners_fixed_tables.h", "hystgen_tables_fixed.h")
-        return ("hystgen_corners_tables.h", "hystgen_tables_float.h")
+        return (f"plays/tables_{self.kind}.h",)
 
     @property
     def states(self) -> tuple[str, ...]:
         """The headers of the run time that have the types of its memory."""
-        if self.fixed:
-            return ("hystgen_corners_fixed_state.h", f"hystgen_corner_{self.bits}.h")
-        return ("hystgen_corners_state.h",)
+        return (f"plays/state_{self.kind}.h",)
+
+    @property
+    def kind(self) -> str:
+        """The kind of arithmetic in names of files."""
+        return "fixed" if self.fixed else "float"
 
     @property
     def kernel_files(self) -> tuple[str, ...]:
@@ -142,32 +181,31 @@ class Family:
     @property
     def kernels(self) -> tuple[str, ...]:
         """The headers of the run time that have the prototypes of its kernels."""
-        return (f"hystgen_kernels_{'fixed' if self.fixed else 'float'}.h", "hystgen_kernels_loop.h")
+        return ("kernels.h",)
 
     @property
     def build(self) -> tuple[str, ...]:
         """The headers that check how code is built."""
-        return ("build_fixed.h",) if self.fixed else ("build_float.h", f"binary{self.bits[1:]}.h")
+        return ("arithmetic/build.h",)
 
     def soft(self, kernels: str) -> tuple[str, ...]:
         """The header with what the corner engine asks of floating point, where it is among these kernels."""
-        return (f"soft_float{self.bits[1:]}.h",) if "_SOFT_FLOAT" in kernels else ()
+        return ("arithmetic/soft_float.h",) if "_SOFT_FLOAT" in kernels else ()
 
     @property
     def opening(self) -> tuple[str, ...]:
         """Headers before all code of a file; in a single header between `opening_apart` and `closing`."""
-        double = ("constants_double.h",) if self.real == "double" else ()
-        return () if self.fixed else ("rounding_begin.h", *double)
+        return () if self.fixed else ("arithmetic/rounding_begin.h",)
 
     @property
     def opening_apart(self) -> tuple[str, ...]:
         """Headers before those if the user's own code follows."""
-        return () if self.fixed else ("rounding_push.h",)
+        return () if self.fixed else ("arithmetic/rounding_push.h",)
 
     @property
     def closing(self) -> tuple[str, ...]:
         """Headers after all code of a single header, so that its user's code is compiled as before."""
-        return () if self.fixed else ("rounding_end.h",)
+        return () if self.fixed else ("arithmetic/rounding_end.h",)
 
 
 FAMILIES = {name: Family(arithmetic) for name, arithmetic in ARITHMETICS.items()}
@@ -211,86 +249,85 @@ class Variant:
         found += ["HYSTGEN_APART_IN_FLOAT_CORNERS "] * (corners and not self.fixed)
         return (*found, *["HYSTGEN_APART_BUT_IN_FLOAT_LOOP "] * (corners or self.fixed))
 
+    @property
+    def facts(self) -> frozenset[str]:
+        """What is true of the model, beside what its arithmetic says."""
+        bent = self.bends not in ("", "none")
+        found = {
+            "CORNERS": self.engine == "corners", "FRONT": self.fronts, "TWO_BRANCHES": self.branches,
+            "FINE_PLAYS": self.finer and not self.chain, "FINE_SIGNAL": self.finer and self.chain,
+            "LIMITED_CODES": self.saturates, "SLEW_LIMIT": self.slew, "BRAKED_LAG": self.braked,
+            "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waits,
+            "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
+            "DASHPOT_PLAYS": self.moves == "dashpot", "BENT_PLAYS": bent, "BUMP": self.bends == "centre",
+            "MOVES_APART": self.fixed and bent and self.moves in ("relaxing", "dilated"),  # they need less of the stack
+        }  # fmt: skip
+        return frozenset(f"HYSTGEN_HAS_{fact}" for fact, holds in found.items() if holds)
+
     def state(self, operator: str) -> str:
         """The header with the type of an instance."""
         if self.engine == "loop":
-            return f"hystgen_loop_{operator}{'_branches' * self.branches}_state.h"
-        return f"hystgen_{operator}{'_front' * self.fronts}{'_fixed' * self.fixed}_state.h"
+            return f"compensator/loop_{operator}{'_branches' * self.branches}_state.h"
+        return f"compensator/corners/state{'_front' * self.fronts}{'_fixed' * self.fixed}.h"
 
     def sources(self) -> tuple[str, ...]:
-        """The files with the functions of both operators."""
-        files = ["clamp.c"]
-        if self.fixed and self.chain:
-            files.append("clamp_fine.c")
-        elif self.fixed:
-            files.append("code_saturating.c" if self.saturates else "code.c")
+        """The files with the functions of both operators, callees before callers."""
+        files = ["compensator/clamp.c"]
+        if self.fixed and not self.chain:
+            files.append("compensator/code.c")
+        if self.fixed or (not self.fronts and (self.chain or self.engine == "loop")):
+            files.append("front/front.c")
         if self.fronts:
-            if self.fixed:
-                files.append("front_two_curves.c" if self.branches else "front_curve.c")
-            turn = f"chain_turn{'_late' * self.turning}.c"
-            two = (turn, "chain_two_branches.c") if self.chain else ("inverse_two_branches.c",)
-            files += two if self.branches else ("inverse_one_branch.c",)
-        elif self.fixed or self.chain or self.engine == "loop":
-            files.append("front_finer.c" if self.finer and not self.chain else "front_none.c")
+            files.append(f"compensator/{'chain/' * (self.chain and self.branches)}branches.c")
         own = self._chain() if self.chain else self._loop() if self.engine == "loop" else self._corners()
-        return (*files, *own, "status.c")
+        return (*files, *own, "compensator/status.c")
 
     @property
-    def _start(self) -> str:
-        """The file with the start memory of engine loop."""
-        return "loop_start_list.c" if self.start_list else "loop_start.c"
+    def _front(self) -> tuple[str, ...]:
+        """The file with what is in front of the plays of engine loop, and with its start memory before that."""
+        front = "branches" if self.branches else "front" if self.fronts else "plain"
+        start = (f"compensator/loop_start{'_list' * self.start_list}.c",) if self.engine == "loop" else ()
+        return (*start, f"compensator/loop_{front}.c")
 
     def _chain(self) -> tuple[str, ...]:
         """The files of a model with effects, apart from its blocks."""
-        front = "branches" if self.branches else "front" if self.fronts else "plain"
-        kind, loops = "fixed" if self.fixed else "float", self.engine == "loop"
-        slew = (f"slew_{kind}.c", "chain_slew.c", *(() if self.braked else ("chain_unbraked.c",)))
-        slew = slew if self.slew else ("chain_free.c",)
-        braked = f"chain_braked{'_quiet' * self.quiet}{'_steady' * self.turning}.c"
-        brake = ("chain_brake.c", braked) if self.braked else ()
-        delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
-        solve = f"chain_solve_{kind}.c"
-        if not self.moves:
-            plays: tuple[str, ...] = (solve, "chain_plays.c") if loops else (f"chain_corners_{kind}.c",)
+        chain, moving = "compensator/chain/", "effects/rate_dependence/"
+        loops, solve, refined = self.engine == "loop", f"{chain}plays_solve.c", f"{chain}refined_input.c"
+        if not loops:
+            plays: tuple[str, ...] = (refined, f"{chain}corners_{'fixed' if self.fixed else 'float'}.c")
+        elif not self.moves:
+            plays = (solve, f"{chain}plays.c", refined)
         elif not self.bends:
-            plays = ("stretch.c", f"relaxing_{kind}.c", solve, "chain_relaxing.c")
+            plays = (f"{moving}relaxing.c", solve, f"{moving}relaxing_plays.c", refined)
         else:
-            before = {"relaxing": ("stretch.c",), "dashpot": (f"yield_{kind}.c",)}.get(self.moves, ())
-            kept = () if self.moves == "dashpot" else ("moved_kept.c",)
-            bent = "bent_fixed.c" if self.fixed and self.bends != "none" else f"bent_{self.bends}.c"
-            known = "bent_itself.c" if self.bends == "none" else "bent_known.c"
-            apart = self.fixed and self.bends != "none" and self.moves in ("relaxing", "dilated")
-            reached = "reached_apart.c" if apart else "reached.c"
-            value = "value_apart.c" if self.bends == "centre" and not self.fixed else "value.c"
-            moved = (*before, bent, f"moved_{self.moves}.c", reached, "moved_rest.c", *kept, known, value)
-            plays = (*moved, "chain_moving.c", f"search_{kind}.c")
-        finer = ("chain_finer.c" if loops else "chain_corners_finer.c") if self.finer else "chain_whole.c"
-        plays = (*plays, finer) if loops else (finer, *plays)
-        chain = ("chain.c", "chain_loop.c" if loops else "chain_corners.c", "chain_calls.c")
-        start = (self._start,) if loops else ()
-        return (*start, f"loop_{front}.c", delay, *slew, f"chain_{kind}.c", *brake, *plays, *chain, *more)
+            before = {"relaxing": (f"{moving}relaxing.c",), "dashpot": (f"{moving}yield.c",)}.get(self.moves, ())
+            moved = f"{moving}{'dashpot' if self.moves == 'dashpot' else 'moved'}.c"
+            plays = (*before, "effects/noncongruent/bent.c", moved, f"{chain}moving_plays.c", f"{chain}moving_search.c",
+                     refined)  # fmt: skip
+        brake = ("effects/slew_limit/brake.c",) if self.braked else ()
+        signals = ("effects/delay/forward.c", "effects/slew_limit/slewed.c", f"{chain}signals.c", *brake)
+        start = f"{chain}{'chain_loop' if loops else 'corners_start'}.c"
+        ageing = ("effects/ageing/calls.c",) if self.ages else ()
+        return (*self._front, *signals, *plays, f"{chain}chain.c", start, f"{chain}chain_calls.c", *ageing)
 
     def _loop(self) -> tuple[str, ...]:
-        front = "branches" if self.branches else "front" if self.fronts else "plain"
         kind = "fixed" if self.fixed else "float"
         return (
-            self._start,
-            f"loop_{front}.c",
-            *(["loop_branches_drive.c"] if self.branches else []),
-            f"loop_output_{kind}.c",
-            "loop.c",
-            f"loop_{kind}.c",
-            "loop_two_branches.c" if self.branches else "loop_one_branch.c",
+            *self._front,
+            *(["compensator/loop_branches_drive.c"] if self.branches else []),
+            f"compensator/loop_output_{kind}.c",
+            "compensator/loop.c",
+            f"compensator/loop_{kind}.c",
+            "compensator/loop_two_branches.c" if self.branches else "compensator/loop_one_branch.c",
         )
 
     def _corners(self) -> tuple[str, ...]:
         kind = "_front" * self.fronts + "_fixed" * self.fixed
-        usual = ("inverse_finer.c" if self.finer else "inverse_whole.c",) if kind == "_fixed" else ()
-        return (f"forward{kind}.c", *usual, f"inverse{kind}.c")
+        return (f"compensator/corners/forward{kind}.c", f"compensator/corners/inverse{kind}.c")
 
 
 def data_folder(name: str) -> Path:
-    """`templates` or `c_runtime`: inside the installed package, or at the top of the checkout."""
+    """`templates`, `c_runtime` or `hystgen`: inside the installed package, or at the top of the checkout."""
     package = Path(__file__).resolve().parent.parent
     installed = package / "_data" / name
     return installed if installed.is_dir() else package.parent / name
@@ -356,33 +393,74 @@ def _defined_name(text: str) -> str:
 
 @functools.cache
 def _read(name: str) -> str:
-    return (data_folder("c_runtime") / name).read_text(encoding="utf-8")
+    """A file of `c_runtime/`, or of the folder of an effect."""
+    return (data_folder("hystgen" if name.startswith("effects/") else "c_runtime") / name).read_text(encoding="utf-8")
 
 
-def _pieces(files: Iterable[str]) -> list[Piece]:
-    return [piece for file in files for piece in split_pieces(_read(file))]
+_CONDITION = re.compile(r"#\s*(ifdef|ifndef|if|elif|else|endif)\b(.*)")
+
+
+def chosen(source: str, facts: Collection[str]) -> str:
+    """The text of a file with what its conditions on facts choose where these hold; other conditions stay in it."""
+    kept = []
+    opened: list[tuple[bool, bool, bool]] = []  # is on facts, has chosen one of its sections, takes this one
+    for line in source.splitlines(keepends=True):
+        found = _CONDITION.match(line)
+        if not found:
+            if all(takes for *_, takes in opened):
+                kept.append(line)
+            continue
+        word, names = found[1], _NAME.findall(found[2])
+        if word.startswith("if"):
+            on_facts = bool(names) and all(map(FACTS.fullmatch, names))
+            holds = not on_facts or _holds(word, found[2], facts)
+            opened.append((on_facts, holds, holds))
+        elif opened[-1][0] and word != "endif":
+            _, before, _ = opened[-1]
+            holds = not before and (word == "else" or _holds(word, found[2], facts))
+            opened[-1] = (True, before or holds, holds)
+            continue
+        on_facts = opened[-1][0]
+        if word == "endif":
+            opened.pop()
+        if not on_facts and all(takes for *_, takes in opened):
+            kept.append(line)
+    return "".join(kept)
+
+
+def _holds(word: str, condition: str, facts: Collection[str]) -> bool:
+    """Whether a condition holds: on one name, or on several that are all defined or not (`defined(A) && !defined(B)`)."""
+    if word in ("ifdef", "ifndef"):
+        return (condition.strip() in facts) == (word == "ifdef")
+    terms = [re.fullmatch(r"(!?)defined\((\w+)\)", term.strip()) for term in condition.split("&&")]
+    assert all(terms), f"not a condition on facts: {condition}"
+    return all((term[2] in facts) == (not term[1]) for term in terms if term)
+
+
+def _pieces(files: Iterable[str], facts: Collection[str]) -> list[Piece]:
+    return [piece for file in files for piece in split_pieces(chosen(_read(file), facts))]
 
 
 def kernel_pieces(family: Family) -> list[Piece]:
     """Every piece of every kernel file of an arithmetic, callees before callers."""
-    return _pieces(family.kernel_files)
+    return _pieces(family.kernel_files, family.facts)
 
 
 def carried(family: Family, pieces: Iterable[Piece]) -> list[Piece]:
     """The pieces of kernel files that `pieces` need although a shared run time keeps them to itself."""
-    shared = {piece.name for piece in _pieces(family.kernels)}
+    shared = {piece.name for piece in _pieces(family.kernels, family.facts)}
     own = [piece for piece in kernel_pieces(family) if piece.name not in shared]
     return needed(own, sorted(used(pieces)))
 
 
 def table_pieces(family: Family) -> list[Piece]:
     """The types of an arithmetic's tables."""
-    return _pieces(family.tables)
+    return _pieces(family.tables, family.facts)
 
 
 def memory_pieces(family: Family) -> list[Piece]:
     """The types that instances and tables of an arithmetic are made of."""
-    return _pieces(family.states)
+    return _pieces(family.states, family.facts)
 
 
 def operator_pieces(
@@ -397,7 +475,9 @@ def operator_pieces(
     as for `api`; `own`: of blocks that are the user's own, which stay as they are."""
     blocks = (FIXED_CHAIN_BLOCKS if variant.fixed else CHAIN_BLOCKS) if variant.chain else ()
     roots = [piece.name for op in operators for piece in _calls(op, calls.get(op, ()))]
-    pieces = needed([*_pieces(blocks), *own, *split_pieces(glue), *_pieces(variant.sources())], roots)
+    facts = family.facts | variant.facts
+    every = [*_pieces(blocks, facts), *own, *split_pieces(glue), *_pieces(variant.sources(), facts)]
+    pieces = needed(every, roots)
     parsed = [(piece, None if piece in own else folding.parsed(piece.text)) for piece in pieces]
     kernels = [found for piece in (*kernel_pieces(family), *own) if (found := folding.parsed(piece.text))]
 
@@ -427,14 +507,15 @@ def _piece(text: str) -> Piece:
 
 def chain_types(own: Iterable[Piece], glue: str, family: Family) -> list[Piece]:
     """The types of blocks, those of the user's own last, and then of instances of models with effects."""
-    return [*_pieces(family.chain_types), *own, *split_pieces(glue)]
+    return [*_pieces(family.chain_types, family.facts), *own, *split_pieces(glue)]
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
     """Prototypes of an operator: those of every model, and those of models with effects that are named."""
-    chain = {f"hystgen_{operator}_{each}" for each in more}
-    beside = [piece for piece in _pieces([f"hystgen_chain_{operator}_api.h"]) if piece.name in chain]
-    return [*_pieces([f"hystgen_{operator}_api.h"]), *beside]
+    prefix = f"hystgen_{operator}_"
+    usual = [piece for piece in _pieces(["compensator/api.h"], ()) if piece.name.startswith(prefix)]
+    chain = {prefix + each for each in more}
+    return [*usual, *(piece for piece in _pieces(["compensator/chain/api.h"], ()) if piece.name in chain)]
 
 
 def state_pieces(variant: Variant, operators: Iterable[str], functions: Sequence[Piece]) -> list[Piece]:
@@ -442,7 +523,7 @@ def state_pieces(variant: Variant, operators: Iterable[str], functions: Sequence
     made = []
     for op in operators:
         named = fields(functions, op)
-        for piece in _pieces([variant.state(op)]):
+        for piece in needed(_pieces([variant.state(op)], variant.facts), [f"hystgen_{op}_t"]):
             lines = piece.text.split("\n")
             member = re.compile(r"^    [\w ]+?(\w+)(?:\[.*\])?;")
             kept = [line for line in lines if not (found := member.match(line)) or found[1] in named]
@@ -525,15 +606,16 @@ def api(
 
 
 def verbatim(files: Iterable[str], owner: str, family: Family, name: str) -> str:
-    """Whole files, as they stand, of the module `name`; `owner` is named in messages."""
-    text = "\n".join(map(_read, files)).replace('"hystgen: ', f'"{owner}: ')
+    """Whole files behind their first paragraph, of the module `name`; `owner` is named in messages."""
+    whole = [chosen(_read(file).partition("\n\n")[2], family.facts) for file in files]
+    text = "\n".join(whole).replace('"hystgen: ', f'"{owner}: ')
     return _named(text, name, family, name)
 
 
 @functools.cache
 def _own(family: Family) -> frozenset[str]:
     """The names that a run time defines."""
-    pieces = [*kernel_pieces(family), *_pieces((*family.tables, *family.states))]
+    pieces = [*kernel_pieces(family), *_pieces((*family.tables, *family.states), family.facts)]
     enums = [piece.code for piece in pieces if "typedef enum" in piece.code]
     listed = [name for code in enums for name in re.findall(r"HYSTGEN_\w+", code)]
     return frozenset([*(piece.name for piece in pieces), *listed, *(f"hystgen_{kind}" for kind in family.types)])
@@ -570,9 +652,9 @@ def types(pieces: Iterable[Piece], prefix: str, family: Family) -> str:
 
 def all_types(files: Iterable[str], prefix: str, family: Family) -> str:
     """Every type definition of headers of the run time."""
-    return types(_pieces(files), prefix, family)
+    return types(_pieces(files, family.facts), prefix, family)
 
 
 def prototypes(prefix: str, family: Family) -> str:
     """Prototypes of all kernels."""
-    return _named("".join(piece.text for piece in _pieces(family.kernels)), prefix, family, prefix)
+    return _named("".join(piece.text for piece in _pieces(family.kernels, family.facts)), prefix, family, prefix)

@@ -24,7 +24,7 @@ KINDS = (
     creep.KIND, lag.KIND, lag.EXACT_KIND, lag.BRAKED_KIND, ageing.KIND, thermal.HEAT_KIND, thermal.KIND, resonance.KIND,
     drift.KIND, thermal.FRICTION_KIND,
 )  # fmt: skip
-"""The kinds of blocks in the catalogue, each with a file of its name in `c_runtime/`."""
+"""The kinds of blocks in the catalogue, each with its C in the folder of its effect."""
 
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constants]]:

@@ -1,0 +1,27 @@
+/* Products of whole numbers with non-integer constants, in fixed point. Called by all blocks in
+   fixed point. */
+#ifndef HYSTGEN_ARITHMETIC_FACTORS_C
+#define HYSTGEN_ARITHMETIC_FACTORS_C
+#include "arithmetic/fixed.h"
+#include "compensator/chain/model.h"
+
+/* Bits of the lower part of a number, which is multiplied separately. */
+#define HYSTGEN_LOW_PART 20u
+
+/* x times a factor, to the nearest integer; |x| < 2^51, a shift is 21 to 82. */
+static int64_t hystgen_times(int64_t x, const hystgen_factor_t *f) {
+    const int32_t high = (int32_t)(x >> HYSTGEN_LOW_PART);
+    const int32_t low = (int32_t)(x & (((int64_t)1 << HYSTGEN_LOW_PART) - 1));
+    const int64_t whole =
+        (int64_t)high * f->mantissa + (((int64_t)low * f->mantissa) >> HYSTGEN_LOW_PART);
+    const unsigned int shift = f->shift - HYSTGEN_LOW_PART;
+    return (whole + ((int64_t)1 << (shift - 1u))) >> shift;
+}
+
+/* The same for |x| < 2^32, whose product with a mantissa fits 64 bits. */
+static int64_t hystgen_short_times(int64_t x, const hystgen_factor_t *f) {
+    const unsigned int shift = f->shift - HYSTGEN_LOW_PART;
+    return (((x * f->mantissa) >> HYSTGEN_LOW_PART) + ((int64_t)1 << (shift - 1u))) >> shift;
+}
+
+#endif

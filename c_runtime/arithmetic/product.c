@@ -1,0 +1,23 @@
+/* The product of effects that are written once for every arithmetic: a user's own, and those of the
+   catalogue with a part.c. */
+#ifndef HYSTGEN_ARITHMETIC_PRODUCT_C
+#define HYSTGEN_ARITHMETIC_PRODUCT_C
+#include "hystgen_runtime.h"
+#ifdef HYSTGEN_FIXED
+#include "arithmetic/factors.c"
+#endif
+
+#ifdef HYSTGEN_FIXED
+/* x times a number from the table of a user's own block. */
+static hystgen_signal_t hystgen_product(const hystgen_number_t *number, hystgen_signal_t x) {
+    return hystgen_times(x >> number->drop, &number->factor) *
+           ((hystgen_signal_t)1 << number->lift);
+}
+#else
+/* x times a number from the table of a user's own block. */
+static inline hystgen_signal_t hystgen_product(const hystgen_number_t *number, hystgen_signal_t x) {
+    return *number * x;
+}
+#endif
+
+#endif

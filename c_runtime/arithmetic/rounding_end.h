@@ -1,0 +1,7 @@
+/* In floating point, after all code of a single header: the user's code is compiled as before. */
+
+#if defined(__clang__) || !defined(__GNUC__)
+#pragma STDC FP_CONTRACT DEFAULT
+#elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
+#pragma GCC pop_options
+#endif

@@ -1,0 +1,21 @@
+/* Functions that compilers do not inline, in order to need less of the stack. */
+
+#if defined(__GNUC__)
+#define HYSTGEN_APART __attribute__((noinline)) static /* has several callers, or rarely runs */
+#else
+#define HYSTGEN_APART static
+#endif
+
+#ifdef HYSTGEN_CHAIN
+/* A step is no part of a reset, and loops over plays go one by one: both need less of the stack. */
+#if defined(__GNUC__)
+#define HYSTGEN_ALONE __attribute__((noinline))
+#else
+#define HYSTGEN_ALONE
+#endif
+#if defined(__clang__)
+#define HYSTGEN_ROLLED _Pragma("clang loop unroll(disable)")
+#else
+#define HYSTGEN_ROLLED
+#endif
+#endif

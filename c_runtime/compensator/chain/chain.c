@@ -1,0 +1,146 @@
+/* Operators of a model with effects: a chain of blocks from drive to displacement. An applied drive
+   passes forwards through all of them, a reference backwards, so that the memory holds only what
+   the actuator has seen. The model's own functions call its blocks:
+
+   waited, slewed   delay and slew limit; only the forward operator has the delay, since references
+                    of the inverse come ahead of time
+   drive_side       lag: in front of the memoryless part and the plays
+   output_side      creep, ageing, heat, gain: behind the plays; the forward operator also has the
+                    modes of the stage here
+   displaced        saturation, offsets and drift, at the very end
+
+   rest: everything has settled at an input; absorb: one sample; solve: the input that gives an
+   output.
+
+   moving   false  no drive has been applied yet: the first one finds everything at rest there
+            true   every block has seen the previous sample
+   A step leaves its answer pending. The next step or settle absorbs it, or the drive committed in
+   its place.
+
+   Signals between the blocks have a type of their own; chain_float.c and chain_fixed.c convert. */
+#ifndef HYSTGEN_CHAIN_CHAIN_C
+#define HYSTGEN_CHAIN_CHAIN_C
+#include "compensator/chain/model.h"
+#include "compensator/chain/drive_signal.c"
+#include "effects/delay/forward.c"
+#include "effects/slew_limit/slewed.c"
+#include "compensator/chain/signals.c"
+#ifndef HYSTGEN_CONFIGURED
+#include "compensator/loop_plain.c"
+#ifndef HYSTGEN_HAS_CORNERS
+#include "compensator/chain/plays.c"
+#elif defined(HYSTGEN_FIXED)
+#include "compensator/chain/corners_fixed.c"
+#else
+#include "compensator/chain/corners_float.c"
+#endif
+#endif
+
+/* Drive v has passed through the drive side and moved the plays. */
+static inline void hystgen_forward_played(hystgen_forward_t *self, hystgen_real_t v) {
+    const hystgen_reach_t late = hystgen_forward_waited(self, v);
+    const hystgen_reach_t reached = hystgen_forward_slewed(self, late);
+    if (reached < late || reached > late) {
+        self->status |= HYSTGEN_STATUS_SLEW_LIMITED;
+    }
+    const hystgen_signal_t x = hystgen_entered_drive(reached);
+    const hystgen_signal_t a = self->moving ? hystgen_forward_drive_side_absorb(self, x)
+                                            : hystgen_forward_drive_side_rest(self, x);
+    self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, hystgen_arriving(a)));
+}
+
+/* The plays have moved: their sum passes through the output side. */
+HYSTGEN_APART_IN_FIXED void hystgen_forward_passed_on(hystgen_forward_t *self) {
+    self->output = self->moving ? hystgen_forward_output_side_absorb(self, self->level)
+                                : hystgen_forward_output_side_rest(self, self->level);
+    self->moving = true;
+}
+
+/* The actuator has seen drive v. */
+HYSTGEN_APART_IN_FIXED void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v) {
+    if (self->moving) {
+        hystgen_forward_travelled(self, v);
+    }
+    self->applied = v;
+    hystgen_forward_played(self, v);
+    hystgen_forward_passed_on(self);
+}
+
+/* Drive v has passed through the drive side and moved the plays. */
+static inline void hystgen_inverse_played(hystgen_inverse_t *self, hystgen_real_t v) {
+    const hystgen_signal_t x = hystgen_entered_drive(v);
+    const hystgen_signal_t a = self->moving ? hystgen_inverse_drive_side_absorb(self, x)
+                                            : hystgen_inverse_drive_side_rest(self, x);
+    self->level = hystgen_inverse_follow(self, hystgen_inverse_arrive(self, hystgen_arriving(a)));
+}
+
+/* The plays have moved: their sum passes through the output side. */
+HYSTGEN_APART_IN_FIXED void hystgen_inverse_passed_on(hystgen_inverse_t *self) {
+    self->output = self->moving ? hystgen_inverse_output_side_absorb(self, self->level)
+                                : hystgen_inverse_output_side_rest(self, self->level);
+    self->moving = true;
+}
+
+/* The actuator has seen drive v. */
+HYSTGEN_APART_IN_FIXED void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v) {
+    if (self->moving) {
+        hystgen_inverse_travelled(self, v);
+    }
+    self->applied = v;
+    hystgen_inverse_played(self, v);
+    hystgen_inverse_passed_on(self);
+}
+
+/* The actuator has seen the pending drive. */
+static void hystgen_inverse_take(hystgen_inverse_t *self) {
+    if (self->has_pending) {
+        hystgen_inverse_absorb(self, self->pending);
+        self->has_pending = false;
+    }
+}
+
+/* Returns drive v and leaves it pending. */
+static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_real_t v) {
+    self->answer = v;
+    self->pending = v;
+    self->has_pending = true;
+    self->stepped = true;
+    return v;
+}
+
+/* The part common to init and reset, once the plays are set: they rest at this drive. */
+HYSTGEN_APART void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive,
+                                         bool ascending) {
+    self->applied = drive;
+    self->drive = hystgen_arriving(hystgen_entered_drive(drive));
+    self->ascending = ascending;
+    self->moving = false;
+    self->status = 0;
+    self->level = hystgen_forward_started(self);
+    (void)hystgen_forward_drive_side_rest(self, hystgen_entered_drive(drive));
+    self->output = hystgen_forward_output_side_rest(self, self->level);
+    self->answer =
+        hystgen_output_code(hystgen_forward_displaced(self, self->output), &self->status);
+    self->status = 0;
+}
+
+/* The part common to init and reset, once the plays are set: they rest at this drive. */
+HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive,
+                                         bool ascending) {
+    self->pending = drive;
+    self->answer = drive;
+    self->has_pending = false;
+    self->stepped = false;
+    self->filled = false;
+    self->bits = 0;
+    self->applied = drive;
+    self->drive = hystgen_arriving(hystgen_entered_drive(drive));
+    self->ascending = ascending;
+    self->moving = false;
+    self->status = 0;
+    self->level = hystgen_inverse_started(self);
+    (void)hystgen_inverse_drive_side_rest(self, hystgen_entered_drive(drive));
+    self->output = hystgen_inverse_output_side_rest(self, self->level);
+}
+
+#endif

@@ -1,0 +1,75 @@
+/* Operators of a model with effects: plays of engine corners in floating point. The inverse moves
+   its plays to the solution; where another drive is applied than leads there, it takes that back.
+ */
+#ifndef HYSTGEN_CHAIN_CORNERS_FLOAT_C
+#define HYSTGEN_CHAIN_CORNERS_FLOAT_C
+#ifndef HYSTGEN_CONFIGURED
+#define HYSTGEN_HAS_CORNERS
+#endif
+#include "compensator/chain/model.h"
+
+/* All plays hold their start values. */
+static void hystgen_forward_plays_init(hystgen_forward_t *self) {
+    hystgen_start(&hystgen_forward_curve, &self->plays, self->corner, &hystgen_forward_start[0]);
+}
+
+/* All plays are 0. */
+static void hystgen_forward_plays_reset(hystgen_forward_t *self) {
+    hystgen_start(&hystgen_forward_curve, &self->plays, self->corner, &hystgen_forward_start[1]);
+}
+
+/* All plays hold their start values. */
+static void hystgen_inverse_plays_init(hystgen_inverse_t *self) {
+    hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, &hystgen_inverse_start[0]);
+    self->sought = false;
+}
+
+/* All plays are 0. */
+static void hystgen_inverse_plays_reset(hystgen_inverse_t *self) {
+    hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, &hystgen_inverse_start[1]);
+    self->sought = false;
+}
+
+/* Sum of the plays. */
+static hystgen_signal_t hystgen_forward_started(const hystgen_forward_t *self) {
+    return self->plays.here.output;
+}
+
+/* Sum of the plays: the curve of the inverse leads from there to their input. */
+static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
+    return self->plays.here.input;
+}
+
+/* The plays follow their input w. Returns their sum. */
+static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
+    if (w < self->plays.here.input || w > self->plays.here.input) {
+        (void)hystgen_plays_step(&hystgen_forward_curve, &self->plays, self->corner, w);
+    }
+    return hystgen_forward_started(self);
+}
+
+/* The plays follow their input w. Returns their sum. */
+static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
+    hystgen_plays_t *m = &self->plays;
+    if (self->sought && (w < m->here.output || w > m->here.output)) {
+        hystgen_copy_place(&m->here, &self->undo);
+        hystgen_forget_line(m);
+    }
+    if (w < m->here.output || w > m->here.output) {
+        hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, w);
+    }
+    self->sought = false;
+    return hystgen_inverse_started(self);
+}
+
+/* Input of the plays at which their sum is h. */
+static hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_signal_t h) {
+    hystgen_copy_place(&self->undo, &self->plays.here);
+    self->sought = true;
+    if (h < self->plays.here.input || h > self->plays.here.input) {
+        (void)hystgen_plays_step(&hystgen_inverse_curve, &self->plays, self->corner, h);
+    }
+    return self->plays.here.output;
+}
+
+#endif

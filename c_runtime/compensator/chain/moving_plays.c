@@ -1,0 +1,164 @@
+/* Operators of a model with effects: plays that an effect moves or bends in its own way. The state
+   of play i is the value at which it would come to rest (`play`) and what it contributes there
+   (`bent`). */
+#ifndef HYSTGEN_CHAIN_MOVING_PLAYS_C
+#define HYSTGEN_CHAIN_MOVING_PLAYS_C
+#include "compensator/chain/model.h"
+#include "compensator/chain/signals.c"
+#include "effects/noncongruent/bent.c"
+#ifdef HYSTGEN_HAS_DASHPOT_PLAYS
+#include "effects/rate_dependence/dashpot.c"
+#else
+#include "effects/rate_dependence/moved.c"
+#endif
+
+#ifdef HYSTGEN_HAS_MOVES_APART
+/* Play i after the input of the plays has gone to w, apart from what it contributes there, to need
+   less of the stack. */
+HYSTGEN_APART hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
+                                             hystgen_play_t w) {
+    return hystgen_moved(i, play, w);
+}
+#else
+/* Play i after the input of the plays has gone to w. */
+static inline hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
+                                             hystgen_play_t w) {
+    return hystgen_moved(i, play, w);
+}
+#endif
+
+/* Play i at rest with its input at w. */
+static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play,
+                                      hystgen_play_t w) {
+    return hystgen_drawn(play[i], w, hystgen_model_tables.threshold[i]);
+}
+
+#ifndef HYSTGEN_HAS_DASHPOT_PLAYS
+/* Play i moves while the input of the plays goes to w. */
+static void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t w) {
+    play[i] = hystgen_reached(i, play, w);
+}
+
+/* Play i rests at z. */
+static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) {
+    play[i] = z;
+}
+#endif
+
+#ifdef HYSTGEN_HAS_BENT_PLAYS
+/* What play i contributes at z; where the play rests, `bent` holds it. */
+static hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
+                                         const hystgen_sum_t *bent, hystgen_play_t z) {
+    return z >= play[i] && z <= play[i] ? bent[i] : hystgen_bent(i, z);
+}
+#else
+/* What play i contributes at z, whether it rests there or not. */
+static inline hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
+                                                const hystgen_sum_t *bent, hystgen_play_t z) {
+    (void)i;
+    (void)play;
+    (void)bent;
+    return z;
+}
+#endif
+
+#if defined(HYSTGEN_HAS_BUMP) && !defined(HYSTGEN_FIXED)
+/* What play i contributes once the input of the plays has gone to w, apart from their sum, to need
+   less of the stack. */
+HYSTGEN_APART hystgen_sum_t hystgen_value(unsigned int i, const hystgen_play_t *play,
+                                          const hystgen_sum_t *bent, hystgen_play_t w) {
+    return hystgen_contributed(i, play, bent, hystgen_reached(i, play, w));
+}
+#else
+/* What play i contributes once the input of the plays has gone to w. */
+static inline hystgen_sum_t hystgen_value(unsigned int i, const hystgen_play_t *play,
+                                          const hystgen_sum_t *bent, hystgen_play_t w) {
+    return hystgen_contributed(i, play, bent, hystgen_reached(i, play, w));
+}
+#endif
+
+/* The plays move while their input goes to w. Returns their sum. */
+HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
+                                                 hystgen_play_t w) {
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        const hystgen_play_t before = play[i];
+        hystgen_move(i, play, w);
+        if (play[i] < before || play[i] > before) {
+            bent[i] = hystgen_bent(i, play[i]);
+        }
+        sum = sum + hystgen_model_tables.weight[i] * bent[i];
+    }
+    play[0] = w;
+    return sum;
+}
+
+/* The plays come to rest with their input at w. Returns their sum. */
+HYSTGEN_APART hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum_t *bent,
+                                               hystgen_play_t w) {
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+    unsigned int i;
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        hystgen_put(i, play, hystgen_resting(i, play, w));
+        bent[i] = hystgen_bent(i, play[i]);
+        sum = sum + hystgen_model_tables.weight[i] * bent[i];
+    }
+    play[0] = w;
+    return sum;
+}
+
+/* The plays follow their input w. Returns their sum. */
+static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
+    if (!self->moving) {
+        return hystgen_level(hystgen_moved_rest(self->play, self->bent, w));
+    }
+    self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
+    hystgen_relax(self->play, self->bent);
+    return self->level;
+}
+
+/* The plays follow their input w. Returns their sum. */
+static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
+    if (!self->moving) {
+        return hystgen_level(hystgen_moved_rest(self->play, self->bent, w));
+    }
+    self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
+    hystgen_relax(self->play, self->bent);
+    return self->level;
+}
+
+/* Sum of the plays in the start memory. */
+static hystgen_signal_t hystgen_forward_started(hystgen_forward_t *self) {
+    return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
+}
+
+/* Sum of the plays in the start memory. */
+static hystgen_signal_t hystgen_inverse_started(hystgen_inverse_t *self) {
+    return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
+}
+
+/* What the plays give once their input has gone to w, or rests there. It rises with w. */
+HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self,
+                                                         hystgen_play_t w) {
+    hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
+    unsigned int i;
+    if (self->moving) {
+        for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+            const hystgen_sum_t value = hystgen_value(i, self->play, self->bent, w);
+            sum = sum + hystgen_model_tables.weight[i] * value;
+        }
+        return sum;
+    }
+    HYSTGEN_ROLLED
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        const hystgen_play_t z = hystgen_resting(i, self->play, w);
+        const hystgen_sum_t value = hystgen_contributed(i, self->play, self->bent, z);
+        sum = sum + hystgen_model_tables.weight[i] * value;
+    }
+    return sum;
+}
+
+#endif

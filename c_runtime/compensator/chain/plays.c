@@ -1,0 +1,39 @@
+/* Operators of a model with effects: plays of engine loop that no effect changes. Called by chain.c
+   and chain_calls.c. */
+#ifndef HYSTGEN_CHAIN_PLAYS_C
+#define HYSTGEN_CHAIN_PLAYS_C
+#include "compensator/chain/model.h"
+#include "compensator/chain/plays_solve.c"
+#include "compensator/chain/signals.c"
+
+/* Sum of the plays. */
+static hystgen_signal_t hystgen_forward_started(const hystgen_forward_t *self) {
+    return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
+}
+
+/* Sum of the plays. */
+static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
+    return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
+}
+
+/* The plays follow their input w. Returns their sum. */
+HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self,
+                                                               hystgen_play_t w) {
+    hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
+    return hystgen_forward_started(self);
+}
+
+/* The plays follow their input w. Returns their sum. */
+HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self,
+                                                               hystgen_play_t w) {
+    hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
+    return hystgen_inverse_started(self);
+}
+
+/* Input of the plays at which their sum is h. */
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *self,
+                                                             hystgen_signal_t h) {
+    return hystgen_input_of(self->play, self->level, h);
+}
+
+#endif

@@ -1,0 +1,27 @@
+/* The output code of a sum of plays, in fixed point. Called by the forward operators of models
+   without effects. */
+#ifndef HYSTGEN_CODE_C
+#define HYSTGEN_CODE_C
+#include "arithmetic/fixed.h"
+#include "compensator/model.h"
+
+/* Output code of a sum. */
+static hystgen_real_t hystgen_code(hystgen_sum_t sum, unsigned int *status) {
+    const hystgen_sum_t code = hystgen_nearest(sum, HYSTGEN_FRACTION);
+#ifdef HYSTGEN_HAS_LIMITED_CODES
+    if (code > HYSTGEN_CODE_MAX || code < -HYSTGEN_CODE_MAX) { /* only after a reset */
+        *status |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
+    }
+#else
+    (void)status;
+#endif
+    if (code > HYSTGEN_CODE_MAX) {
+        return (hystgen_real_t)HYSTGEN_CODE_MAX;
+    }
+    if (code < -HYSTGEN_CODE_MAX) {
+        return (hystgen_real_t)-HYSTGEN_CODE_MAX;
+    }
+    return (hystgen_real_t)code;
+}
+
+#endif

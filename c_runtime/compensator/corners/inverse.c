@@ -1,0 +1,117 @@
+/* The inverse without a memoryless part, in floating point. Called by users. */
+#ifndef HYSTGEN_CONFIGURED
+#define HYSTGEN_HAS_CORNERS
+#endif
+#include "compensator/model.h"
+#include "compensator/clamp.c"
+
+/* Any sample but a usual one. */
+HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
+    const hystgen_curve_t *t = &hystgen_inverse_curve;
+    hystgen_plays_t *m = &self->plays;
+    hystgen_real_t x = u - HYSTGEN_OFFSET;
+    unsigned int bits = 0;
+    hystgen_copy_place(&self->undo, &m->here);
+    if (!(u >= HYSTGEN_OUTPUT_MIN && u <= HYSTGEN_OUTPUT_MAX)) {
+        bits = u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX ? HYSTGEN_STATUS_INPUT_CLAMPED
+                                                               : HYSTGEN_STATUS_HELD;
+        x = (u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : HYSTGEN_OUTPUT_MAX) - HYSTGEN_OFFSET;
+    }
+    if (bits == HYSTGEN_STATUS_HELD) { /* not finite: repeat the last answer */
+        if (self->stepped && self->committed) {
+            hystgen_move_to_output(t, m, self->corner, self->returned);
+        }
+    } else if (m->limited && (m->here.rising ? x >= m->here.input : x <= m->here.input)) {
+        bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
+    } else if ((x < m->here.input || x > m->here.input) &&
+               !hystgen_move_to_input(t, m, self->corner, x)) {
+        hystgen_stop_in_block(t, m, self->corner,
+                              m->here.rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN, x);
+        m->limited = true;
+        bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
+    }
+    self->before = m->here.input;
+    self->stepped = true;
+    self->committed = false;
+    self->status |= bits;
+    return m->here.output;
+}
+
+/* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
+   applied drive in its place. While `limited` is set, references beyond `input` have the same
+   answer, a limit of the drive.
+
+   stepped  committed  the memory is at     a commit replaces    a NaN answers, and leaves there
+   no       no         the start drive      nothing              the start drive
+   no       yes        the committed drive  the committed drive  the committed drive
+   yes      no         the last answer      the last answer      the last answer
+   yes      yes        the committed drive  the committed drive  the last answer, `returned` */
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
+    hystgen_plays_t *m = &self->plays;
+    const hystgen_real_t x = u - HYSTGEN_OFFSET;
+    const bool on = m->here.rising ? x > m->here.input : x < m->here.input;
+    bool same = false; /* the same plays follow */
+    if (on) {
+        same = m->here.rising ? x < m->next : x > m->next;
+    } else if (m->here.k == 0) {
+        same = m->here.rising ? x > m->behind && x < m->here.input
+                              : x < m->behind && x > m->here.input;
+    }
+    if (same) { /* the usual sample */
+        self->before = m->here.input;
+        m->here.input = x;
+        m->here.output = m->start + (x - m->begin) * m->gain;
+        return m->here.output;
+    }
+    if (on && (m->here.rising ? x < m->cap : x > m->cap)) {
+        hystgen_copy_place(&self->undo, &m->here);
+        self->before = x;
+        if (hystgen_move_in_block(&hystgen_inverse_curve, m, x)) {
+            return m->here.output;
+        }
+    }
+    return hystgen_inverse_search(self, u);
+}
+
+void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
+    hystgen_plays_t *m = &self->plays;
+    const hystgen_real_t v = hystgen_clamp_drive(applied) + 0; /* no drive is -0 */
+    if (!(applied >= -HYSTGEN_REAL_MAX && applied <= HYSTGEN_REAL_MAX)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+        return;
+    }
+    self->status |= v < applied || v > applied ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
+    if (self->stepped && !self->committed) {
+        self->returned = m->here.output;
+    }
+    self->committed = true;
+    if (self->before < m->here.input || self->before > m->here.input) { /* a usual step */
+        hystgen_copy_place(&self->undo, &m->here);
+        self->undo.input = self->before;
+        self->undo.output = m->start + (self->before - m->begin) * m->gain;
+    }
+    hystgen_copy_place(&m->here, &self->undo);
+    hystgen_forget_line(m);
+    hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, v);
+    self->before = m->here.input;
+}
+
+HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start) {
+    hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, start);
+    hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner,
+                           hystgen_clamp_drive(self->plays.here.output));
+    hystgen_copy_place(&self->undo, &self->plays.here);
+    self->before = self->plays.here.input;
+    self->stepped = false;
+    self->committed = false;
+    self->status = 0;
+}
+
+void hystgen_inverse_init(hystgen_inverse_t *self) {
+    hystgen_inverse_begin(self, &hystgen_inverse_start[0]);
+}
+
+void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u) {
+    hystgen_inverse_begin(self, &hystgen_inverse_start[1]);
+    (void)hystgen_inverse_step(self, u);
+}

@@ -1,0 +1,136 @@
+/* The inverse with a memoryless part, in floating point. Called by users. */
+#ifndef HYSTGEN_CONFIGURED
+#define HYSTGEN_HAS_CORNERS
+#define HYSTGEN_HAS_FRONT
+#endif
+#include "compensator/model.h"
+#include "front/front.c"
+#include "compensator/clamp.c"
+#include "compensator/branches.c"
+
+/* Keeps the place for a commit to go back to. */
+static void hystgen_inverse_keep(hystgen_inverse_t *self) {
+    hystgen_copy_place(&self->undo, &self->plays.here);
+    self->undo_drive = self->drive;
+    self->undo_ascending = self->ascending;
+}
+
+/* The actuator is at drive v; its move sets the direction. */
+static void hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v) {
+    if (v > self->drive) {
+        self->ascending = true;
+    } else if (v < self->drive) {
+        self->ascending = false;
+    }
+    self->drive = v;
+}
+
+/* Undoes the last step: the actuator has gone to v instead. */
+HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t v) {
+    hystgen_copy_place(&self->plays.here, &self->undo);
+    hystgen_forget_line(&self->plays);
+    self->drive = self->undo_drive;
+    self->ascending = self->undo_ascending;
+    hystgen_inverse_arrive(self, v);
+    const hystgen_real_t w = hystgen_front_forward(v, self->ascending);
+    if (w < self->plays.here.output || w > self->plays.here.output) {
+        hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner, w);
+    }
+}
+
+/* A sample that is not finite: repeat the last answer. */
+static hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self) {
+    hystgen_inverse_keep(self);
+    hystgen_inverse_replace(self, self->stepped && self->committed ? self->returned : self->drive);
+    self->stepped = true;
+    self->committed = false;
+    self->status |= HYSTGEN_STATUS_HELD;
+    return self->drive;
+}
+
+/* One sample. The memory takes the answer as applied at once; a commit, a limit or a drive that
+   holds undoes the step and puts the applied drive in its place.
+
+   stepped  committed  the memory is at     a commit replaces    a NaN answers, and leaves there
+   no       no         the start drive      nothing              the start drive
+   no       yes        the committed drive  the committed drive  the committed drive
+   yes      no         the last answer      the last answer      the last answer
+   yes      yes        the committed drive  the committed drive  the last answer, `returned` */
+hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
+    if (!(u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX)) {
+        return hystgen_inverse_hold(self);
+    }
+    hystgen_inverse_keep(self);
+    if (!self->repeat || u < self->reference || u > self->reference) {
+        hystgen_real_t level = u;
+        if (u < HYSTGEN_OUTPUT_MIN) {
+            level = HYSTGEN_OUTPUT_MIN;
+        } else if (u > HYSTGEN_OUTPUT_MAX) {
+            level = HYSTGEN_OUTPUT_MAX;
+        }
+        self->bits = level < u || level > u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
+        self->reference = u;
+        const hystgen_real_t w = hystgen_plays_step(&hystgen_inverse_curve, &self->plays,
+                                                    self->corner, level - HYSTGEN_OFFSET);
+        const hystgen_real_t v = hystgen_inverse_choose(self, level, w, &self->limited);
+        const hystgen_real_t inside = hystgen_clamp_drive(v);
+        const bool clamped = inside < v || inside > v;
+        self->bits |= self->limited ? HYSTGEN_STATUS_DOMAIN : 0u;
+        if (clamped || (inside <= self->drive && inside >= self->drive)) {
+            /* this drive does not give w: the plays are elsewhere */
+            self->bits |= clamped ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u;
+            hystgen_inverse_replace(self, inside);
+        } else {
+            hystgen_inverse_arrive(self, inside);
+        }
+        self->level = level;
+        self->repeat = true;
+    }
+    self->stepped = true;
+    self->committed = false;
+    self->status |= self->bits;
+    return self->drive;
+}
+
+void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
+    const hystgen_real_t v = hystgen_clamp_drive(applied) + 0; /* no drive is -0 */
+    if (!(applied >= -HYSTGEN_REAL_MAX && applied <= HYSTGEN_REAL_MAX)) {
+        self->status |= HYSTGEN_STATUS_HELD;
+        return;
+    }
+    if (v < applied || v > applied) {
+        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    if (self->stepped && !self->committed) {
+        self->returned = self->drive;
+    }
+    self->committed = true;
+    self->repeat = false;
+    hystgen_inverse_replace(self, v);
+}
+
+HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start,
+                                         const hystgen_drive_t *first) {
+    hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, start);
+    self->level = self->plays.here.input + HYSTGEN_OFFSET;
+    hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner, first->w);
+    self->drive = first->drive;
+    self->ascending = first->ascending;
+    hystgen_inverse_keep(self);
+    self->returned = self->drive;
+    self->reference = 0;
+    self->stepped = false;
+    self->committed = false;
+    self->repeat = false;
+    self->bits = 0;
+    self->status = 0;
+}
+
+void hystgen_inverse_init(hystgen_inverse_t *self) {
+    hystgen_inverse_begin(self, &hystgen_inverse_start[0], &hystgen_inverse_drive[0]);
+}
+
+void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u) {
+    hystgen_inverse_begin(self, &hystgen_inverse_start[1], &hystgen_inverse_drive[1]);
+    (void)hystgen_inverse_step(self, u);
+}

@@ -1,0 +1,54 @@
+/* A memoryless part in fixed point: piecewise polynomials, and rounding to the nearest integer.
+   Called by front.c and by the curves of effects. */
+#include "arithmetic/fixed.h"
+#include "hystgen_runtime.h"
+
+/* x / 2^bits to the nearest integer, ties away from zero. */
+HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits) {
+    if (bits == 0) {
+        return x;
+    }
+    return (x + ((int64_t)1 << (bits - 1u)) - (x < 0 ? 1 : 0)) >> bits;
+}
+
+/* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece:
+   where the pieces begin, the left shifts that stretch them to 2^31, and their coefficients from
+   degree 0. */
+HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
+                                  const int32_t *coefficient, unsigned int pieces,
+                                  unsigned int degree, int32_t x) {
+    unsigned int low = 0;
+    unsigned int high = pieces - 1u;
+    int64_t y = 0;
+    uint32_t h;
+    unsigned int first;
+    unsigned int i;
+    while (low < high) {
+        const unsigned int middle = (low + high + 1u) / 2u;
+        if (x >= knot[middle]) {
+            low = middle;
+        } else {
+            high = middle - 1u;
+        }
+    }
+    h = ((uint32_t)x - (uint32_t)knot[low]) << scale[low];
+    first = low * (degree + 1u);
+    coefficient = &coefficient[first];
+    for (i = degree + 1u; i > 0; --i) {
+        y = coefficient[i - 1u] + ((y * (int64_t)h + ((int64_t)1 << 30)) >> 31);
+    }
+    return y;
+}
+
+/* Drive code for an input w of the plays outside the image of the drive range: the end of the
+   range, and one code more if w is off by more than rounding. Sets `limited` if no envelope gives
+   w. */
+HYSTGEN_API hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w,
+                                           int32_t drive_min, int32_t drive_max, bool *limited) {
+    if (w > e->last) {
+        *limited = w > e->most && w > e->envelope_most;
+        return (hystgen_reach_t)drive_max + (w > e->most ? 1 : 0);
+    }
+    *limited = w < e->least && w < e->envelope_least;
+    return (hystgen_reach_t)drive_min - (w < e->least ? 1 : 0);
+}

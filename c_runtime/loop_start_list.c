@@ -1,6 +1,0 @@
-#include "hystgen_runtime.h"
-
-/* Start memory: each play holds its own value. */
-static void hystgen_loop_init(hystgen_play_t *play) {
-    hystgen_loop_start(&hystgen_model_tables, play, hystgen_model_start);
-}

@@ -1,7 +1,0 @@
-#include "hystgen_runtime.h"
-
-/* Play i after the input of the plays has gone to w. */
-static inline hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
-                                             hystgen_play_t w) {
-    return hystgen_moved(i, play, w);
-}

@@ -1,3 +1,0 @@
-#if defined(__GNUC__) && !defined(__clang__) && (defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF))
-#pragma GCC push_options
-#endif

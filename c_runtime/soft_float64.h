@@ -1,4 +1,0 @@
-#if (defined(__arm__) && (!defined(__ARM_FP) || (__ARM_FP & 8) == 0)) ||                           \
-    (defined(__riscv) && (!defined(__riscv_flen) || __riscv_flen < 64)) || defined(__AVR__)
-#define HYSTGEN_SOFT_FLOAT /* each operation is a library call */
-#endif

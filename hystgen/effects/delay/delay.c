@@ -1,0 +1,45 @@
+/* A delay of the forward operator: drives wait in a ring buffer. */
+#ifndef HYSTGEN_DELAY_DELAY_C
+#define HYSTGEN_DELAY_DELAY_C
+#include "compensator/chain/model.h"
+#ifdef HYSTGEN_FIXED
+#include "arithmetic/factors.c"
+#endif
+
+/* The drive has always been v. */
+static void hystgen_delay_rest(hystgen_real_t *sample, unsigned int *oldest, hystgen_real_t v) {
+    volatile hystgen_real_t *entry = sample; /* no call of memset, which a target need not have */
+    unsigned int i;
+    for (i = 0; i < HYSTGEN_WAITING; ++i) {
+        entry[i] = v;
+    }
+    *oldest = 0;
+}
+
+/* The place after that of the oldest sample. */
+static unsigned int hystgen_delay_next(unsigned int oldest) {
+    return oldest + 1u < HYSTGEN_WAITING ? oldest + 1u : 0;
+}
+
+/* The drive is v at this sample. */
+static void hystgen_delay_put(hystgen_real_t *sample, unsigned int *oldest, hystgen_real_t v) {
+    sample[*oldest] = v;
+    *oldest = hystgen_delay_next(*oldest);
+}
+
+#ifdef HYSTGEN_FIXED
+/* The delayed drive, to the nearest code. */
+static hystgen_reach_t hystgen_delayed(const hystgen_real_t *sample, unsigned int oldest) {
+    const hystgen_reach_t v = sample[oldest];
+    const int64_t change = (int64_t)sample[hystgen_delay_next(oldest)] - v;
+    return v + (hystgen_reach_t)hystgen_times(change, &hystgen_waited);
+}
+#else
+/* The delayed drive: the oldest sample and HYSTGEN_WAITED of the step to the next one. */
+static hystgen_reach_t hystgen_delayed(const hystgen_real_t *sample, unsigned int oldest) {
+    const hystgen_real_t v = sample[oldest];
+    return v + HYSTGEN_WAITED * (sample[hystgen_delay_next(oldest)] - v);
+}
+#endif
+
+#endif

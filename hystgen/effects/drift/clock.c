@@ -1,0 +1,67 @@
+/* Drift over the time since the clock was started. In floating point samples are counted: `low`
+   counts exactly up to `carry`, 2^24; `high` counts how often it got there. In fixed point the
+   drift is a sum of the change in each sample, as a whole part in units of signals and a fraction
+   below. */
+#include "compensator/chain/model.h"
+
+#ifdef HYSTGEN_FIXED
+static void hystgen_clock_start(hystgen_clock_t *self) {
+    self->whole = 0;
+    self->part = 0;
+    self->gained = 0;
+    self->count = 0;
+}
+
+/* One sample later. */
+static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *self) {
+    if (self->count < t->samples) {
+        const int64_t part = self->part + t->slope + self->gained;
+        const int64_t whole = part >> t->bits;
+        self->whole += whole;
+        self->part = part - whole * ((int64_t)1 << t->bits);
+        self->gained += t->change;
+        ++self->count;
+    }
+}
+
+/* The drift `ahead` samples after the present one, limited to +-`farthest`. */
+static int64_t hystgen_clock_drift(const hystgen_clock_table_t *t, const hystgen_clock_t *self,
+                                   int64_t ahead) {
+    const int64_t more = (t->slope + self->gained) * ahead + t->change * (ahead * (ahead - 1) / 2);
+    const int64_t drift = self->whole + ((self->part + more) >> t->bits);
+    if (drift > t->farthest) {
+        return t->farthest;
+    }
+    if (drift < -t->farthest) {
+        return -t->farthest;
+    }
+    return drift;
+}
+#else
+static void hystgen_clock_start(hystgen_clock_t *self) {
+    self->high = 0;
+    self->low = 0;
+}
+
+/* One sample later. */
+static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *self) {
+    const hystgen_real_t next = self->low + 1;
+    const bool full = next >= t->carry;
+    self->low = full ? 0 : next;
+    self->high = full ? self->high + 1 : self->high;
+}
+
+/* The drift `ahead` samples after the present one, limited to +-`farthest`. */
+static hystgen_real_t hystgen_clock_drift(const hystgen_clock_table_t *t,
+                                          const hystgen_clock_t *self, hystgen_real_t ahead) {
+    const hystgen_real_t time = self->high * t->block + (self->low + ahead) * t->sample;
+    const hystgen_real_t drift = (t->rate + t->half_change * time) * time;
+    if (drift > t->farthest) {
+        return t->farthest;
+    }
+    if (drift < -t->farthest) {
+        return -t->farthest;
+    }
+    return drift;
+}
+#endif

@@ -1,0 +1,84 @@
+/* A lag behind a slew limit. A drive that is far ahead of the lag takes its time to come back, so
+   that its lead has to shrink before the lag arrives. */
+#ifndef HYSTGEN_LAG_BRAKED_C
+#define HYSTGEN_LAG_BRAKED_C
+#include "compensator/chain/model.h"
+#include "effects/lag/lag.c"
+
+/* Steps of the search for a lead, which end within 2^-16 of it. */
+#define HYSTGEN_BRAKED_HALVES 16u
+
+/* Everything has settled at the input v. Returns the output. */
+static hystgen_real_t hystgen_braked_rest(hystgen_braked_t *self, hystgen_real_t v) {
+    self->earlier = v;
+    return hystgen_lag_rest(&self->lag, v);
+}
+
+/* The input that leads to the output y at this sample. */
+static hystgen_real_t hystgen_braked_solve(const hystgen_lag_table_t *t, hystgen_braked_t *self,
+                                           hystgen_real_t y) {
+    return hystgen_lag_solve(t, &self->lag, y);
+}
+
+/* The input is v at this sample. Returns the output. */
+static hystgen_real_t hystgen_braked_absorb(const hystgen_lag_table_t *t, hystgen_braked_t *self,
+                                            hystgen_real_t v) {
+    self->earlier = self->lag.asked;
+    return hystgen_lag_absorb(t, &self->lag, v);
+}
+
+/* By how much `lead` exceeds the largest lead that still comes back in time, limited to `room`. The
+   lag is to gain `size`; `most` would gain it in this step. With a lead m, which shrinks by `back`
+   in a step, it gains at most (m + back/2)^2 / (2 back most) of `size` until the lead is gone. */
+static hystgen_real_t hystgen_braked_over(hystgen_real_t size, hystgen_real_t most,
+                                          hystgen_real_t lead, hystgen_real_t back,
+                                          hystgen_real_t room) {
+    const hystgen_real_t margin = back / 2;
+    hystgen_real_t over = lead - most;
+    if (most > margin) {
+        const hystgen_real_t limit = (most + most) * back;
+        hystgen_real_t low = size;
+        hystgen_real_t high = lead;
+        unsigned int i;
+        if (lead <= size || (lead + margin) * (lead + margin) <= limit) {
+            return 0;
+        }
+        for (i = 0; i < HYSTGEN_BRAKED_HALVES; ++i) {
+            const hystgen_real_t middle = low + (high - low) / 2;
+            if ((middle + margin) * (middle + margin) <= limit) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        over = lead - low;
+    }
+    return over > room ? room : over < -room ? -room : over;
+}
+
+/* The drive from which the lag does not overshoot. `near` is the reachable drive nearest to the
+   answer, `beyond` the distance between the two. The lead is cut by no more than the drive falls
+   short of the answer now and fell short before. A target that moves by `way` in a step needs a
+   lead of way/(1 - E). */
+HYSTGEN_APART hystgen_real_t hystgen_braked_drive(const hystgen_lag_table_t *t,
+                                                  const hystgen_braked_t *self, hystgen_real_t near,
+                                                  hystgen_real_t beyond) {
+    const hystgen_lag_t *lag = &self->lag;
+    const hystgen_real_t missed = self->earlier - lag->wanted;
+    const hystgen_real_t room = beyond + (missed < 0 ? -missed : missed) * t->inverse_rate;
+    if (!(room > 0)) {
+        return near;
+    }
+    const hystgen_real_t move = lag->asked - self->earlier;
+    const hystgen_real_t way = move > HYSTGEN_SLEW_RISING     ? HYSTGEN_SLEW_RISING
+                               : move < -HYSTGEN_SLEW_FALLING ? -HYSTGEN_SLEW_FALLING
+                                                              : move;
+    const hystgen_real_t left = (lag->asked - lag->high) + (t->theta * way - way);
+    const hystgen_real_t ahead = near - (lag->high + way * t->inverse_rate);
+    return left < 0 ? near + hystgen_braked_over(-left, -left * t->inverse_rate, -ahead,
+                                                 HYSTGEN_SLEW_RISING - way, room)
+                    : near - hystgen_braked_over(left, left * t->inverse_rate, ahead,
+                                                 HYSTGEN_SLEW_FALLING + way, room);
+}
+
+#endif

@@ -1,0 +1,39 @@
+/* A lag as a block of the chain. The inverse of a lag on a drive that is straight between samples
+   rings; that of x, a lag on a drive that holds, does not. The output is x less theta of its last
+   step, so x is led beyond the output asked for by theta of the output's step: exact on ramps. */
+#ifndef HYSTGEN_LAG_LAG_C
+#define HYSTGEN_LAG_LAG_C
+#include "compensator/chain/model.h"
+
+/* Everything has settled at the input v. Returns the output. */
+static hystgen_real_t hystgen_lag_rest(hystgen_lag_t *self, hystgen_real_t v) {
+    self->high = v;
+    self->low = 0;
+    self->wanted = v;
+    self->asked = v;
+    self->answer = v;
+    return v;
+}
+
+/* The input that leads to the output y at this sample. */
+static hystgen_real_t hystgen_lag_solve(const hystgen_lag_table_t *t, hystgen_lag_t *self,
+                                        hystgen_real_t y) {
+    const hystgen_real_t goal = y + t->theta * (y - self->wanted);
+    self->asked = y;
+    self->answer = self->high + (goal - self->high) * t->inverse_rate;
+    return self->answer;
+}
+
+/* The input is v at this sample. Returns the output. */
+static hystgen_real_t hystgen_lag_absorb(const hystgen_lag_table_t *t, hystgen_lag_t *self,
+                                         hystgen_real_t v) {
+    const hystgen_real_t high = self->high;
+    const hystgen_real_t change = t->rate * (v - high) + self->low;
+    const hystgen_real_t next = high + change;
+    self->high = next;
+    self->low = change - (next - high); /* what rounding took from the sum */
+    self->wanted = self->asked + t->late * (v - self->answer);
+    return next - t->theta * (next - high);
+}
+
+#endif

@@ -1,0 +1,89 @@
+/* A lag in front of two branches, which has to arrive from the side of its branch: x moves in one
+   direction as long as drives lie ahead of it, and the output between two values of x with it. */
+#ifndef HYSTGEN_LAG_STEADY_C
+#define HYSTGEN_LAG_STEADY_C
+#include "compensator/chain/model.h"
+#include "effects/lag/lag.c"
+
+/* Everything has settled. */
+static void hystgen_steady_rest(hystgen_steady_t *self) {
+    self->way = 0;
+    self->moved = 0;
+    self->rises = true;
+}
+
+/* What the lag misses of a way in its first sample. */
+static hystgen_real_t hystgen_steady_missed(const hystgen_lag_table_t *t, hystgen_real_t way) {
+    return t->theta * way;
+}
+
+/* The part of a target's move that is led, twice the move before at most. */
+static hystgen_real_t hystgen_steady_led(hystgen_real_t way, hystgen_real_t moved) {
+    const hystgen_real_t twice = moved + moved;
+    const hystgen_real_t least = twice < 0 ? twice : 0;
+    const hystgen_real_t most = twice < 0 ? 0 : twice;
+    if (way < least) {
+        return least;
+    }
+    if (way > most) {
+        return most;
+    }
+    return way;
+}
+
+/* The input v if it is ahead of x by `little` or more. Else one with which x comes to rest without
+   going back: the last one, `applied`, or one ahead of x by `little`. */
+static hystgen_real_t hystgen_steady_kept(const hystgen_steady_t *self,
+                                          const hystgen_lag_table_t *t, const hystgen_lag_t *lag,
+                                          hystgen_real_t v, hystgen_real_t applied,
+                                          hystgen_real_t little) {
+    const bool rises = self->rises;
+    const hystgen_real_t x = lag->high;
+    const hystgen_real_t kept = rises ? applied - x : x - applied;
+    (void)t; /* as in fixed point */
+    if ((rises ? v - x : x - v) >= little) {
+        return v;
+    }
+    if (kept >= 0 && kept <= little + little) {
+        return applied;
+    }
+    return rises ? x + little : x - little;
+}
+
+/* The input that leads to the output y without taking x back from the direction `rises`. */
+static hystgen_real_t hystgen_steady_solve(hystgen_steady_t *self, const hystgen_lag_table_t *t,
+                                           hystgen_lag_t *lag, hystgen_real_t y, bool rises,
+                                           hystgen_real_t applied, hystgen_real_t little) {
+    self->rises = rises;
+    self->way = y - lag->asked;
+    lag->wanted = y - hystgen_steady_led(self->way, self->moved);
+    lag->answer = hystgen_steady_kept(self, t, lag, hystgen_lag_solve(t, lag, y), applied, little);
+    return lag->answer;
+}
+
+/* The same of a lag behind a brake, which sees the part of the target's move that is led, and what
+   the input before was short of. */
+static hystgen_real_t hystgen_steady_braked(hystgen_steady_t *self, const hystgen_lag_table_t *t,
+                                            hystgen_braked_t *braked, hystgen_real_t y, bool rises,
+                                            hystgen_real_t applied, hystgen_real_t little) {
+    const hystgen_real_t missed = braked->earlier - braked->lag.wanted;
+    const hystgen_real_t v = hystgen_steady_solve(self, t, &braked->lag, y, rises, applied, little);
+    braked->earlier = braked->lag.wanted;
+    braked->lag.wanted -= missed;
+    return v;
+}
+
+/* The lag has followed from x = `before`. What rounding took from the sum is known exactly unless x
+   has moved by its own size or more, and could then take x back. */
+static void hystgen_steady_absorb(hystgen_steady_t *self, hystgen_lag_t *lag,
+                                  hystgen_real_t before) {
+    const hystgen_real_t way = lag->high - before;
+    self->moved = self->way;
+    self->way = 0;
+    const hystgen_real_t size = before < 0 ? -before : before;
+    if ((way < 0 ? -way : way) >= size) {
+        lag->low = 0;
+    }
+}
+
+#endif

@@ -1,0 +1,60 @@
+/* Plays with a nonlinear dashpot. In a step the input counts as if it stood still part of the way;
+   a table (hystgen_yield) gives what a play gains of its stretch in that time. A second row behind
+   the plays holds what rounding took from each, so that none stops short of where it creeps to. */
+#ifndef HYSTGEN_RATE_DEPENDENCE_DASHPOT_C
+#define HYSTGEN_RATE_DEPENDENCE_DASHPOT_C
+#include "compensator/chain/model.h"
+#include "effects/rate_dependence/yield.c"
+
+/* Where the input counts as standing still while it goes to w. */
+static inline hystgen_play_t hystgen_standing(const hystgen_play_t *play, hystgen_play_t w) {
+    return (hystgen_play_t)(play[0] + hystgen_seen((hystgen_sum_t)w - play[0]));
+}
+
+/* How far play i moves, as a yield, while the input of the plays stands still there. */
+HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_change(unsigned int i, const hystgen_play_t *play,
+                                                    hystgen_play_t standing) {
+    const hystgen_sum_t x = (hystgen_sum_t)standing - play[i];
+    const hystgen_sum_t lost = play[HYSTGEN_N_PLAYS + i];
+    const hystgen_sum_t on = (x < 0 ? -x : x) - hystgen_model_tables.threshold[i];
+    if (on > 0) {
+        const hystgen_sum_t gained = hystgen_yield(on);
+        return x < 0 ? lost - gained : lost + gained;
+    }
+    return lost;
+}
+
+/* Play i once it has moved by a yield. */
+static inline hystgen_play_t hystgen_gone(unsigned int i, const hystgen_play_t *play,
+                                          hystgen_sum_t yield) {
+    return (hystgen_play_t)(play[i] + hystgen_moved_by(yield));
+}
+
+/* Play i once the input of the plays has gone to w. */
+static inline hystgen_play_t hystgen_moved(unsigned int i, const hystgen_play_t *play,
+                                           hystgen_play_t w) {
+    return hystgen_gone(i, play, hystgen_change(i, play, hystgen_standing(play, w)));
+}
+
+/* Where the plays are is where they rest, since they only creep on in the next steps. */
+static inline void hystgen_relax(hystgen_play_t *play, hystgen_sum_t *bent) {
+    (void)play;
+    (void)bent;
+}
+
+/* Play i moves while the input of the plays goes to w. */
+HYSTGEN_APART_IN_FLOAT void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t w) {
+    const hystgen_sum_t yield = hystgen_change(i, play, hystgen_standing(play, w));
+    const hystgen_play_t z = hystgen_gone(i, play, yield);
+    const hystgen_sum_t lost = yield - hystgen_yield_of((hystgen_sum_t)z - play[i]);
+    play[HYSTGEN_N_PLAYS + i] = (hystgen_play_t)lost;
+    play[i] = z;
+}
+
+/* Play i rests at z. */
+static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) {
+    play[HYSTGEN_N_PLAYS + i] = 0;
+    play[i] = z;
+}
+
+#endif

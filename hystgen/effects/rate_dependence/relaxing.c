@@ -1,0 +1,110 @@
+/* Viscous plays with one time constant. The state of a play is where it would come to rest
+   (`play`). At the end of a step its input w has stretched it by what lies beyond the threshold;
+   the play gains a share of that. Exact while it slides or rests; contact that begins or ends
+   within a step counts from the first touch. In fixed point a play stops where its stretch would
+   gain less than half a step of the plays' input in a sample. Called by relaxing_plays.c; moved.c
+   has the stretch from here. */
+#ifndef HYSTGEN_RATE_DEPENDENCE_RELAXING_C
+#define HYSTGEN_RATE_DEPENDENCE_RELAXING_C
+#include "compensator/chain/model.h"
+#ifdef HYSTGEN_FIXED
+#include "arithmetic/factors.c"
+#endif
+
+/* The part of x beyond +-r. */
+static hystgen_sum_t hystgen_stretch(hystgen_sum_t x, hystgen_play_t r) {
+    if (x > r) {
+        return x - r;
+    }
+    if (x < -r) {
+        return x + r;
+    }
+    return 0;
+}
+
+#ifdef HYSTGEN_FIXED
+/* Where play i rests: at most as far from the play before as their thresholds are from each other,
+   in spite of rounding. */
+static hystgen_play_t hystgen_beside(const hystgen_play_t *play, unsigned int i, int64_t rest) {
+    const hystgen_tables_t *t = &hystgen_model_tables;
+    if (i > 1u) {
+        const int64_t room = (int64_t)t->threshold[i] - t->threshold[i - 1u];
+        const int64_t low = play[i - 1u] - room;
+        const int64_t high = play[i - 1u] + room;
+        if (rest < low) {
+            return (hystgen_play_t)low;
+        }
+        if (rest > high) {
+            return (hystgen_play_t)high;
+        }
+        return (hystgen_play_t)rest;
+    }
+    return (hystgen_play_t)rest;
+}
+
+/* The plays follow their input w. Returns their sum. */
+HYSTGEN_APART hystgen_sum_t hystgen_relaxing_follow(hystgen_play_t *play, hystgen_play_t w) {
+    const hystgen_tables_t *t = &hystgen_model_tables;
+    hystgen_sum_t sum = (hystgen_sum_t)t->weight[0] * w;
+    unsigned int i;
+    for (i = 1; i <= t->n; ++i) {
+        const int32_t r = t->threshold[i];
+        const int64_t on = hystgen_stretch((int64_t)w - play[i], r);
+        const int64_t z = play[i] + hystgen_times(on, &hystgen_relaxing_late);
+        const int64_t left = hystgen_times(hystgen_stretch(w - z, r), &hystgen_relaxing_kept);
+        sum += t->weight[i] * z;
+        play[i] = hystgen_beside(play, i, z + left);
+    }
+    play[0] = w;
+    return sum;
+}
+
+/* Input of the plays at which their sum is `sum`. No viscous play is stretched with the input where
+   play 1 rests; from there on they are solved for like plain ones, with smaller slopes. */
+static hystgen_reach_t hystgen_relaxing_input(hystgen_play_t *play, hystgen_sum_t sum) {
+    play[0] = play[1];
+    return hystgen_loop_solve(&hystgen_relaxing_tables, play, sum);
+}
+#else
+/* The plays follow their input w. Returns their sum. */
+static hystgen_real_t hystgen_relaxing_follow(hystgen_real_t *play, hystgen_real_t w) {
+    hystgen_real_t sum = hystgen_play.weight[0] * w;
+    unsigned int i;
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        const hystgen_real_t r = hystgen_play.threshold[i];
+        const hystgen_real_t z = play[i] + HYSTGEN_LATE * hystgen_stretch(w - play[i], r);
+        sum = sum + hystgen_play.weight[i] * z;
+        play[i] = z + HYSTGEN_KEPT * hystgen_stretch(w - z, r);
+    }
+    play[0] = w;
+    return sum;
+}
+
+/* Input of the plays at which their sum is h: first without any stretched play, then with those
+   that are stretched on the way there, in the order of their thresholds. */
+static hystgen_real_t hystgen_relaxing_input(const hystgen_real_t *play, hystgen_real_t h) {
+    hystgen_real_t rest = 0;
+    unsigned int i;
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        rest = rest + hystgen_play.weight[i] * play[i];
+    }
+    rest = h - rest;
+    hystgen_real_t w = rest * hystgen_relaxing.inverse[0];
+    const bool rising = w > play[1];
+    for (i = 1; i <= HYSTGEN_N_PLAYS; ++i) {
+        const hystgen_real_t r = hystgen_play.threshold[i];
+        const hystgen_real_t first = rising ? play[i] + r : play[i] - r;
+        if (rising ? w <= first : w >= first) {
+            break;
+        }
+        rest = rest + hystgen_relaxing.share[i] * first;
+        w = rest * hystgen_relaxing.inverse[i];
+        if (rising ? w < first : w > first) {
+            w = first; /* rounding must not take w back past the play's first touch */
+        }
+    }
+    return w;
+}
+#endif
+
+#endif

@@ -1,0 +1,87 @@
+/* Drives at a limited rate in front of a lag, which must not overshoot. Called by chain_calls.c. */
+#ifndef HYSTGEN_CONFIGURED
+#define HYSTGEN_HAS_SLEW_LIMIT
+#define HYSTGEN_HAS_BRAKED_LAG
+#endif
+#include "compensator/chain/model.h"
+#include "compensator/chain/signals.c"
+#include "compensator/chain/drive_signal.c"
+#include "effects/slew_limit/slewed.c"
+#ifdef HYSTGEN_HAS_STEADY_LAG
+#ifdef HYSTGEN_FIXED
+#include "effects/lag/steady_fixed.c"
+#else
+#include "effects/lag/steady.c"
+#endif
+#endif
+#ifdef HYSTGEN_HAS_QUIET_DRIVE
+#include "effects/lag/quiet.c"
+#endif
+#ifdef HYSTGEN_FIXED
+#include "effects/lag/braked_fixed.c"
+#else
+#include "effects/lag/braked.c"
+#endif
+
+/* The drive from which the lag behind the amplifier does not overshoot on its way to the answer v,
+   of which `near` is the nearest that the amplifier reaches. */
+static hystgen_reach_t hystgen_inverse_braked(const hystgen_inverse_t *self, hystgen_reach_t v,
+                                              hystgen_reach_t near) {
+    return hystgen_drive_code(
+        hystgen_braked_drive(&hystgen_braked_1, &self->braked_1, hystgen_entered_drive(near),
+                             hystgen_entered_drive(v > near ? v - near : near - v)));
+}
+
+#if defined(HYSTGEN_HAS_QUIET_DRIVE)
+/* The drive nearest to v that the amplifier reaches in one step, or from which the lag behind it
+   does not overshoot unless the drive stands still; v itself in the first one. */
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
+                                                              hystgen_reach_t v) {
+    if (!self->moving) {
+        return v;
+    }
+    const hystgen_play_t left = hystgen_inverse_left(self);
+    hystgen_inverse_ramp(self, left, v);
+    if (!hystgen_quiet_still(&self->quiet)) {
+        const hystgen_reach_t braked = hystgen_inverse_braked(self, v, self->reached.drive);
+        hystgen_inverse_ramp(self, left, braked);
+    }
+    return self->reached.drive;
+}
+#elif defined(HYSTGEN_HAS_STEADY_LAG)
+/* The drive v, or one that keeps the lag on its branch. */
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_kept(const hystgen_inverse_t *self,
+                                                            hystgen_reach_t v) {
+    return hystgen_drive_code(hystgen_steady_kept(
+        &self->steady, &hystgen_braked_1, &self->braked_1.lag, hystgen_entered_drive(v),
+        hystgen_entered_drive(self->applied), HYSTGEN_DITHER));
+}
+
+/* The drive nearest to v that the amplifier reaches in one step, or from which the lag behind it
+   neither overshoots nor leaves its branch; v itself in the first one. */
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
+                                                              hystgen_reach_t v) {
+    if (!self->moving) {
+        return v;
+    }
+    const hystgen_play_t left = hystgen_inverse_left(self);
+    hystgen_inverse_ramp(self, left, v);
+    const hystgen_reach_t braked = hystgen_inverse_braked(self, v, self->reached.drive);
+    hystgen_inverse_ramp(self, left, hystgen_inverse_kept(self, braked));
+    return self->reached.drive;
+}
+#else
+/* The drive nearest to v that the amplifier reaches in one step, or from which the lag behind it
+   does not overshoot; v itself in the first one. */
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
+                                                              hystgen_reach_t v) {
+    if (!self->moving) {
+        return v;
+    }
+    const hystgen_play_t left = hystgen_inverse_left(self);
+    hystgen_inverse_ramp(self, left, v);
+    const hystgen_reach_t braked = hystgen_inverse_braked(self, v, self->reached.drive);
+    hystgen_inverse_ramp(self, left, braked);
+    return self->reached.drive;
+}
+#endif

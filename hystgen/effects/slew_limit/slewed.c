@@ -1,0 +1,117 @@
+/* Drives at a limited rate, or at any rate. What rounding takes from such a drive, and in floating
+   point from the rate, is kept beside it: no number of steps adds it up, and a step may be smaller
+   than the drive's last bit. Called by chain.c and chain_calls.c. */
+#ifndef HYSTGEN_SLEW_LIMIT_SLEWED_C
+#define HYSTGEN_SLEW_LIMIT_SLEWED_C
+#include "compensator/chain/model.h"
+
+#ifdef HYSTGEN_HAS_SLEW_LIMIT
+#ifdef HYSTGEN_FIXED
+/* Bits below a code of what is kept: the sum of two and a half fits 32 bits. */
+#define HYSTGEN_REST_BITS 30
+
+/* One step of `move`, from which rounding took `more`. */
+static void hystgen_ramp_on(hystgen_ramp_t *ramp, hystgen_reach_t move, hystgen_play_t more) {
+    const hystgen_play_t left = ramp->rest + more;
+    const hystgen_play_t whole =
+        (left + ((hystgen_play_t)1 << (HYSTGEN_REST_BITS - 1))) >> HYSTGEN_REST_BITS;
+    ramp->drive = ramp->drive + move + whole;
+    ramp->rest = left - whole * ((hystgen_play_t)1 << HYSTGEN_REST_BITS);
+}
+#else
+/* One step of `move`, from which rounding took `more`. */
+static void hystgen_ramp_on(hystgen_ramp_t *ramp, hystgen_reach_t move, hystgen_play_t more) {
+    const hystgen_reach_t before = ramp->drive;
+    const hystgen_reach_t next = before + move;
+    const hystgen_reach_t moved = next - before;
+    const hystgen_play_t lost = (before - (next - moved)) + (move - moved);
+    const hystgen_play_t left = lost + (ramp->rest + more);
+    ramp->drive = next + left;
+    ramp->rest = left - (ramp->drive - next);
+}
+#endif
+
+/* Takes the ramp to v, or as near to it as the amplifier gets in one step. */
+HYSTGEN_APART_IN_FIXED void hystgen_ramp_towards(hystgen_ramp_t *ramp, hystgen_reach_t v) {
+    bool beyond;
+    if (v > ramp->drive || (v >= ramp->drive && ramp->rest < 0)) {
+        hystgen_ramp_on(ramp, HYSTGEN_SLEW_RISING, HYSTGEN_SLEW_RISING_REST);
+        beyond = v > ramp->drive || (v >= ramp->drive && ramp->rest < 0);
+    } else {
+        hystgen_ramp_on(ramp, -HYSTGEN_SLEW_FALLING, -HYSTGEN_SLEW_FALLING_REST);
+        beyond = v < ramp->drive || (v <= ramp->drive && ramp->rest > 0);
+    }
+    if (!beyond) {
+        ramp->drive = v;
+        ramp->rest = 0;
+    }
+}
+
+/* The drive nearest to v that the amplifier reaches in one step; v itself in the first one. */
+static hystgen_reach_t hystgen_forward_slewed(hystgen_forward_t *self, hystgen_reach_t v) {
+    if (self->moving) {
+        hystgen_ramp_towards(&self->reached, v);
+    } else {
+        self->reached.drive = v;
+        self->reached.rest = 0;
+    }
+    return self->reached.drive;
+}
+
+/* What rounding has left of the drive applied last: that is where the answer led to, unless another
+   one was applied. */
+static hystgen_play_t hystgen_inverse_left(const hystgen_inverse_t *self) {
+    const bool other = self->applied < self->reached.drive || self->applied > self->reached.drive;
+    return other ? 0 : self->reached.rest;
+}
+
+/* Takes the ramp from the drive applied last, of which rounding has left `rest`, towards v. */
+static void hystgen_inverse_ramp(hystgen_inverse_t *self, hystgen_play_t rest, hystgen_reach_t v) {
+    self->reached.drive = self->applied;
+    self->reached.rest = rest;
+    hystgen_ramp_towards(&self->reached, v);
+}
+
+/* The last answer once more, or the drive nearest to it that the amplifier reaches in one step. */
+HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_held(hystgen_inverse_t *self) {
+    const hystgen_real_t last = self->stepped ? self->answer : self->applied;
+    if (!self->moving) {
+        return last;
+    }
+    hystgen_inverse_ramp(self, hystgen_inverse_left(self), last);
+    if (self->reached.drive < last || self->reached.drive > last) {
+        self->status |= HYSTGEN_STATUS_SLEW_LIMITED;
+    }
+    return (hystgen_real_t)self->reached.drive;
+}
+
+#ifndef HYSTGEN_HAS_BRAKED_LAG
+/* The drive nearest to v that the amplifier reaches in one step; v itself in the first one. */
+static hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self, hystgen_reach_t v) {
+    if (!self->moving) {
+        return v;
+    }
+    hystgen_inverse_ramp(self, hystgen_inverse_left(self), v);
+    return self->reached.drive;
+}
+#endif
+#else
+/* The drive may move any distance in one step. */
+static hystgen_reach_t hystgen_forward_slewed(hystgen_forward_t *self, hystgen_reach_t v) {
+    (void)self;
+    return v;
+}
+
+/* The drive may move any distance in one step. */
+static hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self, hystgen_reach_t v) {
+    (void)self;
+    return v;
+}
+
+/* The last answer once more. */
+static hystgen_real_t hystgen_inverse_held(const hystgen_inverse_t *self) {
+    return self->stepped ? self->answer : self->applied;
+}
+#endif
+
+#endif
