@@ -13,6 +13,8 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
+#include "arithmetic/build.h"
+#include "arithmetic/soft_float.h"
 
 /* Types of a model's numbers: in floating point all the same, in fixed point integers as wide as
    they have to be. play: inputs of the plays; reach: where plays start to follow; sum: outputs
@@ -35,13 +37,9 @@ typedef int64_t hystgen_sum_t;
 #ifdef HYSTGEN_REAL_IS_DOUBLE
 typedef double hystgen_real_t;
 #define HYSTGEN_REAL_MAX DBL_MAX
-#include "binary64.h"
-#include "soft_float64.h"
 #else
 typedef float hystgen_real_t;
 #define HYSTGEN_REAL_MAX FLT_MAX
-#include "binary32.h"
-#include "soft_float32.h"
 #endif
 typedef hystgen_real_t hystgen_play_t;
 typedef hystgen_real_t hystgen_reach_t;
@@ -67,8 +65,7 @@ typedef hystgen_real_t hystgen_number_t;
 
 /* Storage classes of functions in emitted files: kernels are static where a model has its own copy;
    some are kept from being inlined there, to need less stack. */
-#include "apart.h"
-#include "apart_chain.h"
+#include "arithmetic/storage.h"
 #define HYSTGEN_API
 #define HYSTGEN_KERNEL
 #define HYSTGEN_FIXED_KERNEL
@@ -78,23 +75,17 @@ typedef hystgen_real_t hystgen_number_t;
 #define HYSTGEN_APART_BUT_IN_FLOAT_LOOP HYSTGEN_APART
 
 #ifdef HYSTGEN_FIXED
-#include "build_fixed.h"
-#include "hystgen_corners_fixed_state.h"
-#ifdef HYSTGEN_REAL_IS_SHORT
-#include "hystgen_corner_q15.h"
+#include "plays/state_fixed.h"
+#include "plays/tables_fixed.h"
 #else
-#include "hystgen_corner_q31.h"
+#include "plays/state_float.h"
+#include "plays/tables_float.h"
 #endif
-#include "hystgen_corners_fixed_tables.h"
-#include "hystgen_tables_fixed.h"
-#include "hystgen_kernels_fixed.h"
-#else
-#include "build_float.h"
-#include "hystgen_corners_state.h"
-#include "hystgen_corners_tables.h"
-#include "hystgen_tables_float.h"
-#include "hystgen_kernels_float.h"
+#include "kernels.h"
+
+/* An effect of the user's own has this header alone: opened as it is, it finds its product here. */
+#if !defined(HYSTGEN_CONFIGURED) && !defined(HYSTGEN_FIXED)
+#include "arithmetic/product.c"
 #endif
-#include "hystgen_kernels_loop.h"
 
 #endif

@@ -4,7 +4,7 @@
 
 Emits the modules of MODULES and fails on every finding of a rule or check that `deviations.yaml` does not list with a
 reason, and on every one listed there that no module shows any more. gcc has to find nothing at all. The files of
-`c_runtime/` are looked at as they stand too, by clang-tidy and gcc in the units of UNITS, and by clang-format.
+`c_runtime/` and of effects are looked at as they stand too, by clang-tidy and gcc in the units of UNITS, and by clang-format.
 """
 
 from __future__ import annotations
@@ -161,7 +161,7 @@ def clang_format(tool: str, sources: Sequence[Path]) -> Iterator[Finding]:
 def standing(tools: Mapping[str, str], folder: Path, unit: tuple[str, str, str]) -> Iterator[Finding]:
     """A unit of the run time as it stands; what a model does not call is left out by emission alone."""
     source = units.write(folder, *unit)
-    more = [f"-I{units.RUNTIME}", *units.FLAGS, *units.DEFINES[unit[1]]]
+    more = [*units.INCLUDES, *units.FLAGS, *units.DEFINES[unit[1]]]
     yield from gcc(tools["gcc"], [source], more)
     for finding in clang_tidy(tools["clang-tidy"], [source], more):
         # that files are included is what the unit is for; parameters that one model has no use for leave with emission
@@ -211,8 +211,7 @@ def main() -> int:
         jobs = [pool.submit(lambda t, s: list(RUN[t](tools[t], s)), tool, files) for files in emitted for tool in RUN]
         jobs += [pool.submit(lambda s: list(extensions(s)), files) for files in emitted]
         jobs += [pool.submit(lambda u: list(standing(tools, Path(name), u)), unit) for unit in units.UNITS]
-        files = sorted(units.RUNTIME.glob("*.[ch]"))
-        jobs.append(pool.submit(lambda: list(clang_format(tools["clang-format"], files))))
+        jobs.append(pool.submit(lambda: list(clang_format(tools["clang-format"], units.standing()))))
         findings = [finding for job in jobs for finding in job.result()]
     said = problems(findings, deviations())
     print("\n".join(said) or f"static checks: {', '.join(tools)} find nothing in {len(MODULES)} modules but deviations")

@@ -32,7 +32,8 @@ BUILD = (("quick", ["-std=c99", "-O0", "-ffp-contract=off"]),)
 LENGTH = 20_000
 """Calls of each record, a fifth of what `verify` takes by default."""
 
-SOURCES = {name: runtime.data_folder(name) for name in ("templates", "c_runtime")}
+SOURCES = {name: runtime.data_folder(name) for name in ("templates", "c_runtime", "hystgen/effects")}
+"""What is emitted from, by its place in the checkout."""
 
 
 @functools.cache
@@ -51,7 +52,7 @@ def model(name: str) -> Model:
 def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A copy of templates and run time that everything is emitted from."""
     for name, folder in SOURCES.items():
-        shutil.copytree(folder, tmp_path / name)
+        shutil.copytree(folder, tmp_path / name, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     monkeypatch.setattr(runtime, "data_folder", lambda name: tmp_path / name)
     forget()
     yield tmp_path

@@ -1,4 +1,7 @@
-"""The files of `c_runtime/` as they stand: they compile clean, and are the textbook model and the bit reference."""
+"""The files of `c_runtime/` and of effects as they stand.
+
+They compile clean, each by itself and in units, and are the textbook model and the bit reference.
+"""
 
 from __future__ import annotations
 
@@ -72,8 +75,8 @@ def test_compiles_clean_without_undefined_symbols(compiler: str, real: list[str]
     for level in ("-O0", "-O2"):
         output = tmp_path / "runtime.o"
         source = RUNTIME / "hystgen_runtime.c"
-        command = [compiler, *dialect.split(), level, *real, *flags, "-ffp-contract=off", "-c", str(source)]
-        done = subprocess.run([*command, "-o", str(output)], capture_output=True, text=True, check=False)
+        command = [compiler, *dialect.split(), level, *real, *flags, "-ffp-contract=off", f"-I{RUNTIME}"]
+        done = subprocess.run([*command, "-c", source, "-o", output], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         symbols = subprocess.run(["nm", str(output)], capture_output=True, text=True, check=True).stdout
         kinds = {line.split()[-2] for line in symbols.splitlines()}
@@ -156,7 +159,7 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
     number = {"f4": "float", "f8": "double", "i4": "int32_t", "i2": "int16_t"}[real.str[1:]]
     for compiler in ("gcc", "clang"):
         binary = tmp_path / f"{compiler}.so"
-        command = [compiler, *flags, f"-I{units.RUNTIME}", str(source), "-o", str(binary)]
+        command = [compiler, *flags, *units.INCLUDES, str(source), "-o", str(binary)]
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
         ffi = cffi.FFI()
@@ -191,11 +194,53 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
             assert status.tolist() == bits.tolist(), (compiler, op)
 
 
-def test_every_file_is_in_a_unit() -> None:
-    found = set().union(*(units.files(*unit) for unit in units.UNITS))
-    states = {"hystgen_corners_state.h", "hystgen_corners_fixed_state.h"}  # of kernels, which all units have
-    files = {path.name for path in [*RUNTIME.glob("*.c"), *RUNTIME.glob("*_state.h")]}
-    assert files - states - {"hystgen_runtime.c"} == found
+def test_every_line_is_in_a_unit() -> None:
+    found = set().union(*(units.lines(*unit) for unit in units.UNITS))
+    whole = {units.RUNTIME / "hystgen_runtime.c", units.EFFECTS / "resonance" / "part.c"}
+    memory = {units.RUNTIME / "plays" / f"state_{kind}.h" for kind in ("float", "fixed")}  # of kernels, in all units
+    files = [path for path in units.standing() if path.suffix == ".c" or path.stem.rpartition("_")[2] == "state"]
+    expected = {
+        (units.relative(path), number)
+        for path in {*files} - whole - memory
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if not line.startswith("#")
+    }
+    assert expected - found == set()
+
+
+def opened(path: Path) -> tuple[list[str | Path], str]:
+    """The arguments that compile a file as an editor has it, and what is given as input: a header is included."""
+    if path.suffix == ".c":
+        return [path], ""
+    return ["-x", "c", "-"], f'#include "{units.relative(path)}"\nextern int unit;\n'
+
+
+@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("path", units.standing(), ids=units.relative)
+def test_a_file_compiles_as_it_is_opened(compiler: str, path: Path) -> None:
+    source, text = opened(path)
+    command = [compiler, "-std=c99", *C_WARNINGS, *units.FLAGS, *units.INCLUDES, "-fsyntax-only", *source]
+    done = subprocess.run(command, input=text, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("folder", [units.RUNTIME, units.EFFECTS], ids=lambda folder: folder.name)
+def test_editors_are_told_how_to_compile(folder: Path) -> None:
+    """`compile_flags.txt` says what the test above does: clang runs in the folder that has it."""
+    flags = (folder / "compile_flags.txt").read_text(encoding="ascii").split()
+    places = {(folder / flag.removeprefix("-I")).resolve() for flag in flags if flag.startswith("-I")}
+    assert places == {units.RUNTIME.resolve(), units.EFFECTS.parent.resolve()}
+    for path in units.standing():
+        if path.is_relative_to(folder) and path.suffix == ".c":
+            done = subprocess.run(["clang", *flags, "-fsyntax-only", "-Werror", path], cwd=folder, check=False)
+            assert done.returncode == 0, path
+
+
+@pytest.mark.parametrize("path", units.standing(), ids=units.relative)
+def test_a_file_opens_with_a_paragraph(path: Path) -> None:
+    """What it does stands in front of its first line of code."""
+    text = path.read_text(encoding="ascii")
+    assert re.match(r"/\*(?:[^*]|\*(?!/)){20,}\*/\n", text) or path.name == "part.c"
 
 
 def test_functions_of_engine_loop_have_one_name_in_c_and_python() -> None:
@@ -203,7 +248,7 @@ def test_functions_of_engine_loop_have_one_name_in_c_and_python() -> None:
     modules = (loop, fixed, step, step_float, step_fixed)
     trees = (ast.parse(Path(module.__file__).read_text(encoding="utf-8")) for module in modules)
     own = {node.name for tree in trees for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
-    texts = [path.read_text() for path in RUNTIME.glob("loop*.c")]
+    texts = [path.read_text() for path in RUNTIME.rglob("loop*.c")]
     names = {piece.name.removeprefix("hystgen_") for text in texts for piece in runtime.split_pieces(text)}
     assert len(names) > 20
     start = {"loop_init"}  # of two files, one of which is chosen where Python asks how long the list is

@@ -1,4 +1,6 @@
-"""The files of `c_runtime/` as they stand, in one unit with the numbers of a model: nothing is renamed or picked.
+"""The files of `c_runtime/` and of effects as they stand, in one unit with the numbers of a model.
+
+Nothing is renamed or picked but what conditions on the model choose.
 
 The model is called `hystgen`, so that its macros and tables have the names that the files use.
 """
@@ -17,6 +19,9 @@ from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 
 RUNTIME = runtime.data_folder("c_runtime")
+EFFECTS = runtime.data_folder("hystgen") / "effects"
+INCLUDES = [f"-I{RUNTIME}", f"-I{EFFECTS.parent}"]
+"""Where files look for each other."""
 
 DEFINES = {
     "float32": [],
@@ -78,7 +83,7 @@ UNITS = (
     ("creeping", "float32", "corners"),
     ("led", "q31", "corners"),
 )
-"""Every file of `c_runtime/` is in one of them."""
+"""Every line of `c_runtime/` and of the C of effects is in one of them."""
 
 
 def model(name: str) -> Model:
@@ -87,10 +92,27 @@ def model(name: str) -> Model:
     return Model(parse_parameters(text, f"{name}.yaml").model_copy(update={"name": "hystgen"}))
 
 
-def files(name: str, arithmetic: str, engine: str) -> set[str]:
-    """The files that a unit is made of."""
+def standing() -> list[Path]:
+    """All C files and headers."""
+    return [path for folder in (RUNTIME, EFFECTS) for path in sorted(folder.rglob("*.[ch]"))]
+
+
+def relative(path: Path) -> str:
+    """The name of a file as other files include it."""
+    return path.relative_to(EFFECTS.parent if path.is_relative_to(EFFECTS) else RUNTIME).as_posix()
+
+
+def lines(name: str, arithmetic: str, engine: str) -> set[tuple[str, int]]:
+    """The files that a unit is made of, each with the numbers of the lines that are compiled for its model."""
     values = _values(name, arithmetic, engine)
-    return {*values.variant.sources(), *values.family.kernel_files, *_states(values), *_blocks(values)}
+    found = set()
+    for file in {*values.variant.sources(), *values.family.kernel_files, *_states(values), *_blocks(values)}:
+        folder = EFFECTS.parent if file.startswith("effects/") else RUNTIME
+        text = (folder / file).read_text(encoding="utf-8").splitlines()
+        numbered = "".join(f"{line}\n" if line.startswith("#") else f"{n}\n" for n, line in enumerate(text, 1))
+        chosen = runtime.chosen(numbered, values.family.facts | values.variant.facts).splitlines()
+        found |= {(file, int(line)) for line in chosen if not line.startswith("#")}
+    return found
 
 
 def _values(name: str, arithmetic: str, engine: str) -> SimpleNamespace:
@@ -112,9 +134,10 @@ def _blocks(values: SimpleNamespace) -> list[str]:
     blocks = runtime.FIXED_CHAIN_BLOCKS if values.fixed else runtime.CHAIN_BLOCKS
     t = values.numbers
     missing = {
-        "preview": not len(t.tap), "delay": not t.delay.samples, "quiet": not t.quiet, "lag_steady": not t.turning,
+        "delay/preview": not len(t.tap), "delay/delay": not t.delay.samples, "lag/quiet": not t.quiet,
+        "lag/steady": not t.turning,
     }  # fmt: skip
-    left_out = tuple(name for name, absent in missing.items() if absent)
+    left_out = tuple(f"effects/{name}" for name, absent in missing.items() if absent)
     return [file for file in blocks if not file.startswith(left_out)]
 
 
@@ -122,15 +145,16 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     """The unit of both operators of a model, with its kernels."""
     values = _values(name, arithmetic, engine)
     operators = ("forward", "inverse")
-    apis = [f"hystgen_{op}_api.h" for op in operators]
-    headers = [*_states(values), *([] if values.variant.chain else apis)]
+    headers = [*dict.fromkeys(_states(values)), *([] if values.variant.chain else ["compensator/api.h"])]
     types = [] if not values.variant.chain else [
         f'#include "{values.family.chain_types[0]}"', *values.instances.values(),
-        *(f'#include "{header}"' for header in (*apis, *(f"hystgen_chain_{op}_api.h" for op in operators))),
+        '#include "compensator/api.h"', '#include "compensator/chain/api.h"',
     ]  # fmt: skip
     text = "\n".join(
         [
+            "#define HYSTGEN_CONFIGURED",
             *(["#define HYSTGEN_CHAIN"] if values.variant.chain else []),
+            *(f"#define {fact}" for fact in sorted(values.variant.facts)),
             '#include "hystgen_runtime.h"',
             f"#define HYSTGEN_CORNERS {values.corners}",
             *values.limits,

@@ -1,6 +1,6 @@
 """Derives every number in the tanh and atanh kernels; run it to see the tables as C and as Python.
 
-    python c_runtime/fit_coefficients.py [--format float32|float64]
+    python c_runtime/front/fit_coefficients.py [--format float32|float64]
 
 Every polynomial interpolates f(d) - f(0) at Chebyshev nodes in d, the one nearest to d = 0 moved onto it, where the
 error then is that of the rounded f(0) alone. Coefficients are rounded to the format one by one from the lowest, and

@@ -5,8 +5,7 @@
 #define HYSTGEN_FRONT_FRONT_C
 #include "compensator/model.h"
 
-#ifdef HYSTGEN_HAS_FRONT
-#ifdef HYSTGEN_HAS_TWO_BRANCHES
+#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_HAS_TWO_BRANCHES)
 /* Input of the plays: w = G[v], on the branch of the drive's direction. */
 HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascending) {
     if (ascending) {
@@ -40,7 +39,7 @@ HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool asce
     }
     return (hystgen_reach_t)hystgen_nearest(v, HYSTGEN_BELOW);
 }
-#else
+#elif defined(HYSTGEN_FIXED) && defined(HYSTGEN_HAS_FRONT)
 /* Input of the plays: w = G[v]. */
 HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascending) {
     (void)ascending;
@@ -63,7 +62,6 @@ HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool asce
                       HYSTGEN_BACK_PIECES, HYSTGEN_DEGREE, (int32_t)w);
     return (hystgen_reach_t)hystgen_nearest(v, HYSTGEN_BELOW);
 }
-#endif
 #elif defined(HYSTGEN_HAS_FINE_PLAYS)
 /* Input of the plays, with HYSTGEN_FINE bits below a drive code, so that thresholds are exact. */
 static inline hystgen_play_t hystgen_front_forward(hystgen_real_t v) {
@@ -74,7 +72,7 @@ static inline hystgen_play_t hystgen_front_forward(hystgen_real_t v) {
 static inline hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w) {
     return (w + ((hystgen_reach_t)1 << (HYSTGEN_FINE - 1u)) - (w < 0 ? 1 : 0)) >> HYSTGEN_FINE;
 }
-#else
+#elif !defined(HYSTGEN_HAS_FRONT)
 /* Input of the plays: the drive itself. */
 static inline hystgen_play_t hystgen_front_forward(hystgen_fine_t v) {
     return v;

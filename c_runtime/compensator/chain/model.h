@@ -1,0 +1,199 @@
+/* What emission writes for each model with effects in addition: numbers, tables, the types of its
+   instances, and the functions that call its blocks. Here are those of a model that has every
+   effect, so that a file compiles as it is opened in an editor; see compensator/model.h. */
+#ifndef HYSTGEN_CHAIN_MODEL_H
+#define HYSTGEN_CHAIN_MODEL_H
+#ifndef HYSTGEN_CHAIN
+#define HYSTGEN_CHAIN
+#endif
+#include "compensator/model.h"
+#ifdef HYSTGEN_FIXED
+#include "compensator/chain/tables_fixed.h"
+#include "compensator/chain/state_fixed.h"
+#else
+#include "compensator/chain/tables.h"
+#include "compensator/chain/state.h"
+#endif
+#ifndef HYSTGEN_CONFIGURED
+
+#define HYSTGEN_WAITING 3u
+#define HYSTGEN_TAPS 3u
+#define HYSTGEN_QUIET 8u
+#define HYSTGEN_YIELDS 8u
+
+#ifdef HYSTGEN_FIXED
+#define HYSTGEN_FINE_MIN (-32767)
+#define HYSTGEN_FINE_MAX 32767
+#define HYSTGEN_FARTHEST_OFFSET 998850172410LL
+#define HYSTGEN_SLEW_RISING 1600
+#define HYSTGEN_SLEW_FALLING 1600
+#define HYSTGEN_SLEW_RISING_REST 268435491
+#define HYSTGEN_SLEW_FALLING_REST 268435491
+#define HYSTGEN_DITHER 41
+#define HYSTGEN_LEAST_CODE (-163835)
+#define HYSTGEN_MOST_CODE 163835
+#define HYSTGEN_DRIVE_BITS 8u
+#define HYSTGEN_ARRIVING_BITS 8u
+#define HYSTGEN_LEVEL_BITS 8u
+#define HYSTGEN_LEVEL_DROP 20u
+#define HYSTGEN_LARGEST_LEVEL 782495278648LL
+#define HYSTGEN_LARGEST_INPUT 2147483647
+#define HYSTGEN_SHARE_BITS 0u
+#define HYSTGEN_BRAKED_DROP 4u
+#define HYSTGEN_BUMP_DEGREE 5u
+#define HYSTGEN_BUMP_LIFT 4u
+#define HYSTGEN_BUMP_BITS 8u
+#define HYSTGEN_BUMP_END 2000000000
+#define HYSTGEN_YIELD_BITS 8u
+#define HYSTGEN_STRETCH 2147483648u
+extern const hystgen_factor_t hystgen_waited;
+extern const hystgen_factor_t hystgen_relaxing_late;
+extern const hystgen_factor_t hystgen_relaxing_kept;
+extern const hystgen_tables_t hystgen_relaxing_tables;
+extern const hystgen_factor_t hystgen_late[HYSTGEN_N_PLAYS + 1];
+extern const hystgen_factor_t hystgen_kept[HYSTGEN_N_PLAYS + 1];
+extern const hystgen_factor_t hystgen_wider[HYSTGEN_N_PLAYS + 1];
+extern const hystgen_factor_t hystgen_seen_share;
+extern const hystgen_yield_t hystgen_yields[HYSTGEN_YIELDS];
+extern const hystgen_bump_t hystgen_bump[1];
+extern const uint16_t hystgen_bump_of[HYSTGEN_N_PLAYS + 1];
+#else
+#define HYSTGEN_FARTHEST_OFFSET 20.0f
+#define HYSTGEN_SLEW_RISING 3.0f
+#define HYSTGEN_SLEW_FALLING 3.0f
+#define HYSTGEN_SLEW_RISING_REST 0.0f
+#define HYSTGEN_SLEW_FALLING_REST 0.0f
+#define HYSTGEN_DITHER 0.0001f
+#define HYSTGEN_WAITED 0.5f
+#define HYSTGEN_LATE 0.1f
+#define HYSTGEN_KEPT 0.2f
+#define HYSTGEN_SEEN 0.3f
+#define HYSTGEN_HALVES 40u
+#define HYSTGEN_LEAST_INPUT (-8.0f)
+#define HYSTGEN_LARGEST_INPUT 8.0f
+#define HYSTGEN_CENTRE 0.5f
+#define HYSTGEN_INVERSE_WIDTH 2.0f
+#define HYSTGEN_TANH_CENTRE 0.2f
+#define HYSTGEN_TERMS 2u
+#define HYSTGEN_SCALE 4.0f
+#define HYSTGEN_INVERSE_SCALE 0.25f
+extern const struct {
+    hystgen_real_t threshold[HYSTGEN_N_PLAYS + 1];
+    hystgen_real_t weight[HYSTGEN_N_PLAYS + 1];
+} hystgen_play;
+extern const struct {
+    hystgen_real_t share[HYSTGEN_N_PLAYS + 1];
+    hystgen_real_t inverse[HYSTGEN_N_PLAYS + 1];
+} hystgen_relaxing;
+extern const hystgen_real_t hystgen_late[HYSTGEN_N_PLAYS + 1];
+extern const hystgen_real_t hystgen_kept[HYSTGEN_N_PLAYS + 1];
+extern const hystgen_real_t hystgen_wider[HYSTGEN_N_PLAYS + 1];
+extern const hystgen_real_t hystgen_yields[HYSTGEN_YIELDS][5];
+extern const hystgen_real_t hystgen_curve[HYSTGEN_N_PLAYS + 1][HYSTGEN_TERMS];
+#endif
+
+extern const hystgen_lag_table_t hystgen_braked_1;
+extern const hystgen_ageing_table_t hystgen_ageing_1;
+
+typedef struct {
+    hystgen_real_t applied;
+    hystgen_ramp_t reached;
+    hystgen_fine_t drive;
+    hystgen_signal_t level;
+    hystgen_signal_t output;
+    hystgen_real_t answer;
+    hystgen_signal_t offset;
+    hystgen_ageing_t ageing_1;
+    hystgen_real_t waiting[HYSTGEN_WAITING];
+    unsigned int oldest;
+    bool ascending;
+    bool moving;
+    unsigned int status;
+#ifndef HYSTGEN_HAS_CORNERS
+    hystgen_play_t play[2 * HYSTGEN_N_PLAYS + 1];
+    hystgen_sum_t bent[HYSTGEN_N_PLAYS + 1];
+#else
+#ifdef HYSTGEN_FIXED
+    hystgen_place_t here;
+    hystgen_signal_t next;
+    hystgen_kink_t kink;
+#else
+    hystgen_plays_t plays;
+#endif
+    hystgen_corner_t corner[HYSTGEN_CORNERS];
+#endif
+} hystgen_forward_t;
+
+typedef struct {
+    hystgen_real_t pending;
+    hystgen_real_t applied;
+    hystgen_ramp_t reached;
+    hystgen_fine_t drive;
+    hystgen_signal_t level;
+    hystgen_signal_t output;
+    hystgen_real_t answer;
+    hystgen_signal_t offset;
+    hystgen_braked_t braked_1;
+    hystgen_ageing_t ageing_1;
+    hystgen_steady_t steady;
+    hystgen_quiet_t quiet;
+    hystgen_signal_t line[HYSTGEN_TAPS];
+    bool ascending;
+    bool moving;
+    bool has_pending;
+    bool stepped;
+    bool filled;
+    unsigned int bits;
+    unsigned int status;
+#ifndef HYSTGEN_HAS_CORNERS
+    hystgen_play_t play[2 * HYSTGEN_N_PLAYS + 1];
+    hystgen_sum_t bent[HYSTGEN_N_PLAYS + 1];
+#else
+    bool sought;
+#ifdef HYSTGEN_FIXED
+    hystgen_place_t here;
+    hystgen_signal_t next;
+    hystgen_kink_t kink;
+#else
+    hystgen_plays_t plays;
+    hystgen_place_t undo;
+#endif
+    hystgen_corner_t corner[HYSTGEN_CORNERS];
+#endif
+} hystgen_inverse_t;
+
+/* Blocks in front of the plays, and behind them. */
+hystgen_signal_t hystgen_forward_drive_side_rest(hystgen_forward_t *self, hystgen_signal_t v);
+hystgen_signal_t hystgen_forward_drive_side_absorb(hystgen_forward_t *self, hystgen_signal_t v);
+hystgen_signal_t hystgen_forward_output_side_rest(hystgen_forward_t *self, hystgen_signal_t h);
+hystgen_signal_t hystgen_forward_output_side_absorb(hystgen_forward_t *self, hystgen_signal_t h);
+hystgen_signal_t hystgen_inverse_drive_side_rest(hystgen_inverse_t *self, hystgen_signal_t v);
+hystgen_signal_t hystgen_inverse_drive_side_absorb(hystgen_inverse_t *self, hystgen_signal_t v);
+hystgen_signal_t hystgen_inverse_drive_side_solve(hystgen_inverse_t *self, hystgen_signal_t a);
+hystgen_signal_t hystgen_inverse_missed(hystgen_signal_t way);
+hystgen_signal_t hystgen_inverse_output_side_rest(hystgen_inverse_t *self, hystgen_signal_t h);
+hystgen_signal_t hystgen_inverse_output_side_absorb(hystgen_inverse_t *self, hystgen_signal_t h);
+hystgen_signal_t hystgen_inverse_output_side_solve(hystgen_inverse_t *self, hystgen_signal_t y);
+hystgen_signal_t hystgen_inverse_output_side_resting(hystgen_inverse_t *self, hystgen_signal_t y);
+/* Between the output of the chain and the displacement, and the line of references. */
+hystgen_signal_t hystgen_forward_displaced(const hystgen_forward_t *self, hystgen_signal_t y);
+hystgen_signal_t hystgen_inverse_displaced(const hystgen_inverse_t *self, hystgen_signal_t y);
+hystgen_signal_t hystgen_inverse_undisplaced(hystgen_inverse_t *self, hystgen_signal_t u,
+                                             bool *limited);
+hystgen_signal_t hystgen_inverse_ahead(hystgen_inverse_t *self, hystgen_signal_t y);
+void hystgen_inverse_repeat(hystgen_inverse_t *self);
+/* What is set from outside, and what follows the drive's way. */
+void hystgen_forward_settings_init(hystgen_forward_t *self);
+void hystgen_inverse_settings_init(hystgen_inverse_t *self);
+void hystgen_forward_travelled(hystgen_forward_t *self, hystgen_real_t v);
+void hystgen_inverse_travelled(hystgen_inverse_t *self, hystgen_real_t v);
+void hystgen_forward_clock_start(hystgen_forward_t *self);
+void hystgen_inverse_clock_start(hystgen_inverse_t *self);
+bool hystgen_forward_heat(hystgen_forward_t *self, hystgen_real_t temperature);
+bool hystgen_inverse_heat(hystgen_inverse_t *self, hystgen_real_t temperature);
+
+#include "compensator/api.h"
+#include "compensator/chain/api.h"
+
+#endif
+#endif

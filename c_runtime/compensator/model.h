@@ -1,0 +1,118 @@
+/* What emission writes for each model, in front of the operators: constants, tables and, for a
+   memoryless part in floating point, functions. Here is that of a small model, so that a file
+   compiles as it is opened in an editor. A real model is given by who defines HYSTGEN_CONFIGURED. */
+#ifndef HYSTGEN_MODEL_H
+#define HYSTGEN_MODEL_H
+#include "hystgen_runtime.h"
+#ifndef HYSTGEN_CONFIGURED
+
+#define HYSTGEN_N_PLAYS 6
+#define HYSTGEN_CORNERS 7
+#define HYSTGEN_STATUS_INPUT_CLAMPED 1u
+#define HYSTGEN_STATUS_OUTPUT_CLAMPED 2u
+#define HYSTGEN_STATUS_HELD 4u
+#define HYSTGEN_STATUS_DOMAIN 8u
+#define HYSTGEN_STATUS_SLEW_LIMITED 16u
+#define HYSTGEN_STATUS_LIMITED_SETTING 32u
+#define HYSTGEN_FORWARD_INIT_DRIVE 0
+#define HYSTGEN_FORWARD_INIT_ASCENDING false
+#define HYSTGEN_FORWARD_RESET_DRIVE 0
+#define HYSTGEN_FORWARD_RESET_ASCENDING false
+#define HYSTGEN_INVERSE_INIT_DRIVE 0
+#define HYSTGEN_INVERSE_INIT_ASCENDING true
+#define HYSTGEN_INVERSE_RESET_DRIVE 0
+#define HYSTGEN_INVERSE_RESET_ASCENDING true
+#define HYSTGEN_OFFSET 0
+#define HYSTGEN_START 0
+extern const hystgen_tables_t hystgen_model_tables;
+extern const hystgen_play_t hystgen_model_start[HYSTGEN_N_PLAYS + 1];
+
+#ifdef HYSTGEN_FIXED
+#define HYSTGEN_DRIVE_MIN (-32767)
+#define HYSTGEN_DRIVE_MAX 32767
+#define HYSTGEN_OUTPUT_MIN (-30000)
+#define HYSTGEN_OUTPUT_MAX 30000
+#define HYSTGEN_CODE_MAX 32767
+#define HYSTGEN_HOLD 2
+#define HYSTGEN_START_STEP 0
+#define HYSTGEN_FRACTION 28u
+#define HYSTGEN_FINE 0u
+#define HYSTGEN_SHY 63
+#define HYSTGEN_BELOW 0u
+#define HYSTGEN_DEGREE 5u
+extern const hystgen_curve_t hystgen_model_curve;
+extern const hystgen_play_t hystgen_model_zero[HYSTGEN_N_PLAYS + 1];
+#else
+#define HYSTGEN_DRIVE_MIN (-4.0f)
+#define HYSTGEN_DRIVE_MAX 4.0f
+#define HYSTGEN_OUTPUT_MIN (-10.0f)
+#define HYSTGEN_OUTPUT_MAX 10.0f
+#define HYSTGEN_HOLD 0.001f
+extern const hystgen_curve_t hystgen_forward_curve;
+extern const hystgen_curve_t hystgen_inverse_curve;
+extern const hystgen_start_t hystgen_forward_start[2];
+extern const hystgen_start_t hystgen_inverse_start[2];
+#endif
+
+#ifdef HYSTGEN_HAS_FRONT
+#ifdef HYSTGEN_FIXED
+#define HYSTGEN_FRONT_PIECES 20u
+#define HYSTGEN_FRONT_ASCENDING_PIECES 20u
+#define HYSTGEN_FRONT_DESCENDING_PIECES 20u
+#define HYSTGEN_BACK_PIECES 51u
+#define HYSTGEN_BACK_ASCENDING_PIECES 51u
+#define HYSTGEN_BACK_DESCENDING_PIECES 51u
+extern const int32_t hystgen_front_knot[20];
+extern const uint8_t hystgen_front_scale[20];
+extern const int32_t hystgen_front_coefficient[120];
+extern const int32_t hystgen_front_ascending_knot[20];
+extern const uint8_t hystgen_front_ascending_scale[20];
+extern const int32_t hystgen_front_ascending_coefficient[120];
+extern const int32_t hystgen_front_descending_knot[20];
+extern const uint8_t hystgen_front_descending_scale[20];
+extern const int32_t hystgen_front_descending_coefficient[120];
+extern const int32_t hystgen_back_knot[51];
+extern const uint8_t hystgen_back_scale[51];
+extern const int32_t hystgen_back_coefficient[306];
+extern const int32_t hystgen_back_ascending_knot[51];
+extern const uint8_t hystgen_back_ascending_scale[51];
+extern const int32_t hystgen_back_ascending_coefficient[306];
+extern const int32_t hystgen_back_descending_knot[51];
+extern const uint8_t hystgen_back_descending_scale[51];
+extern const int32_t hystgen_back_descending_coefficient[306];
+extern const hystgen_ends_t hystgen_back_ends;
+extern const hystgen_ends_t hystgen_back_ascending_ends;
+extern const hystgen_ends_t hystgen_back_descending_ends;
+#else
+hystgen_real_t hystgen_front_forward(hystgen_real_t v, bool ascending);
+hystgen_real_t hystgen_front_inverse(hystgen_real_t w, bool ascending, bool *limited);
+#endif
+#ifdef HYSTGEN_HAS_CORNERS
+extern const hystgen_drive_t hystgen_forward_drive[2];
+extern const hystgen_drive_t hystgen_inverse_drive[2];
+#endif
+#endif
+
+#ifndef HYSTGEN_CHAIN
+#ifdef HYSTGEN_HAS_CORNERS
+#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_HAS_FRONT)
+#include "compensator/corners/state_front_fixed.h"
+#elif defined(HYSTGEN_FIXED)
+#include "compensator/corners/state_fixed.h"
+#elif defined(HYSTGEN_HAS_FRONT)
+#include "compensator/corners/state_front.h"
+#else
+#include "compensator/corners/state.h"
+#endif
+#elif defined(HYSTGEN_HAS_TWO_BRANCHES)
+#include "compensator/loop_forward_branches_state.h"
+#include "compensator/loop_inverse_branches_state.h"
+#else
+#include "compensator/loop_forward_state.h"
+#include "compensator/loop_inverse_state.h"
+#endif
+#include "compensator/api.h"
+#endif
+
+#endif
+#endif
