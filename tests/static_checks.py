@@ -4,7 +4,8 @@
 
 Emits the modules of MODULES and fails on every finding of a rule or check that `deviations.yaml` does not list with a
 reason, and on every one listed there that no module shows any more. gcc has to find nothing at all. The files of
-`c_runtime/` and of effects are looked at as they stand too, by clang-tidy and gcc in the units of UNITS, and by clang-format.
+`c_runtime/` and of effects are looked at as they stand too, by clang-tidy and gcc in the units of UNITS, and by
+clang-format.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Products of whole numbers with constants that are none, in fixed point: `c_runtime/times.c`."""
+"""Products of whole numbers with non-integer constants, in fixed point: `c_runtime/arithmetic/factors.c`."""
 
 from __future__ import annotations
 

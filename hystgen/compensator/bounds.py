@@ -78,7 +78,7 @@ def _stage_errors(
 
 @dataclass(frozen=True)
 class CornerRoundings:
-    """Roundings of the corner engine, derived operation by operation from `c_runtime/corners_float.c`.
+    """Roundings of the corner engine, derived operation by operation from `c_runtime/plays/corners_float.c`.
 
     `forward`, `inverse`: what one answer adds to the error of the sum of the plays, for plays that have seen the same
     inputs, in output units; `early`: how much too early plays follow in the inverse, in output units; `margin`: how far
@@ -120,7 +120,7 @@ class CornerRoundings:
 
 @dataclass(frozen=True)
 class LoopRoundings:
-    """Roundings of the loop engine in unit roundoffs u, derived operation by operation from `c_runtime/loop_*.c`.
+    """Roundings of the loop engine in unit roundoffs u, derived operation by operation from `c_runtime/plays/loop_*.c`.
 
     `level`: the largest sum of the plays, in output units; `summed`: errors of that sum, for plays that have seen the
     same inputs; `solved`: what solving for their input adds to them, in output units.

@@ -1,5 +1,5 @@
 """The glue of a model with effects in C: tables and memory of its blocks, and the order of their calls. The blocks
-themselves are in `c_runtime/`.
+themselves are in `c_runtime/` and in the folders of effects.
 """
 
 from __future__ import annotations

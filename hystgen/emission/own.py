@@ -1,7 +1,7 @@
 """The C of an effect of the user's own: its file, checked, as pieces of the run time.
 
 The file is the user's own code and is carried as it stands, with the model's name in front of its own. It may contain
-what blocks of `c_runtime/` contain: two types, of the numbers and of the memory, named as in Python, and four
+what blocks of the catalogue contain: two types, of the numbers and of the memory, named as in Python, and four
 functions, with further static functions that they call. Written with `hystgen_product` it is the same for every
 arithmetic. The language is not checked: `hystgen verify` shows what compiles, and to which bits.
 """

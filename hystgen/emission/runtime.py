@@ -429,7 +429,7 @@ def chosen(source: str, facts: Collection[str]) -> str:
 
 
 def _holds(word: str, condition: str, facts: Collection[str]) -> bool:
-    """Whether a condition holds: on one name, or on several that are all defined or not (`defined(A) && !defined(B)`)."""
+    """Whether a condition holds: on one name, or on several as in `defined(A) && !defined(B)`."""
     if word in ("ifdef", "ifndef"):
         return (condition.strip() in facts) == (word == "ifdef")
     terms = [re.fullmatch(r"(!?)defined\((\w+)\)", term.strip()) for term in condition.split("&&")]

@@ -1,4 +1,4 @@
-"""The memoryless part in fixed point: piecewise polynomials, `c_runtime/curve.c`."""
+"""The memoryless part in fixed point: piecewise polynomials, `c_runtime/front/curve.c`."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@
    A step leaves its answer pending. The next step or settle absorbs it, or the drive committed in
    its place.
 
-   Signals between the blocks have a type of their own; chain_float.c and chain_fixed.c convert. */
+   Signals between the blocks have a type of their own; signals.c converts. */
 #ifndef HYSTGEN_CHAIN_CHAIN_C
 #define HYSTGEN_CHAIN_CHAIN_C
 #include "compensator/chain/model.h"

@@ -1,4 +1,4 @@
-"""Plays that an effect moves or bends in its own way: the constants of `c_runtime/chain_moving.c`.
+"""Plays that an effect moves or bends in its own way: the constants of `c_runtime/compensator/chain/moving_plays.c`.
 
 The state of play i is where it would come to rest, and what it contributes there. A plain play rests where it is. A
 viscous one, with the state q before a step, is at `z = q + b1 dz_r(w - q)` at the end of the step, and its new state is

@@ -1,4 +1,4 @@
-"""How plays move and are bent in fixed point: `c_runtime/moved_*.c`, `bent_fixed.c` and `relaxing_fixed.c`."""
+"""How plays move and are bent in fixed point: the C of `effects/rate_dependence/` and `effects/noncongruent/`."""
 
 from __future__ import annotations
 

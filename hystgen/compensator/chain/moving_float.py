@@ -1,4 +1,4 @@
-"""How plays move and are bent in floating point: `c_runtime/moved_*.c`, `bent_*.c` and `relaxing_float.c`."""
+"""How plays move and are bent in floating point: the C of `effects/rate_dependence/` and `effects/noncongruent/`."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class Kind(NamedTuple):
 
 
 def movement(kind: Kind) -> tuple[Function, Function, Function]:
-    """`moved`, `move` and `put` of single plays, as in `c_runtime/moved_*.c`."""
+    """`moved`, `move` and `put` of single plays, as in `moved.c` and `dashpot.c` of `effects/rate_dependence/`."""
     share_of, yields, seen, moved_by, yield_of = kind.share_of, kind.yields, kind.seen, kind.moved_by, kind.yield_of
 
     @jit

@@ -1,4 +1,4 @@
-"""The forward operator without a memoryless part: `c_runtime/forward.c`."""
+"""The forward operator without a memoryless part: `forward.c`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The inverse without a memoryless part: `c_runtime/inverse.c`."""
+"""The inverse without a memoryless part: `inverse.c`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The inverse without a memoryless part, in fixed point: `c_runtime/inverse_fixed.c`."""
+"""The inverse without a memoryless part, in fixed point: `inverse_fixed.c`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The inverse with a memoryless part: `c_runtime/inverse_front.c`, with one branch or two."""
+"""The inverse with a memoryless part: `inverse_front.c`, with one branch or two."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The inverse with a memoryless part in fixed point: `c_runtime/inverse_front_fixed.c`, with one branch or two."""
+"""The inverse with a memoryless part in fixed point: `inverse_front_fixed.c`, with one branch or two."""
 
 from __future__ import annotations
 

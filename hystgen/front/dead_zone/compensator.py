@@ -1,4 +1,4 @@
-"""Dead zones in floating point: `c_runtime/dead_zone_forward.c` and `dead_zone_inverse.c`."""
+"""Dead zones in floating point: `c_runtime/front/dead_zones.c`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tanh envelopes in floating point: `c_runtime/envelope_forward.c` and `envelope_inverse.c`."""
+"""Tanh envelopes in floating point: `c_runtime/front/envelope.c`."""
 
 from __future__ import annotations
 

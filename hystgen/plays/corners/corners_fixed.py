@@ -1,4 +1,4 @@
-"""The plays of the corner engine in fixed point: `c_runtime/corners_fixed.c`."""
+"""The plays of the corner engine in fixed point: `c_runtime/plays/corners_fixed.c`."""
 
 from __future__ import annotations
 
