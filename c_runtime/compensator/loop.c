@@ -1,4 +1,5 @@
-/* Operators of engine loop: the part common to all arithmetics and memoryless parts. */
+/* Operators of engine loop: the part common to all arithmetics and memoryless parts. Called by
+   loop_float.c and loop_fixed.c. */
 #ifndef HYSTGEN_LOOP_C
 #define HYSTGEN_LOOP_C
 #include "compensator/model.h"

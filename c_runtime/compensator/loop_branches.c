@@ -1,4 +1,5 @@
-/* Operators of engine loop: plays behind a memoryless part with two branches. */
+/* Operators of engine loop: plays behind a memoryless part with two branches. Called by loop.c and
+   chain/chain.c. */
 #ifndef HYSTGEN_LOOP_BRANCHES_C
 #define HYSTGEN_LOOP_BRANCHES_C
 #ifndef HYSTGEN_CONFIGURED

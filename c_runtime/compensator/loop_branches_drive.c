@@ -1,4 +1,5 @@
-/* Operators of engine loop: drives in front of a memoryless part with two branches. */
+/* Operators of engine loop: drives in front of a memoryless part with two branches. Called by
+   loop.c. */
 #ifndef HYSTGEN_LOOP_BRANCHES_DRIVE_C
 #define HYSTGEN_LOOP_BRANCHES_DRIVE_C
 #ifndef HYSTGEN_CONFIGURED

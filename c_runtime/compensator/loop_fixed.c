@@ -1,4 +1,4 @@
-/* Operators of engine loop: samples in fixed point, where every code is finite. */
+/* Operators of engine loop: samples in fixed point, where every code is finite. Called by users. */
 #include "arithmetic/fixed.h"
 #include "compensator/model.h"
 #include "compensator/loop.c"

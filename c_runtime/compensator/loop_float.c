@@ -1,4 +1,5 @@
-/* Operators of engine loop: samples in floating point, which may be NaN or infinite. */
+/* Operators of engine loop: samples in floating point, which may be NaN or infinite. Called by
+   users. */
 #include "compensator/model.h"
 #include "compensator/loop.c"
 

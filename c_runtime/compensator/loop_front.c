@@ -1,4 +1,4 @@
-/* Operators of engine loop: plays behind a memoryless part. */
+/* Operators of engine loop: plays behind a memoryless part. Called by loop.c and by chain/. */
 #ifndef HYSTGEN_CONFIGURED
 #define HYSTGEN_HAS_FRONT
 #endif

@@ -1,4 +1,4 @@
-/* Operators of engine loop: start memory. */
+/* Operators of engine loop: start memory. Called by users. */
 #include "compensator/model.h"
 #include "compensator/loop.c"
 #ifndef HYSTGEN_CONFIGURED

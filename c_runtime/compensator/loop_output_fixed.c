@@ -1,5 +1,5 @@
 /* Operators of engine loop: outputs of the plays in fixed point, whose sums are finer than codes.
- */
+   Called by loop.c and loop_fixed.c. */
 #ifndef HYSTGEN_LOOP_OUTPUT_FIXED_C
 #define HYSTGEN_LOOP_OUTPUT_FIXED_C
 #include "arithmetic/fixed.h"

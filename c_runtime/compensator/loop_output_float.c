@@ -1,4 +1,5 @@
-/* Operators of engine loop: outputs of the plays in floating point. */
+/* Operators of engine loop: outputs of the plays in floating point. Called by loop.c and
+   loop_float.c. */
 #ifndef HYSTGEN_LOOP_OUTPUT_FLOAT_C
 #define HYSTGEN_LOOP_OUTPUT_FLOAT_C
 #include "compensator/model.h"

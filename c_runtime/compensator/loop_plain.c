@@ -1,4 +1,4 @@
-/* Operators of engine loop: only plays. */
+/* Operators of engine loop: only plays. Called by loop.c and by chain/. */
 #ifndef HYSTGEN_LOOP_PLAIN_C
 #define HYSTGEN_LOOP_PLAIN_C
 #include "compensator/model.h"

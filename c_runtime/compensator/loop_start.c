@@ -1,4 +1,4 @@
-/* Operators of engine loop: all plays start at one value. */
+/* Operators of engine loop: all plays start at one value. Called by init. */
 #ifndef HYSTGEN_LOOP_START_C
 #define HYSTGEN_LOOP_START_C
 #include "compensator/model.h"

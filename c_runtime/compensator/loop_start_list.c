@@ -1,4 +1,4 @@
-/* Operators of engine loop: each play starts at its own value. */
+/* Operators of engine loop: each play starts at its own value. Called by init. */
 #include "compensator/model.h"
 
 /* Start memory: each play holds its own value. */

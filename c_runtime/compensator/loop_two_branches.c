@@ -1,4 +1,4 @@
-/* Operators of engine loop: start memory and branch. */
+/* Operators of engine loop: start memory and branch. Called by users. */
 #ifndef HYSTGEN_CONFIGURED
 #define HYSTGEN_HAS_FRONT
 #define HYSTGEN_HAS_TWO_BRANCHES

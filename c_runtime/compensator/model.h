@@ -1,6 +1,6 @@
 /* What emission writes for each model, in front of the operators: constants, tables and, for a
    memoryless part in floating point, functions. Here is that of a small model, so that a file
-   compiles as it is opened in an editor. A real model is given by who defines HYSTGEN_CONFIGURED. */
+   compiles as it is opened in an editor. With HYSTGEN_CONFIGURED a real model comes instead. */
 #ifndef HYSTGEN_MODEL_H
 #define HYSTGEN_MODEL_H
 #include "hystgen_runtime.h"

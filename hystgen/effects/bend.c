@@ -1,4 +1,5 @@
-/* A smooth limit behind the plays, in fixed point: piecewise polynomials for it and its inverse. */
+/* A smooth limit behind the plays, in fixed point: piecewise polynomials for it and its inverse.
+   Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "arithmetic/fixed.h"
 #include "compensator/chain/model.h"
 

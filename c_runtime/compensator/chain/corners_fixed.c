@@ -1,7 +1,8 @@
 /* Operators of a model with effects: plays of engine corners in fixed point, which give the same
    bits as those of engine loop. Up to the output `next`, along the move, plays go on from the kink
    that was found last; the inverse has found it when it solved for their input. A search is called
-   with as little of the stack in use as there can be. */
+   with as little of the stack in use as there can be. Called by chain.c, chain_calls.c and
+   corners_start.c. */
 #ifndef HYSTGEN_CHAIN_CORNERS_FIXED_C
 #define HYSTGEN_CHAIN_CORNERS_FIXED_C
 #include "arithmetic/fixed.h"

@@ -1,6 +1,6 @@
 /* Operators of a model with effects: plays of engine corners in floating point. The inverse moves
    its plays to the solution; where another drive is applied than leads there, it takes that back.
- */
+   Called by chain.c, chain_calls.c and corners_start.c. */
 #ifndef HYSTGEN_CHAIN_CORNERS_FLOAT_C
 #define HYSTGEN_CHAIN_CORNERS_FLOAT_C
 #ifndef HYSTGEN_CONFIGURED

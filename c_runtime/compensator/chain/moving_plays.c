@@ -1,6 +1,6 @@
 /* Operators of a model with effects: plays that an effect moves or bends in its own way. The state
    of play i is the value at which it would come to rest (`play`) and what it contributes there
-   (`bent`). */
+   (`bent`). Called by chain.c and moving_search.c. */
 #ifndef HYSTGEN_CHAIN_MOVING_PLAYS_C
 #define HYSTGEN_CHAIN_MOVING_PLAYS_C
 #include "compensator/chain/model.h"

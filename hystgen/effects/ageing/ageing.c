@@ -1,4 +1,5 @@
-/* A gain that depends on the distance travelled, as a piecewise cubic. */
+/* A gain that depends on the distance travelled, as a piecewise cubic. Called by the functions that
+   emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_AGEING_AGEING_C
 #define HYSTGEN_AGEING_AGEING_C
 #include "compensator/chain/model.h"

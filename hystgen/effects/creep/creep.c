@@ -1,6 +1,7 @@
 /* Creep as a block of the chain. Part of each state follows a move at once, so that the block is
    exactly invertible; a state holds what it adds to the next output for an input of 0 there.
-   `ahead` is the sum of them. */
+   `ahead` is the sum of them. Called by the functions that emission writes for a chain, see
+   compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 
 /* Everything has settled at the input x. Returns the output. */

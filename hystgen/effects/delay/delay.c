@@ -1,4 +1,4 @@
-/* A delay of the forward operator: drives wait in a ring buffer. */
+/* A delay of the forward operator: drives wait in a ring buffer. Called by forward.c. */
 #ifndef HYSTGEN_DELAY_DELAY_C
 #define HYSTGEN_DELAY_DELAY_C
 #include "compensator/chain/model.h"

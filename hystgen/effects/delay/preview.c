@@ -1,4 +1,5 @@
-/* A line of references. The newest one is the argument of step and lies ahead of the motion. */
+/* A line of references. The newest one is the argument of step and lies ahead of the motion. Called
+   by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 #ifdef HYSTGEN_FIXED
 #include "arithmetic/factors.c"

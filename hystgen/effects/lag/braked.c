@@ -1,5 +1,6 @@
 /* A lag behind a slew limit. A drive that is far ahead of the lag takes its time to come back, so
-   that its lead has to shrink before the lag arrives. */
+   that its lead has to shrink before the lag arrives. Called by slew_limit/brake.c and by the
+   functions that emission writes for a chain. */
 #ifndef HYSTGEN_LAG_BRAKED_C
 #define HYSTGEN_LAG_BRAKED_C
 #include "compensator/chain/model.h"

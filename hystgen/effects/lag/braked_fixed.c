@@ -1,5 +1,6 @@
 /* A lag behind a slew limit, in fixed point. A drive that is far ahead of the lag takes its time to
-   come back, so that its lead has to shrink before the lag arrives. */
+   come back, so that its lead has to shrink before the lag arrives. Called by slew_limit/brake.c
+   and by the functions that emission writes for a chain. */
 #ifndef HYSTGEN_LAG_BRAKED_FIXED_C
 #define HYSTGEN_LAG_BRAKED_FIXED_C
 #include "arithmetic/fixed.h"

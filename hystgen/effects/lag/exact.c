@@ -1,5 +1,6 @@
 /* A lag of at most half a step as a block of the chain: its inverse fades within a few samples. In
-   fixed point the state is the output at the next sample if the input stays. */
+   fixed point the state is the output at the next sample if the input stays. Called by the
+   functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 #ifdef HYSTGEN_FIXED
 #include "arithmetic/factors.c"

@@ -1,6 +1,7 @@
 /* A lag as a block of the chain. The inverse of a lag on a drive that is straight between samples
    rings; that of x, a lag on a drive that holds, does not. The output is x less theta of its last
-   step, so x is led beyond the output asked for by theta of the output's step: exact on ramps. */
+   step, so x is led beyond the output asked for by theta of the output's step: exact on ramps.
+   Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_LAG_C
 #define HYSTGEN_LAG_LAG_C
 #include "compensator/chain/model.h"

@@ -1,6 +1,7 @@
 /* A lag as a block of the chain, in fixed point: x, a lag on a drive that holds, is led beyond the
    output asked for by theta of the output's step, as in floating point. `lead` is the move that x
-   was to make, so that the effect of an input other than the answer is known. */
+   was to make, so that the effect of an input other than the answer is known. Called by the
+   functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_LAG_FIXED_C
 #define HYSTGEN_LAG_LAG_FIXED_C
 #include "arithmetic/fixed.h"

@@ -2,7 +2,8 @@
    rounding of the one before, and creep notices that too: at rest it goes to and fro by a code.
    After HYSTGEN_QUIET equal references, with drives no farther than HYSTGEN_DITHER from what stands
    in front of the plays in the end, the last one is kept until it is that far off. What is sought
-   in front of the plays is then within twice that of what has arrived; beyond, it has jumped. */
+   in front of the plays is then within twice that of what has arrived; beyond, it has jumped.
+   Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_QUIET_C
 #define HYSTGEN_LAG_QUIET_C
 #include "compensator/chain/model.h"

@@ -1,5 +1,6 @@
 /* A lag in front of two branches, which has to arrive from the side of its branch: x moves in one
-   direction as long as drives lie ahead of it, and the output between two values of x with it. */
+   direction as long as drives lie ahead of it, and the output between two values of x with it.
+   Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_STEADY_C
 #define HYSTGEN_LAG_STEADY_C
 #include "compensator/chain/model.h"

@@ -1,6 +1,7 @@
 /* Plays with a nonlinear dashpot. In a step the input counts as if it stood still part of the way;
    a table (hystgen_yield) gives what a play gains of its stretch in that time. A second row behind
-   the plays holds what rounding took from each, so that none stops short of where it creeps to. */
+   the plays holds what rounding took from each, so that none stops short of where it creeps to.
+   Called by compensator/chain/moving_plays.c. */
 #ifndef HYSTGEN_RATE_DEPENDENCE_DASHPOT_C
 #define HYSTGEN_RATE_DEPENDENCE_DASHPOT_C
 #include "compensator/chain/model.h"

@@ -1,4 +1,5 @@
-/* Stops behind the plays, in fixed point: beyond them the output continues with another slope. */
+/* Stops behind the plays, in fixed point: beyond them the output continues with another slope.
+   Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "arithmetic/fixed.h"
 #include "compensator/chain/model.h"
 #include "arithmetic/factors.c"

@@ -1,5 +1,6 @@
 /* Heat of loops: a few plays stand for all that rub on each other. In fixed point they have as many
-   bits below a drive code as fit. */
+   bits below a drive code as fit. Called by the functions that emission writes for a chain, see
+   compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 
 #ifdef HYSTGEN_FIXED

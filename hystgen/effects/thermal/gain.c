@@ -1,4 +1,5 @@
-/* Gain and offset behind the plays, set from outside. */
+/* Gain and offset behind the plays, set from outside. Called by the functions that emission writes
+   for a chain, see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 
 static void hystgen_gain_init(hystgen_gain_t *self) {

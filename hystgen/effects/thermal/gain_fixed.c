@@ -1,4 +1,6 @@
-/* Gain and offset behind the plays, set from outside, in fixed point. */
+/* Gain and offset behind the plays, set from outside, in fixed point. Called by the functions that
+   emission writes for a chain, see compensator/chain/model.h. Heat and ageing take its reciprocal
+   from here. */
 #ifndef HYSTGEN_THERMAL_GAIN_FIXED_C
 #define HYSTGEN_THERMAL_GAIN_FIXED_C
 #include "arithmetic/fixed.h"

@@ -1,5 +1,6 @@
 /* Gain and offset by the actuator's own heat, which follows from the applied drives. In fixed point
-   the temperature has as many bits as fit in 64, so that a slow one does not stall. */
+   the temperature has as many bits as fit in 64, so that a slow one does not stall. Called by the
+   functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 #ifdef HYSTGEN_FIXED
 #include "arithmetic/factors.c"
