@@ -144,7 +144,6 @@ def _blocks(values: SimpleNamespace) -> list[str]:
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     """The unit of both operators of a model, with its kernels."""
     values = _values(name, arithmetic, engine)
-    operators = ("forward", "inverse")
     headers = [*dict.fromkeys(_states(values)), *([] if values.variant.chain else ["compensator/api.h"])]
     types = [] if not values.variant.chain else [
         f'#include "{values.family.chain_types[0]}"', *values.instances.values(),

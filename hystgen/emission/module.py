@@ -185,7 +185,8 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
             values,
             banner=banner_of(values, f"{file}.c", f"see {file}.h"),
             implementation="\n".join(
-                [words.overview(kernels), whole(*family.opening), whole(*family.soft(kernels), "arithmetic/storage.h"), kernels]
+                [words.overview(kernels), whole(*family.opening),
+                 whole(*family.soft(kernels), "arithmetic/storage.h"), kernels]
             ),
         ),
     }

@@ -1,8 +1,8 @@
 """C text: exact literals, tables, comments, and lines of at most WIDTH characters, however long the model's name is.
 
-The files of `c_runtime/` and of effects are formatted for the prefix `hystgen_`; with another name in them statements are broken
-anew. Rows of tables are broken only if they are too long. clang-format formats them but not what is emitted:
-its lines depend on its version, and the same parameters have to give the same bytes anywhere.
+The files of `c_runtime/` and of effects are formatted for the prefix `hystgen_`; with another name in them statements
+are broken anew. Rows of tables are broken only if they are too long. clang-format formats those files but not what is
+emitted: its lines depend on its version, and the same parameters have to give the same bytes anywhere.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""One step of a model with effects: the bit reference of `c_runtime/compensator/chain/chain.c`, and the operations around it.
+"""One step of a model with effects: the bit reference of `chain/chain.c` in `c_runtime/compensator/`, and around it.
 
 Blocks in front of the plays (lag) and behind them (creep, gain) absorb the applied drive forwards and are solved
 backwards; the plays between them are those of engine loop or corners. The functions of the blocks, and the conversion

@@ -1,4 +1,4 @@
-"""Plays of the corner engine in floating point: `c_runtime/plays/corners_float.c`, and what fixed point shares with it."""
+"""Plays of the corner engine in floating point: `c_runtime/plays/corners_float.c`, and what both arithmetics share."""
 
 from __future__ import annotations
 
