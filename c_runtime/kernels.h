@@ -1,5 +1,9 @@
 /* The functions that a shared run time offers to models. */
-#include "hystgen_runtime.h"
+#ifdef HYSTGEN_FIXED
+#include "plays/tables_fixed.h"
+#else
+#include "plays/tables_float.h"
+#endif
 #ifndef HYSTGEN_KERNELS_H
 #define HYSTGEN_KERNELS_H
 

@@ -391,7 +391,7 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
     ("a kept drive jumps", "effects/lag/quiet.c", "? last : a;", "? a : a;", "calm", "float32"),
     ("relaxing plays gain nothing", "effects/rate_dependence/relaxing.c",
      "HYSTGEN_LATE *", "0 *", "relaxing", "float32"),
-    ("a play is stretched to one side alone", "effects/rate_dependence/relaxing.c",
+    ("a play is stretched to one side alone", "effects/rate_dependence/stretch.c",
      "        return x + r;\n", "        return 0;\n", "relaxing", "float32"),
     ("the wrong half of a search is kept", "compensator/chain/moving_search.c", "sum < search->sum",
      "sum > search->sum", "dilated", "float32"),

@@ -2,10 +2,11 @@
    catalogue with a part.c. Called by the C files of those effects. */
 #ifndef HYSTGEN_ARITHMETIC_PRODUCT_C
 #define HYSTGEN_ARITHMETIC_PRODUCT_C
-#include "hystgen_runtime.h"
 #ifdef HYSTGEN_FIXED
+#include "compensator/chain/model.h"
 #include "arithmetic/factors.c"
 #endif
+#include "arithmetic/numbers.h"
 
 #ifdef HYSTGEN_FIXED
 /* x times a number from the table of a user's own block. */

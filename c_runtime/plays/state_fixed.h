@@ -1,6 +1,6 @@
 /* The memory of engine corners in fixed point. */
 #include "arithmetic/fixed.h"
-#include "hystgen_runtime.h"
+#include "arithmetic/numbers.h"
 #ifndef HYSTGEN_STATE_FIXED_H
 #define HYSTGEN_STATE_FIXED_H
 

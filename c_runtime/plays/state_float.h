@@ -1,5 +1,5 @@
 /* The memory of engine corners in floating point. */
-#include "hystgen_runtime.h"
+#include "arithmetic/numbers.h"
 #ifndef HYSTGEN_STATE_FLOAT_H
 #define HYSTGEN_STATE_FLOAT_H
 

@@ -1,6 +1,6 @@
 /* The constant tables of one model in fixed point. */
 #include "arithmetic/fixed.h"
-#include "hystgen_runtime.h"
+#include "plays/state_fixed.h"
 #ifndef HYSTGEN_TABLES_FIXED_H
 #define HYSTGEN_TABLES_FIXED_H
 

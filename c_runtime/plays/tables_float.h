@@ -1,5 +1,5 @@
 /* The constant tables of one model in floating point. */
-#include "hystgen_runtime.h"
+#include "plays/state_float.h"
 #ifndef HYSTGEN_TABLES_FLOAT_H
 #define HYSTGEN_TABLES_FLOAT_H
 

@@ -298,9 +298,9 @@ class Variant:
         elif not self.moves:
             plays = (solve, f"{chain}plays.c", refined)
         elif not self.bends:
-            plays = (f"{moving}relaxing.c", solve, f"{moving}relaxing_plays.c", refined)
+            plays = (f"{moving}stretch.c", f"{moving}relaxing.c", solve, f"{moving}relaxing_plays.c", refined)
         else:
-            before = {"relaxing": (f"{moving}relaxing.c",), "dashpot": (f"{moving}yield.c",)}.get(self.moves, ())
+            before = {"relaxing": (f"{moving}stretch.c",), "dashpot": (f"{moving}yield.c",)}.get(self.moves, ())
             moved = f"{moving}{'dashpot' if self.moves == 'dashpot' else 'moved'}.c"
             plays = (*before, "effects/noncongruent/bent.c", moved, f"{chain}moving_plays.c", f"{chain}moving_search.c",
                      refined)  # fmt: skip

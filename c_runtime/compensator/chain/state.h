@@ -1,5 +1,8 @@
 /* The memory of a model's effects in floating point. */
-#include "compensator/chain/model.h"
+#ifndef HYSTGEN_CHAIN
+#define HYSTGEN_CHAIN
+#endif
+#include "arithmetic/numbers.h"
 #ifndef HYSTGEN_CHAIN_STATE_H
 #define HYSTGEN_CHAIN_STATE_H
 

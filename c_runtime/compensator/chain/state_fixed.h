@@ -1,6 +1,9 @@
 /* The memory of a model's effects in fixed point. */
 #include "arithmetic/fixed.h"
-#include "compensator/chain/model.h"
+#ifndef HYSTGEN_CHAIN
+#define HYSTGEN_CHAIN
+#endif
+#include "arithmetic/numbers.h"
 #ifndef HYSTGEN_CHAIN_STATE_FIXED_H
 #define HYSTGEN_CHAIN_STATE_FIXED_H
 

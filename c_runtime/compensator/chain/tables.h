@@ -1,5 +1,8 @@
 /* The constants of a model's effects in floating point, for steps of HYSTGEN_SAMPLE_TIME. */
-#include "compensator/chain/model.h"
+#ifndef HYSTGEN_CHAIN
+#define HYSTGEN_CHAIN
+#endif
+#include "arithmetic/numbers.h"
 #ifndef HYSTGEN_CHAIN_TABLES_H
 #define HYSTGEN_CHAIN_TABLES_H
 

@@ -1,6 +1,9 @@
 /* The constants of a model's effects in fixed point, for steps of HYSTGEN_SAMPLE_TIME. */
 #include "arithmetic/fixed.h"
-#include "compensator/chain/model.h"
+#ifndef HYSTGEN_CHAIN
+#define HYSTGEN_CHAIN
+#endif
+#include "arithmetic/numbers.h"
 #ifndef HYSTGEN_CHAIN_TABLES_FIXED_H
 #define HYSTGEN_CHAIN_TABLES_FIXED_H
 

@@ -3,7 +3,9 @@
 #ifndef HYSTGEN_DELAY_FORWARD_C
 #define HYSTGEN_DELAY_FORWARD_C
 #include "compensator/chain/model.h"
+#ifdef HYSTGEN_HAS_DELAY
 #include "effects/delay/delay.c"
+#endif
 
 #ifdef HYSTGEN_HAS_DELAY
 /* The drive is v at this sample. Returns the delayed drive. */

@@ -4,7 +4,7 @@
 #define HYSTGEN_RATE_DEPENDENCE_MOVED_C
 #include "compensator/chain/model.h"
 #include "effects/noncongruent/bent.c"
-#include "effects/rate_dependence/relaxing.c"
+#include "effects/rate_dependence/stretch.c"
 #include "compensator/chain/signals.c"
 
 #ifdef HYSTGEN_HAS_RELAXING_PLAYS

@@ -2,25 +2,14 @@
    (`play`). At the end of a step its input w has stretched it by what lies beyond the threshold;
    the play gains a share of that. Exact while it slides or rests; contact that begins or ends
    within a step counts from the first touch. In fixed point a play stops where its stretch would
-   gain less than half a step of the plays' input in a sample. Called by relaxing_plays.c; moved.c
-   has the stretch from here. */
+   gain less than half a step of the plays' input in a sample. Called by relaxing_plays.c. */
 #ifndef HYSTGEN_RATE_DEPENDENCE_RELAXING_C
 #define HYSTGEN_RATE_DEPENDENCE_RELAXING_C
 #include "compensator/chain/model.h"
+#include "effects/rate_dependence/stretch.c"
 #ifdef HYSTGEN_FIXED
 #include "arithmetic/factors.c"
 #endif
-
-/* The part of x beyond +-r. */
-static hystgen_sum_t hystgen_stretch(hystgen_sum_t x, hystgen_play_t r) {
-    if (x > r) {
-        return x - r;
-    }
-    if (x < -r) {
-        return x + r;
-    }
-    return 0;
-}
 
 #ifdef HYSTGEN_FIXED
 /* Where play i rests: at most as far from the play before as their thresholds are from each other,

@@ -1,0 +1,71 @@
+/* The types of a model's numbers and the storage classes of its functions, by arithmetic. Needed by
+   every other file. */
+#ifndef HYSTGEN_NUMBERS_H
+#define HYSTGEN_NUMBERS_H
+
+#include <float.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+#include "arithmetic/build.h"
+#include "arithmetic/soft_float.h"
+
+/* Types of a model's numbers: in floating point all the same, in fixed point integers as wide as
+   they have to be. play: inputs of the plays; reach: where plays start to follow; sum: outputs
+   before they are rounded; low: the lower part of a sum that a corner keeps. */
+#if defined(HYSTGEN_FIXED)
+#ifdef HYSTGEN_REAL_IS_SHORT
+typedef int32_t hystgen_reach_t;
+typedef int16_t hystgen_real_t;
+typedef uint16_t hystgen_low_t;
+#define HYSTGEN_LOW_BITS 16
+#else
+typedef int64_t hystgen_reach_t;
+typedef int32_t hystgen_real_t;
+typedef uint32_t hystgen_low_t;
+#define HYSTGEN_LOW_BITS 32
+#endif
+typedef int32_t hystgen_play_t;
+typedef int64_t hystgen_sum_t;
+#else
+#ifdef HYSTGEN_REAL_IS_DOUBLE
+typedef double hystgen_real_t;
+#define HYSTGEN_REAL_MAX DBL_MAX
+#else
+typedef float hystgen_real_t;
+#define HYSTGEN_REAL_MAX FLT_MAX
+#endif
+typedef hystgen_real_t hystgen_play_t;
+typedef hystgen_real_t hystgen_reach_t;
+typedef hystgen_real_t hystgen_sum_t;
+#endif
+
+/* In a model with effects, signal: between its blocks, in fixed point wider than codes; fine: a
+   drive in front of its plays, in fixed point with bits below a code; travel: the distance that the
+   drive has covered. Without effects, and in floating point, all of them have the caller's type. */
+#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
+typedef hystgen_sum_t hystgen_signal_t;
+typedef hystgen_play_t hystgen_fine_t;
+typedef hystgen_sum_t hystgen_travel_t;
+#else
+typedef hystgen_real_t hystgen_signal_t;
+typedef hystgen_real_t hystgen_fine_t;
+typedef hystgen_real_t hystgen_travel_t;
+typedef hystgen_real_t hystgen_number_t;
+#define HYSTGEN_FINE_MIN HYSTGEN_DRIVE_MIN
+#define HYSTGEN_FINE_MAX HYSTGEN_DRIVE_MAX
+#define hystgen_clamp_fine hystgen_clamp_drive
+#endif
+
+/* Storage classes of functions in emitted files: kernels are static where a model has its own copy;
+   some are kept from being inlined there, to need less stack. */
+#include "arithmetic/storage.h"
+#define HYSTGEN_API
+#define HYSTGEN_KERNEL
+#define HYSTGEN_FIXED_KERNEL
+#define HYSTGEN_APART_IN_FLOAT_CORNERS HYSTGEN_APART
+#define HYSTGEN_APART_IN_FIXED HYSTGEN_APART
+#define HYSTGEN_APART_IN_FLOAT HYSTGEN_APART
+#define HYSTGEN_APART_BUT_IN_FLOAT_LOOP HYSTGEN_APART
+
+#endif
