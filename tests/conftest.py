@@ -16,6 +16,8 @@ from hypothesis import settings
 settings.register_profile("hystgen", deadline=None)
 settings.load_profile("hystgen")
 
+pytest_plugins = ["processor_time"]
+
 MEASURED = Path(os.environ.get("HYSTGEN_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
 """Folder of the measured records, which the project does not ship: not all of them may be passed on."""
 

@@ -11,7 +11,7 @@ The runs:
 - blind: `make blind`, the cases of the report block, seeds from 0 (single 260, pair 80, none 200, foreign 100, poor 65,
   snr 130); `blind none` is that kind alone;
 - tune: the same commands with `--block tune`, whose cases may be looked at;
-- second_plants: `python -m tests.second_plants --kind KIND --seeds SEEDS`, cases of a second simulator;
+- second_plants: `python -m benchmarks.second_plants --kind KIND --seeds SEEDS`, cases of a second simulator;
 - `disturbances::test_x`: the test of `tests/test_disturbances.py` that fails when the number is doubled, or halved.
 
 `docs/thresholds.csv` lists such tests for every number, each with its case; `python -m tests.threshold_mutants --write`
