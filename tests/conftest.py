@@ -64,6 +64,15 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]
     return call
 
 
+@pytest.fixture(autouse=True)
+def _short_records(request: pytest.FixtureRequest) -> None:
+    """In `make test`, every test may run short records as Python, as a command in a process of its own does."""
+    if request.config.option.markexpr == "not thorough":
+        from hystgen.basics import jit
+
+        jit._samples.clear()
+
+
 @pytest.fixture
 def brief(request: pytest.FixtureRequest) -> Iterator[bool]:
     """Whether `make test` runs; models with effects are then computed in Python, which for short records takes less
