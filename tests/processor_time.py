@@ -3,13 +3,16 @@
     python -m pytest --cpu build/cpu.csv ..
 
 Kinds are `python`, `numba` (compiling), and the command of each process that a test waited for; processes of a pool
-count as `python`. A fixture of several tests is charged to the first of them.
+count as `python`. A fixture of several tests is charged to the first of them. Without `--cpu`, what is compiled in the
+test that imports numba counts as `python`: the import takes too long for a run of few tests.
 """
 
 from __future__ import annotations
 
 import contextlib
 import csv
+import importlib
+import importlib.util
 import os
 import resource
 import subprocess
@@ -110,6 +113,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     times = config.stash[TIMES] = Times()
+    if config.option.cpu and importlib.util.find_spec("numba"):
+        importlib.import_module("numba")
 
     def try_wait(self: subprocess.Popen[Any], flags: int) -> tuple[int, int]:
         try:
