@@ -43,7 +43,7 @@ check: $(VENV)/ready lint
 	$(BIN)/python tests/static_checks.py
 	$(BIN)/python -m pytest -n 2
 
-# All proofs of Frama-C, which has to be there; `make check` does half of them
+# All proofs of Frama-C, which has to be there; `make check` does a third of them
 prove: $(VENV)/ready
 	CI=true HYSTGEN_WHOLE=1 $(BIN)/python -m pytest -n 2 tests/test_proof.py
 

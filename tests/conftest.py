@@ -64,13 +64,13 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]
     return call
 
 
-@pytest.fixture(autouse=True)
-def _short_records(request: pytest.FixtureRequest) -> None:
-    """In `make test`, every test may run short records as Python, as a command in a process of its own does."""
-    if request.config.option.markexpr == "not thorough":
-        from hystgen.basics import jit
+@pytest.fixture(autouse=True, scope="session")
+def _short_records() -> None:
+    """Compile for more samples than a user's process does: few tests run as many, and each function would be compiled
+    in four types."""
+    from hystgen.basics import jit
 
-        jit._samples.clear()
+    jit.SHORT = 10 * jit.SHORT
 
 
 @pytest.fixture

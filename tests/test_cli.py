@@ -693,7 +693,7 @@ def test_a_compiler_that_is_not_installed_fails_and_is_named(monkeypatch: pytest
         assert suite.get("failures") == "0"
 
 
-@pytest.mark.usefixtures("_short")
+@pytest.mark.usefixtures("_few")
 def test_a_compiler_that_does_not_exist_fails_and_is_named(installed: str) -> None:
     Path("linear.yaml").write_text(FILES["linear"])
     result = hyst("verify", "linear.yaml", "--compiler", "no-such-cc", "--compiler", installed, code=2)
