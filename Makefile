@@ -43,7 +43,7 @@ check: $(VENV)/ready lint
 	$(BIN)/python tests/static_checks.py
 	$(BIN)/python -m pytest -n 2
 
-# All proofs of Frama-C, which has to be there; `make check` does half of them
+# All proofs of Frama-C, which has to be there; `make check` does a third of them
 prove: $(VENV)/ready
 	CI=true HYSTGEN_WHOLE=1 $(BIN)/python -m pytest -n 2 tests/test_proof.py
 
@@ -61,15 +61,15 @@ check-bounds: $(VENV)/ready
 
 # Makes the cases with their labels, has them diagnosed and counts; a case whose result is there is not run again
 blind: $(VENV)/ready
-	set -e; for part in $(BLIND); do $(BIN)/python -m tests.plants generate --block report --kind $${part%=*} \
+	set -e; for part in $(BLIND); do $(BIN)/python -m benchmarks.plants generate --block report --kind $${part%=*} \
 	    --seeds $(FIRST):$$(($(FIRST) + $${part#*=})) -o $(BLIND_DIR) --jobs $(JOBS); done
-	$(BIN)/python -m tests.plants run $(BLIND_DIR)/cases -o $(BLIND_DIR)/results --jobs $(JOBS)
-	$(BIN)/python -m tests.plants score $(BLIND_DIR)/cases $(BLIND_DIR)/labels $(BLIND_DIR)/results \
+	$(BIN)/python -m benchmarks.plants run $(BLIND_DIR)/cases -o $(BLIND_DIR)/results --jobs $(JOBS)
+	$(BIN)/python -m benchmarks.plants score $(BLIND_DIR)/cases $(BLIND_DIR)/labels $(BLIND_DIR)/results \
 	    --json $(BLIND_DIR)/score.json
 
 # Blind plants behind compensators made from their records, four an effect
 track: $(VENV)/ready
-	$(BIN)/python -m tests.plants track --seeds 0:5 --jobs $(JOBS)
+	$(BIN)/python -m benchmarks.plants track --seeds 0:5 --jobs $(JOBS)
 
 # The documentation as a site, build/docs/index.html; needs Debian's doxygen
 docs: $(VENV)/ready

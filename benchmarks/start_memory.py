@@ -21,12 +21,9 @@ import sys
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from second_plants import NOISE as NOISE_SHARE
 from second_plants import Stage
 

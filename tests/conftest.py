@@ -16,6 +16,8 @@ from hypothesis import settings
 settings.register_profile("hystgen", deadline=None)
 settings.load_profile("hystgen")
 
+pytest_plugins = ["processor_time"]
+
 MEASURED = Path(os.environ.get("HYSTGEN_DATA") or Path(__file__).resolve().parents[2] / "shared" / "data")
 """Folder of the measured records, which the project does not ship: not all of them may be passed on."""
 
@@ -60,6 +62,15 @@ def run(capfd: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]
         return int(stopped.value.code or 0), out, "\n".join(printed)
 
     return call
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _short_records() -> None:
+    """Compile for more samples than a user's process does: few tests run as many, and each function would be compiled
+    in four types."""
+    from hystgen.basics import jit
+
+    jit.SHORT = 10 * jit.SHORT
 
 
 @pytest.fixture

@@ -75,7 +75,7 @@ def record(one: tables.Compiled, seed: int, n: int = N, share: float = 1.0) -> R
     return Run(np.arange(n) * T, np.clip(np.float32(u).astype(float), low, high), {"temperature": 20.0 + u})
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=4)
 @pytest.mark.thorough(but_one_in=8)
 @pytest.mark.parametrize("name", CHAINS)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
@@ -86,7 +86,7 @@ def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str, brief: bo
     assert {row.operator for row in report.rows} >= ({"inverse"} if operator(name) == "inverse" else {"forward"})
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=3)
 @pytest.mark.thorough
 @pytest.mark.parametrize(
     ("name", "arithmetic"),
@@ -229,6 +229,7 @@ EXACT = dict.fromkeys(("creeping", "logarithmic", "warm", "quick", "dilated", "b
 standing still, which matters where plays catch up within one."""
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.thorough(but_one_in=6)
 @pytest.mark.parametrize("name", EXACT)
 @pytest.mark.parametrize("seed", range(3))

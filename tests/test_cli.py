@@ -618,6 +618,12 @@ def installed() -> str:
 
 
 @pytest.fixture
+def _few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Verification records so short that nothing is compiled for their answers."""
+    monkeypatch.setattr(verification, "verify", partial(verification.verify, length=50))
+
+
+@pytest.fixture
 def _short(monkeypatch: pytest.MonkeyPatch) -> None:
     """Short verification records."""
     monkeypatch.setattr(verification, "verify", partial(verification.verify, length=LENGTH))
@@ -636,6 +642,7 @@ def report(path: str = "r.json") -> dict[str, Any]:
     return found
 
 
+@pytest.mark.thorough
 def test_verify_as_a_ci_job_runs_it(installed: str) -> None:
     Path("linear.yaml").write_text(FILES["linear"])
     done = process("verify", "linear.yaml", "--compiler", installed, "--json", "r.json", "--junit", "r.xml")
@@ -658,7 +665,7 @@ def test_verify_as_a_ci_job_runs_it(installed: str) -> None:
     assert not suite.findall(".//failure")
 
 
-@pytest.mark.usefixtures("_short")
+@pytest.mark.usefixtures("_few")
 def test_verify_compares_what_it_is_asked_for(installed: str) -> None:
     result = hyst("verify", "stage.yaml", "--compiler", installed, "--operator", "both", "--arithmetic", "float64",
                   "--engine", "loop", "--layout", "single-header", "--json", "r.json")  # fmt: skip
@@ -686,7 +693,7 @@ def test_a_compiler_that_is_not_installed_fails_and_is_named(monkeypatch: pytest
         assert suite.get("failures") == "0"
 
 
-@pytest.mark.usefixtures("_short")
+@pytest.mark.usefixtures("_few")
 def test_a_compiler_that_does_not_exist_fails_and_is_named(installed: str) -> None:
     Path("linear.yaml").write_text(FILES["linear"])
     result = hyst("verify", "linear.yaml", "--compiler", "no-such-cc", "--compiler", installed, code=2)
@@ -747,7 +754,7 @@ def test_one_model_that_is_refused_stops_all_before_any_runs() -> None:
     assert everything() == before
 
 
-@pytest.mark.usefixtures("_short")
+@pytest.mark.usefixtures("_few")
 @pytest.mark.parametrize(
     ("weights", "effect", "more"),
     [

@@ -1,4 +1,4 @@
-"""Diagnosis: on plants that share nothing with the package, made by `tests/plants`, and on measured records."""
+"""Diagnosis: on plants that share nothing with the package, made by `benchmarks/plants`, and on measured records."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ from recordings import brute_output, noisy, part_of_file, record, wander, write_
 from scipy.signal import lfilter
 
 import hystgen
+from benchmarks.plants import run as plants_run
+from benchmarks.plants.__main__ import main as plants
 from hystgen.basics import parallel
 from hystgen.diagnosis import Diagnosis
 from hystgen.diagnosis.data import items, preparing
@@ -49,8 +51,6 @@ from hystgen.effects.sensor_nonlinearity.model import SensorPolynomial
 from hystgen.identification.joint import Bent, DeadZones, Ends, Kept
 from hystgen.records import Record, read_record
 from hystgen.report import diagnosis as report
-from tests.plants import run as plants_run
-from tests.plants.__main__ import main as plants
 
 Array = NDArray[np.float64]
 Call = Callable[..., tuple[int, str, str]]

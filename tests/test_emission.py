@@ -63,7 +63,7 @@ def check_codegen(name: str, **options: str) -> None:
     assert {row.operator for row in report.rows} == {"forward", "inverse"}
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=4)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
 @pytest.mark.parametrize("name", FILES)
@@ -239,7 +239,7 @@ def test_bits_equal_in_other_layouts(name: str, arithmetic: str, layout: str) ->
     check_codegen(name, arithmetic=arithmetic, layout=layout)
 
 
-@pytest.mark.slow(one_in=3)
+@pytest.mark.slow(one_in=6)
 @pytest.mark.thorough(but_one_in=24)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
@@ -272,7 +272,7 @@ ALONE = [
 """Every layout with both operators, every operator in one layout; all of them together of two models."""
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=5)
 @pytest.mark.parametrize(("name", "operator", "layout"), ALONE)
 @pytest.mark.thorough
 def test_compiles_clean_and_alone(name: str, operator: str, layout: str, tmp_path: Path) -> None:

@@ -100,6 +100,7 @@ BRANCHED = ("lagging", "aged", "everything", "relaxing")
 """Chains with two branches of the memoryless part: now and then fixed point takes the other one for a sample."""
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.thorough(but_one_in=8)
 @pytest.mark.parametrize("name", CHAINS)
 @BOTH

@@ -5,10 +5,12 @@ from __future__ import annotations
 import subprocess
 import sys
 import warnings
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from modelfiles import CHAINS, FILES
 
@@ -70,6 +72,7 @@ def test_without_numba_the_bit_reference_gives_the_same_bits(
     """Over the records of `verify`, and without a warning of numpy."""
     tables = Model(parse_parameters({**FILES, **CHAINS}[name])).tables(arithmetic, engine)
     found = []
+    monkeypatch.setattr(jitting, "SHORT", 0)
     for has_numba in (True, False):
         monkeypatch.setattr(jitting, "_has_numba", lambda there=has_numba: there)
         with warnings.catch_warnings():
@@ -79,6 +82,21 @@ def test_without_numba_the_bit_reference_gives_the_same_bits(
     for compiled, interpreted in zip(*found, strict=True):
         assert interpreted.answer.tobytes() == compiled.answer.tobytes(), compiled.name
         assert interpreted.status.tobytes() == compiled.status.tobytes(), compiled.name
+
+
+def test_short_records_are_not_compiled_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first samples of a function and type run as Python, those behind them and all of a long record do not."""
+
+    def as_python(samples: int, dtype: type[np.generic] = np.float64, function: Jit[..., Any] = tripled) -> bool:
+        with jitting.for_samples(function, np.zeros(samples, dtype)):
+            return jitting._plain.get()
+
+    monkeypatch.setattr(jitting, "_samples", Counter())
+    some = jitting.SHORT // 2
+    assert not as_python(jitting.SHORT + 1)
+    assert [as_python(some) for _ in range(3)] == [True, True, False]
+    assert as_python(some, np.float32)
+    assert as_python(some, function=sixfold)
 
 
 def test_a_factory_makes_functions_of_what_it_is_given() -> None:

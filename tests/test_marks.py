@@ -1,7 +1,8 @@
-"""The marks of the tests: what is left out where, and that it is counted."""
+"""The marks of the tests: what is left out where, and that it is counted; and the count of processor time."""
 
 from __future__ import annotations
 
+import csv
 import os
 import re
 import subprocess
@@ -19,7 +20,8 @@ ONE_PROCESS_AND_XDIST = pytest.mark.parametrize("options", [(), ("-n", "1")], id
 
 def call(folder: Path, tests: str, *options: str, **environment: str) -> tuple[int, str]:
     """Run these tests under the settings of the suite: exit code and what was printed."""
-    (folder / "conftest.py").write_text(CONFTEST.read_text())
+    for name in ("conftest.py", "processor_time.py"):
+        (folder / name).write_text(CONFTEST.with_name(name).read_text())
     (folder / "pytest.ini").write_text("[pytest]\nmarkers =\n  data: needs records\n  slow: long\n  thorough: deep\n")
     (folder / "test_few.py").write_text(tests)
     kept = {k: x for k, x in os.environ.items() if k not in OWN}
@@ -115,3 +117,30 @@ class TestThorough:
         code, text = call(tmp_path, self.TESTS, *options, HYSTGEN_DATA=str(tmp_path))
         assert code == 0, text
         assert "6 passed" in text
+
+
+class TestProcessorTime:
+    TESTS = (
+        "import subprocess, sys, time\n"
+        "def spend(seconds):\n"
+        "    until = time.process_time() + seconds\n"
+        "    while time.process_time() < until:\n        pass\n"
+        "def test_here():\n    spend(0.4)\n"
+        "def test_below():\n"
+        "    code = 'import time\\nwhile time.process_time() < 0.6:\\n    pass'\n"
+        "    subprocess.run([sys.executable, '-c', code], check=True)\n"
+        "def test_waits():\n    time.sleep(0.5)\n"
+    )
+
+    @ONE_PROCESS_AND_XDIST
+    def test_is_counted_by_test_and_kind(self, options: tuple[str, ...], tmp_path: Path) -> None:
+        code, text = call(tmp_path, self.TESTS, *options, "--cpu", str(tmp_path / "cpu.csv"))
+        assert code == 0, text
+        assert re.search(r"\d+ s of processor time, by file: test_few.py \d+", text)
+        with (tmp_path / "cpu.csv").open(newline="") as file:
+            rows = {row["test"].partition("::")[2]: row for row in csv.DictReader(file)}
+        assert [*rows] == ["test_below", "test_here", "test_waits"], "the most expensive first"
+        assert float(rows["test_here"]["python"]) >= 0.4
+        assert float(rows["test_below"]["python -c"]) >= 0.6
+        assert float(rows["test_below"]["python"]) < 0.4
+        assert float(rows["test_waits"]["all"]) < 0.4

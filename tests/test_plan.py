@@ -15,19 +15,19 @@ import pytest
 from modelfiles import head
 
 import hystgen
+from benchmarks.plants.__main__ import main as plants
+from benchmarks.plants.effects import catalogue
 from hystgen import effects
 from hystgen.basics.problems import PlanError
 from hystgen.planning import waveforms
 from hystgen.report.plan import Plan
-from tests.plants.__main__ import main as plants
-from tests.plants.effects import catalogue
 
 pytestmark = pytest.mark.thorough
 
 Call = Callable[..., tuple[int, str, str]]
 
 SAMPLE = ("asymmetry", "delay", "slew_limit", "thermal")
-"""Effects that every run of the tests hides; `tests.plants` says how to hide them all."""
+"""Effects that every run of the tests hides; `benchmarks.plants` says how to hide them all."""
 
 
 def file_of(folder: Path, low: float = -20.0, high: float = 120.0, more: str = "") -> Path:

@@ -19,12 +19,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from benchmarks.plants import base, bench, case, effects, foreign, labels, refit, rivals, run, score, session, track
+from benchmarks.plants.__main__ import main
+from benchmarks.plants.effects import Effect, Surroundings, drive_side, output_side, slow
+from benchmarks.plants.plant import Plant
 from hystgen.parameters.files import load_parameters
 from hystgen.records import read_record
-from tests.plants import base, bench, case, effects, foreign, labels, refit, rivals, run, score, session, track
-from tests.plants.__main__ import main
-from tests.plants.effects import Effect, Surroundings, drive_side, output_side, slow
-from tests.plants.plant import Plant
 
 pytestmark = pytest.mark.thorough
 
@@ -326,7 +326,7 @@ class TestRecords:
             assert found.noise() == pytest.approx(converters.noise, rel=0.25)
 
     def test_colours_of_noise(self) -> None:
-        from tests.plants.measure import coloured
+        from benchmarks.plants.measure import coloured
 
         rng = np.random.default_rng(0)
         for colour, least, most in (("white", -0.02, 0.02), ("mixed", 0.35, 0.6), ("pink", 0.4, 0.8)):
@@ -417,7 +417,7 @@ class TestRivals:
         assert 0.0 < labels.compared(falling, found.plant)["sensor_nonlinearity"] < math.inf
 
     def test_a_slow_record_leaves_lag_and_delay_open(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        from tests.plants import drives, measure
+        from benchmarks.plants import drives, measure
 
         rng = np.random.default_rng(1)
         stand = bench.Bench("dynamic", 0.0, 100.0, 40.0, (2000.0, 2000.0), 900)

@@ -119,7 +119,7 @@ def test_every_core_gives_the_bits_of_the_reference(name: str, engine: str) -> N
                 assert 0 <= (row.stack or 0) < 400
 
 
-@pytest.mark.slow(one_in=3)
+@pytest.mark.slow(one_in=6)
 @pytest.mark.parametrize("operator", ["both", "inverse"])
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
@@ -289,7 +289,7 @@ def needs_avr() -> None:
         pytest.skip("no AVR here")
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=4)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["plain", "bent", "curved", "two_branches"])
@@ -343,7 +343,7 @@ def test_the_self_test_passes_on_the_avr_as_cpp(arithmetic: str, tmp_path: Path)
     assert avr.run(targets.AVR, avr.link(targets.AVR, written, objects, tmp_path)) == 0
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=5)
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["plain", "listed", "bent", "curved", "mixed"])

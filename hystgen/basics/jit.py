@@ -14,6 +14,7 @@ written to, nothing is cached; cached files that cannot be read are made again.
 
 from __future__ import annotations
 
+import collections
 import contextlib
 import contextvars
 import functools
@@ -25,6 +26,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Generic, ParamSpec, TypeVar, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hystgen.basics import extras
 
@@ -52,6 +54,13 @@ OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "nogil": True}
 
 _plain = contextvars.ContextVar("plain", default=False)
 
+SHORT = 10_000
+"""[samples] As many of one function and type run as Python in a process before it is compiled or loaded: 0.3 s of a
+plain model, whose functions take 8 s to compile, and 1 s with many effects, where that takes 80 s. Set by: `verify` of
+`mixed` and `everything` of tests/modelfiles.py, inverse, 0.035 and 0.10 ms a sample."""
+
+_samples: collections.Counter[tuple[Any, np.dtype[Any]]] = collections.Counter()
+
 
 @contextlib.contextmanager
 def plain() -> Iterator[None]:
@@ -65,6 +74,15 @@ def plain() -> Iterator[None]:
             yield
     finally:
         _plain.reset(before)
+
+
+def for_samples(function: Jit[..., Any], samples: NDArray[Any]) -> contextlib.AbstractContextManager[None]:
+    """As `plain` while `function` has been given few samples of their type in this process, and otherwise nothing."""
+    key = function, samples.dtype
+    if _samples[key] + len(samples) > SHORT:
+        return contextlib.nullcontext()
+    _samples[key] += len(samples)
+    return plain()
 
 
 class Jit(Generic[P, R]):

@@ -3,7 +3,6 @@ double precision, over sampled signals."""
 
 from __future__ import annotations
 
-import contextlib
 import functools
 from collections.abc import Iterable
 from types import ModuleType
@@ -160,7 +159,7 @@ def answers(
     code, state = operations(t), new_state(t, inverse)
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
-    with contextlib.nullcontext() if compiled else jit.plain():
+    with jit.for_samples(code.run, x) if compiled else jit.plain():
         code.init(t, state, int(inverse))
         code.run(t, state, int(inverse), np.asarray(call, dtype=np.uint8), x, found, status)
     return found, status
@@ -204,7 +203,8 @@ class Session:
 
     def init(self) -> None:
         """Back to the start memory."""
-        self._code.init(self.tables, self.state, self._inverse)
+        with jit.plain():  # one pass over the plays is not worth compiling
+            self._code.init(self.tables, self.state, self._inverse)
 
     @property
     def inverse(self) -> bool:
@@ -226,8 +226,9 @@ class Session:
             inputs = [self._cascade.front(float(v), up) for v in seen for up in (True, False)]
             self.tables = self._build(visited=[float(w) for w in inputs])
             self.init()
-        for drive in seen:
-            self._code.visit(self.tables, self.state, self._inverse, drive)
+        with jit.for_samples(self._code.visit, seen):
+            for drive in seen:
+                self._code.visit(self.tables, self.state, self._inverse, drive)
 
     def run(self, x: ArrayLike) -> tuple[NDArray[Any], Bytes]:
         """Answers (N,) for the input samples (N,), and the status bits of each sample.
@@ -249,5 +250,6 @@ class Session:
         the status bits."""
         answers = np.zeros_like(x)
         status = np.zeros(len(x), dtype=np.uint8)
-        self._code.run(self.tables, self.state, self._inverse, op, x, answers, status)
+        with jit.for_samples(self._code.run, x):
+            self._code.run(self.tables, self.state, self._inverse, op, x, answers, status)
         return answers, status

@@ -11,12 +11,13 @@ The runs:
 - blind: `make blind`, the cases of the report block, seeds from 0 (single 260, pair 80, none 200, foreign 100, poor 65,
   snr 130); `blind none` is that kind alone;
 - tune: the same commands with `--block tune`, whose cases may be looked at;
-- second_plants: `python -m tests.second_plants --kind KIND --seeds SEEDS`, cases of a second simulator;
-- `disturbances::test_x`: the test of `tests/test_disturbances.py` that fails when the number is doubled, or halved.
+- second_plants: `python -m benchmarks.second_plants --kind KIND --seeds SEEDS`, cases of a second simulator;
+- acceptance::x: the row x of the table in `tests/test_acceptance.py`, which answers otherwise when the number is
+  doubled or halved; selection::test_x is a test of `tests/test_selection.py` that then fails.
 
-`docs/thresholds.csv` lists such tests for every number, each with its case; `python -m tests.threshold_mutants --write`
-renews it. Other modules read the numbers as attributes of this one, so that a test can change a number in one place.
-Tolerances of searches and sizes of caches, which decide nothing, are in the modules that use them.
+`docs/thresholds.csv` lists them for every number. Other modules read the numbers as attributes of this one, so that a
+test can change a number in one place. Tolerances of searches and sizes of caches, which decide nothing, are in the
+modules that use them.
 """
 
 from __future__ import annotations
@@ -99,18 +100,18 @@ P_DIFFERENT = 0.01
 
 BLOCK_MEMORIES = 2.0
 """[correlation times] Length of the blocks of samples that a test takes as independent: at this length neighbouring
-blocks are hardly correlated. Changed by: blind none, acceptance::test_blocks_are_longer_than_errors_remember."""
+blocks are hardly correlated. Changed by: blind none, acceptance::blocks_are_longer_than_errors_remember."""
 
 BLOCKS = 20
 """[blocks] A record is cut into at least this many, even if its errors are correlated over longer than that allows.
-Changed by: acceptance::test_blocks_are_longer_than_errors_remember."""
+Changed by: acceptance::blocks_are_longer_than_errors_remember."""
 
 SEEN_IN_BOTH = 0.25
 """[times the remaining error or the noise] An effect that removes `FIRST_REMOVES` or `FURTHER_REMOVES` from the fitted
 or the held-out records removes at least this from the others; an error that only one of them shows may belong to
 another effect. With 0.5 one of ten pairs loses its second name; with 0.25 none does, nor with 0, without a false name
 in 24 further cases. Set by: tune pair 0:10; with 0 also tune single, none and poor 0:8. Changed by: blind pair,
-acceptance::test_an_effect_has_to_show_in_both."""
+acceptance::an_effect_has_to_show_in_both."""
 
 ALIKE = 0.25
 """[share of the held-out rms] Two effects whose errors differ by less than this are not separable, unless the p-value
@@ -126,13 +127,13 @@ FAR_LESS = 0.5
 held-out records, whose error may mostly belong to yet another effect. Chance does not let a held-out error fall this
 far, since nothing was fitted to it: a rate dependence beside creep left a third, shown in a few steps, with p = 0.12 by
 blocks. Set by (the latter): second_plants pair 2004. Changed by:
-acceptance::test_equal_effects_come_in_the_order_of_the_catalogue,
-acceptance::test_what_chance_does_not_explain."""
+acceptance::equal_effects_come_in_the_order_of_the_catalogue,
+acceptance::what_chance_does_not_explain."""
 
 EQUAL = 0.005
 """[share of an error] Errors that differ by less than this are equal, however certain the difference is, and
 `selection.place` decides. The last steps of a search change an error by far less. Changed by:
-acceptance::test_equal_effects_come_in_the_order_of_the_catalogue."""
+acceptance::equal_effects_come_in_the_order_of_the_catalogue."""
 
 MOST_OF_GAP = 0.5
 """[share of the gap above the noise] Records of one loop support a name only if it leaves at most this, and leave open
@@ -144,21 +145,21 @@ LEAST_EXPLAINED = 0.5
 the fitted records, so that most is explained. Effects explain less of a disturbance: room temperature acting on the
 gain, and a slow crosstalk line, kept 0.74 to 0.79 of the fitted variance under false names; right names left at most
 0.28. Set by: second_plants foreign 0:10, single 0:13. Changed by:
-acceptance::test_names_near_the_noise_explain_half."""
+acceptance::names_near_the_noise_explain_half."""
 
 MOSTLY_EXPLAINED = 1.0 / 3.0
 """[share of the variance above the noise] The same limit if the names leave more than `MUCH_LEFT`, as wrong names do:
 they then have to explain two thirds. Room temperature acting on the gain kept 0.39 to 0.41 under the names of ageing
 and self-heating; right names left at most 0.30, beside a second effect that was not found. Set by: second_plants
 foreign 300:308, single and pair 300:312. Changed by: second_plants foreign 400:410,
-acceptance::test_names_explain_most."""
+acceptance::names_explain_most."""
 
 MUCH_LEFT = 3.0
 """[times the noise floor] If the named effects leave more than this, the verdict begins with what they leave, and none
 has a name if a number of one is at an end of its range and more than `END_LEAVES` remains. Of 457 blind cases much was
 left with a number at an end for two disturbances by room temperature, and for one pair. Set by (the latter):
 second_plants foreign 11001, 11006, pair 8012, blind first 97000. Changed by: blind single,
-acceptance::test_what_a_verdict_says_first."""
+acceptance::what_a_verdict_says_first."""
 
 END_LEAVES = 0.105
 """[share of the gap above the noise, rms] Where more than `MUCH_LEFT` remains and a number of an effect is at an end of
@@ -179,13 +180,13 @@ selection::test_how_often_a_range_is_widened."""
 FEW_COMPARED = 0.25
 """[share of the samples] If fewer samples were compared, the verdict says so first and names nothing. Of blind records
 without a known history at least 0.5 are compared, of a test whose amplitude grows to its end 0.02 to 0.06. Set by:
-blind, all kinds, first 71000, and second_plants. Changed by: acceptance::test_what_a_verdict_says_first."""
+blind, all kinds, first 71000, and second_plants. Changed by: acceptance::what_a_verdict_says_first."""
 
 FLAT_END = 0.005
 """[share of the drive range] A limit that begins closer to both ends than this is no name: it is met where the drive
 rests at its end, and a few samples elsewhere, so that it is another offset of those rests, which what is left of creep
 asks for. Wrong ones began at 0.0016 of the range, right ones at 0.0128 and more. Set by: second_plants single 9100 and
-9165, blind pair and poor first 97000. Changed by: acceptance::test_a_limit_at_the_very_end_of_the_drive."""
+9165, blind pair and poor first 97000. Changed by: acceptance::a_limit_at_the_very_end_of_the_drive."""
 
 MOST_EFFECTS = 5
 """[effects] The search adds at most this many: no case of any block has more than two. Changed by: run time of
@@ -200,7 +201,7 @@ other forever. Changed by: run time of blind."""
 
 HELD_OUT_ALONE = 3.0
 """[times the fitted error] A held-out record with a larger error shows something that no fitted record does. Changed
-by: acceptance::test_held_out_records_that_are_alone."""
+by: acceptance::held_out_records_that_are_alone."""
 
 # How far a search goes ---------------------------------------------------------------------------------------
 
@@ -256,7 +257,7 @@ TWIN = 0.02
 """[share of the errors] An effect whose fitted and held-out errors are within this of a kept one's is followed up too;
 otherwise chance would decide whether a lag or a delay is dropped. So is a shape with fewer numbers than those of its
 effect that are kept: a front that bends one way left 1 % more than one that bends both ways, and was dropped for it.
-Set by (the latter): second_plants single 8001. Changed by: acceptance::TestScreening::test_a_twin_follows."""
+Set by (the latter): second_plants single 8001. Changed by: acceptance::a_twin_follows."""
 
 PROMISING = 2.0
 """[times the error of the best shape] A shape with larger fitted and held-out errors is not searched jointly. Changed
@@ -290,11 +291,11 @@ saturation."""
 NOMINAL_RANGE = 3.0
 """[factor] Numbers of the nominal model's effects are refitted to at most this times their value, and at least this
 part of it: farther off, it would be a different effect. Changed by:
-acceptance::TestNominal::test_numbers_move_by_up_to_a_factor."""
+acceptance::numbers_move_by_up_to_a_factor."""
 
 SINGLE_FACTORS = 4
 """[numbers] A longer list of numbers is refitted with one common factor: a factor for each would make every list a fit
-of its own. Changed by: acceptance::TestNominal::test_long_lists_have_one_factor."""
+of its own. Changed by: acceptance::long_lists_have_one_factor."""
 
 TOUCHING = 1e-6
 """[share of the slack] A nominal front may violate its constraints by this: files round to ten digits. Derived."""
@@ -302,52 +303,52 @@ TOUCHING = 1e-6
 START_SPAN = 2.0
 """[times the recorded drive range] The drive that the start state comes from lies within a range at most this wide:
 from farther off, the response to it would explain a drift. Changed by:
-acceptance::test_what_limits_the_start_of_an_effect."""
+acceptance::what_limits_the_start_of_an_effect."""
 
 # What a front is called --------------------------------------------------------------------------------------
 
 LIMITER_STRAIGHT = 0.6
 """[share of the range] A limiter has the slope of its middle over at least this. Changed by:
-acceptance::test_what_a_front_is_called."""
+acceptance::what_a_front_is_called."""
 
 LIMITER_NEAR = 0.1
 """[share of the range of slopes] A slope within this of the middle one counts as equal to it. Changed by:
-acceptance::test_what_a_front_is_called."""
+acceptance::what_a_front_is_called."""
 
 LIMITER_SLOPE = 0.6
 """[times the middle slope] A front whose slope at an end is smaller than this is a limit for certain. Changed by:
-acceptance::test_what_a_front_is_called."""
+acceptance::what_a_front_is_called."""
 
 ODD_FRONT = 2.0
 """[times] A front saturates if its odd bend has more than this times the power of its even bend. Changed by:
-acceptance::test_what_a_front_is_called."""
+acceptance::what_a_front_is_called."""
 
 # Which records are fitted and held out -----------------------------------------------------------------------
 
 COMPARED_SAMPLES = 20
 """[samples] A record fits or judges only if more than this are compared: `BLOCKS` of one sample. Quasi-static tests
-taken point by point have hardly more. Changed by: acceptance::TestHeldOut::test_enough_to_compare."""
+taken point by point have hardly more. Changed by: acceptance::enough_to_compare."""
 
 SET_ASIDE = 0.3
 """[share of a record] If no whole record can be held out, this share at the end of one is: nearly the third that is
-held out of several records. Changed by: acceptance::TestHeldOut::test_the_end_of_a_record."""
+held out of several records. Changed by: acceptance::the_end_of_a_record."""
 
 FAST_RECORD = 0.5
 """[share of the largest] A record counts as fast, or as wide, if its rate, or its swing, is at least this share of the
-largest. Changed by: acceptance::TestHeldOut::test_a_fast_record."""
+largest. Changed by: acceptance::a_fast_record."""
 
 THIN_STEPS = 32
 """[samples] Longest stretch that may be left out between two needed samples, a power of two. Changed by: run time,
-acceptance::TestThinning::test_the_longest_stretch."""
+acceptance::the_longest_stretch."""
 
 THIN_STRAIGHT = 0.3
 """[times the noise] A stretch may be left out if the prediction deviates from a straight line over it by at most this,
 and the drive by at most what moves the output that far. Changed by:
-acceptance::TestThinning::test_a_bump_of_the_prediction."""
+acceptance::a_bump_of_the_prediction."""
 
 THIN_TURNING = 0.03
 """[times the noise] The same limit at a turning point, which the plays remember: a tenth of it. Changed by:
-acceptance::TestThinning::test_a_small_turn_of_the_drive."""
+acceptance::a_small_turn_of_the_drive."""
 
 THIN_RESIDUAL = 1.6
 """[times the noise, rms] The same limit for the remaining error: white noise deviates from the line between two of its
@@ -355,12 +356,12 @@ samples by sqrt(1 + 2/3) = 1.3, and an unlucky stretch of it by a quarter more. 
 
 THIN_COLUMN = 0.01
 """[share of its range, rms] The same limit for a further column of the record. Changed by:
-acceptance::TestThinning::test_a_column_that_jitters."""
+acceptance::a_column_that_jitters."""
 
 EDGE = 0.03
 """[share of the drive range] A change of the drive is a jump if it is larger than this: a smaller one moves the output
 by no more than some tens of times the noise, so its sample has little weight. Changed by:
-acceptance::TestEdges::test_a_jump."""
+acceptance::a_jump."""
 
 EDGE_SAMPLES, EDGE_STANDS = 2, 4
 """[samples], [samples] The longest jump that is not resolved, from one sample to the next or with an averaged sample
@@ -372,20 +373,20 @@ second_plants single 0:13, pair 0:6."""
 
 HOLD_SAMPLES = 40
 """[samples] A hold measures noise if it has at least this many: its trend has four numbers, and 24 samples remain after
-`HOLD_SETTLING`. Changed by: acceptance::TestNoiseFloor::test_jitter_of_the_drive."""
+`HOLD_SETTLING`. Changed by: acceptance::jitter_of_the_drive."""
 
 HOLD_DRIVE = 2e-4
 """[share of the drive range] The drive holds while it stays within this: three codes of a 14-bit converter. Changed by:
-acceptance::TestNoiseFloor::test_jitter_of_the_drive."""
+acceptance::jitter_of_the_drive."""
 
 COARSE_DRIVE = 1e-3
 """[share of the drive range] The drive also holds while it changes by no more than one code of its converter, if a code
 is no larger than this: ten bits. Coarser steps are levels of the drive. Changed by:
-acceptance::TestNoiseFloor::test_a_coarse_drive."""
+acceptance::a_coarse_drive."""
 
 HOLD_SETTLING = 0.4
 """[share of a hold] Its beginning, which is left out because the output still settles there. Changed by:
-acceptance::TestNoiseFloor::test_jitter_of_the_drive."""
+acceptance::jitter_of_the_drive."""
 
 HOLD_WEIGHT = 50
 """[times] A long hold counts as at most this many. Changed by: blind none."""
@@ -396,61 +397,61 @@ still ring or creep. Changed by: blind."""
 
 RING_DECAY = 0.9
 """[share of the amplitude] A hold rings if its oscillation keeps more than this from one sample to the next. Changed
-by: acceptance::TestNoiseFloor::test_a_hold_that_rings."""
+by: acceptance::a_hold_that_rings."""
 
 RING_UNPREDICTED = 0.3
 """[share of the variance] It rings only if two samples leave at most this of the next one unpredicted. Changed by:
-acceptance::TestNoiseFloor::test_a_hold_that_rings."""
+acceptance::a_hold_that_rings."""
 
 PERIOD_REPEATS = 2e-3
 """[share of the drive range, rms] Periods of a drive measure noise if they differ by less than this: the response to
 the difference adds as large a share of the output range to the noise. Changed by:
-acceptance::TestNoiseFloor::test_periods_of_a_jittering_drive."""
+acceptance::periods_of_a_jittering_drive."""
 
 HELD_SHARE = 0.55
 """[share of the changes] Samples of an output were held or interpolated if at most this share of its changes is not 0:
-half of the changes are not if every other sample was. Changed by: acceptance::TestNoiseFloor::test_samples_between."""
+half of the changes are not if every other sample was. Changed by: acceptance::samples_between."""
 
 LEAST_NOISE = 1e-5
 """[share of the output range] Every record is assumed to have this noise: 17 bits, more than sensors of a stage resolve
 in a single sample. Without it, records of a simulation would have a noise floor of 0, and any error would be far above
-it. Changed by: acceptance::TestNoiseFloor::test_records_without_noise."""
+it. Changed by: acceptance::records_without_noise."""
 
 # Faults of whole records and samples -------------------------------------------------------------------------
 
 SCALE_OF_ALL = 3.0
 """[factor] If the outputs of all records differ from the prediction by this factor, they are in other units, or of
-another actuator. Changed by: blind foreign, acceptance::TestWholeRecords::test_other_units_of_all."""
+another actuator. Changed by: blind foreign, acceptance::other_units_of_all."""
 
 SCALE_OF_ONE = 1.7
 """[factor] The same limit for one record against the others: an actuator's sensitivity changes less with amplitude and
-rate. Changed by: blind foreign, acceptance::TestWholeRecords::test_a_narrow_record_shows_no_scale."""
+rate. Changed by: blind foreign, acceptance::a_narrow_record_shows_no_scale."""
 
 WIDE_DRIVE = 0.3
 """[share of the widest drive] Only records whose drive is wider than this show their scale. Changed by:
-acceptance::TestWholeRecords::test_a_narrow_record_shows_no_scale."""
+acceptance::a_narrow_record_shows_no_scale."""
 
 OTHER_UNIT = 30.0
 """[times the median width] A drive wider than this is in another unit, and the others are not measured by it. It lies
 between the ratio of a large swing to small loops and a factor of 1000 between units. Changed by:
-acceptance::TestWholeRecords::test_a_drive_in_another_unit_is_no_measure."""
+acceptance::a_drive_in_another_unit_is_no_measure."""
 
 DEAD_SENSOR = 0.1
 """[share of the expected spread] A sensor is dead if its output moves less than this and does not follow the drive.
-Changed by: acceptance::TestWholeRecords::test_a_dead_sensor."""
+Changed by: acceptance::a_dead_sensor."""
 
 FOLLOWS = 0.9
 """[correlation] A scale means something only if the output correlates with the prediction at least this well. Changed
-by: acceptance::TestWholeRecords::test_an_output_follows_its_drive."""
+by: acceptance::an_output_follows_its_drive."""
 
 FOREIGN_CORRELATION, OWN_CORRELATION = 0.95, 0.5
 """[correlation] An output belongs to another record if it correlates with that record's prediction better than the
 first number, and with its own prediction worse than the second. Changed by: blind foreign,
-acceptance::TestWholeRecords::test_the_output_of_another_record."""
+acceptance::the_output_of_another_record."""
 
 LOOP_AREA = 0.3
 """[share of the expected area] An output follows its drive if its loop has at least this area, in the right sense.
-Changed by: acceptance::TestWholeRecords::test_an_output_follows_its_drive."""
+Changed by: acceptance::an_output_follows_its_drive."""
 
 LOOP_SIGMAS = 5.0
 """[standard deviations] The area of a loop counts if it exceeds that of white noise by this factor: noise does so once
@@ -459,27 +460,27 @@ in a million. Derived."""
 OFF_LINE, ON_LINE = 6.0, 0.8
 """[scatters], [share of the samples] Samples that are farther off a line than the first number do not count if the
 others are at least the second number's share. Changed by:
-acceptance::TestWholeRecords::test_a_few_samples_far_off_do_not_count."""
+acceptance::a_few_samples_far_off_do_not_count."""
 
 RAIL_PASSED = 0.01
 """[share of the output range] A value is still the end of a converter if another record passes it by at most this: two
-records differ by an offset. Changed by: acceptance::TestWholeRecords::test_a_converter_ends_at_its_end."""
+records differ by an offset. Changed by: acceptance::a_converter_ends_at_its_end."""
 
 HISTORY_COSTS = 1.5
 """[times the error] If a history raises the error of samples that do not depend on it by more than this, it has bent
 the model. Changed by: blind single (wrong histories),
-acceptance::TestWholeRecords::test_a_history_that_costs_the_rest."""
+acceptance::a_history_that_costs_the_rest."""
 
 # Lines and ripples -------------------------------------------------------------------------------------------
 
 LINE_SHARE = 0.03
 """[share of the error's variance] A line has at least this: smaller ones are not worth a sentence. Changed by:
-acceptance::TestSpectra::test_share_of_a_line."""
+acceptance::share_of_a_line."""
 
 RULING_SHARE = 0.3
 """[share of the error's variance] A line is taken out before the search for effects, or counts though only few records
 have it, if it has at least this: the error of a missing effect may look like a weaker line. Changed by: blind foreign,
-acceptance::TestLines::test_a_line_rules."""
+acceptance::a_line_rules."""
 
 LINE_HEIGHT = 30.0
 """[times the median power around it] A line is at least this high: the highest of 10000 bins of noise reaches 13.
@@ -487,23 +488,23 @@ Changed by: blind none."""
 
 PEAK_HEIGHT = 10.0
 """[times the median power around it] A line of the drive is at least this high, and so is ringing in averaged spectra,
-whose noise scatters less. Changed by: acceptance::TestSpectra::test_height_of_a_line_of_the_drive."""
+whose noise scatters less. Changed by: acceptance::height_of_a_line_of_the_drive."""
 
 DRIVE_LINE_SHARE = 1e-6
 """[share of the drive's power] A peak of the drive is a line of its own if it has at least this: a thousandth of the
-amplitude. Changed by: acceptance::TestSpectra::test_a_line_of_the_drive."""
+amplitude. Changed by: acceptance::a_line_of_the_drive."""
 
 CARRIER_SHARE = 0.5
 """[share of the drive's power] A drive that has at least this in one line makes harmonics, even if its swing changes.
-Changed by: acceptance::TestSpectra::test_harmonics_of_a_carrier."""
+Changed by: acceptance::harmonics_of_a_carrier."""
 
 HARMONICS = 10
 """[harmonics] Number of multiples of that line that the actuator's response has. Changed by:
-acceptance::TestSpectra::test_harmonics_of_a_carrier."""
+acceptance::harmonics_of_a_carrier."""
 
 LINE_PERIODS = 8
 """[periods] A record shows a line, and its travel a ripple, if it has at least this many periods, or pitches: trends
-fill the bins below. Changed by: acceptance::TestSpectra::test_periods_of_a_line."""
+fill the bins below. Changed by: acceptance::periods_of_a_line."""
 
 LINE_SAMPLES = 64
 """[samples] A record shows a line or a period if it has at least this many: eight for each of `LINE_PERIODS`.
@@ -511,7 +512,7 @@ Derived."""
 
 SPECTRUM_SAMPLES = 256
 """[samples] A spectrum, and a search for a ripple, takes at least this many: three times the surroundings of a peak.
-Changed by: acceptance::TestSpectra::test_samples_of_a_spectrum."""
+Changed by: acceptance::samples_of_a_spectrum."""
 
 SPECTRUM_PARTS = (8, 64)
 """[parts of a record] Numbers of parts whose mean spectra show ringing that fades: of 0.4 to 3 % damping after steps
@@ -519,7 +520,7 @@ every five seconds. Set by: disturbances (commit 8380866)."""
 
 SURROUNDINGS, SURROUNDINGS_OF_PARTS = 40, 12
 """[bins] Number on either side with which a peak is compared, in the spectrum of a record and in the mean spectrum of
-its parts. Changed by: acceptance::TestSpectra::test_surroundings_of_a_line."""
+its parts. Changed by: acceptance::surroundings_of_a_line."""
 
 SAME_BINS = 1.5
 """[bins] Lines closer than this are one line: less than the two bins of half the main lobe of a Hann window.
@@ -531,7 +532,7 @@ single."""
 
 SAME_LINE = 0.05
 """[share of the frequency or pitch] A line within this of a stronger one is what remains of that. Changed by:
-acceptance::TestLines::test_the_rest_of_a_line."""
+acceptance::the_rest_of_a_line."""
 
 MOST_LINES = 4
 """[lines] At most this many are searched for: mains, two harmonics and a ripple. Changed by: blind foreign."""
@@ -541,15 +542,15 @@ CRESTS = 5
 
 SEEN_IN = 0.4
 """[share of the records that are long enough] A line counts if at least this share of the records has it, or if it has
-`RULING_SHARE`. Changed by: acceptance::TestLines::test_a_line_in_many_records."""
+`RULING_SHARE`. Changed by: acceptance::a_line_in_many_records."""
 
 COMMON_SHARE = 0.6
 """[share of the records, or of the passes] A line is common, and a ripple confirmed, if it holds in at least this
-share: most. Changed by: acceptance::TestRipple::test_pitches_of_a_pass."""
+share: most. Changed by: acceptance::pitches_of_a_pass."""
 
 STEADY_SHARE = 0.5
 """[share] A line is steady if the phase and amplitude fitted to one half of a record remove at least this of what the
-other half's own fit removes. Changed by: acceptance::TestLines::test_a_line_that_fades."""
+other half's own fit removes. Changed by: acceptance::a_line_that_fades."""
 
 AMPLITUDE_SAMPLES = 2.2
 """[samples per period] With fewer, the amplitude of a line cannot be measured: Nyquist's two, and a tenth more.
@@ -565,28 +566,28 @@ samples per period. Derived."""
 
 CONVERTER_STEP = 0.02
 """[share of the pitch] A pitch that differs by less than this from the smallest step of the output is the converter's.
-Changed by: acceptance::TestRipple::test_a_pitch_of_the_converter."""
+Changed by: acceptance::a_pitch_of_the_converter."""
 
 POSITION_BINS = 4096
 """[bins] Number into which the range is divided, and in which errors are averaged, to find a pitch: enough for pitches
-of a thousandth of the range. Changed by: acceptance::TestRipple::test_the_finest_pitch."""
+of a thousandth of the range. Changed by: acceptance::the_finest_pitch."""
 
 PITCHES = 3
 """[pitches] Number of the strongest that are examined. Changed by:
-acceptance::TestRipple::test_pitches_that_are_examined."""
+acceptance::pitches_that_are_examined."""
 
 PASS_SAMPLES, PASS_PITCHES = 32, 3.0
 """[samples], [pitches] A pass, up or down, that confirms a ripple has at least these. Changed by:
-acceptance::TestRipple::test_pitches_of_a_pass."""
+acceptance::pitches_of_a_pass."""
 
 DRIVE_REPEATS = 0.01
 """[share of the drive range, rms] A drive repeats itself if it differs by less than this from itself a period later:
-more than the noise of a measured drive. Changed by: acceptance::TestSpectra::test_a_noisy_drive_repeats."""
+more than the noise of a measured drive. Changed by: acceptance::a_noisy_drive_repeats."""
 
 DRIVE_AWAY = 0.25
 """[share of the drive range, rms] It has a period only if it differed by more than this before it returned; a drive
 that mostly rests is otherwise always like itself. Changed by:
-acceptance::TestSpectra::test_a_drive_that_mostly_rests."""
+acceptance::a_drive_that_mostly_rests."""
 
 # Stick-slip --------------------------------------------------------------------------------------------------
 
@@ -596,38 +597,38 @@ stand still in one of a hundred. Derived."""
 
 SLIP_STRETCH = 0.5, 3.0
 """[times that motion] Least and largest motion of a stretch that counts. Changed by:
-acceptance::TestStickSlip::test_how_much_stands."""
+acceptance::how_much_stands."""
 
 SLIP_OFF = 0.6
 """[share of the predicted motion] The output stands still if its motion is smaller than predicted by this, and leaps if
-it is larger by this. Changed by: acceptance::TestStickSlip::test_how_much_stands."""
+it is larger by this. Changed by: acceptance::how_much_stands."""
 
 SLIP_STANDS, SLIP_LEAPS = 0.15, 0.05
 """[share of the stretches] Stick-slip stands still in at least the first share of them, and leaps in at least the
-second. Changed by: blind foreign, acceptance::TestStickSlip::test_how_much_stands."""
+second. Changed by: blind foreign, acceptance::how_much_stands."""
 
 SLIP_CONTINUES = 0.3
 """[correlation] Neighbouring stretches of stick-slip correlate at most this much: a lag continues from one to the next,
-whereas a leap makes up for the standstill before it. Changed by: acceptance::TestStickSlip::test_what_goes_on."""
+whereas a leap makes up for the standstill before it. Changed by: acceptance::what_goes_on."""
 
 SLIP_MOVING = 0.25
 """[share of the upper quartile of moves] A drive that moves less than this rests. Changed by:
-acceptance::TestStickSlip::test_samples_that_hardly_move_do_not_count."""
+acceptance::samples_that_hardly_move_do_not_count."""
 
 SLIP_JUMPS = 5
 """[jumps] Stick-slip has at least this many; at least ten times as many samples and five times as many stretches have
-to move. Changed by: acceptance::TestStickSlip::test_how_many_jumps."""
+to move. Changed by: acceptance::how_many_jumps."""
 
 SLIP_ALONE = 3.0
 """[times the moves around it] A jump is larger by this factor than the moves two to five samples away: those of a
 smooth output, however fast, are about as large. Most jumps of stick-slip are of this kind. Changed by:
-acceptance::TestStickSlip::test_a_fast_output_does_not_jump."""
+acceptance::a_fast_output_does_not_jump."""
 
 # What drives are like ----------------------------------------------------------------------------------------
 
 REVERSAL = 0.02
 """[share of the drive range] A reversal is at least this large, above the noise of a measured drive. Changed by:
-acceptance::TestDrives::test_a_small_turn."""
+acceptance::a_small_turn."""
 
 LOOP_ENDS = 0.1
 """[share of the drive range] Loops whose ends lie within this of each other are one loop. Changed by: blind poor."""
@@ -637,7 +638,7 @@ LOOP_SPEEDS = 1.5
 
 LOOP_STANDS = 0.3
 """[share of the time between turns] A drive that rests for longer holds, and does not make a loop. Changed by:
-acceptance::TestDrives::test_a_loop_that_stands_is_none."""
+acceptance::a_loop_that_stands_is_none."""
 
 # How the remaining error is described ------------------------------------------------------------------------
 
@@ -651,34 +652,34 @@ rms of coloured noise scatters more over so few. Changed by: blind none."""
 
 FAST_QUANTILE = 0.9
 """[quantile of the rates] A stretch is fast if its mean rate is above this quantile. Changed by:
-acceptance::TestStretches::test_above_the_noise."""
+acceptance::above_the_noise."""
 
 RANGE_END, RANGE_END_SHARE = 0.1, 0.6
 """[share of the drive range], [share of a stretch] A stretch is at the ends of the range if at least the second share
-of it lies within the first of one of them. Changed by: acceptance::TestStretches::test_ends_of_the_range."""
+of it lies within the first of one of them. Changed by: acceptance::ends_of_the_range."""
 
 VARIABLE_SHARE = 0.1
 """[share of the error's variance] A variable that explains less is not reported. Changed by:
-acceptance::TestDescription::test_a_variable_that_matters."""
+acceptance::a_variable_that_matters."""
 
 VARIABLE_BINS = 24
 """[bins] Number with which a function of one variable is described. Changed by:
-acceptance::TestDescription::test_folds."""
+acceptance::folds."""
 
 FOLD_BLOCKS = 16
 """[blocks] Samples alternate between fit and test in this many blocks, which are longer than errors are correlated.
-Changed by: acceptance::TestDescription::test_folds."""
+Changed by: acceptance::folds."""
 
 DESCRIBED_SAMPLES = 200
 """[samples] An error is described if it has at least this many: about eight in each of `VARIABLE_BINS`. Derived."""
 
 MEMORY_WINS = 1.25
 """[times] Memory is reported in place of a single variable if it explains at least this times as much. Changed by:
-acceptance::TestDescription::test_memory_in_place_of_one_variable."""
+acceptance::memory_in_place_of_one_variable."""
 
 RATE_FREE_SHARE = 0.75
 """[share] An error does not depend on rates if drive and memory alone explain at least this of what they explain
-together with rates. Changed by: acceptance::TestDescription::test_rate_free."""
+together with rates. Changed by: acceptance::rate_free."""
 
 REPEATABLE_SHARE = 0.5
 """[share of the error's variance] An error is repeatable if at least this returns with the drive: most of it.
@@ -686,7 +687,7 @@ Derived."""
 
 PARITY_BINS, PARITY_SAMPLES = 20, 10
 """[bins], [samples] The even share is taken over this many bins of the drive's range, each of which has more than this
-many samples. Changed by: acceptance::TestDescription::test_parity."""
+many samples. Changed by: acceptance::parity."""
 
 PARITY_SHARE = 0.05
 """[share of the error's variance] Parity means something only if the mean over drive and direction has at least this:
@@ -696,10 +697,10 @@ half of `VARIABLE_SHARE`. Derived."""
 
 WILDER = 2.0
 """[times] An inverse whose drive has second differences up to this times those of the plain inverse's is as calm:
-hysteresis alone turns a drive that often. Changed by: acceptance::TestWild::test_a_drive_that_is_rougher."""
+hysteresis alone turns a drive that often. Changed by: acceptance::a_drive_that_is_rougher."""
 
 BEYOND_GAIN = 3.0
 """[times the gain] What an inverse with effects moves the plain model's output by, at most, in held-out rms that the
 effects explain, or in noise if that is more. It takes out what they explain: 0.85 to 0.97 times that for creep, a lag
 and relaxing plays at three speeds, noise at 0.1 % of the output. Changed by:
-acceptance::TestWild::test_an_output_that_moves_further."""
+acceptance::an_output_that_moves_further."""

@@ -34,7 +34,8 @@ POLISHED = 1e-5
 
 COARSE = 1e-3
 """[share of the error] The same for a search that only ranks shapes, or shows whether to go on: far below `BETTER`.
-With 1e-4 to 1e-2 eight cases of `tests.second_plants` (seeds 29000 on) have the same names, and errors within 0.5 %."""
+With 1e-4 to 1e-2 eight cases of `benchmarks.second_plants` (seeds 29000 on) have the same names, and errors
+within 0.5 %."""
 
 CROSSINGS = 2
 """[changes of side] A component of the start that goes from one limit beyond the other is measured from that one; at

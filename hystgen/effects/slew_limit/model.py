@@ -20,7 +20,7 @@ BESIDE = 10.0
 Steps between levels at rest are far beyond it, up to the noise of the converter. Changed by:
 test_effects::test_sudden_edges_leave_other_drives_alone. What bends by less than this part of a limit's travel in a
 sample counts as straight: with 2 `friction damper, exchanged` of docs/recordings.csv has the limit as a rival, from 10
-to 50 it does not, and steps of `tests.second_plants` (single 23015) are the same."""
+to 50 it does not, and steps of `benchmarks.second_plants` (single 23015) are the same."""
 
 MIDDLE = 0.5
 """[samples] Place of a step between two samples of a drive that was measured by averages over each of them. Derived:

@@ -1,8 +1,8 @@
 """Blind plants: records of actuators with known faults, for judging `hystgen diagnose` from outside.
 
-`python -m tests.plants generate | run | score` makes cases, has them diagnosed through the command line, and counts;
-`make blind` does all three with the report block of seeds. Nothing here imports the package, and only `run` and `track`
-call it.
+`python -m benchmarks.plants generate | run | score` makes cases, has them diagnosed through the command line and scores
+the answers; `make blind` does all three with the report block of seeds. Nothing here imports the package, and only
+`run` and `track` call it.
 
 bench, drives, session    the measurement: ranges, rates, waveforms, and the time between the records
 base, effects, plant      the actuator, on a time grid eight times finer than the records

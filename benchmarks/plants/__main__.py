@@ -1,4 +1,4 @@
-"""Command line: `python -m tests.plants generate | run | score | track`; each has `--help`."""
+"""Command line: `python -m benchmarks.plants generate | run | score | track`; each has `--help`."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ def main(words: list[str] | None = None) -> int:
     from .case import KINDS, LARGE, REPORT, SMALL
     from .run import run
 
-    parser = argparse.ArgumentParser(prog="python -m tests.plants", description="Blind plants for `hystgen diagnose`.")
+    described = "Blind plants for `hystgen diagnose`."
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.plants", description=described)
     commands = parser.add_subparsers(dest="command", required=True)
     make = commands.add_parser("generate", help="write cases and, beside them, their labels")
     make.add_argument("--block", choices=("tune", "report"), required=True)

@@ -1,13 +1,13 @@
-"""A second simulator of plants for `hystgen diagnose`, written without the first one (`tests/plants`) and the solver.
+"""A second simulator of plants for `hystgen diagnose`, which shares nothing with the first (`benchmarks/plants`).
 
 Short records (450 to 900 samples) as a laboratory takes them, hysteresis by an Everett function with a stack of
 extremes and a friction element by its differential equation, effects by their own equations, and disturbances that are
 no effect: another axis that steps at random, room temperature on the gain, weights that change with time, a slow line
-of crosstalk, a guide that sticks. Cases and labels have the layout of `tests.plants`, which runs and scores them:
+of crosstalk, a guide that sticks. Cases and labels have the layout of `benchmarks.plants`, which runs and scores them:
 
-    python -m tests.second_plants --kind single --seeds 0:30 -o build/second
-    python -m tests.plants run build/second/cases -o build/second/results
-    python -m tests.plants score build/second/cases build/second/labels build/second/results
+    python -m benchmarks.second_plants --kind single --seeds 0:30 -o build/second
+    python -m benchmarks.plants run build/second/cases -o build/second/results
+    python -m benchmarks.plants score build/second/cases build/second/labels build/second/results
 """
 
 from __future__ import annotations
@@ -528,7 +528,7 @@ def case(kind: str, seed: int, folder: Path) -> str:
 
 def main(words: Sequence[str] | None = None) -> int:
     """The command line."""
-    parser = argparse.ArgumentParser(prog="python -m tests.second_plants", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.second_plants", description=__doc__)
     parser.add_argument("--kind", choices=("single", "pair", "none", "foreign"), required=True)
     parser.add_argument("--seeds", required=True, metavar="A:B")
     parser.add_argument("-o", dest="folder", type=Path, required=True)
