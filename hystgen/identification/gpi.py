@@ -161,7 +161,7 @@ def _finished(
     fitted = _solve_behind(courses, front, shape, tuple(float(x) for x in r), floor, tick)
     if wanted is None:
         fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
-    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # those of the records, whatever the front
+    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # whatever the front
     largest = float(fitted.solution.thresholds[-1])
     firsts = [fitted.inner(item).resettled(largest).first for item in courses]
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]

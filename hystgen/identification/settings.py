@@ -86,7 +86,7 @@ class Settings:
                 lost.append(path)
                 del holder[last]
             elif not how.same:
-                holder[last] = float(f"{float(how.times) * float(holder[last]):.12g}")  # without trailing digits from rounding
+                holder[last] = float(f"{float(how.times) * float(holder[last]):.12g}")  # without rounding noise
         return emit, lost
 
     def _units(self, fit: Fit) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""The codes of a session as a C header, for firmware that plays it."""
+"""The codes of a session as a C header, for firmware that plays them."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from hystgen.planning.session import Session
 
 
 def file(parameters: Parameters) -> str:
-    """Name of the header of a model's session."""
+    """Name of the header for a model's session."""
     return f"{parameters.name}_session.h"
 
 
 def nodes(stretches: Sequence[tuple[int, int]]) -> Codes:
-    """The samples between which the drive is straight, for stretches of steps and samples of each."""
+    """The samples between which the drive is straight, for stretches of steps with the samples of each."""
     return np.cumsum([0, *(every for steps, every in stretches for _ in range(steps))], dtype=np.int64)
 
 

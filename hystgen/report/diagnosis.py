@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hystgen.effects.base import Effect
 
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
-"""How exactly a compensator corrects a stage in front of the plays, and how."""
+"""How exactly a compensator corrects a stage in front of the plays, and by what means."""
 
 VISIBLE = 0.01
 """Relative difference above which an error is visibly larger than another."""
@@ -166,7 +166,7 @@ def _kind(effect: NamedEffect, there: Sequence[Effect]) -> type[Effect] | None:
 
 
 def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
-    """Rows of name, value, low and high, one per number; the first of equal lists stands for all."""
+    """Rows of name, value, low and high, one per number; the first of equal lists represents them all."""
     if isinstance(value, Mapping):
         known = sure or {}
         return [

@@ -34,7 +34,7 @@ FAR = 25.0
 """Ratio of the largest to the smallest value above which an axis is logarithmic."""
 
 HOLD = 16
-"""Fewest samples for which the drive rests, for errors to be drawn over the time since it stopped."""
+"""Fewest samples at which the drive rests for errors to be drawn over the time since it stopped."""
 
 WINDOWS = 12
 """Number of stretches of a record whose rms is drawn over the session."""
@@ -140,7 +140,7 @@ def records(found: Diagnosis, width: float) -> Any:
     axes.plot(values[1], places, "o", color=AFTER, markersize=6, label=_last(found))
     axes.axvline(found.result.noise_floor, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
     axes.set_yticks(places, [f"{each.name}{' (held out)' if each.held_out else ''}" for each in shown])
-    axes.set_ylim(len(shown) - 0.5, -0.5)  # half a place beyond the first and the last
+    axes.set_ylim(len(shown) - 0.5, -0.5)  # half a slot beyond the first and the last
     _range(axes, [*values[0], *values[1], found.result.noise_floor])
     axes.set(xlabel=label("rms error", found.result.unit))
     drawing.legend_above(axes, 3)

@@ -1,4 +1,4 @@
-"""The report of an identification: one page, and its figures as files beside it."""
+"""The report of an identification: one page, with its figures as separate files."""
 
 from __future__ import annotations
 
@@ -76,8 +76,8 @@ def report_fit(
     """Write the report of a fit: `report.html`, which is self-contained, and its pictures. Returns the page's path.
 
     `records`, `holdout`: as given to `identify`, in the same order; records read with options such as `columns` have to
-    be given as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder stay. Raises ValueError for
-    other records, RecordError, OSError.
+    be given as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder are left alone. Raises
+    ValueError for other records, RecordError, OSError.
     """
     if not isinstance(fit, Fit):
         raise TypeError(f"fit is what hystgen.identify returns, not {arguments.kind(fit)}")
@@ -90,8 +90,8 @@ def write(
 ) -> Path:
     """Write report.html and every picture as SVG and PNG into a folder, all or nothing. Returns the page's path.
 
-    `records`: those of the fit, then those held out. `parameter_file`: its name in the command for the next step.
-    Raises PlotError without matplotlib, ValueError for other records than those of the fit, OSError.
+    `records`: those of the fit, then the held-out ones. `parameter_file`: its name in the command for the next step.
+    Raises PlotError without matplotlib, ValueError for records other than those of the fit, OSError.
     """
     check_folder(folder)
     shown = fit_figures.of_fit(fit, records)

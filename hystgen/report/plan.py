@@ -20,7 +20,7 @@ from hystgen.planning.waveforms import EDGE
 from hystgen.report.html import Figure, Listing, Section, Table, Text, page
 
 WIDE, NARROW = (9.0, 5), (4.2, 3)
-"""Width in inches and panels side by side."""
+"""Width in inches and number of panels side by side."""
 
 FIT, JUDGE = drawing.MEASURED, drawing.MODEL
 
@@ -30,7 +30,7 @@ class Plan(planning.Plan):
     """Drive records of one session, in the order in which they are recorded; fields as in `hystgen.planning.plan`."""
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write the CSV files and `plan.html`, which explains them, into a folder, all or nothing; the paths.
+        """Write the CSV files and `plan.html`, which explains them, into a folder, all or nothing; returns the paths.
 
         Raises PlotError without matplotlib, OSError.
         """

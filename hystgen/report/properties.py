@@ -118,7 +118,8 @@ def settling(model: Model, within: float = SETTLED) -> str:
 
 
 def cost(model: Model) -> str:
-    """Cost of the C that `emit` would write, that of the forward operator if there is no inverse; "" if it refuses."""
+    """Cost of the C that `emit` would write, or of the forward operator if there is no inverse; "" if `emit` refuses
+    it."""
     try:
         options = emit_options(model, operator="forward" if model.cascade.inverse_problems() else None)
         found = module.cost_of(model.parameters, model.cascade, options)
@@ -153,7 +154,7 @@ def _effects(model: Model) -> list[str]:
 
 
 def _compensation(effect: Effect, how: Compensation) -> str:
-    """How far the inverse can correct an effect; of a mode, what `emit.compensation.resonance` makes of that."""
+    """How well the inverse can correct an effect; for a mode, how `emit.compensation.resonance` changes that."""
     if not isinstance(effect, Resonance) or how.resonance == "inverse":
         return effect.compensation
     if how.resonance == "none":
@@ -162,7 +163,7 @@ def _compensation(effect: Effect, how: Compensation) -> str:
 
 
 def _reading(model: Model) -> list[str]:
-    """How the inverse reads the reference, as the banner of its C says; nothing where `emit` refuses it."""
+    """How the inverse treats the reference, in the words of the C banner; empty if `emit` refuses it."""
     try:
         options = emit_options(model, operator="inverse")
         return module.reading_of(model.parameters, model.cascade, options)
