@@ -91,7 +91,7 @@ def identify(
         for option, value in (("--name", name), ("--plot", plot), ("--report", report)):
             if value is not None:
                 raise click.UsageError(f"{option} is for one model; leave it out with --batch")
-        # An unquoted pattern comes expanded by the shell: its first file with the option, the rest as arguments
+        # The shell expands an unquoted pattern: its first file goes to the option, the rest become arguments
         _identify_batch(
             (*batch, *data), output, holdout=holdout, emit=emit is not False, jobs=jobs, scheduler=scheduler,
             **options, **how,
@@ -152,7 +152,7 @@ def identify(
 
 
 def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> None:
-    """Print what became of a fleet; exit code 1 if a unit failed, 130 if the user stopped it."""
+    """Print the result of a fleet; exit code 1 if a unit failed, 130 if the user stopped it."""
     from hystgen.fleet import batch as fleet
 
     try:

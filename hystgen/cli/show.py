@@ -1,4 +1,4 @@
-"""`hystgen show`: what a model can do."""
+"""`hystgen show`: the properties of a model."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from hystgen.cli.common import effects_option, guarded, keep_inputs, load_model,
 def show(
     params: str, plot: str | None, settle_within: float | None, json_file: str | None, effects: tuple[str, ...]
 ) -> None:
-    """Print what a model can do: ranges, slopes, loop width, settling after a step, invertible or why not.
+    """Print the properties of a model: ranges, slopes, loop width, settling after a step, invertible or why not.
 
     Example: hystgen show stage_x.yaml --plot stage_x.svg
     """

@@ -53,9 +53,9 @@ def verify(
 
     Example: hystgen verify stage_x.yaml --targets host,cortex-m4f
 
-    Several models in one report: hystgen verify stage_x.yaml stage_y.yaml --junit verify.xml
+    For several models in one report: hystgen verify stage_x.yaml stage_y.yaml --junit verify.xml
 
-    The exit code is 1 where bits differ or C cannot be built, and 2 where nothing is wrong but a tool is missing.
+    The exit code is 1 if bits differ or C cannot be built, and 2 if nothing is wrong except that a tool is missing.
     """
     from hystgen import verification
     from hystgen.basics import writing
@@ -95,7 +95,7 @@ def verify(
 
 
 def _check(model: Model, options: Mapping[str, Any]) -> None:
-    """Raise what emission would, before a model in front of it takes its time."""
+    """Raise any error of emission now, before the models in front of it take their time."""
     from hystgen.emission.calls import emit_options, emitted_model
 
     chosen = emit_options(model, **options)

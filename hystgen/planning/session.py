@@ -67,7 +67,7 @@ class Session:
             text = content.decode("utf-8")
         except UnicodeDecodeError:
             raise ParameterError(file, [Problem("", f"is not UTF-8; {GIVE}")]) from None
-        document = read(text)  # JSON is YAML, and our YAML reader avoids recursion and knows the position of every value
+        document = read(text)  # JSON is YAML; our reader does not recurse and knows positions
         problems = list(document.problems)
         if document.complete:
             problems += [
