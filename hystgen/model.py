@@ -154,8 +154,8 @@ class Model:
             if self.parameters.emit.compensation.quiet and self.cascade.branches_differ:
                 raise UnsupportedEffectsError(
                     "emit.compensation.quiet: with effects, a drive in front of a memoryless part with two branches "
-                    "cannot be kept near what is sought; give both branches the same numbers, or leave out quiet: "
-                    "behind one lag the drive comes to rest by itself"
+                    "cannot be held near its target; give both branches the same numbers, or omit quiet: "
+                    "behind one lag the drive comes to rest anyway"
                 )
 
     def _check_noise_gain(self, arithmetic: str) -> None:
@@ -172,7 +172,7 @@ class Model:
             noise.check(gain, how.noise_gain)
             return
         advice = (
-            "hold it with emit.compensation.noise_gain: 10, by averages of the reference, or allow it with "
+            "limit it by averages of the reference with emit.compensation.noise_gain: 10, or allow it with "
             f"noise_gain: {math.ceil(gain)}"
         )
         if ARITHMETICS[arithmetic].fixed:
@@ -221,7 +221,7 @@ class Model:
             own = [effect.name for effect in self.effects if effect.moves_plays() or effect.bends_plays()]
             if own and (engine or emit.engine) == "corners":
                 raise UnsupportedEffectsError(
-                    f"engine corners knows where plays are from where the drive turned, and {' and '.join(own)} "
+                    f"engine corners derives the plays from the turning points of the drive, but {' and '.join(own)} "
                     "moves or bends each play in its own way; give --engine loop, or auto"
                 )
             if own:
@@ -336,11 +336,11 @@ class Model:
         if np.max(np.abs(record.steps - seconds), initial=0.0) > EVEN * seconds:
             raise EffectsError(
                 f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
-                "in double precision, which takes any times"
+                "in double precision, which takes any sample times"
             )
         if any(effect.name == "drift" for effect in self.effects) and abs(float(record.t[0])) > EVEN * seconds:
             raise EffectsError(
-                f"drift is counted from the first sample, and t begins at {float(record.t[0]):g} s; give t from 0 on"
+                f"drift is counted from the first sample, but t begins at {float(record.t[0]):g} s; give t from 0 on"
             )
         how = self.parameters.emit.compensation
         chosen = self.engine(engine, arithmetic=arithmetic)
@@ -381,7 +381,7 @@ class Model:
             if values.ndim != 1 or len(values) != len(drive) or not np.all(np.isfinite(values)):
                 raise EffectsError(f"{name} has to be {len(drive)} finite numbers, one per sample of v")
         if np.any(np.diff(times) <= 0.0):
-            raise EffectsError("t has to rise from sample to sample")
+            raise EffectsError("t has to increase from sample to sample")
         return Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)
 
     def settling(self, within: float = SETTLED) -> Settling:
@@ -552,6 +552,6 @@ def as_model(source: ModelSource) -> Model:
     model = source if isinstance(source, Model) else getattr(source, "model", None)
     if not isinstance(model, Model):
         raise TypeError(
-            f"give a model, as hystgen.load returns it, or a parameter file, not {arguments.kind(source)}"
+            f"give a model, as returned by hystgen.load, or a parameter file, not {arguments.kind(source)}"
         )
     return model

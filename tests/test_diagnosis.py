@@ -832,7 +832,7 @@ def test_a_record_that_is_fitted_and_held_out_is_told(command: str, tmp_path: Pa
     assert "b.csv" not in err
     code, _, err = run(*words, files[0], files[1], files[3], "--holdout", files[2], "-o", tmp_path / "out")
     assert code == 0, err
-    assert "warning: d.csv: fitted twice, as a.csv too; leave one of them out" in err
+    assert "warning: d.csv: fitted twice, also as a.csv; leave one of them out" in err
     assert "held out" not in err
 
 

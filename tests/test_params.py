@@ -127,7 +127,7 @@ REFUSED = [
         "1:9: not valid YAML: found unknown escape character 'q' (while scanning a double-quoted text); correct the text there",
     ]),
     case('huge_escape', 'name: "\\UFFFFFFFF"\n', [
-        '1:1: not valid YAML soon after this place; correct the text there',
+        '1:1: not valid YAML soon after this position; correct the text there',
     ]),
     case('at_sign', "name: @x\n", [
         "1:7: not valid YAML: found character '@' that cannot start anything (while scanning for what comes next); correct the text there",
@@ -157,7 +157,7 @@ REFUSED = [
         '2:1: directives are not accepted; remove the line that starts with %',
     ]),
     case('late_directive', H + M + "...\n%YAML 1.3\n---\na: 1\n", [
-        '5:1: not valid YAML soon after this place; correct the text there',
+        '5:1: not valid YAML soon after this position; correct the text there',
     ]),
     case('alias', H + M + "units: *u\n", [
         '5:8: units: aliases (*) are not accepted; write the value itself',
@@ -576,7 +576,7 @@ REFUSED = [
         '4:69: model.effects[0].name: unknown effect zzz; known are creep, rate_dependence, resonance, lag, delay, slew_limit, asymmetry, saturation, thermal, drift, ageing, sensor_nonlinearity, noncongruent',
     ]),
     case('effect_user', eff("[{name: 'user:x'}]"), [
-        '4:69: model.effects[0].name: user:x is defined in no file given; give its file (--effects)',
+        '4:69: model.effects[0].name: user:x is not defined in any given file; give its file (--effects)',
     ]),
     case('effect_asymmetry', eff("[{name: asymmetry}]"), [
         '4:69: model.effects[0].name: asymmetry is not written here; make it a stage of model.memoryless',

@@ -126,7 +126,7 @@ def whole(name: str, value: object, unit: str, least: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         raise TypeError(f"{name} is a whole number of {unit}, not {kind(value)}")
     if value < least:
-        raise ValueError(f"{name} is a whole number of {unit} from {least} on, not {value}")
+        raise ValueError(f"{name} is a whole number of {unit}, at least {least}, not {value}")
     return int(value)
 
 
@@ -138,9 +138,9 @@ def numbers(name: str, value: object, example: str) -> tuple[float, ...]:
     try:
         found = tuple(float(x) for x in value)
     except (TypeError, ValueError, OverflowError):
-        raise TypeError(f"{name} is a list of finite numbers, and an entry is none; {hint}") from None
+        raise TypeError(f"{name} is a list of finite numbers, but an entry is not a number; {hint}") from None
     if not all(map(math.isfinite, found)):
-        raise ValueError(f"{name} is a list of finite numbers, and an entry is not finite; {hint}")
+        raise ValueError(f"{name} is a list of finite numbers, but an entry is not finite; {hint}")
     return found
 
 
@@ -150,7 +150,7 @@ def texts(name: str, value: object, keys: Sequence[str], example: str) -> dict[s
         raise TypeError(f"{name} is a mapping of text to text, not {kind(value)}; give {example}")
     strange = [x for entry in value.items() for x in entry if not isinstance(x, str)]
     if strange:
-        raise TypeError(f"{name} is a mapping of text to text, and {kind(strange[0])} is in it; give {example}")
+        raise TypeError(f"{name} is a mapping of text to text, but {kind(strange[0])} is in it; give {example}")
     unknown = [key for key in value if key not in keys] if keys else []
     if unknown:
         raise ValueError(f"{name} has no {printable(unknown[0])}; its keys are {', '.join(keys)}, as in {example}")
@@ -162,7 +162,7 @@ def signal(name: str, value: object) -> NDArray[Any]:
     try:
         found = np.atleast_1d(np.asarray(value))
     except ValueError:  # lists of different lengths
-        raise ValueError(f"{name} has one number per sample, and rows of different lengths are given") from None
+        raise ValueError(f"{name} has one number per sample, but rows of different lengths are given") from None
     if found.ndim != 1:
         hint = ""
         if found.ndim == 2:
@@ -197,7 +197,7 @@ def finite_samples(v: ArrayLike) -> Array:
     """Samples (N,) in double precision. Raises ValueError unless they are finite and one-dimensional."""
     found = samples(v)
     if not np.all(np.isfinite(found)):
-        raise ValueError("an input has to be finite numbers")
+        raise ValueError("an input has to consist of finite numbers")
     return found
 
 
@@ -224,7 +224,7 @@ def whole_from(least: int, **values: int) -> None:
     """Raise ValueError for a parameter that is not an integer, at least `least`."""
     for name, value in values.items():
         if not isinstance(value, int | np.integer) or value < least:
-            raise ValueError(f"{name} has to be a whole number from {least} on, not {value!r}")
+            raise ValueError(f"{name} has to be a whole number, at least {least}, not {value!r}")
 
 
 def finite_numbers(values: Sequence[float], name: str) -> tuple[float, ...]:

@@ -38,13 +38,13 @@ announce: Callable[[str], None] | None = None
 ONCE = "compiling Python functions for this machine, once: up to 20 s, with effects in the C up to 40 s"
 EVERY_TIME = (
     "compiling Python functions for this machine: up to 20 s, with effects in the C up to 40 s, and again every time, "
-    "since no folder for the result can be written to; set NUMBA_CACHE_DIR to one that can"
+    "since no folder for the result is writable; set NUMBA_CACHE_DIR to one that is"
 )
 
 
 def interpreted() -> str:
     """The message for a machine without numba."""
-    return f"computing in Python, which takes longer than compiled; to have it compiled: {extras.install('fit')}"
+    return f"computing in plain Python, which is slower than compiled code; to compile it:  {extras.install('fit')}"
 
 
 # The functions allocate nothing, so reference counting, which would take most of a sample's time, is disabled

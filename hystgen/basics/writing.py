@@ -47,7 +47,7 @@ def temporary() -> Iterator[Path]:
         around = tempfile.gettempdir()
     except FileNotFoundError:
         raise FileNotFoundError(
-            errno.ENOENT, "no folder for temporary files can be written to; set TMPDIR to one"
+            errno.ENOENT, "no folder for temporary files is writable; set TMPDIR to one that is"
         ) from None
     with staging(Path(around)) as folder:
         yield folder
@@ -126,7 +126,7 @@ def place_for(path: str | os.PathLike[str]) -> Path:
     """`destination` of a file in an existing folder. Raises OSError."""
     target = destination(path)
     if not target.parent.is_dir():
-        what = f"the folder {target.parent} does not exist; make it, or choose another output"
+        what = f"the folder {target.parent} does not exist; create it, or choose another output"
         raise FileNotFoundError(errno.ENOENT, what, os.fspath(path))
     return target
 

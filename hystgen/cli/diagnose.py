@@ -49,7 +49,7 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
             console.say(str(path))
         if left_over := planned.left_over(output):
             names = ", ".join(map(str, left_over))
-            console.note(f"warning: of an earlier plan, with other drives: {names}; remove them, or give another -o")
+            console.note(f"warning: from an earlier plan, with other drives: {names}; remove them, or give another -o")
         console.note(f"then run: {planned.command(output)}")
 
     guarded(params, run)

@@ -30,7 +30,7 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
         return None
     units = [unit.strip() for unit in value.split(",")]
     if len(units) != 2 or not any(units):
-        raise click.BadParameter(f"'{value}' is not two units; give that of the drive and that of the output, V,um")
+        raise click.BadParameter(f"'{value}' is not two units; give those of the drive and the output, V,um")
     return dict(zip(("input", "output"), units, strict=True))
 
 
@@ -90,7 +90,7 @@ def identify(
     if batch:
         for option, value in (("--name", name), ("--plot", plot), ("--report", report)):
             if value is not None:
-                raise click.UsageError(f"{option} is for one model; leave it out with --batch")
+                raise click.UsageError(f"{option} is for one model; omit it with --batch")
         # The shell expands an unquoted pattern: its first file goes to the option, the rest become arguments
         _identify_batch(
             (*batch, *data), output, holdout=holdout, emit=emit is not False, jobs=jobs, scheduler=scheduler,
@@ -158,7 +158,7 @@ def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> No
     try:
         done = guarded(output, partial(fleet.identify_batch, sources, output, **options))
     except KeyboardInterrupt:
-        raise Failed("interrupted; what is done is kept, and the same command goes on from there", 130) from None
+        raise Failed("interrupted; finished units are kept, and the same command resumes from there", 130) from None
     console.note(done.table().rstrip("\n"))
     console.say(str(Path(output) / "summary.csv"))
     if done.failed:

@@ -109,11 +109,11 @@ class Fleet:
             f"({kept} by an earlier call), {found}; {len(self.failed)} failed"
         ]
         if not self.judged:
-            lines.append(f"outliers are marked from {outliers.FEWEST} units on")
+            lines.append(f"outliers are marked only with {outliers.FEWEST} or more units")
         taken = [unit for unit in self.units if unit.settings and unit.done and not unit.kept]
         if taken:
             keys = ", ".join(dict.fromkeys(key for unit in taken for key in unit.settings))
-            lines.append(f"{keys} kept from the parameter files that were there, of {len(taken)} units")
+            lines.append(f"{keys} kept from the existing parameter files of {len(taken)} units")
         marked = [("failed", unit.name, unit.message) for unit in self.failed]
         marked += [("outlier", unit.name, unit.outlier) for unit in self.outliers]
         width = max((len(name) for _, name, _ in marked), default=0)
@@ -218,11 +218,11 @@ def _jobs(
     """The units, sorted by name. Raises ValueError for names that clash, FileNotFoundError."""
     for pattern in patterns:
         if "{unit}" not in pattern:
-            raise ValueError(f"holdout {pattern!r} would be that of every unit; write {{unit}} for the unit's name")
+            raise ValueError(f"holdout {pattern!r} would be the same for all units; write {{unit}} for the unit's name")
     paths: dict[Path, Path] = {}
     for source in several(sources):
         if not isinstance(source, str | os.PathLike):
-            raise TypeError("a fleet is made of files, not of records in memory; fit those with hystgen.identify")
+            raise TypeError("a fleet consists of files, not of records in memory; fit those with hystgen.identify")
         paths |= {path.resolve(): path for path in _expanded(os.fspath(source))}
     jobs = []
     for path in paths.values():
@@ -252,7 +252,7 @@ def _expanded(source: str) -> list[Path]:
         found = [path] if path.is_file() else [Path(name) for name in glob.glob(source, recursive=True)]
     found = sorted(file for file in found if file.is_file())
     if not found:
-        raise FileNotFoundError(f"no file matches {source}; give the recordings, one a unit, as a pattern in quotes")
+        raise FileNotFoundError(f"no file matches {source}; give the recordings, one per unit, as a pattern in quotes")
     return found
 
 
@@ -298,7 +298,7 @@ def _kept_rows(folder: Path, jobs: Sequence[_Job]) -> dict[str, Unit]:
     if unreadable:
         files_of = f"{folder / KEPT_IN / unreadable[0]}.json cannot be read"
         more = f", and {len(unreadable) - 1} more" if len(unreadable) > 1 else ""
-        warnings.warn(f"{files_of}{more}; the fit of these units is done again", stacklevel=3)
+        warnings.warn(f"{files_of}{more}; these units are fitted again", stacklevel=3)
     return rows
 
 

@@ -25,8 +25,8 @@ from hystgen.basics import extras, writing
 from hystgen.basics.version import __version__
 from hystgen.identification.settings import Settings
 
-LOST = "the Dask scheduler was lost; the same command goes on from here"
-DIED = "the process that fitted it died, again and again; is there too little memory for its records?"
+LOST = "the Dask scheduler was lost; the same command resumes from here"
+DIED = "the process that fitted it kept dying; is there too little memory for its records?"
 
 PATIENCE = 15.0
 """Seconds allowed for a scheduler to answer, and for it to have a worker."""
@@ -75,7 +75,7 @@ Work = Callable[[Task], Result]
 def fit_unit(task: Task) -> Result:
     """Fit and emit one unit. Never raises an Exception: a failure becomes the result's message."""
     if task.version != __version__:
-        return Result(task.unit, f"the worker has hystgen {__version__}, not {task.version}; install the same")
+        return Result(task.unit, f"the worker has hystgen {__version__}, not {task.version}; install the same version")
     with writing.temporary() as folder:
         paths = {}
         for k, (path, data) in enumerate((*task.records, *task.holdout)):

@@ -168,7 +168,7 @@ def identify(
         reported += [text for item in held if (text := quality.outside(item.name, item.v, drive))]
     reported += [
         f"{item.name}: only {counted(item.used, 'sample is', 'samples are')} left once its start memory is known; it "
-        "hardly counts"
+        "carries little weight"
         for item in compared
         if item.used < SHORTEST
     ]
@@ -318,7 +318,7 @@ def _check_loading_curve(record: Record) -> None:
     if not (top > 0.0 and abs(float(v[0])) <= NEAR_ZERO * top and np.all(np.diff(v) >= -NEAR_ZERO * top)):
         raise IdentificationError(
             f"{record.name} is not an initial loading curve: the drive has to rise all the way from 0; give the part "
-            "of the record up to the first turn, or leave loading_curve out"
+            "of the record up to the first turn, or omit loading_curve"
         )
 
 
@@ -336,7 +336,7 @@ def _checked_thresholds(wanted: int | Sequence[float] | None) -> int | tuple[flo
     if not places or places[0] != 0.0:
         places = (0.0, *places)
     if any(b <= a for a, b in itertools.pairwise(places)):
-        raise ValueError("thresholds are finite, not negative, and rise strictly")
+        raise ValueError("thresholds must be finite, not negative, and strictly increasing")
     return places
 
 
@@ -346,7 +346,7 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
         return None
     if model not in ("gpi-deadzone", "auto"):
         raise ValueError(
-            f"breaks are those of a dead-zone sum, which model {model} does not have; give model gpi-deadzone or auto"
+            f"only a dead-zone sum has breaks, and model {model} has none; give model gpi-deadzone or auto"
         )
     if isinstance(breaks, int | np.integer) and not isinstance(breaks, bool):
         if not 1 <= breaks <= MOST_BREAKS:
@@ -356,7 +356,7 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
         raise ValueError("breaks is a whole number or a list of drive values")
     places = tuple(x for x in arguments.numbers("breaks", breaks, "[-20, 20]") if x != 0.0)
     if not places or not all(map(math.isfinite, places)) or any(b <= a for a, b in itertools.pairwise(places)):
-        raise ValueError("breaks are finite drive values that rise strictly, at least one beside 0")
+        raise ValueError("breaks must be finite, strictly increasing drive values, with at least one besides 0")
     return places
 
 
@@ -367,10 +367,10 @@ def _trial(
     errors, and the reason if there are no rows."""
     if not courses:
         if len(kinds) > 1:
-            raise ValueError("model auto needs something held out: give holdout records beside the loading curve")
+            raise ValueError("model auto needs something held out: give holdout records besides the loading curve")
         return [], kinds[0], [], ""
     short = "too short, or too little of the drive's range in its first part, to hold its end out; give --holdout"
-    instead = "" if len(kinds) == 1 else f". Without anything held out nothing can be chosen: {kinds[0]} was fitted"
+    instead = "" if len(kinds) == 1 else f". With nothing held out there is no choice: {kinds[0]} was fitted"
     fronts, ends = [], []
     for item in courses:
         front, end = _parted(item)

@@ -316,7 +316,7 @@ def between_gaps(record: Record) -> list[Piece]:
     ]
 
 
-BRIDGED, NOT_COMPARED = "v that y does not bear out, bridged", "y far from the neighbours, not compared"
+BRIDGED, NOT_COMPARED = "v without a response in y, bridged", "y far from the neighbours, not compared"
 """Phrases for isolated wrong samples and their treatment."""
 
 

@@ -71,7 +71,7 @@ class Fit:
         Needs matplotlib, of the extra `plot`. Raises PlotError, OSError.
         """
         if self.draw is None:
-            raise drawing.PlotError("nothing draws this fit; use the one that hystgen.identify returns")
+            raise drawing.PlotError("this fit has no figure; use the one returned by hystgen.identify")
         return drawing.picture(partial(self.draw, self), path)
 
     def table(self) -> str:
@@ -186,7 +186,7 @@ class Fit:
         elif any(row.part == "held out" for row in self.rows):
             reported.append("written: fitted to the records of row fit only.")
         if any(row.ignored for row in self.rows):
-            reported.append("ignored: samples at the start, where the memory from before the record is not known.")
+            reported.append("ignored: samples at the start, where the memory from before the record is unknown.")
         if len(self.parameters.model.pi.thresholds) > 1:
             reported += [each.start_sentence(self.unit) for each in self.used if any(each.starts)]
         reported.append(f"95 % confidence: {self._interval_sentence()}.")

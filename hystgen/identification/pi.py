@@ -34,7 +34,7 @@ DUST = 1e-9
 
 FALLS = (
     "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign of y, "
-    "else check which column is which"
+    "otherwise check which column is which"
 )
 """The message if no play is left in the model."""
 
@@ -93,7 +93,7 @@ def solve(
     if reach == 0.0:
         names = ", ".join(dict.fromkeys(item.name for item in courses))
         raise IdentificationError(
-            f"{names}: once the start memory is known the drive does not move any more; record more cycles, or give "
+            f"{names}: the drive no longer moves once the start memory is known; record more cycles, or give "
             "--history"
         )
     if isinstance(wanted, tuple):
@@ -176,16 +176,17 @@ SLOWEST, SAME_SPEED = (0.125, 0.25, 0.5, 1.0), 1.05
 Set by: tests/test_start.py TestDirection."""
 
 FALLING = (
-    "y falls where v rises; if the sensor counts the other way, change the sign of y, else check which column is which"
+    "y falls when v rises; if the sensor counts the other way, change the sign of y, otherwise check which column "
+    "is which"
 )
 
 CLOCKWISE = (
-    "the loops run clockwise: y is ahead of v, where every play is behind its drive, so that no weights follow them. "
+    "the loops run clockwise: y is ahead of v, while every play lags its drive, so no weights can follow them. "
     "If y is a force and v the displacement that goes with it, exchange the columns (--columns v=..,y=..): the model "
     "then gives the displacement"
 )
 
-NO_PLAYS = "no hysteresis was found: the model has no play beside r_0, and its output follows its input without a loop"
+NO_PLAYS = "no hysteresis was found: the model has no play besides r_0, and its output follows its input without a loop"
 
 
 def sense_of(reduced: Reduced, courses: Sequence[Course], squares: float) -> Sense:

@@ -64,7 +64,7 @@ def courses(
             raise IdentificationError(f"{record.name}: no part between its gaps can be used; record without gaps")
         reported.append(
             f"{record.name}: cut at {counted(len(pieces) - 1, 'gap')} of more than "
-            f"{faults.LONG_GAP:g} steps; what the drive did in them is not known, so that each part starts anew"
+            f"{faults.LONG_GAP:g} steps; what the drive did in them is unknown, so each part starts anew"
         )
         made += found
     for k, item in enumerate(made):
@@ -100,7 +100,7 @@ def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> C
         missing = int(np.count_nonzero(no_value(x)))
         if missing > faults.most(len(x)):
             raise IdentificationError(
-                f"{record.name}: {missing} of {len(x)} samples of {name} stand for no value, "
+                f"{record.name}: {missing} of {len(x)} samples of {name} stand for a missing value, "
                 f"{x[no_value(x)][0]:.6g} for one; from {LARGEST:g} on numbers are none in any unit. Record again, or "
                 f"convert {name}"
             )
@@ -110,11 +110,11 @@ def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> C
         raise IdentificationError(f"{record.name}: the drive is constant; a fit needs a drive that moves")
     measured = y[skip:][np.isfinite(y[skip:])]
     if not len(measured) or np.ptp(measured) == 0.0:
-        raise IdentificationError(f"{record.name}: the measured output is constant; is the right column y?")
+        raise IdentificationError(f"{record.name}: the measured output is constant; is y the right column?")
     for name, x in (("v", v), ("y", measured)):
         if np.ptp(x) < LEAST_MOVEMENT:
             raise IdentificationError(
-                f"{record.name}: {name} moves by {np.ptp(x):.3g} in all, which is no movement in any unit; convert it "
+                f"{record.name}: {name} moves by {np.ptp(x):.3g} in all, which is too little in any unit; convert it "
                 "to a smaller unit, or name another column"
             )
     return Course(record.name, v, y, history, skip, len(v), skip).resettled(math.inf)
@@ -132,8 +132,8 @@ def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
     left, before = np.count_nonzero(np.isfinite(item.y) & ~at), np.count_nonzero(np.isfinite(item.y))
     if left < max(LEAST_SOUND * before, SHORTEST):
         raise IdentificationError(
-            f"{item.name}: y stands at the converter's end in {before - left} of {len(at)} samples; set the sensor's "
-            "range so that the whole motion lies inside it, and record again"
+            f"{item.name}: y is at the limit of the converter in {before - left} of {len(at)} samples; set the "
+            "sensor's range to cover the whole motion, and record again"
         )
     return _less(item, at), [(name, level, int(np.count_nonzero(item.y == level))) for name, level in levels]
 
@@ -159,7 +159,8 @@ def _without_stretches(item: Course) -> tuple[Course, list[str]]:
     """The course without the samples of y in stretches that are plainly wrong, and a sentence about each kind."""
     left, ends = without_rails(item)
     reported = [
-        f"{item.name}: {counted(number, 'sample')} of y at the converter's end, the {name} of {level:.6g}, not compared"
+        f"{item.name}: {counted(number, 'sample')} of y at the limit of the converter, the {name} of {level:.6g}, not "
+        "compared"
         for name, level, number in ends
     ]
     left, runs = _without_runs(left)

@@ -299,7 +299,7 @@ def about_model(
     if solution.reach < SMALL_REACH * (high - low):
         reported.append(
             f"the records show little hysteresis: no play above {solution.reach:.3g} moves enough in them; "
-            "record full cycles, several times, or give --history"
+            "record several full cycles, or give --history"
         )
     if isinstance(wanted, tuple):
         beyond = [r for r in wanted if r > solution.reach * (1.0 + 1e-9)]
@@ -307,7 +307,7 @@ def about_model(
             above = f" above {solution.reach:.6g}"
             reported.append(
                 f"{counted(len(beyond), f'threshold{above} hardly moves', f'thresholds{above} hardly move')} in these "
-                "records; do not trust the weights there for larger drives"
+                "records; do not trust their weights for larger drives"
             )
     outputs = [y[np.isfinite(y)] for y in (item.y[item.first : item.last] for item in compared)]
     spread = sum(float(np.sum((y - np.mean(y)) ** 2)) for y in outputs) / own.samples
@@ -330,8 +330,9 @@ def about_inverse(p: NDArray[np.float64], made: Weights) -> list[str]:
         ]
     if p[0] == 0.0:
         return [
-            "p_0 is 0: after each reversal the output stands still (series backlash). The model has no inverse and is "
-            "of use forward only. If the actuator has no backlash, record more slowly or with more samples per second"
+            "p_0 is 0: after each reversal the output does not move (series backlash). The model has no inverse and "
+            "can only be used forward. If the actuator has no backlash, record more slowly or with more samples per "
+            "second"
         ]
     if np.sum(p) > AMPLIFIES * p[0]:
         return [
@@ -363,11 +364,11 @@ def repeated(to_fit: Sequence[Record], held: Sequence[Record]) -> list[str]:
         for other in to_fit[: min(k, len(to_fit))]:
             if np.array_equal(record.v, other.v) and np.array_equal(np.asarray(record.y), np.asarray(other.y)):
                 if k < len(to_fit):
-                    reported.append(f"{record.name}: fitted twice, as {other.name} too; leave one of them out")
+                    reported.append(f"{record.name}: fitted twice, also as {other.name}; leave one of them out")
                 else:
                     alike = "" if record.name == other.name else f", as {other.name}"
                     reported.append(
-                        f"{record.name}: held out, but also fitted{alike}, so that it judges nothing; leave it out of "
+                        f"{record.name}: held out, but also fitted{alike}, so it judges nothing; leave it out of "
                         "one of the two"
                     )
                 break

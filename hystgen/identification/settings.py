@@ -49,22 +49,22 @@ class Settings:
         """Sentences about settings kept and dropped; `fit`: without these settings."""
         said = []
         if self.problem:
-            said.append(f"{self.file}: nothing of what was there is kept, it is not a parameter file: {self.problem}")
+            said.append(f"{self.file}: nothing in the old file is kept, it is not a parameter file: {self.problem}")
         names = [key for key in KEPT_KEYS if key in self.values]
         if self._kept(fit):
             names.insert(0, "units")
         if self.name == fit.parameters.name:
             names.insert(0, "name")
         if names:
-            said.append(f"{self.file}: {', '.join(names)} kept from the file that was there")
+            said.append(f"{self.file}: {', '.join(names)} kept from the existing file")
         _, lost = self._emit(fit)
         if lost:
             keys = ", ".join(f"emit.{key}" for key in lost)
-            said.append(f"{self.file}: {keys} left out, given in other units than the model now has")
+            said.append(f"{self.file}: {keys} left out, since they are in units other than the model's")
         if self.effects:
             said.append(
-                f"{self.file}: the effects of the file that was there ({', '.join(self.effects)}) are left out, they "
-                "were fitted with its weights; find them anew with hystgen diagnose"
+                f"{self.file}: the effects of the existing file ({', '.join(self.effects)}) are left out, since "
+                "they were fitted with its weights; find them again with hystgen diagnose"
             )
         return said
 

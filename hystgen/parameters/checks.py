@@ -301,7 +301,7 @@ class _Checker:
         state = self.get(*path, "initial_state")
         if isinstance(state, tuple) and len(state) != count:
             what = f"has {_entries(len(state))} for {count} thresholds (r_0 included)"
-            self.add((*path, "initial_state"), f"{what}; write one number, or one a threshold")
+            self.add((*path, "initial_state"), f"{what}; write one number, or one per threshold")
 
     def _same_length(self, path: Path, key: str, reference: str) -> None:
         first, second = self.at((*path, key)), self.get(*path, reference)
@@ -422,7 +422,7 @@ class _Checker:
             self._shaped(path, effect, shapes)
         elif given.startswith("user:"):
             there = f", only {', '.join(map(printable, self.user))}" if self.user else ""
-            self.add(name, f"{printable(given)} is defined in no file given{there}; give its file (--effects)")
+            self.add(name, f"{printable(given)} is not defined in any given file{there}; give its file (--effects)")
         else:
             names = (*EFFECT_NAMES, *self.user)
             advice = _nearest(given, names) or f"known are {', '.join(names)}"
@@ -455,7 +455,7 @@ class _Checker:
         if chosen.moves_plays():
             first = self._mover = self._mover or (made.name, path_text(path))
             if first != (made.name, path_text(path)):
-                said = f"says how the plays move, as {printable(first[0])} does (in {first[1]}); keep one of them"
+                said = f"says how the plays move, as does {printable(first[0])} does (in {first[1]}); keep one of them"
                 self.add((*path, "name"), f"{printable(made.name)} {said}")
         for keys, message in made.problems(self._thresholds()):
             self.add((*path, *keys), message)

@@ -156,7 +156,7 @@ def _next(events: Iterator[Any], text: str, builder: _Builder) -> Any:
         message = f"not valid YAML: {_clean(error.problem or 'cannot be read')}{context}; correct the text there"
     except Exception:
         # The parser has failures of its own, such as OverflowError for the escape "\UFFFFFFFF".
-        position, message = builder.position, "not valid YAML soon after this place; correct the text there"
+        position, message = builder.position, "not valid YAML soon after this position; correct the text there"
     builder.document.refuse((), position, message)
     builder.document.data = None
     raise _LimitError

@@ -97,7 +97,7 @@ def wrong_bits(bits: int) -> Iterator[str]:
 def wrong_range(low: float, high: float) -> Iterator[str]:
     """Problems with the range of a converter."""
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        yield f"the DAC range {low:g} to {high:g} does not rise; give its lower end first"
+        yield f"the DAC range {low:g} to {high:g} is not increasing; give its lower end first"
 
 
 def filled(codes: ArrayLike, every: int) -> Codes:

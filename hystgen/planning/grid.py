@@ -57,7 +57,7 @@ class Grid:
         a, b = Decimal(low), Decimal(high)
         digits = 6 - (b - a).adjusted()
         if max(abs(low), abs(high)) > 1e8 * (high - low):
-            raise PlanError([f"input_range [{low!r}, {high!r}] is too narrow for numbers of its size"])
+            raise PlanError([f"input_range [{low!r}, {high!r}] is too narrow for numbers of its magnitude"])
         margin = Decimal(str(MARGIN)) * (b - a)
         first, last = (x.scaleb(digits) for x in (a + margin, b - margin))
         return cls(digits, math.ceil(first), math.floor(last))

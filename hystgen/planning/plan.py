@@ -219,7 +219,7 @@ def plan(
         if value is not None and not 0.0 < value < math.inf
     ]
     if rate is not None and sample_time is not None:
-        problems.append("a rate is one over a sample time; give one or the other")
+        problems.append("a rate is one over a sample time; give only one of them")
     low, high = file.input_range
     grid = Grid.over(low, high)
     top, bottom = grid.values((grid.high, grid.low))
@@ -233,14 +233,14 @@ def plan(
         sample_time = 1.0 / rate
     elif sample_time is None:
         sample_time = file.sample_time or SAMPLE_TIME
-        whose = "the parameter file's" if file.sample_time else "chosen here, since the parameter file has none"
+        whose = "the parameter file's" if file.sample_time else "chosen by default, since the parameter file has none"
         defaults.append(f"The sample time of {sample_time:g} s is {whose}; --sample-time gives another.")
     if max_rate is None:
         max_rate = (high - low) / (FULL_SCALE * sample_time)
         unit = f" {file.units.input}/s" if file.units.input else "/s"
         defaults.append(
-            f"The rate limit of {max_rate:.4g}{unit} was chosen here: the whole range in {FULL_SCALE} sample times. If "
-            "amplifier or stage must not see that, plan again with --max-rate."
+            f"The rate limit of {max_rate:.4g}{unit} was chosen by default: the whole range in {FULL_SCALE} sample "
+            "times. If that is too fast for the amplifier or the stage, plan again with --max-rate."
         )
     tempo = Tempo.of(grid, max_rate, sample_time)
     records = [(each, every := each.every(tempo), written(each, grid, tempo, every)) for each in RECORDS]
@@ -271,7 +271,7 @@ def _dac(
     if bits is None and ends is None:
         return None
     if rate is None:
-        problems.append("codes of a DAC are for one rate; give the rate at which it is played, Hz")
+        problems.append("codes of a DAC need a rate; give the rate at which they are played, Hz")
     if bits is None or ends is None:
         problems.append("codes of a DAC need its bits and its range, the drive at its lower and upper end; give both")
     if bits is not None:

@@ -150,7 +150,7 @@ def _number(low: float, strict: bool = False) -> Callable[[Any], str]:
 def _whole(low: int) -> Callable[[Any], str]:
     def wrong(value: Any) -> str:
         right = isinstance(value, int) and not isinstance(value, bool) and low <= value < HUGE
-        return "" if right else f"a whole number from {low} on, not {shown(value)}"
+        return "" if right else f"a whole number, at least {low}, not {shown(value)}"
 
     return wrong
 
@@ -227,9 +227,9 @@ def _problems(content: Mapping[str, Any]) -> Iterator[Wrong]:
         if own:
             continue
         if part["name"] in names:
-            yield (*place, "name"), f"{shown(part['name'])} is the name of a record before; {GIVE}", False
+            yield (*place, "name"), f"{shown(part['name'])} is the name of an earlier record; {GIVE}", False
         if part["first"] < end:
-            yield (*place, "first"), f"begins in the record before, which ends at sample {end}; {GIVE}", False
+            yield (*place, "first"), f"begins within the previous record, which ends at sample {end}; {GIVE}", False
         names.add(part["name"])
         end = part["first"] + part["samples"]
         if ("samples",) not in wrong and "samples" in content and end > content["samples"]:

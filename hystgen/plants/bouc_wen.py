@@ -93,7 +93,7 @@ class BoucWen:
         if self.alpha < 0.0:
             raise ValueError(f"alpha has to be at least 0, not {self.alpha}")
         if self.n < 1.0:
-            raise ValueError(f"n has to be at least 1, not {self.n}: below, z is not unique")
+            raise ValueError(f"n has to be at least 1, not {self.n}: below that, z is not unique")
         if not -self.beta < self.gamma <= self.beta:
             raise ValueError(f"gamma has to be above -beta and at most beta = {self.beta}, not {self.gamma}")
         if abs(self.start) > self.bound:

@@ -56,7 +56,7 @@ def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: floa
         if not (done and np.all(np.isfinite(found))):
             raise ValueError(
                 f"the integration fails between the inputs {path[first]:g} and {path[last]:g}: with this slope the "
-                "output runs away, or it needs a finer step than there is"
+                "output runs away, or it would need too fine a step"
             )
         y[first : last + 1] = found[:, 0]
     return y[1:]

@@ -47,10 +47,10 @@ class KrasnoselskiiPokrovskii:
             object.__setattr__(self, name, finite_numbers(getattr(self, name), name))
         if not len(self.lower) == len(self.upper) == len(self.weights):
             raise ValueError(
-                f"{len(self.lower)} lower and {len(self.upper)} upper places but {len(self.weights)} weights"
+                f"{len(self.lower)} lower and {len(self.upper)} upper positions but {len(self.weights)} weights"
             )
         if any(p1 > p2 for p1, p2 in zip(self.lower, self.upper, strict=True)):
-            raise ValueError("the lower place of a kernel is not above its upper one")
+            raise ValueError("the lower position of a kernel must not be above its upper one")
 
     @classmethod
     def on_grid(

@@ -66,7 +66,7 @@ class EverettTable:
     def __post_init__(self) -> None:
         edges = finite_numbers(self.edges, "edges")
         if len(edges) < 2 or any(b <= a for a, b in itertools.pairwise(edges)):
-            raise ValueError("edges rise strictly and are at least two")
+            raise ValueError("edges must be strictly increasing, and at least two")
         given = list(self.values) if np.iterable(self.values) else []
         if len(given) != len(edges):
             raise ValueError(f"{len(edges)} edges but {len(given)} rows")
@@ -97,7 +97,7 @@ class EverettTable:
         edges, table = np.array(self.edges), np.array(self.values)
         if not np.all((edges[0] <= beta) & (beta <= alpha) & (alpha <= edges[-1])):
             span = f"{edges[0]:g} to {edges[-1]:g}"
-            raise ValueError(f"an Everett table from {span} knows no place beyond, nor alpha < beta")
+            raise ValueError(f"an Everett table from {span} has no values outside, nor for alpha < beta")
         last = len(edges) - 2
         i = np.clip(np.searchsorted(edges, alpha, side="right") - 1, 0, last)
         j = np.clip(np.searchsorted(edges, beta, side="right") - 1, 0, last)
@@ -142,7 +142,7 @@ class Preisach:
             raise ValueError("an Everett surface is finite, and 0 for alpha = beta")
         along = np.diff(surface, axis=0)[:, :-1][inside[:-1, :-1]], -np.diff(surface, axis=1)[1:][inside[1:, 1:]]
         if any(np.any(part < -slack) for part in along):
-            raise ValueError("an Everett surface rises in alpha and falls in beta")
+            raise ValueError("an Everett surface increases in alpha and decreases in beta")
 
     def simulate(self, v: ArrayLike) -> Array:
         """Output (N,) at the inputs `v` (N,); does not depend on time."""

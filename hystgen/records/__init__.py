@@ -187,7 +187,7 @@ def _check_options(columns: object, sample_time: object, delimiter: object) -> N
     if sample_time is not None:
         arguments.real("sample_time", sample_time, "seconds")
     if delimiter is not None and not isinstance(delimiter, str):
-        raise TypeError(f"delimiter is a character such as ';', not {arguments.kind(delimiter)}")
+        raise TypeError(f"delimiter has to be a character such as ';', not {arguments.kind(delimiter)}")
 
 
 def _check_arrays(record: Record) -> None:
@@ -214,7 +214,7 @@ def _read(
     reading = Reading(file, columns or {}, sample_time, delimiter, tuple(need), tick, points)
     mark = reading.delimiter
     if mark is not None and (len(mark) != 1 or mark in "\"'.\r\n" or mark.isalnum()):
-        reading.problem(f'the delimiter "{printable(mark)}" is not usable; give one character such as ;')
+        reading.problem(f'the delimiter "{printable(mark)}" is not usable; give a single character such as ;')
     if sample_time is not None and not (0.0 < sample_time < float("inf")):
         reading.problem(f"the sample time {sample_time:g} is not positive; give seconds per sample")
     reading.refuse_if_any()
@@ -226,7 +226,7 @@ def _read(
         ) from None
     with stream:
         if not stream.peek(1):
-            raise reading.refuse("is empty; record again or give another file")
+            raise reading.refuse("is empty; record again, or give another file")
         table = FORMATS.get(Path(file).suffix.lower(), read_csv)(reading, stream)
     return repaired(reading, table)
 

@@ -87,8 +87,8 @@ class Clock:
             self._dates |= {text}
         if len(self._dates) > 1:
             self.problem = (
-                f'the date "{text}" may begin with the day or with the month, and dates change; export ISO dates such '
-                "as 2024-03-05, or seconds"
+                f'the date "{text}" may begin with the day or with the month, and the date changes; export ISO dates '
+                "such as 2024-03-05, or seconds"
             )
         return date(three, one, two).toordinal()
 
@@ -182,10 +182,10 @@ class Dialect:
         if any(marks.fullmatch(text) for marks in _THOUSANDS):
             return "thousands marks", "thousands marks are not read, export numbers without them"
         if "." in text and self.decimal != "." and _reads(text):
-            return "decimal point", "the file has decimal commas, write every number with one"
+            return "decimal point", "the file uses decimal commas, write every number with one"
         if _MINUTES.fullmatch(text):
             return "minutes", "write times as hours, minutes and seconds, 0:01:30.5, or in seconds"
-        return "", "write a number, or nothing where there is no value"
+        return "", "write a number, or leave the cell empty if there is no value"
 
 
 def shape(cell: str) -> str:

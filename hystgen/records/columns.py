@@ -89,7 +89,7 @@ def to_seconds(t: Array, unit: str) -> tuple[Array, str]:
     """Times in seconds, and a note for the user, empty if they were in seconds already."""
     scale = TIMES.get(plain(unit).partition(" since ")[0].casefold())
     if scale is None:
-        return t, f'the unit "{printable(unit)}" of t is not a known unit of time; its numbers were taken as seconds'
+        return t, f'the unit "{printable(unit)}" of t is not a known unit of time; its numbers were read as seconds'
     factor, divisor = scale
     if factor == divisor:
         return t, ""
@@ -113,7 +113,7 @@ def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = No
             own = record.units.get(column, "")
             if len(own) > MAX_UNIT or not own.isprintable():
                 strange.append(
-                    f'the unit "{printable(own)}" of {column} in {record.name} is not taken over: a unit has up to '
+                    f'the unit "{printable(own)}" of {column} in {record.name} is ignored: a unit has at most '
                     f"{MAX_UNIT} characters on one line"
                 )
             elif not unit:
@@ -124,7 +124,7 @@ def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = No
     if _LENGTH.fullmatch(plain(drive)) and displacement and not _LENGTH.fullmatch(plain(displacement)):
         strange.append(
             f"the drive is in {printable(drive)} and the displacement in {printable(displacement)}, as if they were "
-            "exchanged; check the columns and the units, the drive comes first"
+            "swapped; check the columns and the units, the drive comes first"
         )
     return units, strange
 
@@ -224,7 +224,7 @@ def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
         factor, divisor = TIMES.get(text.casefold(), (1.0, 1.0))
         said = f"sample time {value:g} {text or 's'}"
         seconds = value / divisor * factor
-    return Step(seconds, f"{said} ({printable(where)}{'' if text else ', which gives no unit'})")
+    return Step(seconds, f"{said} ({printable(where)}{'' if text else ', without a unit'})")
 
 
 # Which column of a file is which of ours: t, v, y, u ---------------------------------------------------------
@@ -338,7 +338,7 @@ def parse_columns(text: str) -> dict[str, str]:
                 "others are written t=#1,v=#3"
             )
         if len(set(numbers)) < len(numbers) or any(int(number) == 0 for number in numbers):
-            raise ValueError(f'"{printable(text)}" names no columns; each has a number of its own, from 1 on')
+            raise ValueError(f'"{printable(text)}" names no columns; write different numbers, starting at 1')
         return dict(zip(STANDARD[-len(numbers) :], (f"#{int(number)}" for number in numbers), strict=True))
     mapping: dict[str, str] = {}
     for part in text.split(","):

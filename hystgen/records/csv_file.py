@@ -104,7 +104,7 @@ def _blocks(reading: Reading, chunks: Iterator[bytes]) -> Iterator[bytes]:
             yield data[:end]
         rest = data[end:]
         if len(rest) > BLOCK:
-            raise reading.refuse(f"has a line of more than {BLOCK >> 20} MB; export one row per line")
+            raise reading.refuse(f"has a line longer than {BLOCK >> 20} MB; export one row per line")
     if rest:
         yield rest
 
@@ -132,9 +132,9 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
     while (len(sample) < SAMPLE or sample.count("\n") < SAMPLE_LINES) and (text := next(blocks, "")):
         sample += text
     if not sample.strip():
-        raise reading.refuse("is empty; record again or give another file")
+        raise reading.refuse("is empty; record again, or give another file")
     if PARAMETERS.search(sample):
-        raise reading.refuse("is a parameter file; give a recording, a table of time, drive and displacement")
+        raise reading.refuse("is a parameter file; give a recording, which is a table of time, drive and displacement")
     found = _layout(reading, sample)
     names = found.names
     units = found.units or [""] * len(names)
@@ -267,7 +267,7 @@ class _Body:
             if end < 0:
                 self.kept = text[begin:]
                 if len(self.kept) > BLOCK:
-                    raise self.reading.refuse("has a segment whose header does not end; export it again", self.line + 1)
+                    raise self.reading.refuse("has a segment with an unfinished header; export it again", self.line + 1)
                 return
             seconds, rows = segments.read(text[begin:end], self.line + 1)
             self.segments.append((self.rows, self.line + 1, seconds))
@@ -281,7 +281,7 @@ class _Body:
         another = text.find(self.layout.another) if self.layout.another else -1
         if another >= 0:
             raise self.reading.refuse(
-                f"has a second table in it ({self.layout.kind}); one file is one experiment, export each by itself",
+                f"contains a second table ({self.layout.kind}); one file is one experiment, export each separately",
                 self.line + 1 + text.count("\n", 0, another),
             )
         lines = text.count("\n") + (not text.endswith("\n") and bool(text))
@@ -342,7 +342,7 @@ class _Body:
             if 0 < row < end and not t[row] > t[row - 1]:
                 raise self.reading.refuse(
                     f"has a segment that begins at {t[row]:g} s, when the one before it has come to {t[row - 1]:g} s; "
-                    "one file is one experiment, export each by itself",
+                    "one file is one experiment, export each separately",
                     line,
                 )
 

@@ -274,7 +274,7 @@ def _without_numbers(reading: Reading, lines: Sequence[_Line], dialects: Sequenc
         raise reading.refuse(
             "has no header row; the first line names the columns, for example t,v,y"
             if lines
-            else "is empty; record again or give another file"
+            else "is empty; record again, or give another file"
         )
     dialect = max(dialects, key=lambda each: len(each.cells(header.text)), default=Dialect())
     if reading.delimiter is None and len(Dialect().cells(header.text)) > 1:
@@ -340,7 +340,7 @@ END = "***End_of_Header***"
 _SEGMENT = re.compile(r"^(?:Channels\b|\*\*\*Start_Special)", re.MULTILINE)
 """How the header of a further segment begins."""
 
-_OWN_TIMES = "its channels have times of their own (X0, Delta_X); export them with one time, X_Columns One"
+_OWN_TIMES = "its channels have separate times (X0, Delta_X); export them with a common time, X_Columns One"
 
 _SPECIAL = ("***Start_Special***", "***End_Special***")
 
@@ -363,7 +363,7 @@ def labview(reading: Reading, lines: Sequence[str]) -> Layout | None:
     header = ends[1] + 1
     names = [cell.strip() for _, cell in dialect.cells(lines[header - 1])] if len(lines) >= header else []
     if len(names) < 2:
-        raise reading.refuse("has no names of channels below the header of the segment; export it again", ends[1])
+        raise reading.refuse("has no channel names below the header of the segment; export it again", ends[1])
     return _of_segment(reading, dialect, file, segment, names, header)
 
 
@@ -548,7 +548,7 @@ def pi_gcs(reading: Reading, lines: Sequence[str]) -> Layout | None:
 def _whole(reading: Reading, entries: dict[str, tuple[int, str]], key: str) -> int:
     line, text = entries[key]
     if not text.isdecimal() or (key != "NDATA" and not 0 < int(text) < LARGEST_CODE):
-        raise reading.refuse(f"{key} is not a possible whole number; correct it, or export the table again", line)
+        raise reading.refuse(f"{key} is not a valid whole number; correct it, or export the table again", line)
     return int(text)
 
 
@@ -658,7 +658,7 @@ def yokogawa(reading: Reading, lines: Sequence[str]) -> Layout | None:
     )  # fmt: skip
     seconds = {_number(reading, dialect, step, "HResolution", place) for step in steps if step}
     if len(seconds) > 1:
-        raise reading.refuse("its channels have sample rates of their own; export them with one rate", place)
+        raise reading.refuse("its channels have different sample rates; export them with one rate", place)
     if settings.get("HUnit", (0, ["s"]))[1][:1] == ["s"] and seconds and min(seconds) > 0.0:
         step = seconds.pop()
         found.steps = [Step(step, f"HResolution {step:g} s (line {place})")]

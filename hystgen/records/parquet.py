@@ -77,7 +77,7 @@ def _vector(reading: Reading, file: Any, field: Any) -> NDArray[np.float64]:
             values = values.cast(pa.int64())
             if origin is None and values.null_count < len(values):
                 origin = values.drop_null()[0].as_py()
-                reading.notes.append(f"{field.name} holds times of day; it was converted to seconds from its first")
+                reading.notes.append(f"{field.name} holds times of day; it was converted to seconds since the first")
             if origin:
                 # Subtract before rounding to a double: nanoseconds since 1970 need more than 53 bits
                 values = compute.subtract_checked(values, origin)

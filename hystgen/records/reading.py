@@ -155,10 +155,10 @@ class Reading:
         steps = finder.steps
         if len({step.start for step in steps}) > 1:
             starts = " and ".join(f"{printable(step.of)} at {step.start}" for step in steps)
-            self.problem(f"the columns do not start together, {starts}; export them with one time", line)
+            self.problem(f"the columns start at different times,  {starts}; export them with a common time", line)
         if any(abs(step.seconds - steps[0].seconds) > SAME_STEP * steps[0].seconds for step in steps):
             said = " and ".join(dict.fromkeys(step.said for step in steps))
-            self.problem(f"there is no time, and the file has {said}; give --sample-time", line)
+            self.problem(f"there is no time, but the file has {said}; give --sample-time", line)
         self.refuse_if_any()
         if finder.understood:
             no_unit = "t" in finder.understood and not found["t"].unit
@@ -252,7 +252,7 @@ class Reading:
         if "t" in numbers and "t" not in units and np.any(numbers["t"] >= NO_SECONDS):
             name = printable(taken["t"].own)
             raise self.refuse(
-                f'the numbers of "{name}" are too large to be seconds, and it has no unit; write the unit behind its '
+                f'the numbers of "{name}" are too large to be seconds, and it has no unit; write the unit after its '
                 f'name, "{name} [ms]"'
             )
         if "t" in units:
@@ -369,7 +369,7 @@ def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_],
     if number > REPAIRABLE * length:
         reading.problem(
             f"{number} of {length} samples {'is' if number == 1 else 'are'} {which}, {first}; more than "
-            f"{100 * REPAIRABLE:g} % is not repaired, record or export again",
+            f"{100 * REPAIRABLE:g} % is too much to repair, record or export again",
             line,
         )
     else:
@@ -395,8 +395,8 @@ def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> 
     if given is None:
         mean = float(t[rows[-1]] - t[rows[0]]) / float(rows[-1] - rows[0])
         reading.problem(
-            f"the time repeats in {np.count_nonzero(steps == 0.0)} of {len(t)} samples, it is written in steps of "
-            f"{finest:.3g} s; give --sample-time (here about {mean:.3g}), or export it with more digits",
+            f"the time repeats in {np.count_nonzero(steps == 0.0)} of {len(t)} samples, because it was written in "
+            f"steps of {finest:.3g} s; give --sample-time (here about {mean:.3g}), or export it with more digits",
             table.line(row),
         )
         return t
@@ -405,7 +405,7 @@ def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> 
     apart = float(np.ptp(even[rows] - t[rows]))
     if apart > finest + given:
         reading.problem(
-            f"the sample time {given:g} s given does not fit the time of the file: over the record they come apart by "
+            f"the sample time {given:g} s given does not fit the time of the file: over the record they diverge by "
             f"{apart:.3g} s; correct it, or export the time with more digits",
             table.line(row),
         )

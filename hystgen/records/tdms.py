@@ -63,6 +63,6 @@ def _vector(reading: Reading, channel: Any) -> NDArray[Any]:
     numbers = np.asarray(channel[:])
     if numbers.dtype.kind != "M":
         return numbers
-    reading.notes.append(f"{channel.name} holds times of day; it was converted to seconds from its first")
+    reading.notes.append(f"{channel.name} holds times of day; it was converted to seconds since the first")
     seconds: NDArray[np.float64] = (numbers - numbers[0]).astype("timedelta64[ns]").astype(np.int64) / NANO
     return seconds

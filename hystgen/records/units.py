@@ -192,7 +192,7 @@ def converted(
                 continue
             goal = taken.get(key, Wanted()) if key else Wanted("degC", "a temperature", named=True)
             if not goal.unit:
-                said = f"{goal.whose} has no unit; it was taken to be in {own}, as column {column} is"
+                said = f"{goal.whose} has no unit; it was assumed to be in {own}, as column {column} is"
                 notes += [said] if goal.told and said not in record.notes else []
                 taken[key] = Wanted(own, f"column {column} of {printable(record.name)}")
                 continue
@@ -222,11 +222,11 @@ def _apart(column: str, own: str, goal: Wanted, option: str) -> str:
     said = f"column {column} is in {own} and {goal.whose} in {goal.unit}"
     strange = [unit for unit in (own, goal.unit) if quantity(unit, column) is None]
     if not strange:
-        return f"{said}, which are different quantities; take another column, or correct the unit behind its name"
+        return f"{said}, which are different quantities; choose another column, or correct the unit after its name"
     more = f", or name the units with {option}" if option else ""
     return (
-        f'{said}, and "{strange[0]}" is no known unit; convert the column and write the same unit behind its name, or '
-        f"none{more}"
+        f'{said}, and "{strange[0]}" is not a known unit; convert the column and write the same unit after its name, '
+        f"or none{more}"
     )
 
 

@@ -75,7 +75,7 @@ def rows(
         row = replace(row, flash=built.flash, ram=built.ram)
         if size is not None and max(built.ram, built.with_selftest + STACK) > board.ram:
             return [replace(row, error=_too_large(board, built, size))]
-        words = f"RAM has the {built.constants} bytes of constants, which lie there on an AVR"
+        words = f"RAM includes the {built.constants} bytes of constants, which are in RAM on an AVR"
         row = replace(row, note=f"{words}, and an instance of each operator")
         result = run(board, link(board, sources, built.objects, folder / board.name))
         return [selftest(row, sources.name, result)]
@@ -87,11 +87,11 @@ def _too_large(board: Board, built: Built, size: Size) -> str:
     if built.ram <= board.ram:
         return (
             f"the self-test does not fit: with the module it takes {built.with_selftest} of {board.ram} bytes of RAM, "
-            f"and {STACK} are for the stack; the module alone takes {built.ram}"
+            f"of which {STACK} are for the stack; the module alone takes {built.ram}"
         )
     fit = size.plays - -(-(built.ram - board.ram) // size.memory.play)
     return (
-        f"{built.ram} bytes of RAM are needed, {built.constants} of them for constants, which lie in RAM on an AVR; "
+        f"{built.ram} bytes of RAM are needed, {built.constants} of them for constants, which are in RAM on an AVR; "
         f"{board.name} has {board.ram}: at {size.memory.play} bytes for each play not more than {fit} of the "
         f"{size.plays} plays fit, fewer beside a stack and other firmware; reduce the plays, or emit one operator"
     )

@@ -68,7 +68,7 @@ class Compiler:
                 check=False, stdin=subprocess.DEVNULL, env={**os.environ, **_own(self.name), "TMPDIR": str(folder)},
             )  # fmt: skip
         except OSError as failure:
-            raise MissingError(f"{self.name} cannot be started: {failure.strerror}; install it anew") from None
+            raise MissingError(f"{self.name} cannot be started: {failure.strerror}; reinstall it") from None
         if done.returncode:
             raise CompileError(f"{self.name} failed:\n{(done.stderr or done.stdout).strip()}")
 
@@ -101,7 +101,7 @@ def find(name: str) -> Compiler | None:
     except ValueError as failure:
         raise ValueError(f"the compiler {name!r} is not a command: {failure}; correct it") from None
     if not words:
-        raise ValueError("a compiler is named by a command; write gcc, clang, zig or another")
+        raise ValueError("a compiler is given as a command; write gcc, clang, zig or another")
     path = shutil.which(words[0])
     return Compiler(name, (path, *words[1:])) if path else None
 

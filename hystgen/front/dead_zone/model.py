@@ -42,7 +42,7 @@ class DeadZone:
         thresholds = finite_numbers(self.thresholds, "thresholds")
         weights = finite_numbers(self.weights, "weights")
         if any(b <= a for a, b in itertools.pairwise(thresholds)) or 0.0 not in thresholds:
-            raise ValueError("dead-zone thresholds rise strictly and contain 0")
+            raise ValueError("dead-zone thresholds must be strictly increasing and contain 0")
         if len(weights) != len(thresholds):
             raise ValueError(f"{counted(len(thresholds), 'threshold')} but {counted(len(weights), 'weight')}")
         object.__setattr__(self, "thresholds", thresholds)
