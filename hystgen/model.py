@@ -154,7 +154,7 @@ class Model:
             if self.parameters.emit.compensation.quiet and self.cascade.branches_differ:
                 raise UnsupportedEffectsError(
                     "emit.compensation.quiet: with effects, a drive in front of a memoryless part with two branches "
-                    "cannot be held near its target; give both branches the same numbers, or omit quiet: "
+                    "cannot be held near its target; give both branches the same numbers, or leave out quiet: "
                     "behind one lag the drive comes to rest anyway"
                 )
 

@@ -803,7 +803,7 @@ def test_a_history_that_the_starts_contradict_is_left_out(tmp_path: Path) -> Non
     assert wrong.content["gap"] == none.content["gap"]
     assert wrong.sentence().endswith("The data have faults: 1 history that the starts contradict.")
     wrong.write(tmp_path / "out")
-    assert "another history than was given" in (tmp_path / "out" / "report.html").read_text()
+    assert "a history other than the given one" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_short_records_without_the_history_that_the_starts_contradict(tmp_path: Path) -> None:

@@ -562,8 +562,8 @@ REFUSED = [
         '4:130: model.effects[0].t_max: 1.0 is not above t_min = 2.0; give seconds, t_min < t_max',
     ]),
     case('effect_saturation_in_front', eff("[{name: saturation, side: front}]"), [
-        '4:62: model.effects[0].level: is missing; add `level: 50.0` (this is saturation behind the plays, one in front is a stage of model.memoryless)',
-        '4:81: model.effects[0].side: unknown key; known here are name, shape, level, centre (this is saturation behind the plays, one in front is a stage of model.memoryless)',
+        '4:62: model.effects[0].level: is missing; add `level: 50.0` (this is saturation behind the plays; one in front is a stage of model.memoryless)',
+        '4:81: model.effects[0].side: unknown key; known here are name, shape, level, centre (this is saturation behind the plays; one in front is a stage of model.memoryless)',
     ]),
     case('effect_empty_values', eff("[{name: lag, time_constant: }, {name: slew_limit, rate: 1, falling_rate: }]"), [
         '4:74: model.effects[0].time_constant: has no value; write one, or remove it',

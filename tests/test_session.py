@@ -308,7 +308,7 @@ class TestCommand:
             (["--plan", "FILE", "--session", "s.json"], "leave out --session"),
             (["FILE", "a.csv", "--rate", "50"], "--rate is for drives; give --plan with it"),
             (["FILE", "a.csv", "b.csv", "--session", "s.json"], "give one, not 2"),
-            (["FILE", "a.csv", "--session", "s.json", "--rest", "3"], "leave out --rest, which it says"),
+            (["FILE", "a.csv", "--session", "s.json", "--rest", "3"], "leave out --rest, which it contains"),
             (["FILE", "a.csv", "--session", "none.json"], "none.json: No such file or directory"),
         ],
     )

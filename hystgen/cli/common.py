@@ -25,7 +25,7 @@ ADVICE = {
     errno.ENOENT: "give a path that exists",
     errno.EACCES: "change its permissions, or give another path",
     errno.EPERM: "change its permissions, or give another path",
-    errno.EROFS: "give a path that can be written to",
+    errno.EROFS: "give a writable path",
     errno.ENOSPC: "free some space, or give another path",
     errno.EISDIR: "give the path of a file",
     errno.ENOTDIR: "give the path of a folder",
@@ -111,14 +111,14 @@ operator_option = click.option(
 arithmetic_option = click.option("--arithmetic", type=click.Choice(list(ARITHMETICS)), help="default: the file's")
 engine_option = click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="default: the file's")
 optimize_option = click.option(
-    "--optimize", type=click.Choice(["auto", "speed", "size"]), help="what engine auto chooses for; default: the file's"
+    "--optimize", type=click.Choice(["auto", "speed", "size"]), help="goal of engine auto; default: the file's"
 )
 effects_option = click.option(
     "--effects", multiple=True, type=click.Path(), metavar="FOLDER",
     help="effects of your own (user:..): a folder with model.py, or a Python file; repeatable",
 )
 partial_option = click.option(
-    "--allow-partial", is_flag=True, help="leave out effects that the C cannot have; its banner names them"
+    "--allow-partial", is_flag=True, help="leave out effects that the C cannot include; its banner names them"
 )
 layout_option = click.option(
     "--layout", type=click.Choice(["self-contained", "shared-runtime", "single-header"]), default="self-contained",
@@ -126,7 +126,7 @@ layout_option = click.option(
 )  # fmt: skip
 skip_option = click.option(
     "--skip", type=float, callback=seconds, default=0.0,
-    help="seconds at the start of every record that are not compared, though their drive counts",
+    help="seconds at the start of every record that are not compared, although their drive counts",
 )  # fmt: skip
 T = TypeVar("T")
 U = TypeVar("U")
@@ -216,14 +216,14 @@ _RECORD_OPTIONS = [
     click.option(
         "--columns",
         metavar="t=Time,v=U,y=Pos",
-        help="our names for the file's columns; in HDF5 v=run1/drive, of a MATLAB struct v=data.v; in text also by "
-        "their numbers, 1,2,3 for t, v, y",
+        help="our names for the file's columns; in HDF5 v=run1/drive, in a MATLAB struct v=data.v; in text also by "
+        "number, 1,2,3 for t, v, y",
     ),
     click.option("--sample-time", type=float, help="seconds, for files without time"),
-    click.option("--delimiter", help="default: what the file shows"),
-    click.option("--history", metavar="V,V,..", help="drive values visited before, in the model's units"),
+    click.option("--delimiter", help="default: found from the file"),
+    click.option("--history", metavar="V,V,..", help="drive values visited before the record, in the model's units"),
     click.option(
-        "--rest", type=float, callback=seconds, default=0.0, help="seconds of pause, seen by effects alone"
+        "--rest", type=float, callback=seconds, default=0.0, help="seconds of pause, which only effects see"
     ),
 ]
 

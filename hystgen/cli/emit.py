@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 @optimize_option
 @layout_option
 @click.option(
-    "--check", is_flag=True, help="write nothing; exit 1 if files of C differ, or none of PARAMS writes them; say which"
+    "--check", is_flag=True, help="write nothing; exit 1 if C files differ, or none of PARAMS writes them; say which"
 )
 @partial_option
 @effects_option

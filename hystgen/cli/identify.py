@@ -46,11 +46,11 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
 @click.option("--breaks", type=int, help="number of breaks of a dead-zone sum; default: chosen on held-out error")
 @click.option(
     "--holdout", multiple=True, type=click.Path(), callback=matched,
-    help="record that takes no part in the fit; or a pattern in quotes, 'held/*.csv'; with --batch for example "
+    help="record not used in the fit; or a pattern in quotes, 'held/*.csv'; with --batch for example "
     "'holdout/{unit}.csv'",
 )  # fmt: skip
 @skip_option
-@click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, from 0 up")
+@click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, rising from 0")
 @click.option("--name", help="C identifier of the model; default: from the output file")
 @click.option(
     "--units", metavar="V,um", callback=_units,
@@ -90,7 +90,7 @@ def identify(
     if batch:
         for option, value in (("--name", name), ("--plot", plot), ("--report", report)):
             if value is not None:
-                raise click.UsageError(f"{option} is for one model; omit it with --batch")
+                raise click.UsageError(f"{option} is for one model; leave it out with --batch")
         # The shell expands an unquoted pattern: its first file goes to the option, the rest become arguments
         _identify_batch(
             (*batch, *data), output, holdout=holdout, emit=emit is not False, jobs=jobs, scheduler=scheduler,

@@ -11,12 +11,12 @@ from hystgen.basics import console
 from hystgen.cli.common import effects_option, guarded, keep_inputs, load_model, params_argument
 
 
-@click.command(short_help="Print what a model can do and what its C costs.")
+@click.command(short_help="Print the properties of a model and the cost of its C.")
 @params_argument
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of loop, loading curve and inverse")
 @click.option(
     "--settle-within", type=float, metavar="PERCENT",
-    help="error within which the output has settled, percent of a step  [default: 1]",
+    help="error within which the output counts as settled, percent of a step  [default: 1]",
 )
 @click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the properties for programs")
 @effects_option

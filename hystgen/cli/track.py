@@ -22,7 +22,7 @@ from hystgen.cli.common import (
 )
 
 
-@click.command(short_help="Print what tracking leaves on a recorded actuator.")
+@click.command(short_help="Print the tracking error on a recorded actuator.")
 @params_argument
 @data_argument(required=True)
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the tracking errors along time")

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 @effects_option
 @click.option("--compiler", multiple=True, help="gcc, clang, zig or another command; default: all found")
 @click.option("--targets", default="host", show_default=True, help="comma separated: " + ", ".join(TARGETS))
-@click.option("--target-length", type=click.IntRange(min=1), help="calls of a record on emulated cores")
+@click.option("--target-length", type=click.IntRange(min=1), help="calls per record on emulated cores")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the report for programs")
 @click.option("--junit", "junit_file", type=click.Path(dir_okay=False), help="write the report as JUnit XML")
 def verify(

@@ -318,7 +318,7 @@ def _check_loading_curve(record: Record) -> None:
     if not (top > 0.0 and abs(float(v[0])) <= NEAR_ZERO * top and np.all(np.diff(v) >= -NEAR_ZERO * top)):
         raise IdentificationError(
             f"{record.name} is not an initial loading curve: the drive has to rise all the way from 0; give the part "
-            "of the record up to the first turn, or omit loading_curve"
+            "of the record up to the first turn, or leave out loading_curve"
         )
 
 

@@ -231,11 +231,11 @@ LONG_HOLDS = (1.0, 0.0, 0.5, 1.0, 0.5, 0.0)
 
 RECORDS = (
     Kind(
-        "slow", "One slow full loop, then nested ones: the hysteresis itself, and what bends it at every amplitude.",
+        "slow", "One slow full loop, then nested ones: the hysteresis itself, and its bends at every amplitude.",
         ("asymmetry", "saturation", "sensor_nonlinearity"), _slow, _lasting(1.0),
     ),
     Kind(
-        "fast_triangles", "The same loops at the rate limit and two and four times slower: what widens them with rate.",
+        "fast_triangles", "The same loops at the rate limit and two and four times slower: how they widen with rate.",
         ("rate_dependence", "lag", "delay", "slew_limit"), _triangles, _fast,
     ),
     Kind(
@@ -248,7 +248,7 @@ RECORDS = (
         ("creep", "drift", "thermal"), partial(_steps, hold=100, levels=LONG_HOLDS), _lasting(4.0, 700),
     ),
     Kind(
-        "staircase", "Steps of other sizes and speeds, to judge what the fast records say.",
+        "staircase", "Steps of other sizes and speeds, to judge the findings of the fast records.",
         ("lag", "delay", "slew_limit", "resonance"), _staircase, _fast, True,
     ),
     Kind(
@@ -260,7 +260,7 @@ RECORDS = (
         ("rate_dependence", "lag", "noncongruent"), _fast_minor, _fast,
     ),
     Kind(
-        "slow_reversals", "Random turning points with pauses, to judge what the slow records say.",
+        "slow_reversals", "Random turning points with pauses, to judge the findings of the slow records.",
         ("creep", "asymmetry", "saturation", "sensor_nonlinearity", "noncongruent"),
         partial(_reversals, seed=2, turns=14, slowest=3.0), _lasting(1.25, 600), True,
     ),
@@ -269,11 +269,11 @@ RECORDS = (
         ("resonance", "lag", "delay"), _sweep, _fast,
     ),
     Kind(
-        "cycles", "Many equal full loops: they travel and heat; later ones differ from earlier ones.",
+        "cycles", "Many equal full loops: they accumulate travel and heat; later ones differ from earlier ones.",
         ("ageing", "thermal"), _cycles, _lasting(1.0, 720),
     ),
     Kind(
-        "settling", "Nested loops and short holds at a middle pace, while it cools: creep and rate in between.",
+        "settling", "Nested loops and short holds at a medium pace, while it cools: creep and rate in between.",
         ("creep", "rate_dependence", "thermal"), _settling, _middle,
     ),
     Kind(
@@ -282,15 +282,15 @@ RECORDS = (
         True,
     ),
     Kind(
-        "multisine", "Equal periods of an odd multisine with random phases: the noise without a model, what is even.",
+        "multisine", "Equal periods of an odd multisine with random phases: noise without a model, even nonlinearity.",
         ("asymmetry", "sensor_nonlinearity", "resonance"), _multisine, _fast,
     ),
     Kind(
-        "reversals", "Random turning points at a middle pace, to judge what lies between slow and fast.",
+        "reversals", "Random turning points at a medium pace, to judge what lies between slow and fast.",
         ("creep", "rate_dependence", "noncongruent"), partial(_reversals, seed=5, turns=25, slowest=3.0), _middle, True,
     ),
     Kind(
-        "slow_again", "The first record once more: what has changed in the session, and is neither rate nor amplitude.",
+        "slow_again", "The first record once more: changes in the session due to neither rate nor amplitude.",
         ("drift", "ageing", "thermal"), _slow, _lasting(1.0),
     ),
 )  # fmt: skip

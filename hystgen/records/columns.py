@@ -124,7 +124,7 @@ def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = No
     if _LENGTH.fullmatch(plain(drive)) and displacement and not _LENGTH.fullmatch(plain(displacement)):
         strange.append(
             f"the drive is in {printable(drive)} and the displacement in {printable(displacement)}, as if they were "
-            "swapped; check the columns and the units, the drive comes first"
+            "exchanged; check the columns and the units, the drive comes first"
         )
     return units, strange
 

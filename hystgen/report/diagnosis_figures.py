@@ -317,14 +317,14 @@ FIGURES = {
 }  # fmt: skip
 
 CAPTIONS = {
-    "gap": "rms error on the held-out records: of the model as given, refitted, and with one effect after the other; "
-    "dotted: what each step takes away. The dashed line is the noise, measured without a model.",
-    "overlay": "The held-out records on which the refitted model does worst. Below each: measured less predicted.",
+    "gap": "rms error on the held-out records: of the model as given, refitted, and with one effect after another; "
+    "dotted: what each step removes. The dashed line is the noise, measured without a model.",
+    "overlay": "The held-out records on which the refitted model does worst. Below each: measured minus predicted.",
     "records": "rms error of every record, against the noise.",
     "time": "rms error in stretches of the records, along the session.",
-    "against": "Mean and scatter of the error on all records against what it may go with. A mean that leaves the "
+    "against": "Mean and scatter of the error on all records against possible causes. A mean that leaves the "
     "dashed band of the noise, or a scatter that widens, is structure. Loop centre: the middle between the last two "
-    "reversals of the drive. While the drive stands still the error is counted in the direction of its last move.",
+    "reversals of the drive. While the drive rests, the error is counted in the direction of its last move.",
     "frequency": "Spectral density of the error on the held-out record on which the refitted model does worst.",
 }
 

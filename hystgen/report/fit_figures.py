@@ -104,7 +104,7 @@ class Shown:
 def of_fit(fit: Fit, records: Sequence[Record]) -> list[Shown]:
     """The records of a fit as they are drawn, held-out records last, as in `fit.used`."""
     if len(records) != len(fit.used):
-        raise ValueError(f"the fit compared {len(fit.used)} records, those held out among them, not {len(records)}")
+        raise ValueError(f"the fit compared {len(fit.used)} records, including the held-out ones, not {len(records)}")
     return [Shown(record, used, fit.along(record, used)) for record, used in zip(records, fit.used, strict=True)]
 
 
@@ -378,7 +378,7 @@ def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
         branches = [(True, drawing.MEASURED, "drive rising" if cascade.branches_differ else "front")]
         if cascade.branches_differ:
             branches.append((False, drawing.RESIDUAL, "drive falling"))
-        for ax, straight, title in ((front[0], 0.0, "Front"), (front[1], 1.0, "Its departure from the line")):
+        for ax, straight, title in ((front[0], 0.0, "Front"), (front[1], 1.0, "Its deviation from the line")):
             for up, colour, name in branches:
                 ax.plot(v, cascade.front(v, up) - straight * v, color=colour, linewidth=1.4, label=name)
             ax.plot(v, (1.0 - straight) * v, color=drawing.QUIET, linewidth=0.9, linestyle="--", label="straight line")

@@ -68,8 +68,8 @@ def properties(model: Model, within: float = SETTLED) -> str:
         lines += _fixed(model, drive, output)
     else:
         lines.append(
-            f"inverse            exists; references {c.output_range[0]:.6g} to {c.output_range[1]:.6g}{output} are "
-            f"answered with drives inside {c.input_range[0]:.6g} to {c.input_range[1]:.6g}{drive}"
+            f"inverse            exists; references {c.output_range[0]:.6g} to {c.output_range[1]:.6g}{output} "
+            f"map to drives inside {c.input_range[0]:.6g} to {c.input_range[1]:.6g}{drive}"
         )
         for arithmetic in (each.name for each in ARITHMETICS.values() if not each.fixed):
             bounds = error_bounds(c, arithmetic, model.engine(arithmetic=arithmetic))
@@ -79,7 +79,7 @@ def properties(model: Model, within: float = SETTLED) -> str:
             )
         lines += _fixed(model, drive, output)
         if c.branches_differ:
-            lines.append("branches           the errors of the inverse hold while it takes the exact model's branch")
+            lines.append("branches           the errors of the inverse hold while it is on the exact model's branch")
     if not model.effects and (words := cost(model)):
         lines.append(f"cost of the C      {words}")
     return "\n".join(lines)
@@ -203,7 +203,7 @@ def warnings(model: Model) -> list[str]:
         return []
     if c.slope_ratio > HARD_RATIO:
         return [
-            f"the slope ratio is {c.slope_ratio:.3g}: the inverse amplifies rounding and model errors by as much; "
+            f"the slope ratio is {c.slope_ratio:.3g}: the inverse amplifies rounding and model errors by that factor; "
             "raise p_0 or narrow input_range"
         ]
     arithmetic = model.parameters.emit.arithmetic

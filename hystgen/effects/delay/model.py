@@ -27,7 +27,7 @@ class Delay(Effect):
 
     place: ClassVar[Place] = Place.DRIVE
     compensated: ClassVar[Compensated] = "none without preview"
-    compensation: ClassVar[str] = "the reference is read ahead of its time; without preview the motion is late"
+    compensation: ClassVar[str] = "the reference is read ahead of time; without preview the motion is late"
 
     @property
     def dead_time(self) -> float:

@@ -24,7 +24,7 @@ class Lag(Effect):
     place: ClassVar[Place] = Place.DRIVE
     order: ClassVar[int] = 2
     compensated: ClassVar[Compensated] = "approximate"
-    compensation: ClassVar[str] = "a lead, exact on ramps; a quarter of the second difference of the drive is left"
+    compensation: ClassVar[str] = "a lead, exact on ramps; the error is a quarter of the second difference of the drive"
 
     def time_scale(self, drive_range: float) -> float:
         """The time constant."""

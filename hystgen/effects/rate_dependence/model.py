@@ -281,7 +281,7 @@ class ThresholdRate(_RateDependence):
 
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = (
-        "exact for betas below half a sample time; beyond, relaxing plays stand in, which lag as far behind on ramps"
+        "exact for betas below half a sample time; beyond that, relaxing plays stand in, which lag as much on ramps"
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:

@@ -32,7 +32,7 @@ class _Saturation(Effect):
     place: ClassVar[Place] = Place.OUTPUT
     timed: ClassVar[bool] = False
     pointwise: ClassVar[bool] = True
-    hint: ClassVar[str] = "this is saturation behind the plays, one in front is a stage of model.memoryless"
+    hint: ClassVar[str] = "this is saturation behind the plays; one in front is a stage of model.memoryless"
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact inside the range, clamped outside"
 

@@ -111,7 +111,7 @@ class _SlewLimit(Effect):
     place: ClassVar[Place] = Place.DRIVE
     order: ClassVar[int] = 1
     compensated: ClassVar[Compensated] = "none"
-    compensation: ClassVar[str] = "the drive is kept within it, so that the memory is the actuator's"
+    compensation: ClassVar[str] = "the drive is kept within it, so the memory matches the actuator's"
 
     @model_validator(mode="after")
     def _same_rate(self) -> Self:

@@ -112,7 +112,7 @@ class LoggedThermal(_Thermal):
     timed: ClassVar[bool] = False
     columns: ClassVar[tuple[str, ...]] = (COLUMN,)
     compensated: ClassVar[Compensated] = "needs a sensor"
-    compensation: ClassVar[str] = "exact with the temperature beside the reference"
+    compensation: ClassVar[str] = "exact, given the temperature along with the reference"
 
     def above(self, run: Run) -> Array:
         """The logged temperature above the reference."""
