@@ -35,12 +35,12 @@ if TYPE_CHECKING:
 
 
 MOST_A_CODE = 0.01
-"""[share of its range] The drive may move this far for one code of the reference; in fixed point, more than that is
+"""[share of its range] The drive may move this far for one code of the reference; in fixed point, anything more is
 noise."""
 
 MOST_GAIN = 100.0
-"""[times the gain at rest] Largest noise gain of an inverse without an explicit request: white noise of 1e-4 of the
-reference's range is then 0.6 to 1.5 % of the drive's range, about MOST_A_CODE, behind a lag of 25 samples. Set by:
+"""[times the gain at rest] Largest noise gain that an inverse may have without being asked for: white noise of 1e-4 of
+the reference's range is then 0.6 to 1.5 % of the drive's range, about MOST_A_CODE, behind a lag of 25 samples. Set by:
 benchmarks/chosen_numbers.py noisy."""
 
 SETTLED = 0.01
@@ -131,7 +131,7 @@ class Model:
             )
 
     def need_compensated(self, arithmetic: str, operator: str) -> None:
-        """Raise if an operator in `arithmetic` cannot have all the model's effects, with all reasons.
+        """Raise, with all reasons, if an operator in `arithmetic` cannot have all the model's effects.
 
         Raises UnsupportedEffectsError, EffectsError without a sample time, NotInvertibleError as `inverse`.
         """
@@ -203,7 +203,7 @@ class Model:
         return list(chain_tables.refusals(self.chain, operator, self.parameters.sample_time, arithmetic, how))
 
     def without(self, effects: Sequence[Effect]) -> Model:
-        """The model without these of its effects."""
+        """The model with these effects left out."""
         part = self.parameters.model
         kept = tuple(effect for effect in part.effects if effect not in effects)
         return Model(self.parameters.model_copy(update={"model": part.model_copy(update={"effects": kept})}))
@@ -310,7 +310,7 @@ class Model:
         return self.chain.simulate([run])[0], said
 
     def _drive_at_start(self) -> float:
-        """The drive that belongs to the start memory, used for samples that are not finite at the beginning."""
+        """The drive that belongs to the start memory, used for leading samples that are not finite."""
         cascade = self.cascade
         return float(cascade.front_inverse(cascade.pi.start[0])) if cascade.start_is_defined else 0.0
 
@@ -499,8 +499,8 @@ def _held(name: str, x: ArrayLike, first: float | None) -> tuple[NDArray[np.floa
 def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] | type[Effect]] = ()) -> Model:
     """The model of a parameter file; `effects`: files, or classes, of the user's own effects that it names.
 
-    Raises ParameterError with every problem in the file, EffectsError for an unusable file of effects; warns of a start
-    memory that had to be projected.
+    Raises ParameterError with every problem in the file, EffectsError for an unusable file of effects; warns if a start
+    memory had to be projected.
     """
     path = arguments.path("the parameter file", path)
     model = Model(load_parameters(path, _own_effects(effects)))
@@ -518,7 +518,7 @@ def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> li
         raise TypeError(f"effects is a list of files or classes, not {arguments.kind(sources)}; give ['my_effect']")
     found: list[type[Effect]] = []
     for source in sources:
-        from hystgen.effects.user import load_user_effects  # no effect, no import: `hystgen emit` has to start fast
+        from hystgen.effects.user import load_user_effects  # only if needed: `emit` has to start fast
 
         found += [source] if isinstance(source, type) else load_user_effects(arguments.path("effects", source))
     return found

@@ -79,7 +79,7 @@ class Fleet:
 
     @property
     def failed(self) -> tuple[Unit, ...]:
-        """Units without a model, or whose C could not be emitted."""
+        """Units that have no model, or whose C could not be emitted."""
         return tuple(unit for unit in self.units if not unit.done)
 
     @property
@@ -150,13 +150,13 @@ def identify_batch(
     identifier. `output`: a folder that gets, for each unit, `UNIT.yaml`, identical to what `identify` writes for that
     unit alone, and the C files of `emit` in a folder `UNIT`; and at the end `summary.csv`, sorted by unit. `holdout`:
     paths of held-out records in which `{unit}` stands for the name of the unit's file without its suffix; these files
-    are not units. `emit`: False omits the C; `emission`: options of `emit`. `jobs`: number of processes, all cores by
-    default. `scheduler`: address of a Dask scheduler, whose workers then do the work and need the package, but no
+    are not units. `emit`: False leaves out the C; `emission`: options of `emit`. `jobs`: number of processes, all cores
+    by default. `scheduler`: address of a Dask scheduler, whose workers then do the work and need the package, but no
     access to any file. `progress`: a bar on a terminal's stderr. Any other option is one of `identify`.
 
-    A unit that fails gets a row with its message and does not stop the others; its older files stay. A later call does
-    not repeat finished work, as long as record, options and tool version are the same and the files are unchanged. An
-    interrupted call leaves only complete files, and the units it had finished. When an existing parameter file is
+    A unit that fails gets a row with its message and does not stop the others; its older files are kept. A later call
+    does not repeat finished work, as long as record, options and tool version are the same and the files are unchanged.
+    An interrupted call leaves only complete files, and the units it had finished. When an existing parameter file is
     rewritten, its description, `sample_time` and `emit` are kept.
 
     Units are outliers by the modified z-scores of `outliers`: a held-out rms error far above the others (its logarithm,
@@ -215,7 +215,7 @@ def _complete(options: Mapping[str, Any]) -> dict[str, Any]:
 def _jobs(
     sources: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], patterns: Sequence[str]
 ) -> list[_Job]:
-    """The units, sorted by name. Raises ValueError for names that clash, FileNotFoundError."""
+    """The units, sorted by name. Raises ValueError if names clash, FileNotFoundError."""
     for pattern in patterns:
         if "{unit}" not in pattern:
             raise ValueError(f"holdout {pattern!r} would be the same for all units; write {{unit}} for the unit's name")
@@ -244,7 +244,7 @@ def _jobs(
 
 
 def _expanded(source: str) -> list[Path]:
-    """The files that a path, a folder or a pattern leads to, sorted."""
+    """The files that a path, a folder or a pattern stands for, sorted."""
     path = Path(source)
     if path.is_dir():
         found = [file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and not file.name.startswith(".")]
@@ -328,7 +328,7 @@ def _kept(folder: Path, job: _Job) -> Unit | None:
 
 
 def _keep(folder: Path, job: _Job, result: Result) -> Unit:
-    """Write the files of a unit, and last the note that it is done."""
+    """Write the files of a unit and, last, the note that it is done."""
     message = result.message
     try:
         written = []
@@ -367,7 +367,7 @@ def _bytes(path: str) -> bytes | None:
 def _here(
     tasks: Iterator[Task], number: int, jobs: int | None, options: Mapping[str, Any]
 ) -> Generator[Result, None, None]:
-    """Results from this machine, after filling its cache of compiled functions."""
+    """Results from this machine, once its cache of compiled functions is filled."""
     import joblib
 
     processes = max(min(jobs or joblib.cpu_count(), number), 1)

@@ -32,8 +32,8 @@ LEAST_ERROR = 1e-6
 
 @dataclass(frozen=True)
 class Judged:
-    """A figure by which units are compared: its name in words and its column; for an `error` the logarithm, and only
-    upwards."""
+    """A figure by which units are compared: its name in words and its column. An `error` is compared by its logarithm,
+    and only high values count."""
 
     words: str
     column: str

@@ -46,7 +46,7 @@ class SchedulerError(OSError):
 class Task:
     """One unit: its C name, `records` and `holdout` as (path, bytes or None if unreadable), and the requested results.
 
-    `options`: of `identify`; `emission`: of `emit`, or None to omit it; `settings`: of an older parameter file.
+    `options`: of `identify`; `emission`: of `emit`, or None to leave out the C; `settings`: of an older parameter file.
     """
 
     unit: str
@@ -121,7 +121,7 @@ def _fitted(task: Task, records: list[str], holdout: list[str]) -> Result:
 
 
 def _line(failure: Exception) -> str:
-    """The reason of a failure, on one line."""
+    """The reason for a failure, on one line."""
     from hystgen.basics.problems import NotInvertibleError
 
     if isinstance(failure, NotInvertibleError):
@@ -244,7 +244,7 @@ def cluster(address: str) -> Iterator[Any]:
         raise SchedulerError(f"a scheduler needs Dask; install it with: {extras.install('fleet')}") from None
     with _quiet():
         try:
-            asyncio.run(_answer(address))  # a client without an answer would wait once more when it is deleted
+            asyncio.run(_answer(address))  # an unanswered client would wait once more when it is deleted
             client = Client(address, timeout=PATIENCE, set_as_default=False)
         except Exception as failure:  # each protocol has its own
             reason = (str(failure).splitlines() or [type(failure).__name__])[0]

@@ -1,7 +1,7 @@
 """From plain data to checked parameters: every problem at once, each in one plain sentence and at its position.
 
-First the structure (pydantic's findings, reworded), then how values fit together, for every part whose structure is
-sound.
+It checks the structure first (pydantic's findings, reworded), then how values fit together, for every part whose
+structure is sound.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ _WRITTEN = {
 def check(
     data: Mapping[str, Any], document: Document | None = None, user: Mapping[str, Shapes] | None = None
 ) -> tuple[schema.Parameters | None, list[Problem]]:
-    """Parameters from `data` (lists as tuples), or None and every problem.
+    """Parameters made from `data` (lists as tuples), or None, and every problem.
 
     `document` gives the positions and the values already refused while reading, which are not checked again. `user`:
     classes of the user's own effects by name.

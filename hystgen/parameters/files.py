@@ -134,7 +134,7 @@ def parse_parameters(text: str, file: str = "<string>", user_effects: Sequence[t
 def make_parameters(
     data: Mapping[str, Any], file: str = "<data>", user_effects: Sequence[type[Effect]] = ()
 ) -> Parameters:
-    """The checked parameters from plain data in the form of the file (lists or tuples; None means omitted).
+    """The checked parameters from plain data in the form of the file (lists or tuples; None means left out).
 
     An entry of `effects` may also be an `Effect`. Raises ParameterError; its problems have no positions, `file` names
     the data in messages.
@@ -160,7 +160,7 @@ def _too_large(size: int | None, file: str) -> ParameterError:
 
 
 def _plain(value: Any) -> Any:
-    """Lists as tuples, NumPy values as Python's, keys without a value omitted."""
+    """Lists as tuples, NumPy values as Python's, keys without a value left out."""
     if hasattr(value, "model_dump"):
         value = value.model_dump()
     if isinstance(value, Mapping):
@@ -211,7 +211,7 @@ def parameters_sha256(parameters: Parameters) -> str:
 
 
 def dump_parameters(parameters: Parameters, comments: Mapping[str, str] | None = None, header: str = "") -> str:
-    """A YAML text that reads back to exactly these parameters; defaults are omitted.
+    """A YAML text that reads back to exactly these parameters; defaults are left out.
 
     `comments` maps dotted paths of keys (`model.pi.weights`) to a comment that is set above the key, which is then
     written even at its default; `header` is set above everything. Both may span several lines. Raises ValueError for a
@@ -227,7 +227,7 @@ def dump_parameters(parameters: Parameters, comments: Mapping[str, str] | None =
 
 @cache
 def _defaults() -> dict[str, Any]:
-    """Keys that are omitted when they have this value."""
+    """Keys that are left out when they have this value."""
     pi = PIParameters(weights=(1.0,))
     data = Parameters(hystgen=1, name="x", input_range=(0.0, 1.0), model=ModelParameters(pi=pi)).model_dump()
     for key in ("hystgen", "name", "input_range"):

@@ -31,7 +31,7 @@ from hystgen.basics.problems import Path, Problem, path_text, printable
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 16
 MAX_VALUES = 100_000
-"""Limits of a file, so that one that is not a parameter file is refused at once. One with 4096 plays has 8200
+"""Limits of a file, so that anything that is not a parameter file is refused at once. One with 4096 plays has 8200
 values."""
 
 _NULL = re.compile(r"(?:~|null|Null|NULL|)\Z")

@@ -15,11 +15,12 @@ CODINGS = ("straight", "twos-complement")
 """How codes are written: straight (offset) binary from 0 up, or two's complement with 0 in the middle of the range."""
 
 FEWEST_BITS, MOST_BITS = 8, 32
-"""Limits of a converter: with fewer than eight bits, a code is more than the margin that drives keep; more than 32 do
+"""Fewest and most bits of a converter: with fewer, a code is more than the margin that drives keep; with more, codes do
 not fit the C header."""
 
 FEWEST_CODES = 100
-"""Codes between the lowest and the highest drive: with fewer, a code is more than the margin that drives keep."""
+"""Fewest codes between the lowest and the highest drive: with fewer, a code is more than the margin that drives
+keep."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +102,8 @@ def wrong_range(low: float, high: float) -> Iterator[str]:
 
 
 def filled(codes: ArrayLike, every: int) -> Codes:
-    """Codes (N,) given every `every` ticks, at every tick: the integers nearest to straight lines between them."""
+    """Codes (N,) at every tick, from codes given at every `every`-th one: the integers nearest to straight lines
+    between them."""
     nodes = np.asarray(codes, dtype=np.int64)
     steps = np.diff(nodes)[:, None] * (2 * np.arange(every)) + every
     return np.append((nodes[:-1, None] + steps // (2 * every)).ravel(), nodes[-1])

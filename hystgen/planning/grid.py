@@ -74,7 +74,8 @@ class Grid:
 
 @dataclass(frozen=True)
 class Tempo:
-    """Times as multiples of the sample time: between samples of `fast`, a duration of `slow` records, the `rest`.
+    """Times as multiples of the sample time: the spacing of samples of `fast` records, the duration of `slow` ones, the
+    `rest`.
 
     `move`: samples of a full-scale move of the fast triangles.
     """

@@ -20,7 +20,7 @@ def file(parameters: Parameters) -> str:
 
 
 def nodes(stretches: Sequence[tuple[int, int]]) -> Codes:
-    """The samples between which the drive is straight, for stretches of steps with the samples of each."""
+    """Runs of straight steps of equal length: the number of steps in each, and the samples per step."""
     return np.cumsum([0, *(every for steps, every in stretches for _ in range(steps))], dtype=np.int64)
 
 
@@ -29,7 +29,8 @@ def header(
 ) -> str:
     """`NAME_session.h`: the codes between which the drive is straight, and how many samples lie between them.
 
-    `codes`: of all samples; `stretches`: numbers of steps and the samples of each; `words`: options of the plan.
+    `codes`: of all samples; `stretches`: pairs of a number of steps and the samples per step; `words`: options of the
+    plan.
     """
     name, unit = parameters.name, parameters.units.input
     kind = f"{'' if dac.zero else 'u'}int{8 * dac.bytes}_t"

@@ -73,8 +73,8 @@ class Plan:
 
     `source`, `effects`: files of the model and of the user's own effects; `history`: drive values visited before every
     record; `rest`: seconds of pause before each; `max_rate`: input/s; `defaults`: a sentence for each of these that was
-    chosen by default. `session`: where the records are in the single drive `whole` at one rate, with codes for `dac`;
-    None if no rate was given. `stretches` of it: numbers of steps between drawn points, and ticks of each.
+    chosen by default. `session`: where the records are in `whole`, the single drive at one rate, with codes for `dac`;
+    None if no rate was given. `stretches` of it: numbers of steps between drawn points, and ticks per step.
     """
 
     parameters: Parameters
@@ -186,10 +186,10 @@ def plan(
 ) -> Plan:
     """The drive records that make all effects of the catalogue separable.
 
-    `source`: a `Model` or a parameter file, with `effects`, files with effects of the user's own; `max_rate`: the
-    fastest that the drive may change, input/s (default: the whole range in `FULL_SCALE` sample times); `sample_time`:
-    shortest time between samples, s (default: the file's, else `SAMPLE_TIME`). Every drive stays inside `input_range`
-    and below `max_rate`.
+    `source`: a `Model` or a parameter file; `effects`: files with effects of the user's own; `max_rate`: the fastest
+    that the drive may change, input/s (default: the whole range in `FULL_SCALE` sample times); `sample_time`: shortest
+    time between samples, s (default: the file's, else `SAMPLE_TIME`). Every drive stays inside `input_range` and below
+    `max_rate`.
 
     `rate`: the sample rate of a converter, Hz, instead of `sample_time`: every drive has one sample per tick, and all
     are parts of one session, with the rests between them. `dac_bits`, `dac_range` and `dac_coding` say how its codes
@@ -321,7 +321,7 @@ class _Player:
         return (len(self.nodes) - 1) * self.every + self.tempo.rest
 
     def played(self, nodes: Sequence[int], every: int) -> tuple[Array, Codes | None]:
-        """Drives and codes at every tick, from samples that are `every` ticks apart."""
+        """Drives and codes at every tick, from samples spaced `every` ticks apart."""
         if self.dac is None:
             return np.array(self.grid.values(converter.filled(nodes, every).tolist())), None
         codes = converter.filled(self.dac.codes(self.grid.values(nodes)), every)

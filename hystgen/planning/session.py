@@ -20,8 +20,8 @@ from hystgen.records import Record
 FILE = "session.json"
 
 OFF = 0.05
-"""Share of the drives' span by which a record may begin and end away from the lowest drive: gain and noise of a
-monitor. A recording that is out of step with its session begins and ends anywhere."""
+"""Share of the drives' span by which a record may start and end away from the lowest drive, to allow for the gain and
+noise of a monitor. A recording that is out of step with its session starts and ends anywhere."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ FIELDS: Mapping[str, Callable[[Any], str]] = {
     "records": lambda value: "" if isinstance(value, tuple) and value else f"a list of records, not {shown(value)}",
     "dac": lambda value: "" if value is None or isinstance(value, dict) else f"a mapping or null, not {shown(value)}",
 }
-"""Keys of the file, and functions that return the problem with their values."""
+"""Keys of the file, each with a function that returns the problem with a value."""
 
 PART_FIELDS: Mapping[str, Callable[[Any], str]] = {
     "name": lambda value: "" if isinstance(value, str) and value else f"text, not {shown(value)}",

@@ -23,7 +23,7 @@ ROUND = 3
 
 
 class Course:
-    """A drive as it is built up: codes sample by sample, counted from the lowest; positions are shares of the range.
+    """A drive being built up: codes sample by sample, counted from the lowest; positions are shares of the range.
 
     `pace`: samples of a quick full-scale move.
     """
@@ -40,8 +40,8 @@ class Course:
     def go(self, place: float, pace: float = 0.0) -> None:
         """A straight move at `pace` samples per full-scale move, in `EDGE` samples or more, within the rate limit.
 
-        Then the drive rests, so that with round corners two samples remain at the turning point: it is thus sampled
-        behind a delay of any fraction of a sample, too.
+        Then the drive rests, so that two samples remain at the turning point even with round corners: it is sampled
+        even behind a delay of any fraction of a sample.
         """
         begin, end = self.codes[-1], self._code(place)
         size = abs(end - begin)
@@ -76,7 +76,7 @@ class Course:
 
 
 def sine(turns: float) -> float:
-    """sin(2 pi turns), to 1e-13: the last bit of the C library's differs from machine to machine."""
+    """sin(2 pi turns), to 1e-13: the C library's sine differs in the last bit from machine to machine."""
     x = turns - math.floor(turns + 0.5)
     if abs(x) > 0.25:
         x = math.copysign(0.5, x) - x
@@ -152,7 +152,7 @@ def _steps(course: Course, hold: int, levels: Sequence[float]) -> None:
 
 
 def _sweep(course: Course, samples: int = 1100) -> None:
-    """Frequency rises with time squared to an eighth of the sampling rate, amplitude falls as the limit requires."""
+    """Frequency rises with time squared to an eighth of the sampling rate; amplitude falls as the limit requires."""
     first, last = 1.0 / (16.0 * course.pace), 1.0 / 8.0
     turns, values = 0.0, []
     for k in range(samples):

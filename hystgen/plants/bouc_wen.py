@@ -51,7 +51,7 @@ def _exactly(v: Array, v0: float, z0: float, p: tuple[float, ...], out: Array) -
     z = z0
     last = v0
     for k in range(len(v)):
-        if v[k] != last:  # going there and back by the formulas would not preserve every bit
+        if v[k] != last:  # computing there and back by the formulas would not preserve every bit
             s = abs(v[k] - last) / distance
             sign = 1.0 if v[k] > last else -1.0
             x = sign * z

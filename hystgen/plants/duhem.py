@@ -66,7 +66,7 @@ def _dahl(v: Array, v0: float, start: float, sigma: float, limit: float, exponen
     force = start
     last = v0
     for k in range(len(v)):
-        if v[k] != last:  # going there and back by the formulas would not preserve every bit
+        if v[k] != last:  # computing there and back by the formulas would not preserve every bit
             sign = 1.0 if v[k] > last else -1.0
             s = sigma * abs(v[k] - last) / limit
             rest = 1.0 - sign * force / limit  # 0 when fully developed in this direction, 2 in the other

@@ -34,7 +34,7 @@ FAR = 25.0
 """Ratio of the largest to the smallest value above which an axis is logarithmic."""
 
 HOLD = 16
-"""Fewest samples at which the drive rests for errors to be drawn over the time since it stopped."""
+"""Fewest samples with the drive at rest for errors to be drawn over the time since it stopped."""
 
 WINDOWS = 12
 """Number of stretches of a record whose rms is drawn over the session."""

@@ -94,7 +94,7 @@ class Shown:
         for lag in (1, 2):
             parts = [self.residual[a:b] for a, b in self.used.parts]
             second = np.concatenate([e[2 * lag :] - 2.0 * e[lag:-lag] + e[: -2 * lag] for e in parts])
-            # without the few kinks at reversals, which are not noise
+            # ignoring the few kinks at reversals, which are not noise
             found.append(1.4826 * float(np.nanmedian(np.abs(second))) / np.sqrt(6.0))
         if not 0.0 < max(found) <= AGREE * min(found):
             return None

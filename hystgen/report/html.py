@@ -42,7 +42,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture as SVG, in a layout for wide pages and one for phones; `alt` describes it in words."""
+    """A picture as SVG, in one layout for wide pages and one for phones; `alt` describes it in words."""
 
     name: str
     wide: bytes

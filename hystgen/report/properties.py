@@ -110,7 +110,7 @@ def facts(model: Model, within: float = SETTLED) -> dict[str, Any]:
 
 
 def settling(model: Model, within: float = SETTLED) -> str:
-    """Settling of the model in a sentence, or the reason why it is not known."""
+    """Settling of the model in a sentence, or the reason why it is unknown."""
     try:
         return model.settling(within).sentence(model.parameters.units.output)
     except EffectsError as error:

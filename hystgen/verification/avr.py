@@ -34,8 +34,8 @@ class Size:
 
 @dataclass(frozen=True)
 class Built:
-    """Object files with measured bytes: flash of the module, its constants, an instance of each operator, and RAM of
-    module and self-test."""
+    """Object files with their sizes in bytes: flash of the module, its constants, an instance of each operator, and RAM
+    of module and self-test."""
 
     objects: tuple[Path, ...]
     flash: int

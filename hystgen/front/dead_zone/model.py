@@ -50,7 +50,7 @@ class DeadZone:
 
     @property
     def branches_differ(self) -> bool:
-        """Both directions have the same curve."""
+        """One curve serves both directions."""
         return False
 
     @cached_property
@@ -130,7 +130,7 @@ class DeadZone:
     def inverse(
         self, y: ArrayLike, ascending: bool = True, low: float = -math.inf, high: float = math.inf
     ) -> Array:
-        """The x in [low, high], where the map has to rise, with the value y; outside, the end pieces continue."""
+        """The x in [low, high] with the value y (the map has to rise there); outside, the end pieces continue."""
         ends, anchors, slopes = self._inverses(low, high)
         values = np.asarray(y, dtype=np.float64)
         piece = np.searchsorted(ends, values, side="right")
@@ -138,7 +138,7 @@ class DeadZone:
         return np.asarray(anchor[..., 0] + (values - anchor[..., 1]) / slopes[piece])
 
     def _inverses(self, low: float, high: float) -> tuple[Array, Array, Array]:
-        """Values at the breaks, anchors and slopes of `over` as arrays, made once for each range."""
+        """Values at the breaks, anchors and slopes of `over` as arrays, made once per range."""
         if (low, high) not in self._inverted:
             kept = self.over(low, high)
             self._inverted[low, high] = np.array(kept.values), np.array(kept.anchors), np.array(kept.slopes)
