@@ -20,7 +20,7 @@ def file(parameters: Parameters) -> str:
 
 
 def nodes(stretches: Sequence[tuple[int, int]]) -> Codes:
-    """Runs of straight steps of equal length: the number of steps in each, and the samples per step."""
+    """Indices of the samples between which the drive is straight, from pairs of a number of steps and their length."""
     return np.cumsum([0, *(every for steps, every in stretches for _ in range(steps))], dtype=np.int64)
 
 

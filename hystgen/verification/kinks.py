@@ -17,12 +17,12 @@ from hystgen.plays.slots import Bytes
 POINTS = 2000
 """Points of a path; following the plays one by one in Python takes about 0.1 s for this number."""
 
-# Kinds of points on the path: a drive at which a play starts to follow, one at which a play would after a turn here, a
-# limit of the drive, or any
+# Kinds of points on the path: a drive at which a play starts to follow, one at which a play would start after a turn
+# here, a limit of the drive, or any
 FOLLOWS, TURNS, LIMIT, ANY = range(4)
 SHARES = (0.6, 0.1, 0.2, 0.1)
 
-# After a point of the inverse: how often a drive is committed, and how often it is that of the point
+# Share of the points of the inverse after which a drive is committed, and of these the share with the point's own
 COMMITTED, THERE = 0.6, 0.7
 
 
@@ -101,7 +101,7 @@ def path(tables: Tables | FixedTables, real: np.dtype[Any], length: int, rng: np
 
 
 def _outputs(tables: Tables | FixedTables, op: Bytes, drive: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Comes after every call; reset returns nothing, but the same drive once more does."""
+    """The output after every call; reset returns none, but a step with the same drive does."""
     times = np.where(op == slots.OP_RESET, 2, 1)
     last = np.cumsum(times) - 1
     calls = np.full(int(times.sum()), slots.OP_STEP, dtype=np.uint8)
@@ -115,7 +115,7 @@ def along(
 ) -> tuple[Bytes, NDArray[np.float64]]:
     """Operations and arguments that follow a path over and over, each time with different last bits.
 
-    Some points are approached by last bits or a little more, from the side of the move, and passed; some are requested
+    Some points are approached in last bits or a little more, from the side of the move, and passed; some are requested
     again, or beyond a limit. For the inverse the references are the outputs along the path, and the drive of a point is
     mostly committed, so that its memory stays on the path. Between init and the first sample there may be a commit, and
     one of the `special` values. `least(x)`: the least step of the type at x.
