@@ -409,7 +409,7 @@ class Model:
 
     @cached_property
     def compensator(self) -> Compensator:
-        """The inverse in double precision of a model with effects; raises as `inverse`."""
+        """The inverse in double precision of a model with effects; raises the same errors as `inverse`."""
         from hystgen.compensator.chained import Compensator
 
         return Compensator(self.chain, self.parameters.emit.compensation)

@@ -12,8 +12,8 @@ In the parameter file it is
         - {name: user:droop, share: 0.05, time_constant: 2.0}
 
 A class is an effect: a name `user:..`, a place in the chain, the method of that place, and a field for each key of the
-parameter file. `candidates` tells a fit what to try. These alone are enough for `simulate`, forwards, and for
-`diagnose`. An inverse and C need a `block`: four functions, here and again in `droop.c`.
+parameter file. `candidates` tells a fit what to try. These alone are enough for `simulate` forwards and for `diagnose`.
+An inverse and C need a `block`: four functions, here and again in `droop.c`.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ class OutputError(click.ClickException):
 
 
 def say(result: str | bytes) -> None:
-    """Print a line, or data as they are, on standard output.
+    """Print a line, or raw data, on standard output.
 
     Raises OutputError, and BrokenPipeError if the reader is gone.
     """

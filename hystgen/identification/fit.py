@@ -103,7 +103,7 @@ class Fit:
     def along(self, record: Record, used: Used) -> NDArray[np.float64]:
         """Free-run output (N,) along a record, computed as in the fit.
 
-        The drive is bridged where the fit bridged it; every part between gaps starts anew and has the free offset that
+        The drive is bridged where the fit bridged it; every part between gaps starts again and has the free offset that
         fits its compared samples best; NaN in parts that were left out. Raises ValueError if `used` belongs to another
         record.
         """

@@ -399,7 +399,7 @@ def loop_reach(swing: float, least: float = LEAST_TRAVEL) -> float:
 
 
 def once(courses: Sequence[Course], reach: float) -> tuple[float, ...]:
-    """Thresholds beyond `reach` of plays that move once, from start memories that were found."""
+    """Thresholds beyond `reach` of plays that move only once, taken from the start memories found."""
     starts = [item.start for item in courses if item.history is None and item.start is not None]
     return tuple(sorted({each.once for each in starts if each.once is not None and each.once > reach}))
 

@@ -135,8 +135,7 @@ class Resonance(_Mode):
         """Frequency from two periods per record to three samples per period, damping from 0.3 % to 70 %.
 
         Starts are spread evenly over log f. Anything faster or more damped is not seen to ring: in the records it is a
-        delay or a lag. A lightly damped mode rings long, and is found from the frequency at which the error alone
-        rings.
+        delay or a lag. A lightly damped mode rings long, and is found from the frequency at which the residual rings.
         """
         low, high = _frequencies(about)
 
