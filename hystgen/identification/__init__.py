@@ -84,26 +84,27 @@ def identify(
     """Fit a model to measured records.
 
     - `records`: one or more of: a path, a data frame or a dict of named columns, a tuple of arrays (t, v, y) of shape
-    (N,), an array (N, 3), all read with `columns`, `sample_time` (s), `delimiter`, or a `Record`; each gets a free
-    offset.
-    - `model`: `pi`; `gpi-deadzone` and `gpi-tanh`, which have a memoryless part in front; or `auto`, the simplest
-      of them whose held-out error is within 3 % of the best.
+      (N,), an array (N, 3), all read with `columns`, `sample_time` (s), `delimiter`, or a `Record`; each gets a free
+      offset.
+    - `model`: `pi`; `gpi-deadzone` and `gpi-tanh`, which have a memoryless part in front; or `auto`, the simplest of
+      them whose held-out error is within 3 % of the best.
     - `thresholds`: a number of plays without r_0, or a list of thresholds (behind a memoryless part, which preserves
-    the length of the drive range and the position of 0, in its output); by default both number and positions are chosen
-    by blocked validation on the records. - `breaks`: how many points, or which, a dead-zone sum may bend at, chosen in
-    the same way by default. - `holdout`: records that take no part in any choice except that of `auto`, and that of one
-    branch or two for `gpi-tanh`; without them the last quarter of each record gives the held-out figures, from a trial
-    model that has not seen it, and the model written is then fitted to everything.
+      the length of the drive range and the position of 0, in its output); by default both number and positions are
+      chosen by blocked validation on the records.
+    - `breaks`: how many points, or which, a dead-zone sum may bend at, chosen in the same way by default.
+    - `holdout`: records that take no part in any choice except that of `auto`, and that of one branch or two for
+      `gpi-tanh`; without them the last quarter of each record gives the held-out figures, from a trial model that has
+      not seen it, and the model written is then fitted to everything.
     - `history`: drive values visited before every record, beginning in a virgin state. Without it, the start of each
       record is ignored until the drive has wiped the memory that matters; if that leaves less than half of the record,
       its start memory is estimated together with the weights.
     - `rest`: seconds of pause after the history; a PI model does not depend on time, so it changes nothing here.
     - `name`: C identifier of the model.
     - `units`: `input` and `output`, by default those of the first record that gives any; columns in other units of the
-    same quantity are converted, but not `history`, `thresholds` and `breaks`. - `skip`: seconds at the start of every
-    record that are not compared, although their drive counts. - `loading_curve`: the records are initial loading
-    curves, with the drive rising from 0 in a virgin actuator, and nothing is held out of them: `p_0 = phi'(0)`,
-    `p(r) = phi''(r)` (22).
+      same quantity are converted, but not `history`, `thresholds` and `breaks`.
+    - `skip`: seconds at the start of every record that are not compared, although their drive counts.
+    - `loading_curve`: the records are initial loading curves, with the drive rising from 0 in a virgin actuator, and
+      nothing is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22).
     - `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as fitted.
     - `progress`: a bar on a terminal's stderr when it takes more than a second.
 

@@ -85,7 +85,7 @@ def to_judge(
     floor: float,
     tick: Tick = None,
 ) -> list[tuple[Fitted, list[Course]]]:
-    """The fits of one kind from which held-out records choose, the simplest first; otherwise as `solve`.
+    """The fits of one kind from which held-out records choose, the simplest first; otherwise the same as `solve`.
 
     Tanh envelopes with one branch and with two: two branches form a loop of their own, as wide in a small swing as in a
     large one. Records of a single swing do not show whether their loop is of that kind, and neither do blocks left out

@@ -172,8 +172,8 @@ ONE_WAY = 0.5
 run in opposite directions. Set by: tests/test_start.py TestDirection."""
 
 SLOWEST, SAME_SPEED = (0.125, 0.25, 0.5, 1.0), 1.05
-"""Shares of the time that the slowest turns take, tried one by one; turns faster by no more than a twentieth join them.
-Set by: tests/test_start.py TestDirection."""
+"""Shares of the time taken by the slowest turns, tried one by one; turns that are at most a twentieth faster are
+included. Set by: tests/test_start.py TestDirection."""
 
 FALLING = (
     "y falls when v rises; if the sensor counts the other way, change the sign of y, otherwise check which column "

@@ -256,7 +256,7 @@ def _neither(error: Array, less: Array) -> bool:
 def _not_remembered(error: Array, less: Array) -> bool:
     """Whether the errors around a pulse of the drive show a memory without the pulse, because its effect is missing.
 
-    Judged where that effect exceeds the model's own errors without the pulse, `less`, and only if the sum is as
+    Samples count where that effect exceeds the model's own errors without the pulse, `less`, and only if the sum is as
     significant as an outlier.
     """
     own = np.abs(less[np.isfinite(less)])

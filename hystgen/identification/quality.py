@@ -43,7 +43,7 @@ class Row:
 
     @classmethod
     def of(cls, part: str, model: str, errors: Sequence[Errors]) -> Row:
-        """The row for the errors of some courses."""
+        """The row that summarises the errors of some courses."""
         joined = np.concatenate([e.error for e in errors])
         joined = joined[np.isfinite(joined)]
         return cls(
