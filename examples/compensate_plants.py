@@ -1,8 +1,8 @@
 """How well a PI or GPI inverse, as compiled C, linearises other hysteretic plants, and where it stops being enough.
 
-For every plant: a training and a held-out record are simulated, `hystgen.identify` chooses among its models, the
-compensator is emitted as C, compiled on this machine and run in front of the plant along a reference that is in
-neither record. Writes plants.csv and plants.svg into the folder and prints the table.
+For every plant, a training and a held-out record are simulated, `hystgen.identify` chooses among its models, and the
+compensator is emitted as C, compiled on this machine and run in front of the plant along a reference that is in neither
+record. Writes plants.csv and plants.svg into the folder and prints the table.
 
 Usage: python examples/compensate_plants.py [-o FOLDER] [--plant NAME]
 """
@@ -37,7 +37,7 @@ from hystgen.records import Record
 
 Array = NDArray[np.float64]
 
-SAMPLES = 1500  # of one part of a record
+SAMPLES = 1500  # length of one part of a record
 
 PLAYS = np.array([[0.0, 4.0, 9.0, 16.0, 26.0], [0.10, 0.03, 0.025, 0.02, 0.015]])  # thresholds and weights
 
@@ -47,8 +47,8 @@ class Case:
     """A plant, the drive range it is used in, whether it leads, and the model that `hystgen.identify` fits.
 
     The output of a leading plant runs ahead of its input. As a play sum it would need negative weights, which
-    `identify` does not give; but its inverse lags. So the records are handed over with input and output exchanged, and
-    the identified model itself is the compensator: its forward operator is emitted.
+    `identify` never returns; but its inverse lags. So input and output of the records are exchanged, and the identified
+    model itself is the compensator: its forward operator is emitted.
     """
 
     name: str
@@ -62,7 +62,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Result:
-    """What was measured of a case; errors in % of the training record's range of what is predicted or controlled."""
+    """Results of a case; errors in % of the training record's range of the predicted or controlled quantity."""
 
     case: Case
     model: str
@@ -79,19 +79,19 @@ class Result:
 
 
 def play_surface(alpha: Array, beta: Array) -> Array:
-    """Everett surface of a play sum: it depends on alpha - beta alone."""
+    """Everett surface of a play sum: it depends only on alpha - beta."""
     thresholds, weights = PLAYS
     return np.asarray(np.maximum((alpha - beta)[..., None] - 2.0 * thresholds, 0.0) @ weights)
 
 
 def bell(alpha: Array, beta: Array) -> Array:
-    """Density of relays: fewer far from the middle and with a wide loop."""
+    """Density of relays: lower far from the middle and for wide loops."""
     centre, half = (alpha + beta) / 2.0, (alpha - beta) / 2.0
     return np.asarray(np.exp(-0.5 * ((centre - 50.0) / 30.0) ** 2 - half / 12.0))
 
 
 def cases() -> list[Case]:
-    """The plants, those that a play sum is made for first; then some of them again, with other models."""
+    """The plants, starting with those that suit a play sum; then some of them again, with other models."""
     slip = MaxwellSlip([1.0, 0.8, 0.6, 0.5], [0.4, 0.9, 1.5, 2.6], spring=1.0)
     hardening = BoucWen(alpha=1.6, k=0.1, D=8.0, beta=0.6, gamma=0.3, n=1.0)
     softening = BoucWen(alpha=0.4, k=0.1, D=8.0, beta=0.6, gamma=0.3, n=1.0)
@@ -133,7 +133,7 @@ def cases() -> list[Case]:
 
 
 def moves(corners: list[float]) -> Array:
-    """Half cosines from corner to corner, of shares of the drive range, as long as they go far."""
+    """Half cosines from corner to corner, in shares of the drive range; longer moves take longer."""
     parts = []
     for start, stop in itertools.pairwise(corners):
         count = max(round(0.25 * SAMPLES * abs(stop - start)), 12)
@@ -150,16 +150,16 @@ def training() -> Array:
 
 
 def held_out() -> Array:
-    """One full sweep, then two sines that share no period, in shares of the range."""
+    """One full sweep, then two sines with no common period, in shares of the range."""
     k = np.arange(2 * SAMPLES) / SAMPLES
     two = 0.5 + 0.3 * np.sin(2.0 * np.pi * 2.3 * k) + 0.17 * np.sin(2.0 * np.pi * 7.9 * k)
     return np.concatenate([moves([0.5, 1.0, 0.0, float(two[0])]), two])
 
 
 def trajectory() -> tuple[Array, int]:
-    """A reference in shares of the output range, and where it begins to count: after a sweep of the whole range.
+    """A reference in shares of the output range, and where errors begin to count: after a sweep of the whole range.
 
-    The sweep forgets how plant and compensator started. What counts are three sines that swell and a staircase.
+    The sweep wipes the start of plant and compensator. The part that counts is three swelling sines and a staircase.
     """
     k = np.arange(3 * SAMPLES) / SAMPLES
     turns = 2.0 * np.pi * k
@@ -176,17 +176,17 @@ def in_range(shares: Array, ends: tuple[float, float]) -> Array:
 
 
 def in_c(model: hystgen.Model, operator: str, arithmetic: str, x: Array) -> Array:
-    """Answers (N,) of the emitted operator, compiled on this machine, to the samples `x` (N,) in physical units."""
+    """Output (N,) of the emitted operator, compiled on this machine, for the samples `x` (N,) in physical units."""
     compensator = CompiledC(model, operator, arithmetic)
     compensator.reset()
     return np.array([compensator.step(sample) for sample in x.tolist()])
 
 
 def memory(case: Case) -> tuple[float, float, float]:
-    """Three things that are 0 for a play sum, of loops over a tenth of the drive range, in % of such a loop's height.
+    """Three figures that are 0 for a play sum, for loops over a tenth of the drive range, in % of such a loop's height.
 
-    How much the height differs between three places; how much in one place with what was before; how far a loop's end
-    is from its begin. The plants need no time, so that the corners are all of a drive.
+    How much the height differs between three places; how much it differs in one place depending on the history; how far
+    apart a loop's start and end are. The plants do not depend on time, so a drive is fully described by its corners.
     """
 
     def heights(corners: list[float]) -> tuple[float, float]:
@@ -264,7 +264,7 @@ def table(results: list[Result]) -> str:
 
 
 def draw(results: list[Result]) -> Any:
-    """Output over reference of every plant, without and with the compensator that is chosen for it."""
+    """Output over reference of every plant, without and with the compensator chosen for it."""
     columns = 3
     results = [result for result in results if result.case.model == "auto"]
     lines = -(-len(results) // columns)
@@ -284,7 +284,7 @@ def draw(results: list[Result]) -> Any:
 
 
 def make(folder: Path, only: str = "") -> list[Result]:
-    """Write plants.csv and plants.svg, of all plants or of one alone, into the folder."""
+    """Write plants.csv and plants.svg into the folder, for all plants or just one."""
     folder.mkdir(parents=True, exist_ok=True)
     results = [measure(case) for case in cases() if only in ("", case.name)]
     with open(folder / "plants.csv", "w", newline="", encoding="utf-8") as file:

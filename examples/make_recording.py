@@ -2,10 +2,10 @@
 
 These are SIMULATED, not measured. The plant is a Preisach relay plane: a continuum of two-position relays that switch
 up at drive alpha and down at drive beta, with a density that is bell-shaped in the relay's centre and falls off with
-its half width, plus a reversible part that stiffens slightly towards the ends. A Prandtl-Ishlinskii model would
-need a density that does not depend on the centre and a straight reversible part, so it can only approximate this
-plant; nothing here comes from hystgen. The sensor adds noise of 6 nm rms, and both the drive and the sensor pass
-16-bit converters. The noise comes from a fixed seed, so the files are the same bytes wherever they are made.
+its half width, plus a reversible part that stiffens slightly towards the ends. A Prandtl-Ishlinskii model would need a
+density that does not depend on the centre, and a straight reversible part, so it can only approximate this plant;
+nothing here comes from hystgen. The sensor adds noise of 6 nm rms, and both drive and sensor pass through 16-bit
+converters. The noise comes from a fixed seed, so the files have the same bytes wherever they are made.
 
 Usage: python examples/make_recording.py [FOLDER]
 """
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-RATE = 2000.0  # samples a second
+RATE = 2000.0  # samples per second
 DRIVE_FULL = 100.0  # V, full scale of the 16-bit drive converter
 SENSOR_FULL = 25.0  # um, full scale of the 16-bit sensor
 NOISE = 0.006  # um rms
@@ -56,13 +56,13 @@ class Relays:
 
     def __init__(self) -> None:
         self.table = everett_table()
-        self.extrema: list[tuple[float, float]] = []  # (maximum, minimum after it), falling and rising
+        self.extrema: list[tuple[float, float]] = []  # (maximum, the minimum after it) pairs, both decreasing
         self.floor = 0.0  # latest minimum, where the present rise began
         self.last = 0.0
         self.rising = True
 
     def everett(self, a: float, b: float) -> float:
-        """Table value between grid points."""
+        """Interpolated table value."""
         x, y = a * GRID / DRIVE_FULL, b * GRID / DRIVE_FULL
         i, j = min(int(x), GRID - 1), min(int(y), GRID - 1)
         f, g = x - i, y - j
@@ -91,7 +91,7 @@ class Relays:
         return self.settled()
 
     def settled(self) -> float:
-        """What the remembered loops contribute."""
+        """Contribution of the remembered loops."""
         total = 0.0
         bottom = self.floor
         for top, low in self.extrema:
@@ -101,13 +101,14 @@ class Relays:
 
 
 def bell_noise(seed: int, count: int) -> Array:
-    """Nearly normal noise of unit variance: twelve raw generator words a sample, whose stream numpy guarantees."""
+    """Nearly normal noise of unit variance: twelve words per sample from a raw generator whose stream numpy
+    guarantees."""
     words = np.random.PCG64(seed).random_raw(12 * count).reshape(count, 12)
     return np.asarray(((words >> np.uint64(11)).astype(np.float64) * 2.0**-53).sum(axis=1) - 6.0)
 
 
 def measure(drive: list[float], seed: int) -> list[tuple[float, float, float]]:
-    """Time, drive as the converter gives it, and what the sensor reads."""
+    """Time, drive as read from the converter, and sensor reading."""
     relays = Relays()
     noise = NOISE * bell_noise(seed, len(drive))
     rows = []
@@ -140,7 +141,7 @@ def fit_drive() -> list[float]:
 
 
 def holdout_drive() -> list[float]:
-    """Three sines that share no period, rising from rest."""
+    """Three sines with no common period, rising from rest."""
     drive = []
     for k in range(3000):
         t = k / RATE

@@ -35,15 +35,16 @@ if TYPE_CHECKING:
 
 
 MOST_A_CODE = 0.01
-"""[share of its range] The drive may move this far for one code of the reference; in fixed point more is noise."""
+"""[share of its range] The drive may move this far for one code of the reference; in fixed point, anything more is
+noise."""
 
 MOST_GAIN = 100.0
-"""[times the gain at rest] Largest noise gain of an inverse for which nobody has asked: white noise of 1e-4
-of the reference's range then is 0.6 to 1.5 % of the drive's range, about MOST_A_CODE, behind a lag of 25 samples. Set
-by: benchmarks/chosen_numbers.py noisy."""
+"""[times the gain at rest] Largest noise gain that an inverse may have without being asked for: white noise of 1e-4 of
+the reference's range is then 0.6 to 1.5 % of the drive's range, about MOST_A_CODE, behind a lag of 25 samples. Set by:
+benchmarks/chosen_numbers.py noisy."""
 
 SETTLED = 0.01
-"""Error within which the output has settled after a step, share of the final step, where none is given."""
+"""Default error within which the output counts as settled after a step, as a share of the final step."""
 
 
 def cascade_of(parameters: Parameters) -> Cascade:
@@ -64,7 +65,7 @@ def cascade_of(parameters: Parameters) -> Cascade:
 
 @dataclass(frozen=True, repr=False)
 class Model:
-    """A model as its parameter file gives it: `parameters`, and the mathematics in `cascade`."""
+    """A model as given by its parameter file: `parameters`, and the mathematics in `cascade`."""
 
     parameters: Parameters
 
@@ -86,7 +87,7 @@ class Model:
     def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
         """A picture of loops, the initial loading curve and, if it exists, the inverse with its accuracy.
 
-        Returns matplotlib's Figure, which a notebook shows; with `path`, a .png or .svg, it is written there as well.
+        Returns matplotlib's Figure, which a notebook shows; with `path`, a .png or .svg file, it is also written there.
         Effects are not drawn. Needs matplotlib, of the extra `plot`. Raises PlotError, OSError.
         """
         return drawing.picture(self._figure, path)
@@ -130,7 +131,7 @@ class Model:
             )
 
     def need_compensated(self, arithmetic: str, operator: str) -> None:
-        """Raise where an operator in `arithmetic` cannot have all the model's effects, with all reasons.
+        """Raise, with all reasons, if an operator in `arithmetic` cannot have all the model's effects.
 
         Raises UnsupportedEffectsError, EffectsError without a sample time, NotInvertibleError as `inverse`.
         """
@@ -153,12 +154,12 @@ class Model:
             if self.parameters.emit.compensation.quiet and self.cascade.branches_differ:
                 raise UnsupportedEffectsError(
                     "emit.compensation.quiet: with effects, a drive in front of a memoryless part with two branches "
-                    "cannot be kept near what is sought; give both branches the same numbers, or leave out quiet: "
-                    "behind one lag the drive comes to rest by itself"
+                    "cannot be held near its target; give both branches the same numbers, or leave out quiet: "
+                    "behind one lag the drive comes to rest anyway"
                 )
 
     def _check_noise_gain(self, arithmetic: str) -> None:
-        """Raise UnsupportedEffectsError where the inverse makes more of the reference's noise than is allowed."""
+        """Raise UnsupportedEffectsError if the inverse amplifies the noise of the reference more than is allowed."""
         from hystgen.compensator.chain import layout, noise
         from hystgen.compensator.chain import tables as chain_tables
         from hystgen.compensator.chain.parts import Parts
@@ -171,7 +172,7 @@ class Model:
             noise.check(gain, how.noise_gain)
             return
         advice = (
-            "hold it with emit.compensation.noise_gain: 10, by averages of the reference, or allow it with "
+            "limit it by averages of the reference with emit.compensation.noise_gain: 10, or allow it with "
             f"noise_gain: {math.ceil(gain)}"
         )
         if ARITHMETICS[arithmetic].fixed:
@@ -202,7 +203,7 @@ class Model:
         return list(chain_tables.refusals(self.chain, operator, self.parameters.sample_time, arithmetic, how))
 
     def without(self, effects: Sequence[Effect]) -> Model:
-        """The model with these of its effects left out."""
+        """The model with these effects left out."""
         part = self.parameters.model
         kept = tuple(effect for effect in part.effects if effect not in effects)
         return Model(self.parameters.model_copy(update={"model": part.model_copy(update={"effects": kept})}))
@@ -214,13 +215,13 @@ class Model:
         arithmetic: str | None = None,
         optimize: str | None = None,
     ) -> str:
-        """'corners' or 'loop': what is given, or else the parameter file's, with `auto` decided for `optimize`."""
+        """'corners' or 'loop': the given one, or else the parameter file's, with `auto` decided for `optimize`."""
         emit = self.parameters.emit
         if self.effects:
             own = [effect.name for effect in self.effects if effect.moves_plays() or effect.bends_plays()]
             if own and (engine or emit.engine) == "corners":
                 raise UnsupportedEffectsError(
-                    f"engine corners knows where plays are from where the drive turned, and {' and '.join(own)} "
+                    f"engine corners derives the plays from the turning points of the drive, but {' and '.join(own)} "
                     "moves or bends each play in its own way; give --engine loop, or auto"
                 )
             if own:
@@ -233,7 +234,7 @@ class Model:
     def tables(
         self, arithmetic: str, engine: str, operator: str | None = None
     ) -> Tables | FixedTables | ChainTables:
-        """The numbers of an emitted operator, by default the parameter file's, with its LSBs in fixed point."""
+        """The number format of an emitted operator, by default the parameter file's, with its LSBs in fixed point."""
         if self.effects:
             from hystgen.compensator.chain import tables as chain_tables
 
@@ -272,12 +273,13 @@ class Model:
     ) -> NDArray[Any]:
         """Output (N,) for the drive samples `v` (N,) from the start memory.
 
-        Without `arithmetic` in double precision, unlimited unless `clamp`. With 'float32', 'float64', 'q31' or 'q15'
-        the bit reference of the emitted C, which limits the drive to `input_range`; fixed point takes and gives codes.
+        Without `arithmetic` it computes in double precision, unlimited unless `clamp`. With 'float32', 'float64', 'q31'
+        or 'q15' it is the bit reference of the emitted C, which limits the drive to `input_range`; fixed point takes
+        and returns codes.
 
-        Only effects see time: `t` (N,) in seconds, rising, or the parameter file's `sample_time`; and `extra`, further
-        columns (N,) such as `temperature`. Everything starts at rest at the first sample. Raises EffectsError for what
-        they need and do not get, UnsupportedEffectsError for effects in an `arithmetic`.
+        Only effects use time: `t` (N,) in seconds, increasing, or the parameter file's `sample_time`; and `extra`,
+        further columns (N,) such as `temperature`. Everything starts at rest at the first sample. Raises EffectsError
+        if effects lack something they need, UnsupportedEffectsError for effects in an `arithmetic`.
 
         Warns (`SampleWarning`) with the number of drives outside `input_range`, and of samples that are not finite: the
         drive before them is held.
@@ -296,7 +298,7 @@ class Model:
         t: ArrayLike | None = None,
         extra: Mapping[str, ArrayLike] | None = None,
     ) -> tuple[NDArray[Any], list[str]]:
-        """What `simulate` gives, and its warnings as sentences."""
+        """The result of `simulate`, and its warnings as sentences."""
         if not self.effects:
             session = self.session("forward", arithmetic, engine, clamp)
             return remarks.run(session, v)
@@ -308,7 +310,7 @@ class Model:
         return self.chain.simulate([run])[0], said
 
     def _drive_at_start(self) -> float:
-        """The drive of the start memory, in which samples that begin with none are held."""
+        """The drive that belongs to the start memory, used for leading samples that are not finite."""
         cascade = self.cascade
         return float(cascade.front_inverse(cascade.pi.start[0])) if cascade.start_is_defined else 0.0
 
@@ -321,7 +323,7 @@ class Model:
         extra: Mapping[str, ArrayLike] | None,
         inverse: bool,
     ) -> tuple[NDArray[Any], list[str]]:
-        """Answers (N,) of the bit reference of a model with effects, and remarks; see `simulate`."""
+        """Output (N,) of the bit reference of a model with effects, and remarks; see `simulate`."""
         from hystgen.compensator.chain import run, tables
         from hystgen.compensator.chained import EVEN
 
@@ -334,11 +336,11 @@ class Model:
         if np.max(np.abs(record.steps - seconds), initial=0.0) > EVEN * seconds:
             raise EffectsError(
                 f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
-                "in double precision, which takes any times"
+                "in double precision, which takes any sample times"
             )
         if any(effect.name == "drift" for effect in self.effects) and abs(float(record.t[0])) > EVEN * seconds:
             raise EffectsError(
-                f"drift is counted from the first sample, and t begins at {float(record.t[0]):g} s; give t from 0 on"
+                f"drift is counted from the first sample, but t begins at {float(record.t[0]):g} s; give t from 0 on"
             )
         how = self.parameters.emit.compensation
         chosen = self.engine(engine, arithmetic=arithmetic)
@@ -379,15 +381,16 @@ class Model:
             if values.ndim != 1 or len(values) != len(drive) or not np.all(np.isfinite(values)):
                 raise EffectsError(f"{name} has to be {len(drive)} finite numbers, one per sample of v")
         if np.any(np.diff(times) <= 0.0):
-            raise EffectsError("t has to rise from sample to sample")
+            raise EffectsError("t has to increase from sample to sample")
         return Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)
 
     def settling(self, within: float = SETTLED) -> Settling:
-        """How long after a step of the drive over its range, up and down, the output stays close to its final value.
+        """How long after a full-range step of the drive, up and down, the output takes to stay close to its final
+        value.
 
-        `within`: the error, share of the final step of the output. Found by simulating the steps with all effects, up
-        to an hour; drift and what follows a logged column are left out. Raises EffectsError where an effect of the
-        user's own fails on such a step.
+        `within`: the error, as a share of the final step of the output. Found by simulating the steps with all effects,
+        up to an hour; drift and effects that follow a logged column are left out. Raises EffectsError if one of the
+        user's own effects fails on such a step.
         """
         from hystgen.chain.settling import settling
 
@@ -406,7 +409,7 @@ class Model:
 
     @cached_property
     def compensator(self) -> Compensator:
-        """The inverse in double precision of a model with effects; raises as `inverse`."""
+        """The inverse in double precision of a model with effects; raises the same errors as `inverse`."""
         from hystgen.compensator.chained import Compensator
 
         return Compensator(self.chain, self.parameters.emit.compensation)
@@ -433,16 +436,16 @@ class InverseModel:
     ) -> NDArray[Any]:
         """Drive (N,) for the reference samples `u` (N,); arguments as for `Model.simulate`.
 
-        The drive stays in `input_range` as that of the C does, and the memory follows the limited drive, so that all
-        is exact again at the next reference in reach; `clamp=False` gives the mathematical inverse without a range, in
-        double precision. For a sample that is not finite the drive holds. Warns (`SampleWarning`) with the numbers of
-        limited and of held samples.
+        The drive stays in `input_range` like that of the C, and the memory follows the limited drive, so that
+        everything is exact again at the next reference in reach; `clamp=False` gives the mathematical inverse without a
+        range, in double precision. The drive is held for a sample that is not finite. Warns (`SampleWarning`) with the
+        numbers of limited and of held samples.
 
-        With effects the whole reference is known: delays and modes take it before its time, and everything is at rest
-        at the first sample. It is read as `emit.compensation` of the parameter file says, in samples of the record;
-        `quiet` changes nothing in double precision, which has no codes to dither between. What a mode leaves is its
-        reference's fourth difference over 6, what a lag leaves a quarter of the second difference of the drive behind
-        it; all else is exact.
+        With effects the whole reference is known: delays and modes use it ahead of time, and everything is at rest at
+        the first sample. It is treated as `emit.compensation` in the parameter file says, in samples of the record;
+        `quiet` changes nothing in double precision, which has no codes to dither between. The error of a mode is the
+        fourth difference of its reference over 6, that of a lag a quarter of the second difference of the drive behind
+        it; everything else is exact.
         """
         v, said = self.answers(u, arithmetic, clamp, engine, t=t, extra=extra)
         remarks.tell(said)
@@ -458,7 +461,7 @@ class InverseModel:
         t: ArrayLike | None = None,
         extra: Mapping[str, ArrayLike] | None = None,
     ) -> tuple[NDArray[Any], list[str]]:
-        """What `simulate` gives, and its warnings as sentences."""
+        """The result of `simulate`, and its warnings as sentences."""
         model = self.forward
         if not model.effects:
             session = model.session("inverse", arithmetic, engine, clamp)
@@ -473,14 +476,15 @@ class InverseModel:
         return v, remarks.inverse(len(v), 0, limited, int(np.count_nonzero(held)))
 
     def inverse(self) -> Model:
-        """The model that this compensates."""
+        """The model that this inverse compensates."""
         return self.forward
 
 
 def _held(name: str, x: ArrayLike, first: float | None) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Samples (N,), called `name`, with the finite one before in place of each that is not, and which those are.
+    """Samples (N,), called `name`, in which each non-finite one is replaced by the finite one before it, and a mask of
+    those replaced.
 
-    Before the first finite one stands `first`, or where that is None the first finite one itself.
+    Those before the first finite one become `first` or, if that is None, the first finite one itself.
     """
     samples = np.array(arguments.signal(name, x), dtype=np.float64)
     wrong = ~np.isfinite(samples)
@@ -493,10 +497,10 @@ def _held(name: str, x: ArrayLike, first: float | None) -> tuple[NDArray[np.floa
 
 
 def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] | type[Effect]] = ()) -> Model:
-    """The model of a parameter file; `effects`: files, or classes, of effects of the user's own that it names.
+    """The model of a parameter file; `effects`: files, or classes, of the user's own effects that it names.
 
-    Raises ParameterError with every problem in the file, EffectsError for a file of effects that cannot be used; warns
-    of a start memory that had to be projected.
+    Raises ParameterError with every problem in the file, EffectsError for an unusable file of effects; warns if a start
+    memory had to be projected.
     """
     path = arguments.path("the parameter file", path)
     model = Model(load_parameters(path, _own_effects(effects)))
@@ -514,7 +518,7 @@ def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> li
         raise TypeError(f"effects is a list of files or classes, not {arguments.kind(sources)}; give ['my_effect']")
     found: list[type[Effect]] = []
     for source in sources:
-        from hystgen.effects.user import load_user_effects  # no effect, no import: `hystgen emit` has to start fast
+        from hystgen.effects.user import load_user_effects  # only if needed: `emit` has to start fast
 
         found += [source] if isinstance(source, type) else load_user_effects(arguments.path("effects", source))
     return found
@@ -548,6 +552,6 @@ def as_model(source: ModelSource) -> Model:
     model = source if isinstance(source, Model) else getattr(source, "model", None)
     if not isinstance(model, Model):
         raise TypeError(
-            f"give a model, as hystgen.load returns it, or a parameter file, not {arguments.kind(source)}"
+            f"give a model, as returned by hystgen.load, or a parameter file, not {arguments.kind(source)}"
         )
     return model

@@ -513,7 +513,7 @@ def test_bad_usage_is_refused_without_a_trace(words: str) -> None:
 @pytest.mark.parametrize(("words", "said"), [
     ("identify stage.yaml -o new.yaml", "stage.yaml: error: is a parameter file; give a recording"),
     ("identify drive.csv -o new/", "'new/' is a folder; give the file to write, as in new/stage_x.yaml"),
-    ("identify drive.csv -o new.yaml --units V", "'V' is not two units; give that of the drive and that of the output"),
+    ("identify drive.csv -o new.yaml --units V", "'V' is not two units; give those of the drive and the output"),
     ("identify drive.csv -o new.yaml --name 2x", 'error: the name "2x" is not a usable C prefix'),
     ("identify drive.csv -o new.yaml --delimiter ;", "csv:1:1: error: has commas between its cells, not semicolons; "),
     ("identify drive.csv -o new.yaml --delimiter tab", "has commas between its cells, not tabs; leave out --"),

@@ -427,8 +427,8 @@ def test_speed() -> None:
 @pytest.mark.parametrize(
     ("p0", "n", "message"),
     [
-        (1.0, 0, "n has to be a whole number from 1 on, not 0"),
-        (1.0, 2.5, "n has to be a whole number from 1 on, not 2.5"),
+        (1.0, 0, "n has to be a whole number, at least 1, not 0"),
+        (1.0, 2.5, "n has to be a whole number, at least 1, not 2.5"),
         (math.nan, 2, "p0 has to be a finite number, not nan"),
     ],
 )

@@ -803,7 +803,7 @@ def test_a_history_that_the_starts_contradict_is_left_out(tmp_path: Path) -> Non
     assert wrong.content["gap"] == none.content["gap"]
     assert wrong.sentence().endswith("The data have faults: 1 history that the starts contradict.")
     wrong.write(tmp_path / "out")
-    assert "another history than was given" in (tmp_path / "out" / "report.html").read_text()
+    assert "a history other than the given one" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_short_records_without_the_history_that_the_starts_contradict(tmp_path: Path) -> None:
@@ -832,7 +832,7 @@ def test_a_record_that_is_fitted_and_held_out_is_told(command: str, tmp_path: Pa
     assert "b.csv" not in err
     code, _, err = run(*words, files[0], files[1], files[3], "--holdout", files[2], "-o", tmp_path / "out")
     assert code == 0, err
-    assert "warning: d.csv: fitted twice, as a.csv too; leave one of them out" in err
+    assert "warning: d.csv: fitted twice, also as a.csv; leave one of them out" in err
     assert "held out" not in err
 
 

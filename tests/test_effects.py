@@ -1112,7 +1112,7 @@ def test_an_own_effect_in_a_model(tmp_path: Path) -> None:
 
     text = dump_parameters(model.parameters)
     assert parse_parameters(text, "f", [neighbour]) == model.parameters
-    with pytest.raises(ParameterError, match=r"stage.yaml:8:14: .*user:neighbour is defined in no file given; give"):
+    with pytest.raises(ParameterError, match=r"stage.yaml:8:14: .*user:neighbour is not defined in any given file"):
         load_parameters(path)
     path.write_text(FILE + "    - {name: user:neighbour, amplitude: 0.5, perod: 2.0}\n")
     with pytest.raises(ParameterError) as caught:
@@ -1271,7 +1271,7 @@ def test_simulate_runs_a_session_with_history_and_rest(
     assert not np.array_equal(expected[0], model.chain.simulate([Run(t, v)], [4.0, -4.0])[0])
     code, out, err = run("simulate", path, files[0])
     assert (code, out) == (2, "")
-    assert "user:neighbour is defined in no file given" in err
+    assert "user:neighbour is not defined in any given file" in err
     code, out, err = run("simulate", path, files[0], "--effects", tmp_path / "none.py")
     said = "cannot be read (No such file or directory); give a folder with model.py, or a Python file"
     assert (code, out, err) == (2, "", f"error: {tmp_path}/none.py: {said}")

@@ -201,7 +201,7 @@ class TestOneWrongRow:
             assert fit.parameters.input_range == pytest.approx(clean.parameters.input_range, abs=0.6), k
             figures = [row(each, "all").rms_percent for each in (fit, clean)]
             assert figures[0] == pytest.approx(figures[1], rel=0.15), k
-            assert any("of v that y does not bear out, bridged" in text for text in fit.warnings), k
+            assert any("of v without a response in y, bridged" in text for text in fit.warnings), k
         assert tried > 2
 
     @pytest.mark.parametrize("history", [(0.0,), None])
@@ -445,7 +445,8 @@ class TestConverterAtItsEnd:
         (used,) = fit.used
         assert used.stretches.tolist() == np.flatnonzero((y <= low) | (y >= high)).tolist()
         for count, end in ((np.count_nonzero(y >= high), "largest"), (np.count_nonzero(y <= low), "least")):
-            assert any(f"{count} samples of y at the converter's end, the {end}" in text for text in fit.warnings)
+            said = f"{count} samples of y at the limit of the converter, the {end}"
+            assert any(said in text for text in fit.warnings)
         assert fit.rows[0].rms < 0.01 * (high - low)
 
     def test_backlash_is_none(self) -> None:
@@ -550,7 +551,7 @@ class TestInverse:
         content = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
         assert not content["inverse"]["exists"]
         (said,) = content["inverse"]["warnings"]
-        assert said.startswith("p_0 is 0: after each reversal the output stands still (series backlash). The mod")
+        assert said.startswith("p_0 is 0: after each reversal the output does not move (series backlash). The mod")
         assert f"warning: {said}" in err.splitlines()
         page = (tmp_path / "out" / "report.html").read_text()
         assert page.index("About the inverse: p_0 is 0") < page.index("How the gap shrinks")
@@ -595,5 +596,5 @@ def test_what_a_file_without_values_is_called(tmp_path: Path) -> None:
     v, y = DRIVES["fading"], output(DRIVES["fading"])
     with pytest.raises(RecordError, match=r"2000 of 2000 samples are without a value.*such as .* count as none"):
         read_record(write_csv(tmp_path / "a.csv", v, (y + 10.0) * 1e300))
-    with pytest.raises(IdentificationError, match=r"y moves by .* which is no movement in any unit; convert it"):
+    with pytest.raises(IdentificationError, match=r"y moves by .* which is too little in any unit; convert it"):
         prepared.course_of(record(v, y * 1e-300), None, 0)

@@ -139,7 +139,7 @@ def test_summary(units: Path, fleet: Path) -> None:
     assert {name: row["status"] for name, row in table.items() if row["status"] != "done"} == {
         "garbage": "failed", "nothing": "failed",
     }  # fmt: skip
-    assert table["nothing"]["message"] == f"{units}/nothing.csv: error: is empty; record again or give another file"
+    assert table["nothing"]["message"] == f"{units}/nothing.csv: error: is empty; record again, or give another file"
     assert table["garbage"]["message"].startswith(f"{units}/garbage.csv:2:1: error: the first line has numbers, ")
     row, fit = table["SN_100"], hystgen.identify(units / "SN-100.csv")
     every = {r.part: r for r in fit.rows if r.model == "written" or r.part == "held out"}
@@ -187,7 +187,7 @@ def test_few_units_are_not_judged(few: Path, tmp_path: Path, run: Run) -> None:
     """An unquoted pattern arrives as several words; a folder is as good."""
     code, _, err = run("identify", "--batch", *sorted(few.iterdir()), "-o", tmp_path / "a", "--no-emit")
     assert code == 0
-    assert "outliers are marked from 8 units on" in err
+    assert "outliers are marked only with 8 or more units" in err
     assert {row["outlier"] for row in rows(tmp_path / "a").values()} == {"not judged"}
     assert not (tmp_path / "a" / "SN_100").exists()
     assert run("identify", "--batch", few, "-o", tmp_path / "b", "--no-emit", "--jobs", 1)[0] == 0
@@ -317,7 +317,7 @@ def test_notes_that_cannot_be_read_are_one_warning(kind: str, few: Path, tmp_pat
         return
     assert code == 0
     assert err.count("warning") == 1
-    assert f"warning: {notes[0]} cannot be read, and 1 more; the fit of these units is done again" in err
+    assert f"warning: {notes[0]} cannot be read, and 1 more; these units are fitted again" in err
     assert "(1 by an earlier call)" in err
     assert tree(output) == whole
 
@@ -332,7 +332,7 @@ def test_another_version_of_the_tool_does_all_again(few: Path, tmp_path: Path, m
 def test_a_worker_of_another_version_is_reported(few: Path) -> None:
     task = Task("a", (("a.csv", (few / "SN-100.csv").read_bytes()),), (), {}, None, version="0.0.1")
     assert workers.fit_unit(task).message == (
-        f"the worker has hystgen {hystgen.__version__}, not 0.0.1; install the same"
+        f"the worker has hystgen {hystgen.__version__}, not 0.0.1; install the same version"
     )
 
 
@@ -356,7 +356,7 @@ def test_interrupted(sent: signal.Signals, jobs: int, units: Path, fleet: Path, 
     assert out == ""
     if sent == signal.SIGINT:
         assert process.returncode == 130
-        assert err == "interrupted; what is done is kept, and the same command goes on from there\n"
+        assert err == "interrupted; finished units are kept, and the same command resumes from there\n"
         assert time.monotonic() - stopped < 10.0
     whole = tree(fleet)
     found = {name: data for name, data in tree(output).items() if not Path(name).parts[-1].startswith(".hystgen-")}
@@ -488,7 +488,7 @@ def test_a_scheduler_that_dies_is_one_message(units: Path, tmp_path: Path) -> No
     cluster.communicate()
     out, err = started.communicate(timeout=120)
     assert (started.returncode, out) == (2, "")
-    assert err == "error: the Dask scheduler was lost; the same command goes on from here\n"
+    assert err == "error: the Dask scheduler was lost; the same command resumes from here\n"
 
 
 def test_without_dask_one_line_says_what_to_install(

@@ -387,7 +387,7 @@ class TestFaults:
         spoilt = v.copy()
         spoilt[wrong] = 170.0
         fit = hystgen.identify(record(spoilt, y), thresholds=THRESHOLDS)
-        assert "made: 4 isolated samples of v that y does not bear out, bridged" in " ".join(fit.warnings)
+        assert "made: 4 isolated samples of v without a response in y, bridged" in " ".join(fit.warnings)
         assert held_out(fit, np.asarray) <= np.sqrt(1.1**2 - 1.0) * NOISE
         assert fit.parameters.input_range[1] <= 100.0
 

@@ -584,7 +584,7 @@ class TestFigures:
         made = record(v, brute_output(v, THRESHOLDS, WEIGHTS, 0.0))
         ramp = np.linspace(20.0, 60.0, 300)
         fit = hystgen.identify([made, record(ramp, 0.1 * ramp, "ramp")])
-        assert "ramp: only 1 sample is left once its start memory is known; it hardly counts" in fit.warnings
+        assert "ramp: only 1 sample is left once its start memory is known; it carries little weight" in fit.warnings
 
     def test_predict(self) -> None:
         history = (90.0, 10.0)
@@ -674,19 +674,19 @@ class TestRefused:
                 (),
                 "{path}: error: the drive v is 5 throughout; a fit needs a drive that moves, check the columns",
             ),
-            (SINE, SINE * 0.0, (), "data.csv: the measured output is constant; is the right column y?"),
+            (SINE, SINE * 0.0, (), "data.csv: the measured output is constant; is y the right column?"),
             (
                 SINE,
                 np.where(np.arange(400) < 30, np.nan, SINE),
                 (),
                 "{path}:2:1: error: 30 of 400 samples are without a value in v or y or t, the first in line 2; more "
-                "than 5 % is not repaired, record or export again",
+                "than 5 % is too much to repair, record or export again",
             ),
             (
                 np.arange(400.0),
                 SINE,
                 (),
-                "data.csv: once the start memory is known the drive does not move any more; record more cycles, or "
+                "data.csv: the drive no longer moves once the start memory is known; record more cycles, or "
                 "give --history",
             ),
             (
@@ -694,7 +694,7 @@ class TestRefused:
                 -SINE,
                 (),
                 "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change "
-                "the sign of y, else check which column is which",
+                "the sign of y, otherwise check which column is which",
             ),
             (SINE, SINE, ("--skip", "0.39"), "data.csv has 400 samples, at least 406 are needed"),
             (
@@ -745,7 +745,7 @@ class TestRefused:
         target = tmp_path / "none" / "a.yaml"
         code, _, err = run("identify", EXAMPLES / "stage_recording.csv", "-o", target, "--thresholds", 2)
         assert code == 2
-        what = f"the folder {target.parent} does not exist; make it, or choose another output"
+        what = f"the folder {target.parent} does not exist; create it, or choose another output"
         assert err.splitlines()[-1] == f"error: {target}: {what}"
         assert list(tmp_path.iterdir()) == []
 

@@ -95,9 +95,9 @@ def test_labview_with_comments_and_faults(tmp_path: Path) -> None:
     said = problem(put(tmp_path / "b.lvm", bad))
     assert f':{first + 4}:10: error: "overload" in column "Drive" is not a number' in said
     several = [*lvm("No"), *lvm("No")[16:]]
-    assert "has a second table in it" in problem(put(tmp_path / "c.lvm", several))
+    assert "contains a second table" in problem(put(tmp_path / "c.lvm", several))
     text = problem(put(tmp_path / "d.lvm", lvm("Multi", steps=("1E-3", "2E-3"))))
-    assert "channels have times of their own" in text
+    assert "channels have separate times" in text
     cut = read_record(put(tmp_path / "e.lvm", lines[:-10]))
     assert cut.notes == ("the file says that it has 50 samples, it has 40",)
     assert "without a segment" in problem(put(tmp_path / "f.lvm", lines[:14]))
@@ -126,7 +126,7 @@ def test_labview_in_segments(tmp_path: Path) -> None:
     unended = read_record(put(tmp_path / "e.lvm", [*first, "", *first[13:20]]))
     assert unended.notes == ("the last segment has no rows; it was left out",)
     several = [line.replace("1.000000E-3\t1.000000E-3", "1E-3\t2E-3") for line in lvm("Multi")[13:]]
-    assert "channels have times of their own" in problem(put(tmp_path / "f.lvm", [*lvm("Multi"), "", *several]))
+    assert "channels have separate times" in problem(put(tmp_path / "f.lvm", [*lvm("Multi"), "", *several]))
     assert "a segment that begins at 0 s" in problem(put(tmp_path / "d.lvm", [*first, "", *first[13:]]))
 
 
@@ -294,7 +294,7 @@ def test_styles_of_instruments(tmp_path: Path, style: str) -> None:
 def test_settings_of_instruments_that_say_no_one_time(tmp_path: Path) -> None:
     head = [line.format(names='"Drive","Sensor"').replace('1.000000e-03"', '2.0e-03"', 1) for line in YOKOGAWA]
     path = put(tmp_path / "a.csv", [*head, *rows(",{v:.6f},{y:.6f}")])
-    assert problem(path) == ":5:1: error: its channels have sample rates of their own; export them with one rate"
+    assert problem(path) == ":5:1: error: its channels have different sample rates; export them with one rate"
     path = put(tmp_path / "b.csv", ["CH1V,CH2V,t0 = 0, tInc = fast", *rows("{v:.6f},{y:.6f},,")])
     assert problem(path) == ':1:1: error: tInc has "fast", which is not a number; export it again'
 
@@ -332,7 +332,7 @@ def test_tdms(tmp_path: Path) -> None:
     # Waveforms that start apart are not put side by side
     later = {**wave, "wf_start_offset": 0.2}
     path = write_tdms(tmp_path / "b.tdms", {"Drive": V, "Sensor": Y}, Drive=wave, Sensor=later)
-    assert "the columns do not start together, Scan/Drive at 2024-03-05T14:21:05" in problem(path)
+    assert "the columns start at different times,  Scan/Drive at 2024-03-05T14:21:05" in problem(path)
     path = write_tdms(
         tmp_path / "c.tdms", {"Drive": V, "Sensor": Y}, Drive=wave, Sensor={**wave, "wf_increment": 0.002}
     )
@@ -347,7 +347,7 @@ def test_tdms_with_times_and_without(tmp_path: Path) -> None:
     stamps = np.datetime64("2024-03-05T14:21:05") + (np.arange(N) * 1000).astype("timedelta64[us]")
     record = read_record(write_tdms(tmp_path / "b.tdms", {"Timestamp": stamps, "Drive": V, "Sensor": Y}))
     check(record)
-    assert record.notes == ("Timestamp holds times of day; it was converted to seconds from its first",)
+    assert record.notes == ("Timestamp holds times of day; it was converted to seconds since the first",)
     path = write_tdms(tmp_path / "c.tdms", {"v": V, "y": Y.astype(np.float32)}, v={"wf_increment": 0.0})
     assert "give --sample-time" in problem(path)
     assert read_record(path, sample_time=0.001).y == pytest.approx(Y, rel=1e-6)

@@ -127,7 +127,7 @@ REFUSED = [
         "1:9: not valid YAML: found unknown escape character 'q' (while scanning a double-quoted text); correct the text there",
     ]),
     case('huge_escape', 'name: "\\UFFFFFFFF"\n', [
-        '1:1: not valid YAML soon after this place; correct the text there',
+        '1:1: not valid YAML soon after this position; correct the text there',
     ]),
     case('at_sign', "name: @x\n", [
         "1:7: not valid YAML: found character '@' that cannot start anything (while scanning for what comes next); correct the text there",
@@ -157,7 +157,7 @@ REFUSED = [
         '2:1: directives are not accepted; remove the line that starts with %',
     ]),
     case('late_directive', H + M + "...\n%YAML 1.3\n---\na: 1\n", [
-        '5:1: not valid YAML soon after this place; correct the text there',
+        '5:1: not valid YAML soon after this position; correct the text there',
     ]),
     case('alias', H + M + "units: *u\n", [
         '5:8: units: aliases (*) are not accepted; write the value itself',
@@ -562,8 +562,8 @@ REFUSED = [
         '4:130: model.effects[0].t_max: 1.0 is not above t_min = 2.0; give seconds, t_min < t_max',
     ]),
     case('effect_saturation_in_front', eff("[{name: saturation, side: front}]"), [
-        '4:62: model.effects[0].level: is missing; add `level: 50.0` (this is saturation behind the plays, one in front is a stage of model.memoryless)',
-        '4:81: model.effects[0].side: unknown key; known here are name, shape, level, centre (this is saturation behind the plays, one in front is a stage of model.memoryless)',
+        '4:62: model.effects[0].level: is missing; add `level: 50.0` (this is saturation behind the plays; one in front is a stage of model.memoryless)',
+        '4:81: model.effects[0].side: unknown key; known here are name, shape, level, centre (this is saturation behind the plays; one in front is a stage of model.memoryless)',
     ]),
     case('effect_empty_values', eff("[{name: lag, time_constant: }, {name: slew_limit, rate: 1, falling_rate: }]"), [
         '4:74: model.effects[0].time_constant: has no value; write one, or remove it',
@@ -576,7 +576,7 @@ REFUSED = [
         '4:69: model.effects[0].name: unknown effect zzz; known are creep, rate_dependence, resonance, lag, delay, slew_limit, asymmetry, saturation, thermal, drift, ageing, sensor_nonlinearity, noncongruent',
     ]),
     case('effect_user', eff("[{name: 'user:x'}]"), [
-        '4:69: model.effects[0].name: user:x is defined in no file given; give its file (--effects)',
+        '4:69: model.effects[0].name: user:x is not defined in any given file; give its file (--effects)',
     ]),
     case('effect_asymmetry', eff("[{name: asymmetry}]"), [
         '4:69: model.effects[0].name: asymmetry is not written here; make it a stage of model.memoryless',

@@ -640,10 +640,10 @@ def test_sample_rates_of_structs(tmp_path: Path) -> None:
         scipy.io.savemat(tmp_path / "a.mat", {"data": {"drive": V, "position": Y, name: 1000.0}})
         record = read_record(tmp_path / "a.mat")
         check(record)
-        assert record.read_as == f"v = drive, y = position; time from sample rate 1000 Hz ({said}, which gives no unit)"
+        assert record.read_as == f"v = drive, y = position; time from sample rate 1000 Hz ({said}, without a unit)"
     beside_struct(tmp_path / "b.mat", {"v": V, "y": Y}, "Fs", 1000.0)
     (problem,) = problems(tmp_path / "b.mat")
-    assert "sample rate 7 Hz (fs, which gives no unit)" in problem
+    assert "sample rate 7 Hz (fs, without a unit)" in problem
     assert "give --sample-time" in problem
 
 
@@ -750,7 +750,7 @@ def test_seconds_by_other_names_and_unknown_units_of_time(tmp_path: Path) -> Non
     write_csv(tmp_path / "a.csv", {"t [samples]": T, "v": V, "y": Y})
     record = read_record(tmp_path / "a.csv")
     check(record)
-    assert record.notes == ('the unit "samples" of t is not a known unit of time; its numbers were taken as seconds',)
+    assert record.notes == ('the unit "samples" of t is not a known unit of time; its numbers were read as seconds',)
 
 
 def test_units_of_parquet_fields(tmp_path: Path) -> None:
@@ -928,7 +928,7 @@ def test_faults_far_into_a_file_of_many_blocks(tmp_path: Path, monkeypatch: pyte
     column = len(",".join(some[900][:2])) + 2
     assert caught.value.problems == [
         f'{tmp_path / "bad.csv"}:902:{column}: error: "fault" in column "y" is not a number; write a number, or '
-        "nothing where there is no value",
+        "leave the cell empty if there is no value",
         f"{tmp_path / 'bad.csv'}:1802:1: error: 1 column where the header has 4; complete or remove the line",
         f"{tmp_path / 'bad.csv'}:1902:1: error: 5 columns where the header has 4; complete or remove the line",
     ]
@@ -986,7 +986,7 @@ def test_latin_1_and_binary_parts_far_into_a_file(tmp_path: Path, monkeypatch: p
     (tmp_path / "b.csv").write_bytes(text + b"\0\0\0\n")
     assert "is not a text file" in problems(tmp_path / "b.csv")[0]
     (tmp_path / "c.csv").write_bytes(text + b"1" * 600)
-    assert "has a line of more than" in problems(tmp_path / "c.csv")[0]
+    assert "has a line longer than" in problems(tmp_path / "c.csv")[0]
 
 
 def test_a_pipe_is_read(tmp_path: Path) -> None:

@@ -189,7 +189,7 @@ class TestRepair:
         (problem,) = problems(write(tmp_path / "b.csv", cells))
         assert problem == (
             ":12:1: error: 6 of 100 samples are without a value in v or y or t, the first in line 12; more than 5 % is "
-            "not repaired, record or export again"
+            "too much to repair, record or export again"
         )
         values = {name: column.copy() for name, column in zip("tvy", np.array(cells, dtype=float).T, strict=True)}
         np.savez(tmp_path / "b.npz", **values)
@@ -204,7 +204,7 @@ class TestRepair:
         (problem,) = problems(write(tmp_path / "a.csv", cells))
         assert problem == (
             ":13:1: error: 89 of 100 samples are not later than the sample before, the first in line 13; more than 5 % "
-            "is not repaired, record or export again"
+            "is too much to repair, record or export again"
         )
 
     def test_lines_count_comments_and_blank_lines(self, tmp_path: Path) -> None:
@@ -229,7 +229,7 @@ class TestRefuse:
 
     def test_empty(self, tmp_path: Path) -> None:
         (tmp_path / "a.csv").write_text("\n \n")
-        assert problems(tmp_path / "a.csv") == [": error: is empty; record again or give another file"]
+        assert problems(tmp_path / "a.csv") == [": error: is empty; record again, or give another file"]
         (tmp_path / "b.csv").write_text("# only a comment\n")
         assert "has no header row" in problems(tmp_path / "b.csv")[0]
         (tmp_path / "c.csv").write_text("t,v,y\n")
@@ -284,8 +284,8 @@ class TestRefuse:
         column = len(cells[4][0]) + 2
         reported = problems(path)
         assert reported[0] == (
-            f':6:{column}: error: "abc" in column "v" is not a number; write a number, or nothing where there is no '
-            "value"
+            f':6:{column}: error: "abc" in column "v" is not a number; write a number, or leave the cell '
+            "empty if there is no value"
         )
         assert reported[1].startswith(f":11:{len(','.join(cells[9][:2])) + 2}: error: ")
         assert reported[2] == ":13:1: error: 1 column where the header has 3; complete or remove the line"
@@ -384,7 +384,7 @@ class TestWriteColumns:
         lost = tmp_path / "none" / "a.csv"
         with pytest.raises(OSError, match=r"\S") as caught:
             write_columns(lost, ("a",), (np.zeros(2),))
-        what = f"the folder {lost.parent} does not exist; make it, or choose another output"
+        what = f"the folder {lost.parent} does not exist; create it, or choose another output"
         assert str(caught.value) == f"[Errno 2] {what}: '{lost}'"
         assert target.read_text() == "old"
         assert sorted(p.name for p in tmp_path.iterdir()) == ["a.csv", "folder"]

@@ -51,7 +51,7 @@ def test_settings_of_a_replaced_file_are_kept_and_reported(tmp_path: Path, run: 
     assert (found.units.input, found.units.output) == ("kV", "nm"), "the records are converted to them"
     assert found.input_range == pytest.approx([1e-3 * end for end in fresh.input_range])
     assert found.model.pi.weights == pytest.approx([1e6 * weight for weight in fresh.model.pi.weights], rel=1e-6)
-    assert f"{target}: name, units, description, sample_time, emit kept from the file that was there" in said
+    assert f"{target}: name, units, description, sample_time, emit kept from the existing file" in said
     bytes_now = target.read_bytes()
     assert identified(target, run, record=record)[0] == found
     assert target.read_bytes() == bytes_now
@@ -88,7 +88,7 @@ def test_a_file_that_is_no_parameter_file_is_replaced_aloud(text: str, words: st
     target.write_text(text)
     found, said = identified(target, run)
     assert found.sample_time is None
-    assert f"{target}: nothing of what was there is kept" in said
+    assert f"{target}: nothing in the old file is kept" in said
     assert words in said
 
 
@@ -109,7 +109,7 @@ def test_a_fleet_keeps_them_too(tmp_path: Path, run: Run) -> None:
     code, _, err = run(*command)
     assert code == 0
     assert "2 done (1 by an earlier call)" in err
-    assert "sample_time, emit kept from the parameter files that were there, of 1 units" in err
+    assert "sample_time, emit kept from the existing parameter files of 1 units" in err
     found = load_parameters(file)
     assert (found.sample_time, found.emit.arithmetic) == (2e-5, "q15")
     assert hystgen.differences(file, tmp_path / "out" / "one") == []
@@ -151,6 +151,6 @@ def test_what_cannot_be_written_is_found_before_the_fit(tmp_path: Path, run: Run
         assert code == 2, err
     code, _, err = run("identify", RECORDING, "-o", tmp_path / "no" / "such" / "a.yaml")
     assert code == 2
-    assert "make it, or choose another output" in err
+    assert "create it, or choose another output" in err
     assert not good.exists()
     assert not (tmp_path / "no").exists()

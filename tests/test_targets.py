@@ -358,7 +358,7 @@ def test_constants_count_as_ram_on_the_avr(name: str, arithmetic: str, engine: s
     assert said
     assert 0.8 * int(said[1]) < row.ram <= int(said[1])
     assert row.flash > 1000
-    assert "constants, which lie there on an AVR" in report.table()
+    assert "constants, which are in RAM on an AVR" in report.table()
     assert f'name="ram" value="{row.ram}"' in report.to_junit()
 
 
@@ -377,7 +377,7 @@ def test_a_model_too_large_for_the_avr_says_how_many_plays_fit() -> None:
     (row,) = hystgen.verify(of_many_plays(900), targets=[board]).rows
     found = re.search(r"not more than (\d+) of the 900 plays fit", row.error)
     assert found, row.error
-    assert "constants, which lie in RAM on an AVR" in row.error
+    assert "constants, which are in RAM on an AVR" in row.error
     fit = int(found[1])
     assert 400 < fit < 900
     for plays, fits in ((fit, True), (fit + 2, False)):

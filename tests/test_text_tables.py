@@ -234,7 +234,7 @@ def test_one_cause_one_message(tmp_path: Path) -> None:
     assert len(found) <= 4
     found = [problem for problem in found if "0x" not in problem]
     assert [problem.split(": error: ")[0] for problem in found] == [":12:9", f":52:{column}", ":53:1"]
-    assert found[0].endswith("where there is no value (and 29 more, the last in line 41)")
+    assert found[0].endswith("if there is no value (and 29 more, the last in line 41)")
     assert found[2].endswith("complete or remove the line (and 1 more, the last in line 57)")
 
 
@@ -368,7 +368,7 @@ def test_times_since_1970(tmp_path: Path) -> None:
 
     for factor in (10**3, 10**6, 10**9):
         for name in ("timestamp", "t"):
-            text = f'the numbers of "{name}" are too large to be seconds, and it has no unit; write the unit behind'
+            text = f'the numbers of "{name}" are too large to be seconds, and it has no unit; write the unit after'
             assert text in problems(stamps(name, factor))[0]
     assert read_record(stamps("timestamp [ms]", 10**3)).sample_time == pytest.approx(0.001, rel=1e-3)
 
@@ -376,7 +376,8 @@ def test_times_since_1970(tmp_path: Path) -> None:
 def test_times_with_too_few_digits(tmp_path: Path) -> None:
     path = put(tmp_path / "a.csv", "t,v,y", *(f"{t:.2f},{v},{y}" for t, v, y in zip(T, V, Y, strict=True)))
     (problem,) = problems(path)
-    assert problem.startswith(":3:1: error: the time repeats in 56 of 60 samples, it is written in steps of 0.01 s; ")
+    assert problem.startswith(":3:1: error: the time repeats in 56 of 60 samples, because it was written in steps of ")
+    assert "steps of 0.01 s; " in problem
     assert "give --sample-time (here about 0.0005" in problem
     record = read_record(path, sample_time=0.0005)
     check(record)

@@ -144,8 +144,8 @@ def test_simulate_converts_whatever_the_file(suffix: str, tmp_path: Path, run: R
 @pytest.mark.parametrize(
     ("unit", "why"),
     [
-        ("V", "column u is in V and the model's output in nm, which are different quantities; take another column"),
-        ("raw", 'and "raw" is no known unit; convert the column and write the same unit behind its name, or none'),
+        ("V", "column u is in V and the model's output in nm, which are different quantities; choose another column"),
+        ("raw", 'and "raw" is not a known unit; convert the column and write the same unit after its name, or none'),
     ],
 )
 def test_what_is_another_quantity_is_refused(unit: str, why: str, tmp_path: Path, run: Run) -> None:
@@ -189,7 +189,7 @@ def test_a_model_without_units_takes_those_of_the_record(tmp_path: Path, run: Ru
     two = write(tmp_path / "two.csv", {"t": T, "u [um]": Y * 1e-3})
     code, _, err = run("simulate", params, one, two, "--operator", "inverse", "-o", tmp_path / "out")
     assert code == 0, err
-    assert "one.csv: the model's output has no unit; it was taken to be in nm, as column u is" in err
+    assert "one.csv: the model's output has no unit; it was assumed to be in nm, as column u is" in err
     assert "two.csv: column u [um] was converted to nm" in err
     for name in ("one", "two"):
         np.testing.assert_allclose(table((tmp_path / "out" / f"{name}.csv").read_text())["v"][40:], V[40:], atol=1e-9)
@@ -238,7 +238,7 @@ def test_identify_converts_to_one_unit_and_keeps_that_of_the_file_it_replaces(tm
     assert "nm.csv: column y [nm] was converted to um: 1 nm is 0.001 um" in said
     again, said = fitted(nm)
     assert again.units == first.units, "those of the file that is there"
-    assert f"{target}: name, units kept from the file that was there" in said
+    assert f"{target}: name, units kept from the existing file" in said
     assert again.input_range == pytest.approx((float(np.min(V)), float(np.max(V))))
     assert again.model.pi.weights == pytest.approx(first.model.pi.weights, rel=1e-6)
     text = "".join(line for line in target.read_text().splitlines(True) if not line.startswith(("emit", "sample_time")))
@@ -275,8 +275,8 @@ def test_a_fleet_is_fitted_in_the_units_asked_for(tmp_path: Path) -> None:
     assert a.model.pi.weights == pytest.approx(b.model.pi.weights, rel=1e-6)
     (failed,) = fleet.failed
     assert failed.message.endswith(
-        "c.csv: error: column y is in N and the output of units in nm, which are different quantities; take another "
-        "column, or correct the unit behind its name"
+        "c.csv: error: column y is in N and the output of units in nm, which are different quantities; choose "
+        "another column, or correct the unit after its name"
     )
     assert all(unit.kept for unit in hystgen.identify_batch(tmp_path / "units", tmp_path / "out", **how).units[:2])
 
@@ -291,7 +291,7 @@ def test_diagnose_converts_and_gives_a_model_without_units_those_of_the_records(
     assert found.result.gap.as_given.holdout == pytest.approx(20.0, rel=0.2), "nm, as the fitted record has"
     assert found.result.unit == "nm"
     assert found.parameters.units.model_dump() == {"input": "V", "output": "nm"}
-    assert "a.csv: the model's output has no unit; it was taken to be in nm, as column y is" in found.notes
+    assert "a.csv: the model's output has no unit; it was assumed to be in nm, as column y is" in found.notes
     assert "b.csv: column y [um] was converted to nm: 1 um is 1000 nm" in found.notes
 
 

@@ -148,7 +148,7 @@ def test_a_compiler_may_be_a_command_of_several_words(tmp_path: Path, monkeypatc
     ("command", "message"),
     [
         ("gcc 'a", "the compiler \"gcc 'a\" is not a command: No closing quotation; correct it"),
-        (" ", "a compiler is named by a command; write gcc, clang, zig or another"),
+        (" ", "a compiler is given as a command; write gcc, clang, zig or another"),
     ],
 )
 def test_what_is_no_command_is_refused(command: str, message: str) -> None:

@@ -152,7 +152,7 @@ def test_a_link_that_leads_nowhere_is_named(tmp_path: Path, monkeypatch: pytest.
     with pytest.raises(FileNotFoundError) as caught:
         writing.write_atomically("lost", "a")
     assert caught.value.filename == "lost"
-    assert caught.value.strerror == f"the folder {tmp_path}/nowhere does not exist; make it, or choose another output"
+    assert caught.value.strerror == f"the folder {tmp_path}/nowhere does not exist; create it, or choose another output"
     for write in (lambda: writing.write_atomically("loop", "a"), lambda: writing.write_files(Path("loop"), {"a": "a"})):
         with pytest.raises(OSError, match="leads back to itself; choose another output") as refused:
             write()

@@ -1,9 +1,9 @@
 """From a plan to a diagnosis in one run: plan the drives, play and record them, cut the recording, diagnose.
 
 hardware.py has the two functions that touch hardware, here a simulated bench; put your own in their place. Nothing is
-known of the stage but the range of its drive: the first record gives the model that the diagnosis begins with.
+known about the stage except the range of its drive: the first record gives the model that the diagnosis starts from.
 
-Writes plan, recording, model and diagnosis into the folder, and prints what is missing in a model of plays alone.
+Writes plan, recording, model and diagnosis into the folder, and prints what a model of plays alone is missing.
 
 Usage: python examples/acquire [-o FOLDER] [--rate HZ]
 """

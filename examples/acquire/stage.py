@@ -1,7 +1,7 @@
 """A stage on the bench, with its converters. SIMULATED: nothing here comes from hystgen.
 
-A DAC and an amplifier drive it, sliders that stick behind springs until they slip take up part of the drive, two
-springs with dampers go on moving after it. A monitor of the amplifier and a position sensor are read through an ADC.
+A DAC and an amplifier drive it; sliders that stick behind springs until they slip take up part of the drive; two
+springs with dampers go on moving after it. An ADC reads a monitor of the amplifier and a position sensor.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ class Bench:
         self.noise = np.random.default_rng(5)
 
     def run(self, codes: NDArray[np.int64], rate: float) -> tuple[Array, Array]:
-        """Readings of monitor and sensor, counts of the ADC."""
+        """Readings of monitor and sensor, as counts of the ADC."""
         half = 2 ** (BITS - 1)
         drive = LOW + (np.clip(codes, -half, half - 1) + half) * (HIGH - LOW) / 2**BITS
         move = np.diff(drive, prepend=0.0).tolist()

@@ -1,8 +1,8 @@
 """From a recording that a model does not explain to firmware that tracks: identify, diagnose, emit, run the C.
 
-A stage with hidden creep and a bent transducer (stage.py, which shares nothing with hystgen) is recorded. A model is
-identified, the gap between model and stage is diagnosed, the C of the model before and after is emitted, compiled on
-this machine and put in front of the same stage for a motion that is in no recording.
+A stage with hidden creep and a bent transducer (stage.py, which shares no code with hystgen) is recorded. A model is
+identified and the gap between model and stage is diagnosed. The C of the models before and after is emitted, compiled
+on this machine and put in front of the same stage for a motion that is in no recording.
 
 Writes recordings, models, C and the picture `tracking.png` into the folder, and prints the table.
 
@@ -27,7 +27,8 @@ from hystgen.parameters.files import dump_parameters
 Array = NDArray[np.float64]
 
 SECONDS = 7.5 * DAMPERS[-1][0]
-"""Of the recording to fit, s: the slowest damper comes to rest several times, as creep has to show to be identified."""
+"""Length of the recording to fit, s: the slowest damper comes to rest several times, since creep has to show to be
+identified."""
 
 
 def write(path: Path, drives: Array) -> Path:
@@ -96,7 +97,7 @@ def main() -> None:
         colours = (drawing.OTHER, drawing.GAP, drawing.MODEL)
         for (name, step), colour in zip(runs.items(), colours, strict=True):
             left = tracked(step, wanted) - wanted
-            left -= np.mean(left[inside])  # the zero of a displacement is free
+            left -= np.mean(left[inside])  # the zero of a displacement is arbitrary
             rms = 100.0 * float(np.std(left[inside])) / (high - low)
             print(f"{name:24} {rms:6.3f} % of the motion, rms")
             error.plot(t, 100.0 * left / (high - low), color=colour, linewidth=1.0, label=f"{name}: {rms:.2f} % rms")

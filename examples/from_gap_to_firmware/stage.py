@@ -1,8 +1,8 @@
 """The stage that nobody tells hystgen about: stick and slip, a bent transducer, creep, a noisy sensor. SIMULATED.
 
 Sliders that stick behind springs until they slip take up part of the drive, a transducer bends it, and two springs with
-dampers go on moving after it. Nothing here comes from hystgen: no plays, no dead zones, no filters of its own. Time
-runs in steps far finer than the samples.
+dampers go on moving after it. Nothing here comes from hystgen: it has no plays, no dead zones and no filters of
+hystgen's. Time advances in steps far finer than the samples.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 SAMPLE_TIME = 0.01  # s, a fortieth of the fastest damper's time constant, so that its creep shows in many samples
-FINE = 10  # steps of the simulation in one sample
+FINE = 10  # simulation steps per sample
 FULL = 100.0  # V
 NOISE = 0.004  # um rms
 
@@ -25,7 +25,7 @@ DAMPERS = ((0.4, 0.03), (8.0, 0.04))  # s, and share of the motion that comes la
 
 
 class Stage:
-    """The stage at rest at 0 V; `move` takes it to the next sample."""
+    """The stage at rest at 0 V; `move` advances it to the next sample."""
 
     def __init__(self, seed: int = 1) -> None:
         self.noise = np.random.default_rng(seed)
@@ -34,7 +34,7 @@ class Stage:
         self.late = np.zeros(len(DAMPERS))
 
     def move(self, v: float) -> float:
-        """The true displacement, um, once the drive has gone straight to v in one sample."""
+        """The true displacement, um, after the drive has moved to v along a straight line in one sample."""
         h = 0.0
         for drive in np.linspace(self.v, v, FINE + 1)[1:]:
             bent = drive + BENT * drive * (FULL - drive)
@@ -47,7 +47,7 @@ class Stage:
         return 2.0 + h + float(np.sum(self.late))
 
     def measure(self, drives: Array) -> Array:
-        """What the sensor reads, sample by sample, once the stage has rested at the first drive."""
+        """Sensor readings, sample by sample, after the stage has rested at the first drive."""
         self.move(float(drives[0]))
         for _ in range(5000):
             self.move(float(drives[0]))

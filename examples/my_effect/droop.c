@@ -1,8 +1,8 @@
 #include "hystgen_runtime.h"
 
 /* The functions of `model.py`, operation for operation, in the same order: only then are the bits
-   those of Python, in every arithmetic. What begins with hystgen_ gets the model's name in emitted
-   files. */
+   the same as Python's, in every arithmetic. In emitted files the prefix hystgen_ is replaced by
+   the model's name. */
 
 typedef struct {
     hystgen_number_t inverse_slope;
@@ -19,7 +19,7 @@ typedef struct {
     hystgen_signal_t before; /* input of the last sample */
 } hystgen_user_droop_t;
 
-/* Everything has settled at the input x. Returns the output. */
+/* Settle everything at the input x. Returns the output. */
 static hystgen_signal_t hystgen_user_droop_rest(const hystgen_user_droop_table_t *t,
                                                 hystgen_user_droop_t *self, hystgen_signal_t x)
 {
@@ -28,7 +28,7 @@ static hystgen_signal_t hystgen_user_droop_rest(const hystgen_user_droop_table_t
     return hystgen_product(&t->rest, x);
 }
 
-/* The input of the settled output y. */
+/* The input that belongs to the settled output y. */
 static hystgen_signal_t hystgen_user_droop_resting(const hystgen_user_droop_table_t *t,
                                                    hystgen_signal_t y)
 {
@@ -45,7 +45,7 @@ static hystgen_signal_t hystgen_user_droop_solve(const hystgen_user_droop_table_
     return hystgen_product(&t->inverse_slope, y + (self->leaked + change));
 }
 
-/* The input is x at this sample. Returns the output. */
+/* Take in the input x at this sample. Returns the output. */
 static hystgen_signal_t hystgen_user_droop_absorb(const hystgen_user_droop_table_t *t,
                                                   hystgen_user_droop_t *self, hystgen_signal_t x)
 {

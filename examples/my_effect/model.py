@@ -1,19 +1,19 @@
-"""An effect of one's own: the droop of a charge amplifier, whose charge leaks away while the drive stands still.
+"""An effect of your own: the droop of a charge amplifier, whose charge leaks away while the drive is at rest.
 
     hystgen simulate stage_x.yaml drive.csv -o predicted.csv --effects examples/my_effect
     hystgen diagnose stage_x.yaml records.csv -o diagnosis --effects examples/my_effect
     hystgen emit diagnosis/params.yaml -o firmware --effects examples/my_effect
     hystgen verify diagnosis/params.yaml --targets host,cortex-m4f --effects examples/my_effect
 
-The parameter file has it as
+In the parameter file it is
 
     model:
       effects:
         - {name: user:droop, share: 0.05, time_constant: 2.0}
 
 A class is an effect: a name `user:..`, a place in the chain, the method of that place, and a field for each key of the
-parameter file. `candidates` tells a fit what to try. With these alone it takes part in `simulate`, forwards, and in
-`diagnose`. For an inverse, and for C, it needs a `block`: four functions, here and once more in `droop.c`.
+parameter file. `candidates` tells a fit what to try. These alone are enough for `simulate` forwards and for `diagnose`.
+An inverse and C need a `block`: four functions, here and again in `droop.c`.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ from pydantic import Field
 
 from hystgen.effects import About, Candidate, Effect, OwnBlock, Place, Run, decays, follow, product
 
-# The block: y = h - X, where X follows share * h. For h straight between two samples
-# X_k = X_(k-1) + (early h_(k-1) + late h_k - rate X_(k-1)), of which all but late h_k is known beforehand.
+# The block: y = h - X, where X follows share * h. With h a straight line between two samples, X_k = X_(k-1) + (early
+# h_(k-1) + late h_k - rate X_(k-1)), of which everything but late h_k is known beforehand.
 INVERSE_SLOPE, REST, INVERSE_REST, SHARE, RATE, EARLY, LATE = range(7)
 LEAKED, BEFORE = range(2)
 
 
 def rest(t: Any, s: Any, x: Any) -> Any:
-    """Everything has settled at the input x; the output."""
+    """Settle everything at the input x; return the output."""
     s[LEAKED] = product(t[SHARE], x)
     s[BEFORE] = x
     return product(t[REST], x)
 
 
 def resting(t: Any, y: Any) -> Any:
-    """The input of the settled output y."""
+    """The input that belongs to the settled output y."""
     return product(t[INVERSE_REST], y)
 
 
@@ -51,7 +51,7 @@ def solve(t: Any, s: Any, y: Any) -> Any:
 
 
 def absorb(t: Any, s: Any, x: Any) -> Any:
-    """The input is x at this sample; the output."""
+    """Take in the input x at this sample; return the output."""
     leaking = product(t[EARLY], s[BEFORE]) + product(t[LATE], x)
     s[LEAKED] = s[LEAKED] + (leaking - product(t[RATE], s[LEAKED]))
     s[BEFORE] = x
@@ -59,7 +59,7 @@ def absorb(t: Any, s: Any, x: Any) -> Any:
 
 
 class Droop(Effect):
-    """Of the displacement, `share` leaks away with a time constant: `y = h - X`, `tau X' = share h - X`."""
+    """A `share` of the displacement leaks away with a time constant: `y = h - X`, `tau X' = share h - X`."""
 
     name: Literal["user:droop"] = Field(description="name of the effect")
     share: Annotated[float, Field(ge=0, lt=1)] = Field(description="of the displacement that leaks away in the end")
@@ -75,14 +75,14 @@ class Droop(Effect):
     )  # fmt: skip
 
     def numbers(self, seconds: float) -> list[float]:
-        """The table of the block at steps of `seconds`, in double precision."""
+        """The table of the block for steps of `seconds`, in double precision."""
         _, early, late = (self.share * float(x[0]) for x in decays(np.array([seconds]), self.time_constant))
-        rate = -float(np.expm1(-seconds / self.time_constant))  # 1 - E, with all its digits
+        rate = -float(np.expm1(-seconds / self.time_constant))  # 1 - E, without losing digits
         settled = 1.0 - self.share
         return [1.0 / (1.0 - late), settled, 1.0 / settled, self.share, rate, early, late]
 
     def filtered(self, h: np.ndarray, run: Run) -> np.ndarray:
-        """What is left of the displacement, each row of h by itself."""
+        """The displacement minus the droop, for each row of h separately."""
         y = np.empty_like(h)
         for row, left in zip(np.atleast_2d(h), np.atleast_2d(y), strict=True):
             follow(row, *run.factors(self.time_constant), row[0], left)
@@ -90,7 +90,7 @@ class Droop(Effect):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The share in hundredths, the time constant from ten samples to the length of a record."""
+        """The share in hundredths; the time constant from ten samples to the length of a record."""
         low, high = np.log10(10.0 * about.sample_time), np.log10(max(about.duration, 100.0 * about.sample_time))
 
         def build(x: np.ndarray) -> Droop:

@@ -1,9 +1,9 @@
-"""Draw the figures of the tutorial note again and compare with every number that it prints.
+"""Redraw the figures of the tutorial note and compare our results with every number that it prints.
 
     python examples/note [-o FOLDER]
 
-runs `make` of every module in this folder. Where a number is not the printed one, or not the right one where the note
-has a misprint (docs/note.md lists them), it says which and the exit code is 1.
+runs `make` of every module in this folder. If a number differs from the printed one, or from the correct one where the
+note has a misprint (docs/note.md lists them), it says which, and the exit code is 1.
 """
 
 from __future__ import annotations

@@ -1,13 +1,13 @@
-"""Figures 15 and 16: the closed loop, with and without a compensator, and with the emitted C as one.
+"""Figures 15 and 16: the closed loop, with and without a compensator, and with the emitted C as compensator.
 
     python examples/note/closed_loop.py [-o FOLDER]
 
 The note runs three cases and finds either inverse "greatly improved" over none. With its own plant (38), gains and
-reference the largest error says the opposite: the hysteresis has a gain of its own above 1, which simply raises that
-of the loop. A linear scale instead of an inverse takes that gain out, and against it the inverse has the smaller
-largest error (not the smaller rms: the hysteresis mostly lags, and so does the loop). What the gain costs is seen in
-the error over time: where two plays or more follow, the uncompensated loop is beyond its stability limit and rings
-near the plant's resonance, and so does the one with the scale on its steepest pieces.
+reference, the largest error says the opposite: the hysteresis has a gain above 1, which simply raises that of the loop.
+A linear scale in place of the inverse takes that gain out; compared with it, the inverse has the smaller largest error
+(but not the smaller rms: the hysteresis mostly lags, and so does the loop). The price of the gain shows in the error
+over time: where two plays or more follow, the uncompensated loop is beyond its stability limit and rings near the
+plant's resonance, and so does the one with the scale on its steepest pieces.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ HERE = Path(__file__).resolve().parent
 PLANT = ([8.8e16], [1.0, 1.6e4, 6.6e8, 5.3e12, 8.8e16])
 CONTROLLER = PIController(kp=0.185, ki=185.0)
 MEAN_GAIN = 2.05  # output over drive of Example 1's loop at a drive of +-4; in this control loop the drive is smaller
-PERIOD = 1.0  # s; the first one is left out, there the memory is still the start's
-BLOCK = 200  # samples of which the largest is drawn
+PERIOD = 1.0  # s; the first period is left out, since it still shows the start memory
+BLOCK = 200  # each drawn point is the largest of this many samples
 
 # Largest error in the second period, as measured with another simulation of the same loop
 EXPECTED = {"no compensator": 0.102, "exact inverse": 0.136, "approximate inverse": 0.139, "linear scale 1/2.05": 0.206}
@@ -36,12 +36,12 @@ COLOURS = (drawing.FAULT, drawing.MEASURED, drawing.GAP, drawing.RESIDUAL, drawi
 
 
 def reference(t: float) -> float:
-    """Output units, `t` in s."""
+    """In output units; `t` in s."""
     return 4.0 * math.sin(2.0 * math.pi * t)
 
 
 def make(folder: Path) -> None:
-    """Run the loops, print their errors and draw the figures. Raises MismatchError where a figure has changed."""
+    """Run the loops, print their errors and draw the figures. Raises MismatchError if a figure has changed."""
     rate = STAGE_1.parameters.sample_time
     assert rate is not None
 
@@ -83,7 +83,7 @@ def second(response: Response) -> slice:
 
 
 def gain(response: Response) -> float:
-    """Slope of the straight line through the origin that is nearest to displacement over demand."""
+    """Slope of the straight line through the origin that best fits displacement over demand."""
     u, h = response.control[second(response)], response.displacement[second(response)]
     return float(u @ h / (u @ u))
 
@@ -92,19 +92,19 @@ def ringing(response: Response) -> tuple[float, float]:
     """Largest part of the error above 1 kHz in the second period, and its strongest frequency (Hz)."""
     step = response.t[1] - response.t[0]
     fast = signal.sosfiltfilt(signal.butter(4, 1000.0, "high", fs=1.0 / step, output="sos"), response.error)
-    # the filter's end is none of the loop's
+    # the transient at the end comes from the filter, not from the loop
     fast = fast[second(response)][:-200]
     return float(np.max(np.abs(fast))), float(np.argmax(np.abs(np.fft.rfft(fast))) / (len(fast) * step))
 
 
 def paths(cases: dict[str, Response]) -> object:
-    """What the controller sees of the actuator: displacement over demand, and what a straight line misses of it."""
+    """The actuator as the controller sees it: displacement over demand, and its deviation from a straight line."""
     figure = drawing.figure(10.4, 4.3)
     loops, rest = figure.subplots(1, 2)
     for (name, response), colour in zip(cases.items(), COLOURS, strict=True):
         u, h = response.control[second(response)], response.displacement[second(response)]
         loops.plot(u, h, color=colour, label=name, linewidth=1.2)
-        # the case without a compensator lies under those with a scale
+        # the case without a compensator is drawn below those with a scale
         rest.plot(u / np.max(np.abs(u)), h - gain(response) * u, color=colour,
                   **({"linewidth": 4.0, "alpha": 0.4} if name == "no compensator" else {"linewidth": 1.2}))  # fmt: skip
     loops.set(title="From demand to displacement", xlabel="demand $u$ (output units)",

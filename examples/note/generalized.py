@@ -29,7 +29,7 @@ def make(folder: Path) -> None:
 
 
 def _numbers() -> None:
-    """What the note prints of Examples 4 and 6."""
+    """Numbers that the note prints for Examples 4 and 6."""
     found = note.PI_4.inverse()
     # The note's z_5 = 4.386 is one off in its last digit
     note.check("Example 4, z_i (36)", found.thresholds, "0 0.293 0.877 1.755 2.924 4.385 6.139")
@@ -46,7 +46,7 @@ def _numbers() -> None:
     printed = "0 1.906 3.179 3.809 4.241 4.524 4.704 4.816 4.885 4.928 4.954 4.97"
     note.check("Example 4, tau_j (53)", zone.thresholds[11:], printed, off[:12])
     note.check("Example 4, tau_-j (55)", [-tau for tau in zone.thresholds[11::-1]], printed, off[:12])
-    # mu as the printed eta give them; the note's own, up to 10.226, are within what the rounding of eta allows
+    # mu from the printed eta; the note's own, up to 10.226, are within what the rounding of eta allows
     right = "0.210 0.065 0.122 0.182 0.306 0.510 0.847 1.407 2.303 3.852 6.590 11.384"
     note.check("Example 4, mu_j (54)", zone.weights[11:], right)
     note.check("Example 4, mu_-j (56)", zone.weights[11::-1], right)

@@ -1,4 +1,4 @@
-"""Figures 11 to 14: the inverse of the play sum, what it achieves, and what one of wrong parameters achieves."""
+"""Figures 11 to 14: the inverse of the play sum, its effect, and the effect of one with wrong parameters."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def draw_tracking(areas: list[Any], letters: str, u: note.Array, y: note.Array, 
 
 
 def save_compensation(folder: Path, name: str, example: str, u: note.Array, v: note.Array, y: note.Array) -> None:
-    """Inverse, model and both in a row, each over its input: reference u, drive v, output y."""
+    """Inverse, model and composition in a row, each over its input: reference u, drive v, output y."""
     drawn, (inverse, model, both) = note.panels(3, 3)
     inverse.plot(u, v, color=note.SECOND)
     model.plot(v, y, color=note.FIRST)

@@ -1,4 +1,4 @@
-"""Figures 5, 6 and 8 to 10, the play sum and its properties, and one more, a density and the plays for it."""
+"""Figures 5, 6 and 8 to 10, the play sum and its properties, and one of our own, a density and the plays for it."""
 
 from __future__ import annotations
 
@@ -48,10 +48,10 @@ def _full_loop(model: PI, v_max: float) -> tuple[note.Array, note.Array]:
 
 
 def _draw_width(axes: Any, model: PI, v_max: float) -> None:
-    """The loop, and by how much its rising and falling half are apart where the output is zero."""
+    """The loop, and the distance between its rising and falling halves where the output is zero."""
     v, y = _full_loop(model, v_max)
     right, left = float(np.interp(0.0, y[:2001], v[:2001])), float(np.interp(0.0, y[:2000:-1], v[:2000:-1]))
-    # both crossings move by an output's error over the slope there
+    # both crossings move by the output error divided by the slope there
     off_by = 2.0 * note.summed(model, v) / model.slopes[0] + note.rounded(8, v_max)
     note.close("width of the loop (32), corrected", right - left, model.width, off_by)
     axes.plot(v, y, color=note.FIRST)
@@ -82,7 +82,7 @@ def _width_and_slopes(folder: Path) -> None:
         turns = 2.0 * ends[i : i + 2] - v_max
         inside = (v[:2001] > turns[0] + 0.01) & (v[:2001] < turns[1] - 0.01)
         slopes = np.diff(y[:2001][inside]) / np.diff(v[:2001][inside])
-        # two outputs and two inputs of a step
+        # a step takes two outputs and two inputs
         step = 2.0 * v_max / 2000
         off_by = 2.0 * (note.summed(model, v) + model.slopes[i] * note.rounded(2, v_max)) / step
         note.close(f"slope S_{i + 1} of a segment (33)", slopes, model.slopes[i], off_by)
@@ -98,7 +98,7 @@ def _width_and_slopes(folder: Path) -> None:
 
 
 def draw_plays(axes: Any, letter: str, v: note.Array, model: PI, title: str, unit: str) -> None:
-    """The plays of a model over their input `v`, each with its threshold beside its flat top."""
+    """The plays of a model over their input `v`, each with its threshold next to its flat top."""
     plays = operators.plays(v, model.thresholds)[1:]
     place, step = -np.inf, 0.06 * np.ptp(plays)
     for i in range(model.n - 1, -1, -1):
@@ -143,7 +143,7 @@ def _starts(folder: Path) -> None:
         fifth = operators.play(v, model.thresholds[5], start)
         play.plot(note.TIME[:1001], fifth[:1001], style, color=colour, label=f"$M_0$ = {start:g}")
         loop.plot(v[:1001], outputs[-1][:1001], style, color=colour, label=f"$M_0$ = {start:g}")
-    # the input has run through 2 r_6 = 5.4 once it has come down from 4 to -1.4
+    # the input has moved by 2 r_6 = 5.4 once it has come down from 4 to -1.4
     swept = int(np.argmax(np.maximum.accumulate(v) - v >= 2.0 * note.EXAMPLE_1.thresholds[-1]))
     for other in outputs[1:]:
         note.close("the start is forgotten after a sweep of 2 r_6", other[swept:], outputs[0][swept:], 0.0)
@@ -155,7 +155,7 @@ def _starts(folder: Path) -> None:
 
 
 def _example_1_width_and_slopes(folder: Path) -> None:
-    # Slopes as the printed weights give them, for the note's 0.71 1.33 1.8 2.16 2.4 2.51 2.53
+    # Slopes from the printed weights, for the note's 0.71 1.33 1.8 2.16 2.4 2.51 2.53
     note.check("Example 1, slopes S_i (33)", note.EXAMPLE_1.slopes, "0.72 1.32 1.80 2.16 2.40 2.52 2.532")
     note.check("Example 1, width (32), corrected", note.EXAMPLE_1.width, "1.5")
     note.check("Example 1, width (32), corrected", note.EXAMPLE_1.width, "1.518")
@@ -170,7 +170,7 @@ def _example_1_width_and_slopes(folder: Path) -> None:
 
 
 def _density(folder: Path) -> None:
-    """`p(r) = 0.8 exp(-0.3 r)` up to 10 as 6 plays, and how far they may be off."""
+    """`p(r) = 0.8 exp(-0.3 r)` up to 10 as 6 plays, and their largest error."""
     continuous = density.from_formula(density.parse_formula("0.8*exp(-0.3*r)"), 10.0)
     plays = continuous.discretise(0.7, 6)
     model = PI(plays.thresholds, plays.weights)

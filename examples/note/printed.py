@@ -1,4 +1,4 @@
-"""The note's examples with the numbers that it prints, and what the modules with its figures share."""
+"""The note's examples with the printed numbers, and the helpers shared by the modules that draw its figures."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ EXAMPLE_6 = Cascade(PI_4, (ENVELOPE_6,), 0.0, (-5.0, 5.0))
 TIME = np.linspace(0.0, 2.0, 2001)
 """Seconds; two periods of 1 Hz."""
 ROUNDING = 2.0**-53
-"""What one rounding may add, as a share of its result."""
+"""Largest error of one rounding, as a share of its result."""
 INPUT, OUTPUT = "input units", "output units"
 DRIVE, ANSWER, REFERENCE = f"input $v$ ({INPUT})", f"output $y$ ({OUTPUT})", f"reference $u$ ({OUTPUT})"
 FIRST, SECOND, THIRD, DIM = drawing.MEASURED, drawing.MODEL, drawing.RESIDUAL, drawing.IGNORED
 
 
 class MismatchError(AssertionError):
-    """A computed number is not the one it should be."""
+    """A computed number differs from the expected one."""
 
 
 def sine(amplitude: float, frequency: float = 1.0) -> Array:
@@ -50,7 +50,7 @@ def sine(amplitude: float, frequency: float = 1.0) -> Array:
 def check(what: str, values: ArrayLike, printed: str, off: ArrayLike = 0.0) -> None:
     """Raise MismatchError unless every value rounds to the printed number (decimal text, separated by spaces).
 
-    `off`: by how much more it may differ, where the note computed from numbers of which it prints only some digits.
+    `off`: how much more it may differ, where the note computed from numbers of which it prints only some digits.
     """
     found, texts = np.atleast_1d(np.asarray(values, dtype=np.float64)), printed.split()
     allowed = np.broadcast_to(np.asarray(off, dtype=np.float64), found.shape)
@@ -76,26 +76,28 @@ def coarse(x: ArrayLike) -> Array:
 
 
 def rounded(count: float, size: ArrayLike) -> float:
-    """What `count` roundings of numbers up to `size` may add up to."""
+    """Largest sum of `count` roundings of numbers up to `size`."""
     return float(count * 2.0**-53 * np.max(np.abs(size)))
 
 
 def summed(pi: PI, v: ArrayLike) -> float:
-    """How far roundings may put two sums of plays apart: of each term a difference, a product and a sum."""
+    """Largest difference that rounding makes between two sums of plays: each term has a difference, a product and a
+    sum."""
     return rounded(2 * 3 * (pi.n + 1), pi.slopes[-1] * np.max(np.abs(v)))
 
 
 def inverted(pi: PI, u: ArrayLike) -> float:
-    """How far roundings may put the inverse of a play sum off: of each term a difference, a product and a sum, and as
-    many in its weight and threshold."""
+    """Largest error that rounding makes in the inverse of a play sum: each term has a difference, a product and a sum,
+    and as many in its weight and threshold."""
     return rounded(6 * (pi.n + 1), np.sum(np.abs(pi.inverse().weights)) * np.max(np.abs(u)))
 
 
 def cancelled(model: PI | Cascade, u: ArrayLike, v: ArrayLike) -> float:
-    """How far roundings may keep a model behind its inverse from the identity, for the reference u and the drive v.
+    """How far rounding may keep the composition of a model and its inverse from the identity, for the reference u and
+    the drive v.
 
-    No output moves by more than the last slope times how far the input of the plays is off; a front and its inverse
-    add roundings of the input times the largest slope, and of the output.
+    No output moves by more than the last slope times the error of the input of the plays; a front and its inverse add
+    roundings of the input times the largest slope, and of the output.
     """
     pi, front = (model, 0.0) if isinstance(model, PI) else (model.pi, rounded(8, model.front(v)))
     if isinstance(model, Cascade):
@@ -105,7 +107,7 @@ def cancelled(model: PI | Cascade, u: ArrayLike, v: ArrayLike) -> float:
 
 
 def spread(function: Callable[[Array], ArrayLike], numbers: Sequence[float], half: ArrayLike) -> Array:
-    """How far the results of `function` may move, to first order, while each number moves by up to its `half`."""
+    """How far the results of `function` may move, to first order, if each number moves by up to its `half`."""
     x = np.asarray(numbers, dtype=np.float64)
     middle = np.asarray(function(x))
     moved = np.broadcast_to(np.asarray(half, dtype=np.float64), x.shape)
@@ -121,7 +123,7 @@ def panels(count: int, columns: int = 2) -> tuple[Any, list[Any]]:
 
 
 def describe(axes: Any, letter: str, title: str, x: str, y: str, legend: bool = False) -> None:
-    """Title with the letter of the panel, axes with units, and the legend where nothing is hidden."""
+    """Title with the letter of the panel, axes with units, and the legend where it hides nothing."""
     axes.set(title=f"({letter}) {title}", xlabel=x, ylabel=y)
     if legend:
         axes.margins(y=0.12)

@@ -1,4 +1,4 @@
-"""Arguments of the public calls, of models, plants and operators: what is wrong with one, and what to give instead."""
+"""Arguments of public calls, models, plants and operators: what is wrong with one, and what to pass instead."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def kind(value: object) -> str:
-    """A value as a message names it: its type, of an array with its shape."""
+    """A value as named in messages: its type, and the shape of an array."""
     name = "array" if isinstance(value, np.ndarray) else type(value).__name__
     if isinstance(value, str | int | float | None):
         return f"{printable(repr(value))}"
@@ -46,7 +46,7 @@ def known_options(call: str, function: Callable[..., Any], given: Iterable[str])
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """The public call, which raises a TypeError with a suggestion for an option that it does not have."""
+    """The public call, which raises a TypeError with a suggestion for an unknown option."""
     needed = [each.name for each in inspect.signature(function).parameters.values() if each.default is each.empty]
 
     @functools.wraps(function)
@@ -58,7 +58,8 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def taking(options_of: Callable[..., Any], name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """The same for a call that passes its `**options` to `options_of`; shown in its signature; `name`: for messages."""
+    """The same for a call that passes its `**options` to `options_of`; they appear in its signature; `name`: for
+    messages."""
     handed = [
         each.replace(kind=inspect.Parameter.KEYWORD_ONLY)
         for each in inspect.signature(options_of).parameters.values()
@@ -97,7 +98,7 @@ def choice(name: str, value: object, known: Sequence[str]) -> None:
 
 
 def words(name: str, value: object, example: str) -> tuple[str, ...]:
-    """A list of words. Raises TypeError; one word alone is not a list."""
+    """A list of words. Raises TypeError; a single word is not a list."""
     if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping):
         found = tuple(value)
         if all(isinstance(word, str) for word in found):
@@ -113,7 +114,7 @@ def real(name: str, value: object, unit: str) -> float:
 
 
 def number(name: str, value: object, unit: str, least: float = -math.inf) -> float:
-    """A finite number from `least` on. Raises TypeError and ValueError."""
+    """A finite number, at least `least`. Raises TypeError and ValueError."""
     found = real(name, value, unit)
     if not (math.isfinite(found) and found >= least):
         raise ValueError(f"{name} is a number of {unit}{', not negative' if least == 0 else ''}, not {found:g}")
@@ -121,11 +122,11 @@ def number(name: str, value: object, unit: str, least: float = -math.inf) -> flo
 
 
 def whole(name: str, value: object, unit: str, least: int) -> int:
-    """A whole number from `least` on. Raises TypeError and ValueError."""
+    """An integer, at least `least`. Raises TypeError and ValueError."""
     if isinstance(value, bool) or not isinstance(value, int | np.integer):
         raise TypeError(f"{name} is a whole number of {unit}, not {kind(value)}")
     if value < least:
-        raise ValueError(f"{name} is a whole number of {unit} from {least} on, not {value}")
+        raise ValueError(f"{name} is a whole number of {unit}, at least {least}, not {value}")
     return int(value)
 
 
@@ -137,19 +138,19 @@ def numbers(name: str, value: object, example: str) -> tuple[float, ...]:
     try:
         found = tuple(float(x) for x in value)
     except (TypeError, ValueError, OverflowError):
-        raise TypeError(f"{name} is a list of finite numbers, and an entry is none; {hint}") from None
+        raise TypeError(f"{name} is a list of finite numbers, but an entry is not a number; {hint}") from None
     if not all(map(math.isfinite, found)):
-        raise ValueError(f"{name} is a list of finite numbers, and an entry is not finite; {hint}")
+        raise ValueError(f"{name} is a list of finite numbers, but an entry is not finite; {hint}")
     return found
 
 
 def texts(name: str, value: object, keys: Sequence[str], example: str) -> dict[str, str]:
-    """A mapping of some of `keys` to text, all of them text. Raises TypeError and ValueError."""
+    """A mapping of some of `keys` to text. Raises TypeError and ValueError."""
     if not isinstance(value, Mapping):
         raise TypeError(f"{name} is a mapping of text to text, not {kind(value)}; give {example}")
     strange = [x for entry in value.items() for x in entry if not isinstance(x, str)]
     if strange:
-        raise TypeError(f"{name} is a mapping of text to text, and {kind(strange[0])} is in it; give {example}")
+        raise TypeError(f"{name} is a mapping of text to text, but {kind(strange[0])} is in it; give {example}")
     unknown = [key for key in value if key not in keys] if keys else []
     if unknown:
         raise ValueError(f"{name} has no {printable(unknown[0])}; its keys are {', '.join(keys)}, as in {example}")
@@ -161,7 +162,7 @@ def signal(name: str, value: object) -> NDArray[Any]:
     try:
         found = np.atleast_1d(np.asarray(value))
     except ValueError:  # lists of different lengths
-        raise ValueError(f"{name} has one number per sample, and rows of different lengths are given") from None
+        raise ValueError(f"{name} has one number per sample, but rows of different lengths are given") from None
     if found.ndim != 1:
         hint = ""
         if found.ndim == 2:
@@ -193,10 +194,10 @@ def samples(v: ArrayLike) -> Array:
 
 
 def finite_samples(v: ArrayLike) -> Array:
-    """Samples (N,) in double precision. Raises ValueError unless they are finite and in one dimension."""
+    """Samples (N,) in double precision. Raises ValueError unless they are finite and one-dimensional."""
     found = samples(v)
     if not np.all(np.isfinite(found)):
-        raise ValueError("an input has to be finite numbers")
+        raise ValueError("an input has to consist of finite numbers")
     return found
 
 
@@ -220,10 +221,10 @@ def positive(**values: float) -> None:
 
 
 def whole_from(least: int, **values: int) -> None:
-    """Raise ValueError for a parameter that is not a whole number from `least` on."""
+    """Raise ValueError for a parameter that is not an integer, at least `least`."""
     for name, value in values.items():
         if not isinstance(value, int | np.integer) or value < least:
-            raise ValueError(f"{name} has to be a whole number from {least} on, not {value!r}")
+            raise ValueError(f"{name} has to be a whole number, at least {least}, not {value!r}")
 
 
 def finite_numbers(values: Sequence[float], name: str) -> tuple[float, ...]:

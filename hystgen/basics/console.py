@@ -27,12 +27,12 @@ class OutputError(click.ClickException):
         _discard(sys.stdout)
 
     def show(self, file: Any = None) -> None:
-        """Print the message in the words of all others."""
+        """Print the message in the format of all others."""
         note(f"error: {self.message}", file)
 
 
 def say(result: str | bytes) -> None:
-    """Print a line, or data as they are, on standard output.
+    """Print a line, or raw data, on standard output.
 
     Raises OutputError, and BrokenPipeError if the reader is gone.
     """
@@ -41,7 +41,7 @@ def say(result: str | bytes) -> None:
 
 
 def note(words: str, file: Any = None) -> None:
-    """Print talk on standard error, as far as it can be written; nothing depends on it."""
+    """Print remarks on standard error, as far as it can be written; nothing depends on it."""
     try:
         click.echo(words, file=file, err=True)
     except OSError:
@@ -61,7 +61,7 @@ def _output() -> Iterator[None]:
 
 
 def _discard(stream: Any) -> None:
-    """Have the remaining output of a stream thrown away, else the interpreter tries once more when it ends."""
+    """Discard the remaining output of a stream; otherwise the interpreter tries again when it ends."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
@@ -69,14 +69,14 @@ def _discard(stream: Any) -> None:
 
 
 class Commands(click.Group):
-    """A command line that ends in good order, for any kind of output and whoever ends it.
+    """A command line that exits cleanly, for any kind of output and whatever ends it.
 
-    SIGTERM and SIGHUP end it as an exception does, so that nothing unfinished is left behind, with the exit code of a
-    process that the signal ended. A character that the terminal's code page lacks is written as an escape.
+    SIGTERM and SIGHUP end it like an exception, so that nothing unfinished is left behind, with the exit code of a
+    process ended by that signal. Characters missing from the terminal's code page are escaped.
     """
 
     def main(self, *arguments: Any, **options: Any) -> Any:
-        """Run the command that the words name, and exit."""
+        """Run the command given by the words, and exit."""
         with _ended_by_signals(), _any_character():
             try:
                 return super().main(*arguments, **options)
@@ -87,7 +87,7 @@ class Commands(click.Group):
                 sys.exit(2)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; an error of the system that it does not catch is one of the output."""
+        """Run the command; an operating system error that it does not catch concerns the output."""
         with _output():
             return super().invoke(ctx)
 
@@ -114,12 +114,12 @@ def _any_character() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _ended_by_signals() -> Iterator[None]:
-    """Raise SystemExit at the signals of ENDING, unless they are ignored (nohup) or somebody else's."""
+    """Raise SystemExit at the signals of ENDING, unless they are ignored (nohup) or already handled."""
     before: dict[signal.Signals, Any] = {}
 
     def end(number: int, _: Any) -> None:
         for each in before:
-            signal.signal(each, signal.SIG_IGN)  # once is enough; a second one would stop the clearing up
+            signal.signal(each, signal.SIG_IGN)  # once is enough; a second one would interrupt the clean-up
         raise SystemExit(128 + number)
 
     if threading.current_thread() is threading.main_thread():

@@ -1,6 +1,6 @@
 """Shared by all figures: colours, labels, thinned lines, and the same bytes for the same figure.
 
-matplotlib is imported when one is drawn; its settings, and those of the user, stay as they are.
+matplotlib is imported when a figure is drawn; its settings, and the user's, are left alone.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ BLOCKS = 1000
 """Number of blocks of samples whose extremes a thinned line keeps."""
 
 MOST_POINTS = 4000
-"""Lines with more points than this that cannot be thinned become pixels in an SVG; most points of a cloud."""
+"""Lines with more points than this that cannot be thinned become pixels in an SVG; also the most points of a cloud."""
 
 
 KINDS = (".png", ".svg")
@@ -66,7 +66,7 @@ class PlotError(ValueError):
 
 
 def check_path(path: str | os.PathLike[str]) -> None:
-    """Raise PlotError for a file that cannot hold a plot."""
+    """Raise PlotError for a file type that cannot hold a plot."""
     target = Path(path)
     if target.suffix.lower() not in KINDS:
         raise PlotError(f"{target}: a plot is a .png or .svg file")
@@ -101,8 +101,8 @@ def require() -> None:
 def _import() -> None:
     """Import matplotlib. Raises ImportError.
 
-    A notebook passes on its backend, which this environment may lack, and matplotlib then cannot be imported. Pictures
-    here are files, which need no backend; for others it is the one asked for, if it exists.
+    A notebook passes on its backend, which this environment may lack; matplotlib then cannot be imported. Pictures here
+    are files, which need no backend; for others it is the requested one, if it exists.
     """
     backend = None if "matplotlib" in sys.modules else os.environ.pop("MPLBACKEND", None)
     try:
@@ -117,7 +117,7 @@ def _import() -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Silence matplotlib about its caches, which it puts elsewhere if the home folder is read-only."""
+    """Silence matplotlib about its caches, which it moves if the home folder is read-only."""
     logger = logging.getLogger("matplotlib")
     before = logger.level
     if before == logging.NOTSET:
@@ -165,7 +165,7 @@ def label(what: str, unit: str | None) -> str:
 
 
 def noise_lines(axes: Any, noise: float | None) -> None:
-    """The standard deviation of the noise on both sides of zero; nothing where it is not known."""
+    """The standard deviation of the noise on both sides of zero; nothing if it is unknown."""
     if noise is None:
         return
     for side, name in ((noise, "noise, \N{PLUS-MINUS SIGN} 1 sd"), (-noise, None)):

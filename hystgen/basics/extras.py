@@ -1,4 +1,4 @@
-"""The extras of this package, and the command that installs one into the Python that runs."""
+"""The extras of this package, and the command that installs one into the running Python."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import urllib.request
 from pathlib import Path
 
 FIT = ("scipy", "numba", "joblib", "threadpoolctl", "rich")
-"""Packages of the extra `fit`, without which nothing is fitted."""
+"""Packages of the extra `fit`, without which nothing can be fitted."""
 
 PLOT = ("matplotlib",)
 """Packages of the extra `plot`."""
@@ -24,7 +24,7 @@ class MissingExtraError(ImportError):
 
 
 def require_fit(what: str, plot: bool = False) -> None:
-    """Raise MissingExtraError where `what` cannot be done because packages of the extra `fit` are not installed.
+    """Raise MissingExtraError if `what` cannot be done because packages of the extra `fit` are not installed.
 
     `plot`: it needs the extra `plot` too, so that one command installs both.
     """
@@ -50,7 +50,7 @@ def install(extra: str) -> str:
 def _requirement(extra: str) -> list[str]:
     """Arguments of pip install."""
     checkout = Path(__file__).resolve().parents[2]
-    if (checkout / "pyproject.toml").is_file():  # installed editable, or not installed at all
+    if (checkout / "pyproject.toml").is_file():  # an editable install, or not installed at all
         return ["-e", f"{checkout}[{extra}]"]
     try:
         text = importlib.metadata.distribution("hystgen").read_text("direct_url.json")

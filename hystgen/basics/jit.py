@@ -8,8 +8,8 @@ as `followed.py_func` is everywhere. Numba is imported with the first call that 
 as Python, with the same bits.
 
 Compiled code is cached on disk; its cache key contains the source of every function that takes part, so that a change
-in a helper can never leave a stale caller behind. The cache saves time and is never needed: where no folder can be
-written to, nothing is cached; cached files that cannot be read are made again.
+in a helper can never leave a stale caller behind. The cache saves time but is not required: if no folder is writable,
+nothing is cached; unreadable cached files are rebuilt.
 """
 
 from __future__ import annotations
@@ -40,16 +40,16 @@ announce: Callable[[str], None] | None = None
 ONCE = "compiling Python functions for this machine, once: up to 20 s, with effects in the C up to 40 s"
 EVERY_TIME = (
     "compiling Python functions for this machine: up to 20 s, with effects in the C up to 40 s, and again every time, "
-    "since no folder for the result can be written to; set NUMBA_CACHE_DIR to one that can"
+    "since no folder for the result is writable; set NUMBA_CACHE_DIR to one that is"
 )
 
 
 def interpreted() -> str:
     """The message for a machine without numba."""
-    return f"computing in Python, which takes longer than compiled; to have it compiled: {extras.install('fit')}"
+    return f"computing in plain Python, which is slower than compiled code; to compile it:  {extras.install('fit')}"
 
 
-# The functions allocate nothing, so that counting references, which would take most of a sample's time, is left out
+# The functions allocate nothing, so reference counting, which would take most of a sample's time, is disabled
 OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "nogil": True}
 
 _plain = contextvars.ContextVar("plain", default=False)
@@ -66,7 +66,7 @@ _samples: collections.Counter[tuple[Any, np.dtype[Any]]] = collections.Counter()
 def plain() -> Iterator[None]:
     """Inside, functions run as plain Python, for short signals: there is nothing to compile or to load.
 
-    Numbers overflow and become NaN without a warning, as they do in compiled code.
+    Numbers overflow and become NaN without a warning, as in compiled code.
     """
     before = _plain.set(True)
     try:
@@ -92,7 +92,7 @@ class Jit(Generic[P, R]):
         functools.update_wrapper(self, function)
         self.py_func = function
         self.targetoptions = {**OPTIONS, "inline": "always" if inline else "never"}
-        """options of numba, which looks here for those of a function that others call"""
+        """numba's options, read by numba when a function is called by another"""
 
     def __call__(self, *given: P.args, **named: P.kwargs) -> R:
         if _plain.get():
@@ -128,18 +128,19 @@ class Jit(Generic[P, R]):
         twin.__module__ = function.__module__
         twin.__qualname__ = f"{function.__name__}_{kind}_{self.mark}"
         made = numba.njit(**options)(twin)
-        with contextlib.suppress(RuntimeError):  # no folder that can be written to
+        with contextlib.suppress(RuntimeError):  # no folder is writable
             made._cache = _cache_class()(twin)  # as its enable_caching does with numba's own class
         return made
 
     @property
     def _numba_type_(self) -> Any:
-        """Numba's type of the function where another one calls it."""
+        """Numba's type of the function when another one calls it."""
         return self.inner._numba_type_
 
     @functools.cached_property
     def mark(self) -> str:
-        """A hash of all that its compiled code depends on: its source and that of all that it calls, and constants."""
+        """A hash of everything its compiled code depends on: its source, that of all the functions it calls, and
+        constants."""
         text, functions = repr(OPTIONS), [self]
         for function in functions:
             text += inspect.getsource(function.py_func) + repr(function.targetoptions)
@@ -177,7 +178,7 @@ def _cache_class() -> Any:
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             try:
                 return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-            except Exception:  # whatever unpickling half a file ends in
+            except Exception:  # any error that unpickling half a file may raise
                 with contextlib.suppress(OSError):
                     self.flush()  # type: ignore[no-untyped-call]
                 return None
@@ -190,7 +191,7 @@ def _cache_class() -> Any:
 
 
 def _cache_folder() -> str | None:
-    """Where compiled code of this package is kept; None where no folder can be written to."""
+    """Where compiled code of this package is kept; None if no folder is writable."""
     try:
         return str(_cache_class()(_cache_folder).cache_path)
     except RuntimeError:
@@ -211,7 +212,7 @@ def _announce(text: Callable[[], str]) -> None:
 
 @functools.cache
 def _listen() -> None:
-    """Have `announce` called when numba starts to compile."""
+    """Call `announce` when numba starts to compile."""
     from numba.core import event
 
     class FirstCompilation(event.Listener):

@@ -1,4 +1,4 @@
-"""A model's name, which is the prefix of its C, and the length of names of units."""
+"""A model's name, which is the prefix of its C, and the length of unit names."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ NAME_PATTERN = "^[A-Za-z](_?[A-Za-z0-9])*$"
 """Letters, digits and single underscores between them, starting with a letter."""
 
 MAX_UNIT = 40
-"""[characters] The longest name of a unit: a longer one in the header of a recording is not taken for a unit, since it
-would not fit a parameter file."""
+"""[characters] The longest name of a unit: anything longer in the header of a recording is not taken for a unit, since
+it would not fit a parameter file."""
 
 
 def _words(text: str) -> frozenset[str]:
@@ -34,7 +34,7 @@ KEYWORDS = _words(
     """
 )
 
-# NAME.h may lie on an include path, where it would be found in place of the system's header.
+# NAME.h may be on an include path, where it would be found in place of the system's header.
 _HEADERS = _words(
     """
     aio alloca arduino assert complex cpio ctype dirent dlfcn endian errno fcntl fenv float fmtmsg fnmatch ftw
@@ -47,8 +47,8 @@ _HEADERS = _words(
 
 _DEVICES = frozenset(["con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))])
 
-# Macros UPPER_... of a model with one of these names would mix with the macros of a standard header:
-# the first group is reserved whatever follows, of the second only names that the header forms itself.
+# Macros UPPER_... of a model with one of these names would clash with the macros of a standard header: the first group
+# is reserved whatever follows, the second only with names that the header itself forms.
 _MACRO_FAMILIES = dict.fromkeys(_words("dbl dec dec32 dec64 dec128 flt ldbl"), "float")
 _MACRO_NAMES = (
     dict.fromkeys(_words("ptrdiff sig_atomic size wchar wint intptr uintptr intmax uintmax"), "stdint")
@@ -60,7 +60,7 @@ _MACRO_NAMES = (
 
 
 def name_problem(name: str) -> str | None:
-    """What is wrong with a model's name, and what to do; None if it can be used.
+    """What is wrong with a model's name, and what to do; None if it is usable.
 
     A name is the prefix of every emitted symbol (`NAME_...`) and, in upper case, of every macro, and it names
     the files `NAME.h`, `NAME.c` and `NAME_selftest.h/.c`. Case is ignored in every comparison, because macros

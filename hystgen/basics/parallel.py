@@ -1,7 +1,7 @@
 """The same work on several items, in forked copies of this process or in its threads.
 
-A copy (fork) sees all that this process had when it was made, so that little has to be sent, and results are those of a
-plain loop whatever the processes' order. Where processes cannot be copied safely it is a plain loop.
+A copy (fork) sees everything that this process had when it was made, so little has to be sent, and the results are
+those of a plain loop in whatever order the processes run. If processes cannot be copied safely, it is a plain loop.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ _at_work: Sequence[int] | memoryview[int] = (0,)
 """Number of busy workers in this process's pool."""
 
 def cores() -> int:
-    """Largest number of processes here; 1 where they cannot be copied.
+    """Largest number of processes here; 1 if they cannot be copied.
 
-    A lock that another thread holds would stay locked in a copy, and some system libraries do not survive a fork.
+    A lock held by another thread would stay locked in a copy, and some system libraries do not survive a fork.
     """
     import multiprocessing
 
@@ -54,9 +54,10 @@ def _cores() -> int:
 def each(
     work: Callable[[T], R], items: Sequence[T], jobs: int, tick: Callable[[], None] = lambda: None
 ) -> list[R]:
-    """`[work(item) for item in items]` by `jobs` processes; results are pickled, `tick` is called for each of them.
+    """`[work(item) for item in items]` with `jobs` processes; results are pickled, and `tick` is called for each of
+    them.
 
-    What fails in a process, or takes it down, is repeated here: an exception is raised as in a plain loop.
+    An item that fails or kills its worker is rerun in this process: an exception is raised as in a plain loop.
     """
     pool: Pool[int, R] = Pool(lambda k: work(items[k]), jobs)
     with pool:
@@ -67,14 +68,14 @@ def each(
 class _Task(Generic[T, R]):
     item: T
     done: list[R] = field(default_factory=list)
-    """its result, once it is there"""
+    """the task's result, once available"""
     after: list[_Task[T, R]] = field(default_factory=list)
 
 
 class Pool(Generic[T, R]):
-    """Up to `jobs` processes for the same work on items that come up one after the other; `with` ends them.
+    """Up to `jobs` processes for the same work on items that arrive one after the other; `with` ends them.
 
-    They are made when the first things come, and see what this process had then; things and results are pickled.
+    They are started when the first items arrive, and see what this process had then; items and results are pickled.
     """
 
     def __init__(self, work: Callable[[T], R], jobs: int) -> None:
@@ -98,10 +99,10 @@ class Pool(Generic[T, R]):
         tick: Callable[[], None] = lambda: None,
         then: Callable[[T, R], Iterable[T]] = lambda *_: (),
     ) -> list[tuple[T, R]]:
-        """All the things with their results, in the order of a plain loop; `tick` is called for each of them.
+        """All the items with their results, in the order of a plain loop; `tick` is called for each of them.
 
-        `then`: further tasks that follow from a result; they go first. What fails in a process, or takes it down, is
-        repeated here: an exception is raised as in a plain loop.
+        `then`: further tasks that follow from a result; they go first. An item that fails or kills its worker is rerun
+        in this process: an exception is raised as in a plain loop.
         """
         tasks = [_Task[T, R](item) for item in items]
 
@@ -122,7 +123,7 @@ class Pool(Generic[T, R]):
         return found
 
     def _elsewhere(self, waiting: deque[_Task[T, R]], finish: Callable[[_Task[T, R], R], list[_Task[T, R]]]) -> None:
-        """Have the tasks done by the processes; those behind a failure may be left."""
+        """Let the processes do the tasks; those after a failure may remain undone."""
         from multiprocessing import connection
 
         self._gather(len(waiting))
@@ -133,7 +134,7 @@ class Pool(Generic[T, R]):
             while free and waiting and not failed:
                 reach, task = free.pop(), waiting.popleft()
                 busy[reach] = task
-                with contextlib.suppress(BrokenPipeError):  # which shows below
+                with contextlib.suppress(BrokenPipeError):  # which is noticed below
                     reach.send(task.item)
             self._at_work[0] = len(busy)
             if not busy:
@@ -153,11 +154,11 @@ class Pool(Generic[T, R]):
                     waiting.extendleft(finish(task, result))
 
     def _gather(self, most: int) -> None:
-        """Make processes while there are fewer than tasks."""
+        """Start processes while there are fewer than tasks."""
         import multiprocessing
 
         fork = multiprocessing.get_context("fork")
-        # An interrupt is for this process; a copy that got it before it can ignore it would say so
+        # Interrupts are for this process; a copy that got one before it ignores them would report it
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             while len(self._workers) < min(self._jobs, most):
@@ -166,7 +167,7 @@ class Pool(Generic[T, R]):
                 process = fork.Process(target=_serve, args=(self._work, there, others, self._at_work), daemon=True)
                 try:
                     process.start()
-                except OSError:  # no room for another: go on with those already running, or without any
+                except OSError:  # no room for another: continue with those already running, or without any
                     here.close()
                     return
                 finally:
@@ -182,10 +183,10 @@ def _serve(
     global _at_work
     _at_work = at_work
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    for ending in (signal.SIGTERM, signal.SIGHUP):  # the original process answers these signals
+    for ending in (signal.SIGTERM, signal.SIGHUP):  # the original process handles these signals
         signal.signal(ending, signal.SIG_DFL)
     gc.freeze()  # a garbage collection would copy all of the parent's memory
-    for each in others:  # its ends, which would keep one copy waiting for the other when the parent is gone
+    for each in others:  # its pipe ends, which would keep one copy waiting for the other after the parent is gone
         each.close()
     while True:
         try:
@@ -200,7 +201,7 @@ def _serve(
 
 
 def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
-    """`work(item)` for all items, in threads that are gone when it is done; compiled work runs side by side there.
+    """`work(item)` for all items, in threads that end with the call; compiled work runs in parallel there.
 
     Used while other cores are idle, as when the last worker of a pool has a long task; otherwise a plain loop.
     """

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 Path = tuple[str | int, ...]
-"""Place of a value in the file: keys and list indices from the top level down."""
+"""Path of a value in the file: keys and list indices from the top level down."""
 
 SHOWN = 60
 """Longest piece of a user's text repeated in a message."""
@@ -16,8 +16,8 @@ SHOWN = 60
 class Problem:
     """One thing that is wrong with a file.
 
-    `path` is dotted (`model.pi.weights[2]`, empty for the file as a whole); `message` says what is wrong
-    and, after a semicolon, what to do; `line` and `column` count from 1 and are None where there is none.
+    `path` is dotted (`model.pi.weights[2]`, empty for the file as a whole); `message` says what is wrong and, after a
+    semicolon, what to do; `line` and `column` count from 1 and are None if there is none.
     """
 
     path: str
@@ -49,14 +49,14 @@ class ParameterError(ValueError):
 
 
 def printable(text: str) -> str:
-    """A user's text as it is repeated in a message: at most 60 characters, unprintable ones escaped."""
+    """A user's text as repeated in messages: at most 60 characters, unprintable ones escaped."""
     if len(text) > SHOWN:
         text = text[: SHOWN - 3] + "..."
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def shown(value: object) -> str:
-    """A value as a message names it: numbers as they are, text in quotes, lists and mappings by kind."""
+    """A value as named in messages: numbers as they are, text in quotes, lists and mappings by kind."""
     if isinstance(value, str):
         return f'the text "{printable(value)}"'
     if value is None:
@@ -73,7 +73,7 @@ def shown(value: object) -> str:
 
 
 def path_text(path: Path) -> str:
-    """A path as a message names it: `model.pi.weights[2]`; keys that are not plain words are quoted."""
+    """A path as named in messages: `model.pi.weights[2]`; keys that are not plain words are quoted."""
     text = ""
     for part in path:
         if isinstance(part, int):
@@ -87,7 +87,7 @@ def path_text(path: Path) -> str:
 class RecordError(ValueError):
     """A data file that is refused, with every problem found in it.
 
-    `problems` has one line per problem, `FILE:LINE:COL: error: what; what to do` (`FILE: error: ...` where there is no
+    `problems` has one line per problem, `FILE:LINE:COL: error: what; what to do` (`FILE: error: ...` if there is no
     line); `str()` joins them.
     """
 
@@ -109,11 +109,11 @@ class EffectsError(ValueError):
 
 
 class UnsupportedEffectsError(EffectsError):
-    """Something that cannot be done yet for a model with effects; it names them."""
+    """Something not yet supported for a model with effects; it names them."""
 
 
 class NotInvertibleError(ValueError):
-    """A well-formed model whose inverse was asked for and does not exist; `reasons` says why, one line each."""
+    """A well-formed model whose inverse was requested and does not exist; `reasons` says why, one line each."""
 
     def __init__(self, reasons: Sequence[str]) -> None:
         super().__init__("the model has no inverse: " + "; ".join(reasons))
@@ -123,7 +123,7 @@ class NotInvertibleError(ValueError):
 class FormatError(ValueError):
     """A model whose numbers do not fit the arithmetic.
 
-    `problems`: where the value stands in a parameter file, `()` for none, and what is wrong; `str()` gives a line each.
+    `problems`: path of the value in a parameter file, `()` for none, and what is wrong; `str()` gives one line each.
     """
 
     def __init__(self, *problems: str | tuple[Path, str]) -> None:
@@ -136,7 +136,7 @@ class SampleWarning(UserWarning):
 
 
 def counted(number: int, one: str, several: str = "") -> str:
-    """`1 sample`, `2 samples`; `several`: the words behind any other number, where they are not `one` with an s."""
+    """`1 sample`, `2 samples`; `several`: the words after any other number, if they are not `one` with an s."""
     return f"{number} {one if number == 1 else several or f'{one}s'}"
 
 

@@ -11,8 +11,8 @@ PATIENCE = 1.0
 """Seconds before the bar appears."""
 
 OFTEN = 0.1
-"""Seconds between two pictures of it; drawn by `tick`, since a thread of the bar's own would forbid copies of the
-process (`parallel`)."""
+"""Seconds between two updates of it; drawn by `tick`, since a thread for the bar would rule out forking
+(`parallel`)."""
 
 
 class Progress:

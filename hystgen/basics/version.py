@@ -1,3 +1,3 @@
-"""The version of the tool, which emitted files and reports name."""
+"""The version of the tool, named in emitted files and reports."""
 
 __version__ = "0.1.0"

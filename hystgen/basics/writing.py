@@ -1,8 +1,8 @@
-"""Files that appear complete or not at all, and folders for work under way.
+"""Files that appear complete or not at all, and folders for work in progress.
 
-Whatever is written is made in a staging folder beside its place and then renamed. The folder goes when the work ends,
-however it ends; what a killed process leaves is removed by the next one that writes to the same place. A lock in it,
-which the system releases with the process, distinguishes the two.
+Everything is written in a staging folder next to its destination and then renamed. The folder is removed when the work
+ends, however it ends; the next process that writes to the same place removes the remains of a killed one. A lock in it,
+which the system releases with the process, distinguishes the two cases.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _swept: set[str] = set()
 
 @contextlib.contextmanager
 def staging(around: Path) -> Iterator[Path]:
-    """A new, empty folder in the folder `around`, for the time of the block. Raises OSError."""
+    """A new, empty folder in the folder `around`, for the duration of the block. Raises OSError."""
     sweep(around)
     place, lock = _new(around)
     try:
@@ -42,12 +42,12 @@ def staging(around: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def temporary() -> Iterator[Path]:
-    """A new, empty folder where the system keeps temporary files, for the time of the block. Raises OSError."""
+    """A new, empty folder where the system keeps temporary files, for the duration of the block. Raises OSError."""
     try:
         around = tempfile.gettempdir()
     except FileNotFoundError:
         raise FileNotFoundError(
-            errno.ENOENT, "no folder for temporary files can be written to; set TMPDIR to one"
+            errno.ENOENT, "no folder for temporary files is writable; set TMPDIR to one that is"
         ) from None
     with staging(Path(around)) as folder:
         yield folder
@@ -66,7 +66,7 @@ def sweep(around: Path) -> None:
 
 
 def _remove_stale(place: Path) -> None:
-    """Remove a staging folder of this user that no process holds. Raises OSError where that cannot be found out."""
+    """Remove a staging folder of this user that no process holds. Raises OSError if that cannot be determined."""
     if sys.platform == "win32" or place.is_symlink() or place.stat().st_uid != os.geteuid():
         return
     if not set(os.listdir(place)) <= {_LOCK, _FILES}:
@@ -78,7 +78,7 @@ def _remove_stale(place: Path) -> None:
 
 
 def _new(around: Path) -> tuple[Path, int | None]:
-    """A new folder and its lock, None where the file system has none."""
+    """A new folder and its lock, None if the file system has no locks."""
     while True:
         place = Path(tempfile.mkdtemp(prefix=PREFIX, dir=around))
         try:
@@ -91,7 +91,7 @@ def _new(around: Path) -> tuple[Path, int | None]:
 
 
 def _hold(place: Path) -> int | None:
-    """Lock a staging folder; None where another process holds it, or is removing it. Raises OSError without locks."""
+    """Lock a staging folder; None if another process holds it, or is removing it. Raises OSError without locks."""
     if sys.platform == "win32":
         raise OSError(errno.ENOTSUP, os.strerror(errno.ENOTSUP))
     import fcntl
@@ -123,16 +123,16 @@ def destination(path: str | os.PathLike[str]) -> Path:
 
 
 def place_for(path: str | os.PathLike[str]) -> Path:
-    """`destination` of a file, whose folder is there. Raises OSError."""
+    """`destination` of a file in an existing folder. Raises OSError."""
     target = destination(path)
     if not target.parent.is_dir():
-        what = f"the folder {target.parent} does not exist; make it, or choose another output"
+        what = f"the folder {target.parent} does not exist; create it, or choose another output"
         raise FileNotFoundError(errno.ENOENT, what, os.fspath(path))
     return target
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Raise the OSError that `write_atomically` would end in, found by a trial in the folder."""
+    """Raise the OSError that `write_atomically` would raise, found by a trial in the folder."""
     target = place_for(path)
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
@@ -141,7 +141,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def try_folder(folder: Path, path: str | os.PathLike[str]) -> None:
-    """Raise the OSError, with the name `path`, that writing into an existing folder would end in."""
+    """Raise the OSError, with the name `path`, that writing into an existing folder would raise."""
     try:
         with tempfile.TemporaryFile(prefix=PREFIX, dir=folder):
             pass
@@ -164,19 +164,19 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> None
             (folder / target.name).write_bytes(data)
             os.replace(folder / target.name, target)
     except OSError as failure:
-        # Name the file that was asked for, not the one on the way there
+        # Name the requested file, not the temporary one
         raise OSError(failure.errno, failure.strerror, os.fspath(path)) from None
 
 
 def check_files(folder: Path, names: Iterable[str]) -> None:
-    """Raise the OSError that writing these files into `folder` would end in, as far as that is known before."""
+    """Raise the OSError that writing these files into `folder` would raise, as far as that is known beforehand."""
     around = destination(folder) if folder.is_symlink() else folder
     while not around.exists() and around != around.parent:
         around = around.parent
     if not around.is_dir():
         raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(around))
     try_folder(around, around)
-    for name in names:  # the one thing that could stop a replacement half-way
+    for name in names:  # the only thing that could stop a replacement half-way
         if (folder / name).is_dir():
             raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(folder / name))
 
@@ -184,14 +184,14 @@ def check_files(folder: Path, names: Iterable[str]) -> None:
 def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
     """Write `files` (name to ASCII text or bytes) into `folder`; each appears complete, none before all are ready.
 
-    A folder that is not there yet appears with all of them; of one that is, other files stay as they are, and so do
-    those that have the same bytes already.
+    A new folder appears with all of them; in an existing one other files are left alone, and so are those that already
+    have the same bytes.
     """
     target = destination(folder)  # a link stays a link
     new = not target.exists()
     around = target.parent if new else target
     around.mkdir(parents=True, exist_ok=True)
-    sweep(target.parent)  # of a call that was killed before the folder appeared
+    sweep(target.parent)  # left by a call that was killed before the folder appeared
     try:
         with staging(around) as staged:
             made = staged / "made"
@@ -207,7 +207,7 @@ def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
                         os.replace(made / name, target / name)
     except OSError as failure:
         own = not failure.filename or PREFIX in str(failure.filename)
-        if own and failure.errno is not None:  # name what was asked for
+        if own and failure.errno is not None:  # name the requested path
             raise OSError(failure.errno, failure.strerror, str(folder)) from None
         raise
     return [folder / name for name in files]

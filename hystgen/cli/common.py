@@ -25,29 +25,29 @@ ADVICE = {
     errno.ENOENT: "give a path that exists",
     errno.EACCES: "change its permissions, or give another path",
     errno.EPERM: "change its permissions, or give another path",
-    errno.EROFS: "give a path that can be written to",
+    errno.EROFS: "give a writable path",
     errno.ENOSPC: "free some space, or give another path",
     errno.EISDIR: "give the path of a file",
     errno.ENOTDIR: "give the path of a folder",
     errno.EEXIST: "give another path",
 }
-"""What to do about errors of the system."""
+"""Advice for operating system errors."""
 
 
 class Failed(click.ClickException):
-    """A check that failed (exit code 1) or input that cannot be used (2); the message says everything."""
+    """A check that failed (exit code 1) or unusable input (2); the message says everything."""
 
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
         self.exit_code = code  # type: ignore[misc]  # click declares it on the class and reads it on the instance
 
     def show(self, file: Any = None) -> None:
-        """Print the message alone: it already says that it is an error."""
+        """Print just the message: it already says that it is an error."""
         console.note(self.message, file)
 
 
 def guarded(path: str, action: Callable[[], Any]) -> Any:
-    """Run `action` and turn what it may raise into a message and an exit code."""
+    """Run `action` and turn the errors it may raise into a message and an exit code."""
     from hystgen.basics.extras import MissingExtraError
     from hystgen.basics.problems import (
         FormatError,
@@ -74,19 +74,19 @@ def guarded(path: str, action: Callable[[], Any]) -> Any:
         raise Failed(f"{path}: error: {error}", 1) from None
     except FormatError as error:
         raise Failed(str(located(path, error.problems)), 2) from None
-    except BrokenPipeError:  # whoever reads has had enough, which click ends quietly
+    except BrokenPipeError:  # the reader closed the pipe, which click handles quietly
         raise
     except (ValueError, OSError, MissingExtraError) as error:
         raise Failed(f"error: {_reason(error)}", 2) from None
 
 
 def _reason(error: Exception) -> str:
-    """The text of an error; for errors of the system the file, the reason and what to do."""
+    """The text of an error; for operating system errors the file, the reason and what to do."""
     if not isinstance(error, OSError) or not error.strerror:
         return str(error)
     said = f"{error.filename}: {error.strerror}" if error.filename else error.strerror
     number = error.errno or 0
-    if number in ADVICE and error.strerror == os.strerror(number):  # texts of this package bring advice of their own
+    if number in ADVICE and error.strerror == os.strerror(number):  # messages of this package bring their own advice
         return f"{said}; {ADVICE[number]}"
     return said
 
@@ -111,14 +111,14 @@ operator_option = click.option(
 arithmetic_option = click.option("--arithmetic", type=click.Choice(list(ARITHMETICS)), help="default: the file's")
 engine_option = click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="default: the file's")
 optimize_option = click.option(
-    "--optimize", type=click.Choice(["auto", "speed", "size"]), help="what engine auto chooses for; default: the file's"
+    "--optimize", type=click.Choice(["auto", "speed", "size"]), help="goal of engine auto; default: the file's"
 )
 effects_option = click.option(
     "--effects", multiple=True, type=click.Path(), metavar="FOLDER",
     help="effects of your own (user:..): a folder with model.py, or a Python file; repeatable",
 )
 partial_option = click.option(
-    "--allow-partial", is_flag=True, help="leave out effects that the C cannot have; its banner names them"
+    "--allow-partial", is_flag=True, help="leave out effects that the C cannot include; its banner names them"
 )
 layout_option = click.option(
     "--layout", type=click.Choice(["self-contained", "shared-runtime", "single-header"]), default="self-contained",
@@ -126,14 +126,14 @@ layout_option = click.option(
 )  # fmt: skip
 skip_option = click.option(
     "--skip", type=float, callback=seconds, default=0.0,
-    help="seconds at the start of every record that are not compared, though their drive counts",
+    help="seconds at the start of every record that are not compared, although their drive counts",
 )  # fmt: skip
 T = TypeVar("T")
 U = TypeVar("U")
 
 
 def for_each(items: Sequence[T], action: Callable[[T], U]) -> list[U]:
-    """The results of `action` for all items. Raises Failed with all messages and the higher one of the exit codes."""
+    """The results of `action` for all items. Raises Failed with all messages and the highest of the exit codes."""
     made, failures = [], []
     for item in items:
         try:
@@ -170,7 +170,7 @@ def number_list(option: str, text: str, example: str) -> list[float]:
 
 
 def matched(_context: click.Context, _option: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
-    """The files that patterns such as 'held/*.csv' stand for, by name; every other path as it is."""
+    """The files that match patterns such as 'held/*.csv', sorted by name; every other path unchanged."""
     found: list[str] = []
     for path in value:
         found += [path] if os.path.lexists(path) else sorted(glob.glob(path)) or [path]
@@ -178,9 +178,9 @@ def matched(_context: click.Context, _option: click.Parameter, value: tuple[str,
 
 
 class Judging(click.Command):
-    """A command with records and held-out records; says which files behind `--holdout FILE` it would fit.
+    """A command with records and held-out records; says which of the files after `--holdout FILE` it would fit.
 
-    A shell makes `--holdout a.csv b.csv` of `--holdout *.csv`, and the option takes the first of them alone.
+    A shell expands `--holdout *.csv` to `--holdout a.csv b.csv`, of which the option takes only the first.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -201,7 +201,7 @@ class Judging(click.Command):
 
 
 def data_argument(required: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """The records of a command."""
+    """The records given to a command."""
     return click.argument("data", nargs=-1, required=required, type=click.Path(), callback=matched)
 
 
@@ -216,20 +216,20 @@ _RECORD_OPTIONS = [
     click.option(
         "--columns",
         metavar="t=Time,v=U,y=Pos",
-        help="our names for the file's columns; in HDF5 v=run1/drive, of a MATLAB struct v=data.v; in text also by "
-        "their numbers, 1,2,3 for t, v, y",
+        help="our names for the file's columns; in HDF5 v=run1/drive, in a MATLAB struct v=data.v; in text also by "
+        "number, 1,2,3 for t, v, y",
     ),
     click.option("--sample-time", type=float, help="seconds, for files without time"),
-    click.option("--delimiter", help="default: what the file shows"),
-    click.option("--history", metavar="V,V,..", help="drive values visited before, in the model's units"),
+    click.option("--delimiter", help="default: found from the file"),
+    click.option("--history", metavar="V,V,..", help="drive values visited before the record, in the model's units"),
     click.option(
-        "--rest", type=float, callback=seconds, default=0.0, help="seconds of pause, seen by effects alone"
+        "--rest", type=float, callback=seconds, default=0.0, help="seconds of pause, which only effects see"
     ),
 ]
 
 
 def record_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """The options of every command that takes records."""
+    """The options shared by all commands that take records."""
     for option in reversed(_RECORD_OPTIONS):
         command = option(command)
     return command

@@ -49,7 +49,7 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
             console.say(str(path))
         if left_over := planned.left_over(output):
             names = ", ".join(map(str, left_over))
-            console.note(f"warning: of an earlier plan, with other drives: {names}; remove them, or give another -o")
+            console.note(f"warning: from an earlier plan, with other drives: {names}; remove them, or give another -o")
         console.note(f"then run: {planned.command(output)}")
 
     guarded(params, run)
@@ -58,14 +58,14 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
 @click.command(cls=Judging, short_help="Name the effects that a model is missing.")
 @params_argument
 @data_argument(required=False)
-@click.option("-o", "output", type=click.Path(file_okay=False), help="folder for what is found, or planned")
+@click.option("-o", "output", type=click.Path(file_okay=False), help="folder for the findings, or the plan")
 @click.option(
     "--holdout", multiple=True, type=click.Path(), callback=matched,
-    help="record that judges and takes no part in the fits; or a pattern in quotes, 'held/*.csv'",
+    help="record to judge by, not used in the fits; or a pattern in quotes, 'held/*.csv'",
 )  # fmt: skip
 @click.option("--plan", is_flag=True, help="write the drive records to measure, and a page that explains them")
 @click.option("--max-rate", type=float, help="with --plan: fastest change of the drive, input units per second")
-@click.option("--rate", type=float, metavar="HZ", help="with --plan: all drives at this rate of a converter, in order")
+@click.option("--rate", type=float, metavar="HZ", help="with --plan: all drives in order, at a converter's rate")
 @click.option("--dac-bits", type=int, help="with --rate: codes for a DAC with this many bits")
 @click.option(
     "--dac-range", metavar="LOW,HIGH", help="drive at the lowest code and one above the highest, amplifier included"
@@ -74,7 +74,7 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
     "--dac-coding", type=click.Choice(["straight", "twos-complement"]), help="of the codes  [default: straight]"
 )
 @click.option(
-    "--session", type=click.Path(), help="session.json of a plan: DATA is one recording of it all"
+    "--session", type=click.Path(), help="session.json of a plan: DATA is one recording of the whole session"
 )
 @effects_option
 @record_options
@@ -95,7 +95,7 @@ def diagnose(
     Example: hystgen diagnose stage_x.yaml plan/recording.csv --session plan/session.json -o diagnosis/
     """
     if output is None:
-        what = "the drives, as in -o plan/" if plan else "what is found, as in -o diagnosis/"
+        what = "the drives, as in -o plan/" if plan else "the findings, as in -o diagnosis/"
         raise click.UsageError(f"Missing option '-o': give a folder for {what}")
     played = {name: reading.pop(name) for name in PLAYED}
     if plan:
@@ -126,7 +126,7 @@ def diagnose(
     if session is not None:
         said = [name for name, value in (("--holdout", holdout), ("--history", history), ("--rest", rest)) if value]
         if said or len(data) != 1:
-            what = f"leave out {', '.join(said)}, which it says" if said else f"give one, not {len(data)}"
+            what = f"leave out {', '.join(said)}, which it contains" if said else f"give one, not {len(data)}"
             raise click.UsageError(f"--session is for one recording of the whole session; {what}")
     from hystgen import diagnosis, records
     from hystgen.basics import drawing, extras, writing

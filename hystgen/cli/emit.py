@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 @optimize_option
 @layout_option
 @click.option(
-    "--check", is_flag=True, help="write nothing; exit 1 if files of C differ, or none of PARAMS writes them; say which"
+    "--check", is_flag=True, help="write nothing; exit 1 if C files differ, or none of PARAMS writes them; say which"
 )
 @partial_option
 @effects_option
@@ -50,7 +50,7 @@ def emit(
 
     Example: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --operator inverse --arithmetic float32
 
-    All emitted files of a folder up to date: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --check
+    To keep all emitted files of a folder up to date: hystgen emit stage_x.yaml stage_y.yaml -o firmware/ --check
 
     With an effect of your own: hystgen emit diagnosis/params.yaml -o firmware/ --effects my_effect/
     """
@@ -93,9 +93,9 @@ def _check(
 
         def again(other: Mapping[str, str], model: Model = model, found: Any = found) -> list[stale.Difference]:
             try:
-                with warnings.catch_warnings(action="ignore"):  # told of the files that were asked for
+                with warnings.catch_warnings(action="ignore"):  # says which files were requested
                     return calls.stale_files(model, output, **other, allow_partial=options["allow_partial"])
-            except ValueError:  # no such model any more
+            except ValueError:  # the model no longer exists
                 return list(found)
 
         differing.append(stale.Stale(path, found, wanted, again))

@@ -30,7 +30,7 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
         return None
     units = [unit.strip() for unit in value.split(",")]
     if len(units) != 2 or not any(units):
-        raise click.BadParameter(f"'{value}' is not two units; give that of the drive and that of the output, V,um")
+        raise click.BadParameter(f"'{value}' is not two units; give those of the drive and the output, V,um")
     return dict(zip(("input", "output"), units, strict=True))
 
 
@@ -46,11 +46,11 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
 @click.option("--breaks", type=int, help="number of breaks of a dead-zone sum; default: chosen on held-out error")
 @click.option(
     "--holdout", multiple=True, type=click.Path(), callback=matched,
-    help="record that takes no part in the fit; or a pattern in quotes, 'held/*.csv'; with --batch for example "
+    help="record not used in the fit; or a pattern in quotes, 'held/*.csv'; with --batch for example "
     "'holdout/{unit}.csv'",
 )  # fmt: skip
 @skip_option
-@click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, from 0 up")
+@click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, rising from 0")
 @click.option("--name", help="C identifier of the model; default: from the output file")
 @click.option(
     "--units", metavar="V,um", callback=_units,
@@ -91,7 +91,7 @@ def identify(
         for option, value in (("--name", name), ("--plot", plot), ("--report", report)):
             if value is not None:
                 raise click.UsageError(f"{option} is for one model; leave it out with --batch")
-        # An unquoted pattern comes expanded by the shell: its first file with the option, the rest as arguments
+        # The shell expands an unquoted pattern: its first file goes to the option, the rest become arguments
         _identify_batch(
             (*batch, *data), output, holdout=holdout, emit=emit is not False, jobs=jobs, scheduler=scheduler,
             **options, **how,
@@ -152,13 +152,13 @@ def identify(
 
 
 def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> None:
-    """Print what became of a fleet; exit code 1 if a unit failed, 130 if the user stopped it."""
+    """Print the result of a fleet; exit code 1 if a unit failed, 130 if the user stopped it."""
     from hystgen.fleet import batch as fleet
 
     try:
         done = guarded(output, partial(fleet.identify_batch, sources, output, **options))
     except KeyboardInterrupt:
-        raise Failed("interrupted; what is done is kept, and the same command goes on from there", 130) from None
+        raise Failed("interrupted; finished units are kept, and the same command resumes from there", 130) from None
     console.note(done.table().rstrip("\n"))
     console.say(str(Path(output) / "summary.csv"))
     if done.failed:

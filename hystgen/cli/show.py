@@ -1,4 +1,4 @@
-"""`hystgen show`: what a model can do."""
+"""`hystgen show`: the properties of a model."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from hystgen.basics import console
 from hystgen.cli.common import effects_option, guarded, keep_inputs, load_model, params_argument
 
 
-@click.command(short_help="Print what a model can do and what its C costs.")
+@click.command(short_help="Print the properties of a model and the cost of its C.")
 @params_argument
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of loop, loading curve and inverse")
 @click.option(
     "--settle-within", type=float, metavar="PERCENT",
-    help="error within which the output has settled, percent of a step  [default: 1]",
+    help="error within which the output counts as settled, percent of a step  [default: 1]",
 )
 @click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the properties for programs")
 @effects_option
 def show(
     params: str, plot: str | None, settle_within: float | None, json_file: str | None, effects: tuple[str, ...]
 ) -> None:
-    """Print what a model can do: ranges, slopes, loop width, settling after a step, invertible or why not.
+    """Print the properties of a model: ranges, slopes, loop width, settling after a step, invertible or why not.
 
     Example: hystgen show stage_x.yaml --plot stage_x.svg
     """

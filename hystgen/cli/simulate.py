@@ -1,4 +1,4 @@
-"""`hystgen simulate`: a model or its inverse over records."""
+"""`hystgen simulate`: run a model or its inverse over records."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def simulate(
     params: str, data: tuple[str, ...], output: str | None, operator: str, arithmetic: str | None, engine: str | None,
     effects: tuple[str, ...], history: str | None, rest: float, **reading: Any,
 ) -> None:
-    """Run the model (column v) or its inverse (column u) over records; several files are one session.
+    """Run the model (column v) or its inverse (column u) over records; several files form one session.
 
     Example: hystgen simulate stage_x.yaml drive.csv -o predicted.csv --history 100,-100
     """
@@ -88,7 +88,7 @@ def simulate(
             columns[f"{answer}_measured"] = columns.pop(answer)
             units[f"{answer}_measured"] = units.pop(answer, "")
         columns[answer] = answers
-        if record.units.keys() - {"t"}:  # a header with units says that of the answer too
+        if record.units.keys() - {"t"}:  # if the header has units, so has the output column
             units[answer] = getattr(units_of_model, "output" if answer == "y" else "input")
         header = records.headers(columns, units)
         if target is None:

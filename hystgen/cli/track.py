@@ -22,7 +22,7 @@ from hystgen.cli.common import (
 )
 
 
-@click.command(short_help="Print what tracking leaves on a recorded actuator.")
+@click.command(short_help="Print the tracking error on a recorded actuator.")
 @params_argument
 @data_argument(required=True)
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the tracking errors along time")
@@ -36,8 +36,8 @@ def track(
 ) -> None:
     """Print the tracking error on the recorded actuator: with a straight line, with plays alone, with the whole model.
 
-    The straight line is fitted to the records. Plays alone are the model without its effects: nothing else is changed,
-    and nothing is fitted.
+    The straight line is fitted to the records. Plays alone are the model without its effects, with nothing else changed
+    and nothing refitted.
 
     Example: hystgen track diagnosed/params.yaml held_out.csv --plot tracking.svg
     """

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 @effects_option
 @click.option("--compiler", multiple=True, help="gcc, clang, zig or another command; default: all found")
 @click.option("--targets", default="host", show_default=True, help="comma separated: " + ", ".join(TARGETS))
-@click.option("--target-length", type=click.IntRange(min=1), help="calls of a record on emulated cores")
+@click.option("--target-length", type=click.IntRange(min=1), help="calls per record on emulated cores")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the report for programs")
 @click.option("--junit", "junit_file", type=click.Path(dir_okay=False), help="write the report as JUnit XML")
 def verify(
@@ -53,9 +53,9 @@ def verify(
 
     Example: hystgen verify stage_x.yaml --targets host,cortex-m4f
 
-    Several models in one report: hystgen verify stage_x.yaml stage_y.yaml --junit verify.xml
+    For several models in one report: hystgen verify stage_x.yaml stage_y.yaml --junit verify.xml
 
-    The exit code is 1 where bits differ or C cannot be built, and 2 where nothing is wrong but a tool is missing.
+    The exit code is 1 if bits differ or C cannot be built, and 2 if nothing is wrong except that a tool is missing.
     """
     from hystgen import verification
     from hystgen.basics import writing
@@ -95,7 +95,7 @@ def verify(
 
 
 def _check(model: Model, options: Mapping[str, Any]) -> None:
-    """Raise what emission would, before a model in front of it takes its time."""
+    """Raise any error of emission now, before the models in front of it take their time."""
     from hystgen.emission.calls import emit_options, emitted_model
 
     chosen = emit_options(model, **options)

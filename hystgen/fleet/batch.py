@@ -1,4 +1,4 @@
-"""Fitting and emitting a fleet: many units of one design, one record each.
+"""Fitting and emitting a fleet: many units of one design, with one record each.
 
 >>> fleet = hystgen.identify_batch("units/*.csv", "params", holdout="holdout/{unit}.csv")
 >>> print(fleet.table())
@@ -37,7 +37,7 @@ from hystgen.identification.settings import Settings
 from hystgen.records import FORMATS, Record, several, write_atomically
 
 SUFFIXES = (".csv", ".tsv", ".lvm", *FORMATS)
-"""Files that are taken from a folder."""
+"""Files that are picked up from a folder."""
 
 KEPT_IN = ".hystgen"
 """Folder, inside the output folder, with the results of finished units."""
@@ -53,10 +53,10 @@ COLUMNS = ("unit", "file", "status", "message", *FIGURES, "outlier", "outlier_in
 class Unit:
     """One row of the summary.
 
-    `name`: C identifier of the model; `file`: its record; `done`, else `message` says in one line what failed;
-    `figures`: see `FIGURES`; `outlier`: the figures by which the unit is unlike the rest, and how far; empty if it is
-    not; `sha256`: of records, options, settings and tool version; `kept`: done by an earlier call; `settings`: keys
-    taken over from the parameter file that was there.
+    `name`: C identifier of the model; `file`: its record; `done`: whether it succeeded, otherwise `message` says in one
+    line what failed; `figures`: see `FIGURES`; `outlier`: the figures in which the unit differs from the rest, and by
+    how much; empty if it does not; `sha256`: of records, options, settings and tool version; `kept`: done by an earlier
+    call; `settings`: keys kept from the existing parameter file.
     """
 
     name: str
@@ -72,23 +72,23 @@ class Unit:
 
 @dataclass(frozen=True)
 class Fleet:
-    """All units of a call, sorted by name; `judged` is False where they are too few to mark outliers."""
+    """All units of a call, sorted by name; `judged` is False if there are too few to mark outliers."""
 
     units: tuple[Unit, ...]
     judged: bool
 
     @property
     def failed(self) -> tuple[Unit, ...]:
-        """Units without a model, or whose C could not be emitted."""
+        """Units that have no model, or whose C could not be emitted."""
         return tuple(unit for unit in self.units if not unit.done)
 
     @property
     def outliers(self) -> tuple[Unit, ...]:
-        """Units that are unlike the rest."""
+        """Units that differ from the rest."""
         return tuple(unit for unit in self.units if unit.outlier)
 
     def summary(self) -> str:
-        """One CSV row a unit: the same bytes for any order and number of processes."""
+        """One CSV row per unit: the same bytes for any order and number of processes."""
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
         table.writerow(COLUMNS)
@@ -109,11 +109,11 @@ class Fleet:
             f"({kept} by an earlier call), {found}; {len(self.failed)} failed"
         ]
         if not self.judged:
-            lines.append(f"outliers are marked from {outliers.FEWEST} units on")
+            lines.append(f"outliers are marked only with {outliers.FEWEST} or more units")
         taken = [unit for unit in self.units if unit.settings and unit.done and not unit.kept]
         if taken:
             keys = ", ".join(dict.fromkeys(key for unit in taken for key in unit.settings))
-            lines.append(f"{keys} kept from the parameter files that were there, of {len(taken)} units")
+            lines.append(f"{keys} kept from the existing parameter files of {len(taken)} units")
         marked = [("failed", unit.name, unit.message) for unit in self.failed]
         marked += [("outlier", unit.name, unit.outlier) for unit in self.outliers]
         width = max((len(name) for _, name, _ in marked), default=0)
@@ -123,7 +123,7 @@ class Fleet:
 
 @dataclass(frozen=True)
 class _Job:
-    """The work for a unit; `key`: hash of everything that its outputs depend on."""
+    """The task for a unit; `key`: hash of everything that its outputs depend on."""
 
     unit: str
     file: str
@@ -147,22 +147,22 @@ def identify_batch(
     """Fit a model to every unit of a fleet, and emit its C.
 
     `sources`: files, patterns such as `units/*.csv`, and folders; every file is one unit, named after the file as a C
-    identifier. `output`: the folder that gets, for each unit, `UNIT.yaml`, the bytes that `identify` writes for it
-    alone, and in folder `UNIT` the C files, those of `emit`; and at the end `summary.csv`, sorted by unit. `holdout`:
-    paths of held-out records in which `{unit}` stands for the name of the unit's file without its ending; files that
-    they lead to are not units. `emit`: False leaves the C out; `emission`: options of `emit`. `jobs`: processes, all
-    cores by default. `scheduler`: address of a Dask scheduler, whose workers then do the work and need the package,
-    but no access to any file. `progress`: a bar on a terminal's stderr. Any other option is one of `identify`.
+    identifier. `output`: a folder that gets, for each unit, `UNIT.yaml`, identical to what `identify` writes for that
+    unit alone, and the C files of `emit` in a folder `UNIT`; and at the end `summary.csv`, sorted by unit. `holdout`:
+    paths of held-out records in which `{unit}` stands for the name of the unit's file without its suffix; these files
+    are not units. `emit`: False leaves out the C; `emission`: options of `emit`. `jobs`: number of processes, all cores
+    by default. `scheduler`: address of a Dask scheduler, whose workers then do the work and need the package, but no
+    access to any file. `progress`: a bar on a terminal's stderr. Any other option is one of `identify`.
 
-    A unit that fails is a row with its message and stops no other; its older files stay. What is done is not done
-    again by a later call, as long as record, options and tool version are the same and the files are as they were
-    written. A call that is interrupted leaves complete files only, and what it had done. Of a parameter file that is
-    there and is written anew its description, `sample_time` and `emit` are kept.
+    A unit that fails gets a row with its message and does not stop the others; its older files are kept. A later call
+    does not repeat finished work, as long as record, options and tool version are the same and the files are unchanged.
+    An interrupted call leaves only complete files, and the units it had finished. When an existing parameter file is
+    rewritten, its description, `sample_time` and `emit` are kept.
 
     Units are outliers by the modified z-scores of `outliers`: a held-out rms error far above the others (its logarithm,
-    in %), or a gain (output range over drive range), width or p_0 far off; with fewer than 8 units that are done none
-    is marked. Raises ValueError for arguments that fit no unit, FileNotFoundError where a source leads to no file,
-    workers.SchedulerError, an OSError, for a scheduler that cannot be used.
+    in %), or a gain (output range over drive range), width or p_0 far off; with fewer than 8 finished units none is
+    marked. Raises ValueError for arguments that fit no unit, FileNotFoundError if a source leads to no file,
+    workers.SchedulerError, an OSError, for an unusable scheduler.
     """
     extras.require_fit("identify_batch")
     output = arguments.path("output", output)
@@ -201,7 +201,7 @@ def identify_batch(
 
 
 def _complete(options: Mapping[str, Any]) -> dict[str, Any]:
-    """All options of `identify` that are the same for every unit, its defaults for those not given."""
+    """All options of `identify` that are the same for every unit, with defaults for those not given."""
     own = {"holdout": (), "name": "", "progress": False}
     arguments.known_options("identify_batch", identification.identify, options)
     bound = inspect.signature(identification.identify).bind((), **own, **options)
@@ -215,14 +215,14 @@ def _complete(options: Mapping[str, Any]) -> dict[str, Any]:
 def _jobs(
     sources: str | os.PathLike[str] | Iterable[str | os.PathLike[str]], patterns: Sequence[str]
 ) -> list[_Job]:
-    """The units, sorted by name. Raises ValueError for names that clash, FileNotFoundError."""
+    """The units, sorted by name. Raises ValueError if names clash, FileNotFoundError."""
     for pattern in patterns:
         if "{unit}" not in pattern:
-            raise ValueError(f"holdout {pattern!r} would be that of every unit; write {{unit}} for the unit's name")
+            raise ValueError(f"holdout {pattern!r} would be the same for all units; write {{unit}} for the unit's name")
     paths: dict[Path, Path] = {}
     for source in several(sources):
         if not isinstance(source, str | os.PathLike):
-            raise TypeError("a fleet is made of files, not of records in memory; fit those with hystgen.identify")
+            raise TypeError("a fleet consists of files, not of records in memory; fit those with hystgen.identify")
         paths |= {path.resolve(): path for path in _expanded(os.fspath(source))}
     jobs = []
     for path in paths.values():
@@ -233,7 +233,7 @@ def _jobs(
     taken: dict[str, str] = {}
     clashes = []
     for job in jobs:
-        other = taken.setdefault(job.unit.lower(), job.file)  # as file systems and macros see it
+        other = taken.setdefault(job.unit.lower(), job.file)  # as file systems and macros see them
         if other != job.file:
             clashes.append(f"{other} and {job.file} would both be unit {job.unit}; rename one")
     if clashes:
@@ -244,7 +244,7 @@ def _jobs(
 
 
 def _expanded(source: str) -> list[Path]:
-    """The files that a path, a folder or a pattern leads to, sorted."""
+    """The files that a path, a folder or a pattern stands for, sorted."""
     path = Path(source)
     if path.is_dir():
         found = [file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and not file.name.startswith(".")]
@@ -252,7 +252,7 @@ def _expanded(source: str) -> list[Path]:
         found = [path] if path.is_file() else [Path(name) for name in glob.glob(source, recursive=True)]
     found = sorted(file for file in found if file.is_file())
     if not found:
-        raise FileNotFoundError(f"no file matches {source}; give the recordings, one a unit, as a pattern in quotes")
+        raise FileNotFoundError(f"no file matches {source}; give the recordings, one per unit, as a pattern in quotes")
     return found
 
 
@@ -275,7 +275,7 @@ def _keyed(job: _Job, options: Mapping[str, Any], emission: Mapping[str, str | N
 
 
 def _digest(path: Path) -> str | None:
-    """SHA-256 of a file, None for one that cannot be read."""
+    """SHA-256 of a file, None if it cannot be read."""
     try:
         with path.open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
@@ -284,7 +284,7 @@ def _digest(path: Path) -> str | None:
 
 
 def _kept_rows(folder: Path, jobs: Sequence[_Job]) -> dict[str, Unit]:
-    """The units finished by an earlier call; a warning if its notes on some cannot be read."""
+    """The units finished by an earlier call; a warning if the notes on some cannot be read."""
     rows = {}
     unreadable = []
     for job in jobs:
@@ -298,14 +298,14 @@ def _kept_rows(folder: Path, jobs: Sequence[_Job]) -> dict[str, Unit]:
     if unreadable:
         files_of = f"{folder / KEPT_IN / unreadable[0]}.json cannot be read"
         more = f", and {len(unreadable) - 1} more" if len(unreadable) > 1 else ""
-        warnings.warn(f"{files_of}{more}; the fit of these units is done again", stacklevel=3)
+        warnings.warn(f"{files_of}{more}; these units are fitted again", stacklevel=3)
     return rows
 
 
 def _kept(folder: Path, job: _Job) -> Unit | None:
-    """The unit as an earlier call finished it; None if it did not, or anything has changed since.
+    """The unit as finished by an earlier call; None if it was not, or if anything has changed since.
 
-    Raises OSError, ValueError or RecursionError for notes that no call has written so.
+    Raises OSError, ValueError or RecursionError for notes not written by this package.
     """
     try:
         known = json.loads((folder / KEPT_IN / f"{job.unit}.json").read_text("ascii"))
@@ -328,7 +328,7 @@ def _kept(folder: Path, job: _Job) -> Unit | None:
 
 
 def _keep(folder: Path, job: _Job, result: Result) -> Unit:
-    """Write the files of a unit, and last the note that it is done."""
+    """Write the files of a unit and, last, the note that it is done."""
     message = result.message
     try:
         written = []
@@ -367,7 +367,7 @@ def _bytes(path: str) -> bytes | None:
 def _here(
     tasks: Iterator[Task], number: int, jobs: int | None, options: Mapping[str, Any]
 ) -> Generator[Result, None, None]:
-    """Results from this machine, the compiled functions put into its cache first."""
+    """Results from this machine, once its cache of compiled functions is filled."""
     import joblib
 
     processes = max(min(jobs or joblib.cpu_count(), number), 1)

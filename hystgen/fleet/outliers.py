@@ -1,8 +1,8 @@
-"""Units that are unlike the rest of their fleet.
+"""Units that differ from the rest of their fleet.
 
-Modified z-scores: `0.6745 (x - median) / MAD`, MAD the median absolute deviation from the median; 0.6745 makes them
-comparable with scores of a normal distribution, and beyond 3.5 a value counts as an outlier (B. Iglewicz and
-D. C. Hoaglin, How to Detect and Handle Outliers, 1993).
+Modified z-scores: `0.6745 (x - median) / MAD`, with MAD the median absolute deviation from the median; 0.6745 makes
+them comparable with scores of a normal distribution, and beyond 3.5 a value counts as an outlier (B. Iglewicz and D. C.
+Hoaglin, How to Detect and Handle Outliers, 1993).
 """
 
 from __future__ import annotations
@@ -20,26 +20,27 @@ FEWEST = 8
 """[units] With fewer, a median absolute deviation means little, and no unit is marked."""
 
 SAME = 1e-6
-"""Relative spread below which units are alike for every purpose: written digits and solvers differ by less."""
+"""Relative spread below which units are equal for every purpose: written digits and solvers differ by less."""
 
 MATTERS, MATTERS_ERROR = 0.05, 0.2
 """An outlier differs from the median by at least this share of it, and an error lies above it by at least this share:
 units of a tight fleet score high for differences that nobody would act on."""
 
 LEAST_ERROR = 1e-6
-"""Held-out errors below this, in %, are rounding of the written digits."""
+"""Held-out errors below this, in %, come from rounding of the written digits."""
 
 
 @dataclass(frozen=True)
 class Judged:
-    """A figure that units are compared by: its words and its column; of an `error` the logarithm, and only upwards."""
+    """A figure by which units are compared: its name in words and its column. An `error` is compared by its logarithm,
+    and only high values count."""
 
     words: str
     column: str
     error: bool = False
 
     def value(self, figures: Mapping[str, object]) -> float | None:
-        """The number that is compared; None where a unit has no such figure."""
+        """The number to compare; None if a unit has no such figure."""
         number = figures.get(self.column)
         if not isinstance(number, float) or not math.isfinite(number):
             return None
@@ -57,8 +58,8 @@ JUDGED = (
 def modified_scores(values: Sequence[float]) -> list[float]:
     """Modified z-score of every value, in the order given.
 
-    Where more than half of the values are alike, MAD is 0 and the mean absolute deviation takes its place with the
-    factor sqrt(2/pi) that belongs to it; where all are alike, all scores are 0.
+    If more than half of the values are equal, MAD is 0 and the mean absolute deviation takes its place with its own
+    factor sqrt(2/pi); if all are equal, all scores are 0.
     """
     x = np.asarray(values, dtype=np.float64)
     middle = float(np.median(x))

@@ -1,7 +1,7 @@
 """Fitting units elsewhere: in processes of this machine (joblib), or on the workers of a Dask cluster.
 
-A task carries the bytes of its records and a result the text of its files, so that a worker needs the package and
-neither the records nor the output folder.
+A task carries the bytes of its records and a result the text of its files, so a worker needs the package but neither
+the records nor the output folder.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from hystgen.basics import extras, writing
 from hystgen.basics.version import __version__
 from hystgen.identification.settings import Settings
 
-LOST = "the Dask scheduler was lost; the same command goes on from here"
-DIED = "the process that fitted it died, again and again; is there too little memory for its records?"
+LOST = "the Dask scheduler was lost; the same command resumes from here"
+DIED = "the process that fitted it kept dying; is there too little memory for its records?"
 
 PATIENCE = 15.0
-"""Seconds for a scheduler to answer, and for it to have a worker."""
+"""Seconds allowed for a scheduler to answer, and for it to have a worker."""
 
 IDLE = 30.0
-"""Seconds after which a process without work ends."""
+"""Seconds after which an idle process ends."""
 
 WATCH = 1.0
-"""[s] A process checks at this interval whether the one that started it is still there."""
+"""[s] Interval at which a process checks that its parent is still there."""
 
 
 class SchedulerError(OSError):
@@ -44,9 +44,9 @@ class SchedulerError(OSError):
 
 @dataclass(frozen=True)
 class Task:
-    """One unit: its C name, `records` and `holdout` as (path, bytes or None where unreadable), and the results wanted.
+    """One unit: its C name, `records` and `holdout` as (path, bytes or None if unreadable), and the requested results.
 
-    `options`: of `identify`; `emission`: of `emit`, or None to leave it out; `settings`: of an older parameter file.
+    `options`: of `identify`; `emission`: of `emit`, or None to leave out the C; `settings`: of an older parameter file.
     """
 
     unit: str
@@ -73,9 +73,9 @@ Work = Callable[[Task], Result]
 
 
 def fit_unit(task: Task) -> Result:
-    """Fit and emit one unit. Never raises an Exception: a failure is the result's message."""
+    """Fit and emit one unit. Never raises an Exception: a failure becomes the result's message."""
     if task.version != __version__:
-        return Result(task.unit, f"the worker has hystgen {__version__}, not {task.version}; install the same")
+        return Result(task.unit, f"the worker has hystgen {__version__}, not {task.version}; install the same version")
     with writing.temporary() as folder:
         paths = {}
         for k, (path, data) in enumerate((*task.records, *task.holdout)):
@@ -121,7 +121,7 @@ def _fitted(task: Task, records: list[str], holdout: list[str]) -> Result:
 
 
 def _line(failure: Exception) -> str:
-    """The reason of a failure, in one line."""
+    """The reason for a failure, on one line."""
     from hystgen.basics.problems import NotInvertibleError
 
     if isinstance(failure, NotInvertibleError):
@@ -159,8 +159,8 @@ def _figures(fit: Any, model: Any) -> dict[str, Any]:
 def _begin(folder: str, parent: int) -> None:
     """Set up a worker process; the process that started it, `parent`, ends it and cleans up.
 
-    Ctrl-C reaches all processes of a terminal; the one that was started there ends the others. Temporary files go below
-    a folder of that one, which removes it. If that one is killed, results would be waited on for ever.
+    Ctrl-C reaches all processes of a terminal; the parent ends the others. Temporary files go into a folder of the
+    parent, which removes it. If the parent is killed, a worker would otherwise wait for ever to deliver its results.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     tempfile.tempdir = folder
@@ -168,17 +168,17 @@ def _begin(folder: str, parent: int) -> None:
 
 
 def _end_with(parent: int) -> None:
-    """End this process when the one that started it is gone."""
+    """End this process when its parent is gone."""
     while os.getppid() == parent:
         time.sleep(WATCH)
     os._exit(1)
 
 
 def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> Generator[Result, None, None]:
-    """Results in the order in which they come, from `jobs` processes (1: from this one); tasks are taken when needed.
+    """Results in order of completion, from `jobs` processes (1: from this one); tasks are taken as needed.
 
-    A process that dies takes the whole pool along. The units under way are then repeated one by one: only a unit that
-    dies again by itself has failed, and the rest goes on.
+    A process that dies takes the whole pool down with it. The units in progress are then repeated one by one: only a
+    unit that dies again on its own has failed, and the rest continue.
     """
     with writing.temporary() as folder:
         yield from _pooled(tasks, jobs, work, str(folder))
@@ -217,13 +217,13 @@ def _pooled(tasks: Iterable[Task], jobs: int, work: Work, folder: str) -> Genera
             sent.clear()
         finally:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # that tasks are cancelled whose results nobody waits for
+                warnings.simplefilter("ignore")  # cancelling tasks that nobody waits for warns
                 results.close()
 
 
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep the libraries of a cluster from logging tracebacks of errors that are reported in one line."""
+    """Keep the libraries of a cluster from logging tracebacks of errors that we report in one line."""
     names = [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("distributed", "tornado")]
     before = {logger: logger.level for logger in map(logging.getLogger, [*names, "asyncio"])}
     for logger in before:
@@ -244,7 +244,7 @@ def cluster(address: str) -> Iterator[Any]:
         raise SchedulerError(f"a scheduler needs Dask; install it with: {extras.install('fleet')}") from None
     with _quiet():
         try:
-            asyncio.run(_answer(address))  # a client that is not answered would wait once more when it is deleted
+            asyncio.run(_answer(address))  # an unanswered client would wait once more when it is deleted
             client = Client(address, timeout=PATIENCE, set_as_default=False)
         except Exception as failure:  # each protocol has its own
             reason = (str(failure).splitlines() or [type(failure).__name__])[0]
@@ -267,10 +267,10 @@ async def _answer(address: str) -> None:
 
 
 def on_cluster(tasks: Iterable[Task], client: Any, work: Work = fit_unit) -> Generator[Result, None, None]:
-    """Results in the order in which they come, from the workers of a Dask scheduler.
+    """Results in order of completion, from the workers of a Dask scheduler.
 
-    No more tasks than the workers soon need are under way, so that few records are in memory. Dask repeats what a
-    dying worker had; a unit on which workers die again and again has failed. Raises SchedulerError.
+    Only as many tasks as the workers soon need are in flight, so that few records are in memory. Dask repeats the tasks
+    of a dying worker; a unit that keeps killing workers has failed. Raises SchedulerError.
     """
     from distributed import as_completed
     from distributed.scheduler import KilledWorker

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from hystgen.parameters.files import Parameters
 
 MODELS = (*gpi.KINDS, "auto")
-"""Names of the contract."""
+"""Names defined by the contract."""
 
 P0_FLOOR = 0.05
 """Share of the sum of weights below which p_0 is raised if the data allow it."""
@@ -83,33 +83,33 @@ def identify(
 ) -> Fit:
     """Fit a model to measured records.
 
-    - `records`: one or several of: a path, a data frame or a dict of named columns, a tuple of arrays (t, v, y) of
-      shape (N,), an array (N, 3), all read with `columns`, `sample_time` (s), `delimiter`, or a `Record`; each gets
-      a free offset.
-    - `model`: `pi`; `gpi-deadzone` and `gpi-tanh`, which have a memoryless part in front; or `auto`, the simplest
-      of them whose held-out error is within 3 % of the best.
-    - `thresholds`: a number of plays without r_0, or a list of thresholds (behind a memoryless part, which keeps
-      the length of the drive range and the place of 0, in its output); by default both number and places are chosen
-      by blocked validation on the records.
-    - `breaks`: how many places, or which, a dead-zone sum may bend at, chosen in the same way by default.
-    - `holdout`: records that take no part in any choice but that of `auto`, and that of one branch or two of
+    - `records`: one or more of: a path, a data frame or a dict of named columns, a tuple of arrays (t, v, y) of shape
+      (N,), an array (N, 3), all read with `columns`, `sample_time` (s), `delimiter`, or a `Record`; each gets a free
+      offset.
+    - `model`: `pi`; `gpi-deadzone` and `gpi-tanh`, which have a memoryless part in front; or `auto`, the simplest of
+      them whose held-out error is within 3 % of the best.
+    - `thresholds`: a number of plays without r_0, or a list of thresholds (behind a memoryless part, which preserves
+      the length of the drive range and the position of 0, in its output); by default both number and positions are
+      chosen by blocked validation on the records.
+    - `breaks`: how many points, or which, a dead-zone sum may bend at, chosen in the same way by default.
+    - `holdout`: records that take no part in any choice except that of `auto`, and that of one branch or two for
       `gpi-tanh`; without them the last quarter of each record gives the held-out figures, from a trial model that has
       not seen it, and the model written is then fitted to everything.
     - `history`: drive values visited before every record, beginning in a virgin state. Without it, the start of each
-      record is ignored until the drive has wiped the memory that matters; if less than half of the record would be
-      left, its start memory is estimated together with the weights.
+      record is ignored until the drive has wiped the memory that matters; if that leaves less than half of the record,
+      its start memory is estimated together with the weights.
     - `rest`: seconds of pause after the history; a PI model does not depend on time, so it changes nothing here.
     - `name`: C identifier of the model.
-    - `units`: `input` and `output`, by default those of the first record that gives any; columns in others of the same
-      quantity are converted, which `history`, `thresholds` and `breaks` are not.
+    - `units`: `input` and `output`, by default those of the first record that gives any; columns in other units of the
+      same quantity are converted, but not `history`, `thresholds` and `breaks`.
     - `skip`: seconds at the start of every record that are not compared, although their drive counts.
     - `loading_curve`: the records are initial loading curves, with the drive rising from 0 in a virgin actuator, and
       nothing is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22).
     - `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as fitted.
     - `progress`: a bar on a terminal's stderr when it takes more than a second.
 
-    The start memory in the parameter file is the one that `history` leads to. Without it, it is 0, that of a virgin
-    actuator: no record shows in which state the firmware will find it. Raises RecordError for unusable files,
+    The start memory in the parameter file is the one that `history` leads to. Without a history it is 0, that of a
+    virgin actuator: no record shows in which state the firmware will find it. Raises RecordError for unusable files,
     IdentificationError for records that nothing can be fitted to, ValueError and TypeError for wrong arguments.
 
     >>> import numpy as np, hystgen
@@ -169,11 +169,11 @@ def identify(
         reported += [text for item in held if (text := quality.outside(item.name, item.v, drive))]
     reported += [
         f"{item.name}: only {counted(item.used, 'sample is', 'samples are')} left once its start memory is known; it "
-        "hardly counts"
+        "carries little weight"
         for item in compared
         if item.used < SHORTEST
     ]
-    if not loading_curve:  # every sample of one depends on the start
+    if not loading_curve:  # every sample of a loading curve depends on the start
         largest = float(fitted.solution.thresholds[-1])
         reported += [text for each in errors if (text := quality.about_start(each, largest))]
     reported += quality.about_model(fitted.solution, how.wanted, [fitted.inner(item) for item in compared], own)
@@ -225,7 +225,7 @@ class _How:
 
 @dataclass(frozen=True)
 class _Tried:
-    """A model of one kind, the courses it was fitted to, those it has not seen, and its errors on them."""
+    """A model of one kind, the courses it was fitted to, the held-out courses, and its errors on them."""
 
     fitted: Fitted
     compared: list[Course]
@@ -234,7 +234,7 @@ class _Tried:
     held_out: Row
 
     def as_candidate(self) -> Row:
-        """The held-out row under the name of the kind, for the table of `auto`."""
+        """The held-out row labelled with the kind, for the table of `auto`."""
         return replace(self.held_out, part="candidate", model=self.fitted.front.name)
 
 
@@ -247,21 +247,22 @@ def auto(courses: Sequence[Course], held: Sequence[Course]) -> Fitted:
 def _best(
     courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, tick: gpi.Tick = None
 ) -> _Tried:
-    """Fit one kind to courses and compare it with others, which choose where `gpi.to_judge` leaves them a choice."""
+    """Fit one kind to courses and compare it with held-out ones, which choose if `gpi.to_judge` leaves them a
+    choice."""
     found = gpi.to_judge(courses, kind, how.wanted, how.breaks, how.floor, tick)
     tried = [_compared(fitted, compared, fitted.begun(held)) for fitted, compared in found]
     return tried[_choose(tried)]
 
 
 def _try(courses: Sequence[Course], ends: Sequence[Course], kind: str, how: _How, bar: Progress) -> _Tried:
-    """Fit one kind to the first parts of records and compare it with the rest of them."""
+    """Fit one kind to the first parts of records and compare it with their remainders."""
     fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, how.floor, bar.tick)
     begun = [replace(other, start=item.start) for item, other in zip(compared, ends, strict=True)]
     return _compared(fitted, compared, begun)
 
 
 def _compared(fitted: Fitted, compared: list[Course], begun: Sequence[Course]) -> _Tried:
-    """A fit with its errors on courses that it has not seen."""
+    """A fit with its errors on held-out courses."""
     largest = float(fitted.solution.thresholds[-1])
     settled = [replace(item, first=fitted.inner(item).resettled(largest).first) for item in begun]
     for item in settled:
@@ -286,7 +287,8 @@ def _choose(tried: Sequence[_Tried]) -> int:
 
 
 def _rms_inside(tried: _Tried) -> float:
-    """Held-out rms error over samples whose drive is within `BEYOND` of the fitted range; over all if those are few."""
+    """Held-out rms error over samples whose drive is within `BEYOND` of the fitted range; over all samples if those are
+    few."""
     low, high = _drive(tried.compared)
     low, high = low - BEYOND * (high - low), high + BEYOND * (high - low)
     if all(low <= np.min(each.course.v) and np.max(each.course.v) <= high for each in tried.errors):
@@ -317,7 +319,7 @@ def _check_loading_curve(record: Record) -> None:
     if not (top > 0.0 and abs(float(v[0])) <= NEAR_ZERO * top and np.all(np.diff(v) >= -NEAR_ZERO * top)):
         raise IdentificationError(
             f"{record.name} is not an initial loading curve: the drive has to rise all the way from 0; give the part "
-            "of the record up to the first turn, or leave loading_curve out"
+            "of the record up to the first turn, or leave out loading_curve"
         )
 
 
@@ -335,17 +337,17 @@ def _checked_thresholds(wanted: int | Sequence[float] | None) -> int | tuple[flo
     if not places or places[0] != 0.0:
         places = (0.0, *places)
     if any(b <= a for a, b in itertools.pairwise(places)):
-        raise ValueError("thresholds are finite, not negative, and rise strictly")
+        raise ValueError("thresholds must be finite, not negative, and strictly increasing")
     return places
 
 
 def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | tuple[float, ...] | None:
-    """None, a number of breaks, or their places. Raises ValueError."""
+    """None, a number of breaks, or their positions. Raises ValueError."""
     if breaks is None:
         return None
     if model not in ("gpi-deadzone", "auto"):
         raise ValueError(
-            f"breaks are those of a dead-zone sum, which model {model} does not have; give model gpi-deadzone or auto"
+            f"only a dead-zone sum has breaks, and model {model} has none; give model gpi-deadzone or auto"
         )
     if isinstance(breaks, int | np.integer) and not isinstance(breaks, bool):
         if not 1 <= breaks <= MOST_BREAKS:
@@ -355,21 +357,21 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
         raise ValueError("breaks is a whole number or a list of drive values")
     places = tuple(x for x in arguments.numbers("breaks", breaks, "[-20, 20]") if x != 0.0)
     if not places or not all(map(math.isfinite, places)) or any(b <= a for a, b in itertools.pairwise(places)):
-        raise ValueError("breaks are finite drive values that rise strictly, at least one beside 0")
+        raise ValueError("breaks must be finite, strictly increasing drive values, with at least one besides 0")
     return places
 
 
 def _trial(
     courses: Sequence[Course], kinds: Sequence[str], how: _How, bar: Progress
 ) -> tuple[list[Row], str, list[pi.Errors], str]:
-    """Rows of models fitted to the first part of each record and compared with the rest, the kind chosen by them, its
+    """Rows of models fitted to the first part of each record and compared with the remainder, the kind they select, its
     errors, and the reason if there are no rows."""
     if not courses:
         if len(kinds) > 1:
-            raise ValueError("model auto needs something held out: give holdout records beside the loading curve")
+            raise ValueError("model auto needs something held out: give holdout records besides the loading curve")
         return [], kinds[0], [], ""
     short = "too short, or too little of the drive's range in its first part, to hold its end out; give --holdout"
-    instead = "" if len(kinds) == 1 else f". Without anything held out nothing can be chosen: {kinds[0]} was fitted"
+    instead = "" if len(kinds) == 1 else f". With nothing held out there is no choice: {kinds[0]} was fitted"
     fronts, ends = [], []
     for item in courses:
         front, end = _parted(item)
@@ -386,7 +388,7 @@ def _trial(
     own = Row.of("fit", "trial", [_compare(item, best.fitted) for item in best.compared])
     rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
     rows += [own, replace(best.held_out, model="trial")]
-    # if the amplitude fades, the end by itself has a smaller range, which is no measure for the errors of both
+    # if the amplitude fades, the end alone has a smaller range, which is no measure for the errors of both
     whole = max(item.output_range for item in courses)
     return [replace(row, output_range=whole) for row in rows], kinds[chosen], best.errors, ""
 
@@ -395,7 +397,7 @@ def _parted(item: Course) -> tuple[Course, Course]:
     """The part of a record to fit, and the part to hold out.
 
     That is the record's end, unless the drive goes far beyond its earlier range there, for example with growing
-    amplitudes; then the last part of the same length that stays within the range of the rest.
+    amplitudes; then it is the last part of the same length that stays within the range of the rest.
     """
     number = round(len(item.v) * HELD_OUT)
     last = len(item.v)
@@ -446,7 +448,7 @@ def _parameters(
 
 
 def stage_content(stage: Stage) -> dict[str, object]:
-    """A stage as the parameter file has it."""
+    """A stage of the model as written in the parameter file."""
     if isinstance(stage, DeadZone):
         return {"kind": "dead_zone", "thresholds": list(stage.thresholds), "weights": list(stage.weights)}
     assert isinstance(stage, TanhEnvelope)

@@ -1,4 +1,4 @@
-"""Faults of a recording that must not reach a fit: isolated wrong samples, gaps, and stretches of the output.
+"""Faults in a recording that must not reach a fit: isolated wrong samples, gaps, and bad stretches of the output.
 
 Samples that are not compared have no `y` (NaN) in a course; their drive still runs through the plays.
 """
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 LONGEST = 4
-"""Most samples in a row that count as an isolated fault; more must come from the actuator or the sensor."""
+"""Longest run of samples that counts as an isolated fault; a longer one must come from the actuator or the sensor."""
 
 OUTLYING = 8.0
 """[standard deviations of the scatter around it] An outlier is farther than this from the median around it."""
@@ -45,7 +45,7 @@ STEP, STEP_OF_RANGE = 3.0, 0.02
 """A step of the drive is `STEP` times the quantile `TAIL` of its moves, and at least this share of its range."""
 
 MOST_OUTLIERS = 0.01
-"""Largest share of samples that is left out as outliers; more of them are no outliers."""
+"""Largest share of samples that is left out as outliers; if there are more, they are not outliers."""
 
 FEW = 2
 """Number of samples that may be left out of a record of any length: its first and its last one."""
@@ -58,7 +58,7 @@ SEEN, SIGMAS = 0.05, 4.0
 standard deviations of its noise."""
 
 OUT_OF_SCALE = 3.0
-"""Outputs that lie beyond all others by this many of their ranges are wrong, unless the drive is as far out."""
+"""Outputs that lie outside all others by this many times their range are wrong, unless the drive is as far out."""
 
 
 def most(samples: int) -> int:
@@ -70,7 +70,7 @@ def outliers(error: Array, v: Array, swing: float) -> Flags:
     """Isolated samples of an error signal (N,) that lie far from their neighbours; never NaN.
 
     `swing`: peak-to-peak output; errors far below it spoil nothing. Samples at a step of the drive `v` (N,) do not
-    count: a model that lacks a lag or a resonance misses them.
+    count: a model without a lag or a resonance misses them.
     """
     found = np.zeros(len(error), dtype=bool)
     stepped = _stepped(v)
@@ -89,7 +89,7 @@ def far_from_others(error: Array, swing: float) -> list[tuple[int, int]]:
     `swing`: as in `outliers`.
 
     The scatter is taken from the median absolute deviation from a running median (Hampel identifier; Pearson, Control
-    Engineering Practice 2005), so that neither the outliers nor what a model misses widens it.
+    Engineering Practice 2005), so that neither the outliers nor systematic model errors widen it.
     """
     from scipy.ndimage import median_filter
 
@@ -114,7 +114,8 @@ def _scatter(sizes: Array, faulty: int) -> float:
 
 
 def _stepped(v: Array) -> Flags:
-    """Samples around a step of the drive that is far larger than nearly all others, and a part of its range."""
+    """Samples around a step of the drive that is far larger than nearly all others, and a sizeable part of its
+    range."""
     step = np.abs(np.diff(v))
     found = np.zeros(len(v), dtype=bool)
     for k in np.flatnonzero(step > max(STEP * float(np.quantile(step, TAIL)), STEP_OF_RANGE * float(np.ptp(v)))):
@@ -123,7 +124,7 @@ def _stepped(v: Array) -> Flags:
 
 
 def _jump(x: Array, first: int, last: int) -> tuple[float, Array]:
-    """The smaller one of the jumps to and from samples [first, last), and their distances from the line between their
+    """The smaller of the jumps to and from samples [first, last), and their distances from the line between their
     neighbours.
 
     At either end of a record there is only one jump.
@@ -135,7 +136,7 @@ def _jump(x: Array, first: int, last: int) -> tuple[float, Array]:
 
 
 def _stands_out(x: Array, first: int, last: int) -> bool:
-    """Whether samples [first, last) jump away and back at once, by far more than the signal moves around them.
+    """Whether samples [first, last) jump away and back abruptly, by far more than the signal moves around them.
 
     The tip of a triangle does not, nor does a move of a few samples that a model misses.
     """
@@ -150,10 +151,10 @@ def _stands_out(x: Array, first: int, last: int) -> bool:
 
 
 def wrong_drive(v: Array, y: Array) -> Flags:
-    """Isolated samples of the drive that jump away and back without a response of the output (NaN: not known).
+    """Isolated samples of the drive that jump away and back without a response of the output (NaN: unknown).
 
     A real pulse of the drive shows in the output, at once or a little later; one that does not is a fault of the
-    recording. At the ends of a record the drive jumps once. Numbers that stand for no value always count.
+    recording. At the ends of a record the drive jumps once. Numbers that stand for "no value" always count.
     """
     found = no_value(v)
     known = np.isfinite(y)
@@ -178,8 +179,8 @@ def wrong_drive(v: Array, y: Array) -> Flags:
 def pulses(v: Array) -> list[tuple[int, int]]:
     """Short runs [first, last) of the drive that jump away and back, or stand apart at an end.
 
-    They may be real, or rows that are wrong altogether: zeros, another sample's numbers, the converter's end. Empty if
-    there are so many that they must be the drive.
+    They may be real, or rows that are entirely wrong: zeros, another sample's numbers, a saturated converter. Empty if
+    there are so many that they must be part of the drive.
     """
     span = _span(v)
     found = [(first, last) for first, last, _ in _pulses(v, span)] if span > 0.0 and len(v) > WINDOW else []
@@ -187,7 +188,7 @@ def pulses(v: Array) -> list[tuple[int, int]]:
 
 
 def returns(v: Array, first: int, last: int) -> bool:
-    """Whether the drive leaves its course at samples [first, last), by a part of its range, and comes back.
+    """Whether the drive leaves its course at samples [first, last), by a sizeable part of its range, and comes back.
 
     At an end, where it cannot come back, it has to stand out as well.
     """
@@ -207,7 +208,7 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
     # a sample that stands apart makes three of them large
     usual_bend = _scatter(np.abs(v[1:-1] - 0.5 * (v[:-2] + v[2:])), 3 * FEW)
     least = max(STEP_OF_RANGE * span, OUTLYING * usual_bend)
-    # of the steps around the two jumps at most `LONGEST` + 1 belong to the pulse, and two to another one
+    # of the steps around the two jumps, at most `LONGEST` + 1 belong to the pulse, and two to another one
     usual = rank_filter(step, -(LONGEST + 4), size=2 * (AROUND + LONGEST) + 1, mode="mirror")
     large = np.flatnonzero((step > least) & (step > CLEAR * usual))
     n = len(v)
@@ -226,7 +227,7 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
 def _notice(follows: Array, y: Array, first: int, last: int) -> float:
     """How far the output leaves the line through its surroundings at samples [first, last) and soon after.
 
-    `follows`: the motion of the output expected without the pulse, which is no response to it.
+    `follows`: the motion of the output expected without the pulse, which is not a response to it.
     """
     at_once = _bent(y[max(first - 1, 0) : last + 1])
     near = slice(max(first - 1, 0), last + LONGEST)
@@ -234,7 +235,7 @@ def _notice(follows: Array, y: Array, first: int, last: int) -> float:
 
 
 def _bent(x: Array) -> float:
-    """How far samples lie from the line between the first and the last one that are known."""
+    """How far samples lie from the line between the first and the last known ones."""
     known = np.flatnonzero(np.isfinite(x))
     if len(known) < 2:
         return 0.0
@@ -243,7 +244,7 @@ def _bent(x: Array) -> float:
 
 
 def wrong_output(v: Array, y: Array) -> Flags:
-    """Outputs that stand for no value, and outputs out of all scale while the drive is not."""
+    """Outputs that stand for "no value", and outputs out of all proportion while the drive is not."""
     found = no_value(y)
     known = np.flatnonzero(~found)
     if len(known) < WINDOW:
@@ -255,7 +256,8 @@ def wrong_output(v: Array, y: Array) -> Flags:
 
 
 def smooth(record: Record) -> Record:
-    """The record with straight lines across samples that are wrong even without a model, to judge it as a whole."""
+    """The record with straight lines across samples that are obviously wrong without a model, to judge it as a
+    whole."""
     assert record.y is not None
     v, y = record.v, np.asarray(record.y, dtype=np.float64)
     wrong = wrong_output(v, y)
@@ -271,7 +273,7 @@ def _beyond(x: Array, times: float) -> Flags:
 
 
 def _ends(x: Array) -> tuple[float, float]:
-    """Least and largest sample without as many of the outermost as may be isolated faults."""
+    """Least and largest sample, ignoring as many outermost ones as may be isolated faults."""
     x = np.sort(x)
     return float(x[min(most(len(x)), len(x) // 2)]), float(x[max(len(x) - 1 - most(len(x)), len(x) // 2)])
 
@@ -314,8 +316,8 @@ def between_gaps(record: Record) -> list[Piece]:
     ]
 
 
-BRIDGED, NOT_COMPARED = "v that y does not bear out, bridged", "y far from the neighbours, not compared"
-"""Phrases for isolated wrong samples and what was done with them."""
+BRIDGED, NOT_COMPARED = "v without a response in y, bridged", "y far from the neighbours, not compared"
+"""Phrases for isolated wrong samples and their treatment."""
 
 
 def sentence(name: str, found: NDArray[np.intp], what: str) -> str:
@@ -339,19 +341,20 @@ SHARP, USUAL = 8.0, 0.98
 """A drop-out begins and ends with a step of `SHARP` times the quantile `USUAL` of the steps."""
 
 SWINGS = 0.4
-"""A step is part of a swing if all but one of the steps beside it exceed this share of it."""
+"""A step is part of a swing if all but one of the steps next to it exceed this share of it."""
 
 LONGEST_DROP_OUT = 200
 """Most samples of a drop-out, but never more than a twentieth of the record."""
 
 SHORT = 3
-"""Fewer samples count as isolated; the fit leaves those out by itself."""
+"""Fewer samples count as isolated; the fit itself leaves those out."""
 
 MOVES_ON = 0.01
-"""[share of its range] The drive goes on outwards by at least this while the output stands at a converter's end."""
+"""[share of its range] The drive goes on outwards by at least this while the output is stuck at the end of a
+converter's range."""
 
 SUDDEN = 4.0
-"""A converter's end is reached in steps below this many times the steps expected from the drive."""
+"""The end of a converter's range is reached in steps below this many times the steps expected from the drive."""
 
 GRAINS = 8.0
 """A coarse output is held if it stays while the drive should move it by this many of its steps."""
@@ -374,7 +377,7 @@ def sensitivity(y: Array, v: Array) -> float:
 def drop_outs(y: Array, v: Array) -> list[tuple[int, int]]:
     """Runs [a, b) in which the output leaves by a step, stays away and comes back by a step, while the drive does not.
 
-    Ringing takes several steps. `y`: NaN where it is not compared.
+    Ringing takes several steps. `y`: NaN in samples that are not compared.
     """
     known = np.flatnonzero(np.isfinite(y))
     if len(known) < 100:
@@ -443,8 +446,8 @@ def rails(y: Array, v: Array) -> list[tuple[str, float]]:
     """Ends of the output's range at which many samples in a row are equal while the drive moves on outwards, with their
     levels.
 
-    An end that is reached and left by a step does not count, since that is a drop-out, nor one where the drive only
-    turns: that is backlash or a coarse converter.
+    An end reached and left by a step does not count, since that is a drop-out; nor does one where the drive just turns:
+    that is backlash or a coarse converter.
     """
     known = np.isfinite(y)
     if not known.any():
@@ -456,7 +459,7 @@ def rails(y: Array, v: Array) -> list[tuple[str, float]]:
     between = known & (y > low) & (y < high)
     if not between.any():
         return []
-    slope = sensitivity(y[between], v[between])  # samples at either end would flatten it
+    slope = sensitivity(y[between], v[between])  # samples at the ends of the range would flatten it
     for name, end, sign in (("largest", high, 1.0), ("least", low, -1.0)):
         least = max(MOVES_ON * float(np.ptp(v)), GRAINS * grain / slope if slope > 0.0 and grain < np.inf else 0.0)
         runs = runs_of(y == end)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 HELD_OUT = 0.25
-"""Share of each record, at its end, that is held out for the figures if no record is given for that."""
+"""Share of each record, at its end, held out for the figures if no held-out record is given."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -35,8 +35,8 @@ class Fit:
 
     `parameters`: as in a parameter file; `rows`: the fit table; `warnings`: what the user should know, one sentence
     each; `intervals`: 95 % confidence intervals; `used`: the compared samples of each record, held-out records last;
-    `history`: drive values visited before each record, None if unknown; `records`: those of `used`, in that order;
-    `draw`: makes the figure of `plot`, None if nothing is drawn.
+    `history`: drive values visited before each record, None if unknown; `records`: the records of `used`, in that
+    order; `draw`: makes the figure of `plot`, None if there is nothing to draw.
     """
 
     parameters: Parameters
@@ -65,13 +65,13 @@ class Fit:
         return Model(self.parameters)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
-        """A picture: the loop of a record, held out if there is one, and the model's; residuals over time; weights.
+        """A picture: the loop of a record (a held-out one if any) with the model's; residuals over time; weights.
 
-        Returns matplotlib's Figure, which a notebook shows; with `path`, a .png or .svg, it is written there as well.
+        Returns matplotlib's Figure, which a notebook shows; with `path`, a .png or .svg file, it is also written there.
         Needs matplotlib, of the extra `plot`. Raises PlotError, OSError.
         """
         if self.draw is None:
-            raise drawing.PlotError("nothing draws this fit; use the one that hystgen.identify returns")
+            raise drawing.PlotError("this fit has no figure; use the one returned by hystgen.identify")
         return drawing.picture(partial(self.draw, self), path)
 
     def table(self) -> str:
@@ -83,9 +83,9 @@ class Fit:
     ) -> NDArray[np.float64]:
         """Free-run output (N,) of the model along a record's drive, in output units.
 
-        The start memory comes from `history`, else from the history of the fit; else the plays are at rest at the first
-        drive value, so that samples before the drive has swept its range mean little. `free_offset` shifts the result
-        to the mean of the record's `y`. Warns if the drive leaves the fitted range.
+        The start memory comes from `history`, or else from the history of the fit; otherwise the plays are at rest at
+        the first drive value, so samples before the drive has swept its range mean little. `free_offset` shifts the
+        result to the mean of the record's `y`. Warns if the drive leaves the fitted range.
         """
         (data,) = in_units([_read(record)], self.parameters.units, sources=[record])
         outside = quality.outside(data.name, data.v, self.parameters.input_range)
@@ -101,9 +101,9 @@ class Fit:
         return np.asarray(predicted + self.parameters.model.output_offset)
 
     def along(self, record: Record, used: Used) -> NDArray[np.float64]:
-        """Free-run output (N,) along a record as the fit compared it.
+        """Free-run output (N,) along a record, computed as in the fit.
 
-        The drive is bridged where the fit bridged it; every part between gaps starts anew and has the free offset that
+        The drive is bridged where the fit bridged it; every part between gaps starts again and has the free offset that
         fits its compared samples best; NaN in parts that were left out. Raises ValueError if `used` belongs to another
         record.
         """
@@ -166,13 +166,13 @@ class Fit:
 
     @property
     def unit(self) -> str:
-        """Unit of the output, empty if it is not known."""
+        """Unit of the output, empty if unknown."""
         units = self.parameters.units
         return (units.output or "") if units is not None else ""
 
     @property
     def remarks(self) -> list[str]:
-        """Explanations of the words in the fit table, one or two sentences each."""
+        """Explanations of the terms in the fit table, one or two sentences each."""
         n = len(self.parameters.model.pi.thresholds) - 1
         reported = [
             f"{counted(n, 'play')}. Errors of a free run with a free offset per record; % of the largest compared "
@@ -186,7 +186,7 @@ class Fit:
         elif any(row.part == "held out" for row in self.rows):
             reported.append("written: fitted to the records of row fit only.")
         if any(row.ignored for row in self.rows):
-            reported.append("ignored: samples at the start, where the memory from before the record is not known.")
+            reported.append("ignored: samples at the start, where the memory from before the record is unknown.")
         if len(self.parameters.model.pi.thresholds) > 1:
             reported += [each.start_sentence(self.unit) for each in self.used if any(each.starts)]
         reported.append(f"95 % confidence: {self._interval_sentence()}.")
@@ -214,9 +214,9 @@ class Used:
 
     `name`: of the record; `held_out`: whether it took no part in the fit; `samples`: its length; `parts`: first and
     last sample (exclusive) of each part that was run, a single part if there is no gap; `starts`: the start memory
-    found for each of them, None if it was given or not found; `skipped`: not compared at the start because that was
-    asked for; `ignored`: not compared at the start of a part because its start memory is not known; `outliers`: of y,
-    not compared; `stretches`: the same in drop-outs, held samples or a converter's end; `bridged`: of v, replaced by a
+    found for each part, None if it was given or not found; `skipped`: excluded at the start on request; `ignored`: not
+    compared at the start of a part because its start memory is unknown; `outliers`: samples of y not compared;
+    `stretches`: the same in drop-outs, held samples or converter saturation; `bridged`: samples of v replaced by a
     straight line; `gaps`: first sample after each gap; `left_out`: parts between gaps that are too short to use.
     """
 
@@ -259,7 +259,7 @@ class Used:
 
 
 def used_of(records: Sequence[Record], courses: Sequence[Course], held_out: bool) -> tuple[Used, ...]:
-    """How the samples of `records` were used, given the courses that were finally compared."""
+    """How the samples of `records` were used, given the courses finally compared."""
     return tuple(
         _of_record(record, [item for item in courses if item.origin[0] == number], held_out)
         for number, record in enumerate(records)

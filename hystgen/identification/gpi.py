@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 Tick = Callable[[int], None] | None
 
 KINDS = ("pi", "gpi-deadzone", "gpi-tanh")
-"""Names of what can be fitted; `auto` chooses among them."""
+"""Kinds of model that can be fitted; `auto` chooses among them."""
 
 BREAK_COUNTS = (1, 2, 4, 8)
 """Numbers of breaks of a dead-zone sum that are tried."""
@@ -33,7 +33,7 @@ FRONT_PARSIMONY = 1.02
 """A front with fewer shape numbers is taken if its validation error is within this factor of the best."""
 
 INVERSE_PLAYS = 10
-"""Plays of the measured output in the convex problem that starts the search for a dead-zone sum."""
+"""Number of plays of the measured output in the convex problem that starts the search for a dead-zone sum."""
 
 LEAST_SLOPE = 0.1
 """Least slope of a piece of the front, and of the inverse play sum, in that problem, as a share of the mean slope."""
@@ -57,7 +57,7 @@ class Fitted:
         return joint.through_front(item, self.stages)
 
     def begun(self, courses: Sequence[Course]) -> list[Course]:
-        """Courses that took no part in the fit, with start memories if their history is not known."""
+        """Held-out courses, with start memories if their history is unknown."""
         return start.of_model(courses, self.stages, self.solution.thresholds, self.solution.weights)
 
 
@@ -69,10 +69,10 @@ def solve(
     floor: float,
     tick: Tick = None,
 ) -> tuple[Fitted, list[Course]]:
-    """Fit a model of one kind; also returns the courses, their drive as measured, over the compared samples.
+    """Fit a model of one kind; also returns the courses, with the measured drive, over the compared samples.
 
-    Of several fronts of a kind, takes the one with the fewest shape numbers whose prediction of blocks left out of the
-    fit is close to the best. Raises IdentificationError.
+    Of several fronts of a kind, it takes the one with the fewest shape numbers whose prediction of blocks left out of
+    the fit is close to the best. Raises IdentificationError.
     """
     return _solved(courses, kind, wanted, breaks, floor, tick, lambda found: [_by_blocks(found)])[0]
 
@@ -85,10 +85,11 @@ def to_judge(
     floor: float,
     tick: Tick = None,
 ) -> list[tuple[Fitted, list[Course]]]:
-    """The fits of one kind among which held-out records choose, the simplest first; otherwise as `solve`.
+    """The fits of one kind from which held-out records choose, the simplest first; otherwise the same as `solve`.
 
-    Tanh envelopes with one branch and with two: two have a loop by themselves, as wide in a small swing as in a large
-    one. Records of a single swing do not show whether theirs is of that kind, and neither do blocks left out of them.
+    Tanh envelopes with one branch and with two: two branches form a loop of their own, as wide in a small swing as in a
+    large one. Records of a single swing do not show whether their loop is of that kind, and neither do blocks left out
+    of them.
     """
 
     def chosen(found: Sequence[_Found]) -> Sequence[_Found]:
@@ -124,7 +125,7 @@ def _solved(
     tick: Tick,
     choose: Callable[[Sequence[_Found]], Sequence[_Found]],
 ) -> list[tuple[Fitted, list[Course]]]:
-    """The fits with the fronts that `choose` takes."""
+    """The fits with the fronts that `choose` selects."""
     # a start memory found without the front is not exact behind it, but better than too few samples to compare
     courses = start.needed(courses, (), wanted if kind == "pi" else None)
     plain, compared = pi.solve(courses, wanted, floor, tick)
@@ -150,7 +151,7 @@ def _finished(
     floor: float,
     tick: Tick,
 ) -> tuple[Fitted, list[Course]]:
-    """The fit with a front: plays placed behind it, and its shape found again for them."""
+    """The fit with a front: plays placed behind it, and its shape refitted for them."""
     front, shape = found.front, found.shape
     courses = start.needed(courses, front.stages(shape, DIGITS), wanted)
     fitted = _solve_behind(courses, front, shape, wanted, floor, tick)
@@ -160,7 +161,7 @@ def _finished(
     fitted = _solve_behind(courses, front, shape, tuple(float(x) for x in r), floor, tick)
     if wanted is None:
         fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
-    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # the records', whatever the front
+    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # whatever the front
     largest = float(fitted.solution.thresholds[-1])
     firsts = [fitted.inner(item).resettled(largest).first for item in courses]
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]
@@ -180,7 +181,7 @@ def _solve_behind(
 
 
 def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, ...] | None) -> list[Front]:
-    """The fronts of a kind, in rising order of their numbers of shape parameters."""
+    """The fronts of a kind, with increasing numbers of shape parameters."""
     drive = (min(item.drive_range[0] for item in courses), max(item.drive_range[1] for item in courses))
     if kind == "gpi-tanh":
         return [Tanh(drive), Tanh(drive, 2)]
@@ -220,12 +221,12 @@ def validation(shaped: joint.Shaped, front: Front) -> float:
 
 
 def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
-    """Shape of a dead-zone sum from the problem that is linear in it and in the inverse play sum together.
+    """Shape of a dead-zone sum from a problem that is linear in the sum and the inverse play sum together.
 
-    `PI^-1[y] = G[v]`: plays of the measured output, with weights q_0 > 0 and q_i <= 0, on the one side, pieces of the
-    drive with positive slopes on the other (Kuhnen, European Journal of Control 9, 2003, 407-418, where the memoryless
-    part lies behind the plays). It is convex, but it minimises an error of the drive, and noise of the output
-    enters the plays: only a start for the fit of the output. None if no sample is left.
+    `PI^-1[y] = G[v]`: plays of the measured output, with weights q_0 > 0 and q_i <= 0, on one side, pieces of the drive
+    with positive slopes on the other (Kuhnen, European Journal of Control 9, 2003, 407-418, where the memoryless part
+    lies behind the plays). It is convex, but it minimises an error of the drive, and noise of the output enters the
+    plays: it is only a starting point for the fit of the output. None if no sample is left.
     """
     low, high = front.drive
     places = np.array([low, *front.breaks, high])
@@ -235,7 +236,7 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
     z = np.linspace(0.0, 0.4 * swing, INVERSE_PLAYS + 1)
     turned = []
     for item in courses:
-        # the memory of the inverse is not known even if that of the plays is
+        # the memory of the inverse is unknown even if that of the plays is known
         measured = faults.bridged(item.y, ~np.isfinite(item.y))
         first = max(item.first, reduction.settled(measured[: item.last], math.inf))
         pieces = np.clip(item.v[None, :], places[:-1, None], places[1:, None]) - places[:-1, None]

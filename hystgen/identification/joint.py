@@ -71,15 +71,15 @@ class Front(Protocol):
         """Values that must not be negative for the front to be invertible, in addition to the bounds; may be empty."""
 
     def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
-        """The stages of the model, their numbers rounded to `digits` if those are given.
+        """The stages of the model, with numbers rounded to `digits` if given.
 
-        A search takes them as they are: in a difference of two, each rounded to ten digits, six are gone.
+        A search uses them unrounded: the difference of two numbers rounded to ten digits has lost six.
         """
 
 
 @dataclass(frozen=True)
 class Kept:
-    """A memoryless part that stays as it is; without stages, the default, the model is a plain play sum."""
+    """A fixed memoryless part; by default it has no stages, and the model is a plain play sum."""
 
     given: tuple[Stage, ...] = ()
     name: str = "pi"
@@ -105,10 +105,10 @@ class Kept:
 
 @dataclass(frozen=True)
 class DeadZones:
-    """Dead-zone sums with given breaks (41); the shape is the logarithm of each piece's slope over the first one's.
+    """Dead-zone sums with given breaks (41); the shape is the logarithm of each piece's slope relative to the first.
 
-    `drive`: the fitted range; `breaks`: places inside it where the slope may change, strictly rising, none of them 0,
-    since a threshold of 0 is the straight line in every dead-zone sum.
+    `drive`: the fitted range; `breaks`: points inside it where the slope may change, strictly increasing and none of
+    them 0, since a threshold of 0 is the straight line in every dead-zone sum.
     """
 
     drive: tuple[float, float]
@@ -117,7 +117,7 @@ class DeadZones:
 
     @property
     def straight(self) -> Array:
-        """All slopes alike."""
+        """All slopes equal."""
         return np.zeros(len(self.breaks))
 
     @property
@@ -168,12 +168,12 @@ class Ends:
 
     @property
     def straight(self) -> Array:
-        """Slightly flatter at the ends, so that the derivatives with respect to the places are not zero."""
+        """Slightly flatter at the ends, so that the derivatives with respect to the distances are not zero."""
         return np.array([0.1, 0.1, -0.1])
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """A place may lie at its end, where it has no effect; the two do not meet."""
+        """A distance may be zero, where it has no effect; the two bends do not meet."""
         return np.array([1e-3, 1e-3, -FLATTER]), np.array([0.45, 0.45, 0.0])
 
     def slack(self, shape: Array) -> Array:
@@ -181,7 +181,7 @@ class Ends:
         return np.empty(0)
 
     def widest(self, shape: Array) -> float:
-        """The wider of both flat ends, as a share of the range."""
+        """The longer of the two flat ends, as a share of the range."""
         return float(np.max(shape[:2]))
 
     def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
@@ -210,7 +210,7 @@ class Bent:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Ratios of slopes are limited as in a search piece by piece."""
+        """Ratios of slopes are limited as in a piecewise search."""
         most = np.full(self.degree, 0.5 * STEEPEST / self.degree)
         return -most, most
 
@@ -233,9 +233,9 @@ class Bent:
 class Tanh:
     """Tanh envelopes with one branch or two (45).
 
-    The shape of a branch is `a1` times half the drive range, and the place of its steepest point, counted from the
+    The shape of a branch is `a1` times half the drive range, and the position of its steepest point, counted from the
     middle of the range in units of half its length. The descending branch has two more numbers: the logarithm of its
-    height over that of the ascending one, and its lift above it in the middle of the range, as a share of the range.
+    height relative to the ascending one, and its lift above it in the middle of the range, as a share of the range.
     """
 
     drive: tuple[float, float]
@@ -248,24 +248,25 @@ class Tanh:
 
     @property
     def straight(self) -> Array:
-        """A gently bent branch, so that the derivative with respect to its place is not zero; no gap between two."""
+        """A gently bent branch, so that the derivative with respect to its position is not zero; no gap between two."""
         return np.array([0.3, 0.0] if self.branches == 1 else [0.3, 0.0, 0.3, 0.0, 0.0, 0.0])
 
     def doubled(self, single: Array) -> Array:
-        """Two branches that are both the single one of that shape."""
+        """Two branches that both equal the single one of that shape."""
         return np.concatenate([single, single, [0.0, 0.0]])
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Curvature and place of each branch, then length and lift."""
+        """Curvature and position of each branch, then height and lift."""
         low = [CURVED[0], -20.0] * self.branches + [-0.5, 0.0] * (self.branches - 1)
         high = [CURVED[1], 20.0] * self.branches + [0.5, 0.3] * (self.branches - 1)
         return np.array(low), np.array(high)
 
     def slack(self, shape: Array) -> Array:
-        """Distances of the ends from where a branch becomes flat, and of the descending branch above the ascending."""
+        """Distances of the ends from where a branch becomes flat, and of the descending branch above the ascending
+        one."""
         held = [FLATTEST - shape[2 * b] * (1.0 + abs(shape[2 * b + 1])) for b in range(self.branches)]
-        if self.branches == 2 and min(held) < -FLATTEST:  # a branch may be flat to the last digit, and have no length
+        if self.branches == 2 and min(held) < -FLATTEST:  # a branch may be flat to the last digit, and have no height
             held += [-1.0] * len(self._places)
         elif self.branches == 2:
             stage = self._stage(shape, None)
@@ -321,14 +322,15 @@ def _numbers(values: Sequence[float], digits: int | None) -> list[float]:
 
 
 def even_breaks(drive: tuple[float, float], count: int) -> tuple[float, ...]:
-    """`count` breaks evenly spaced inside the drive range; one that would fall on 0 is moved aside a little."""
+    """`count` breaks evenly spaced inside the drive range; one that would fall on 0 is moved a little."""
     low, high = drive
     step = (high - low) / (count + 1)
     return aside([rounded(low + step * (j + 1), 6) for j in range(count)], 0.05 * step)
 
 
 def aside(places: Sequence[float], least: float) -> tuple[float, ...]:
-    """The places; one within `least` of 0 moves to `least`, since a dead zone with threshold 0 is the line itself."""
+    """The positions; one within `least` of 0 moves to `least`, since a dead zone with threshold 0 is the line
+    itself."""
     return tuple(rounded(least, 6) if abs(x) < least else x for x in places)
 
 
@@ -337,16 +339,17 @@ def aside(places: Sequence[float], least: float) -> tuple[float, ...]:
 
 DIFFERENCE = 2.0**-16
 """Change of a shape number for a derivative; shape numbers are of the order of one. A search needs a few digits of a
-derivative: this leaves five before its curve shows, and eleven of the output behind the rounding of doubles."""
+derivative: this leaves five before the curvature shows, and eleven digits of the output above the rounding of
+doubles."""
 
 MOST_STEPS = 25
-"""Most steps of a search. For `examples/stage_recording.csv` fronts take 2 to 10."""
+"""Most steps of a search. For `examples/stage_recording.csv`, fronts take 2 to 10."""
 
 DAMPING = 1e-3
 """Damping of the first step, relative to the diagonal of its equations."""
 
 ENOUGH = 0.005
-"""The search ends when the sum of squares falls by less than this many times its share of one sample.
+"""The search ends when the sum of squares falls by less than this many times its share per sample.
 
 A step of one standard deviation of an estimate changes it by one such share.
 """
@@ -355,14 +358,14 @@ LEAST_CHANGE = 1e-8
 """The search also ends when no shape number changes by more than this."""
 
 GRAIN = 1.0 / 32.0
-"""[of the rms error] A number of a step is rounded by at most half of what moves the output by this much.
+"""[of the rms error] A number in a step is rounded by at most half of what moves the output by this much.
 
-As the rounding of each of m numbers is independent, all of them raise the sum of squares by m GRAIN^2 / 12 times its
-share of one sample: half of `ENOUGH` for 32 numbers.
+As the rounding errors of m numbers are independent, together they raise the sum of squares by m GRAIN^2 / 12 times its
+share per sample: half of `ENOUGH` for 32 numbers.
 """
 
 COARSEST = 2.0**-10
-"""Largest unit of a shape number, of the order of one: those that hardly show yet must not be moved by rounding."""
+"""Largest rounding unit of a shape number, of the order of one: rounding must not move numbers that hardly show yet."""
 
 COMPARED = 200_000
 """Samples compared in the search for the shape: an even selection from longer records, although all samples run through
@@ -448,8 +451,8 @@ def search(
     """The best shape near that of `now`, and the damping with which the search would continue.
 
     `linear` linearises the system about a shape and weights. `little`: the search also ends after a step that lowers
-    the error by less than this share. Steps that fail count, and the next one is damped more. It ends before a step for
-    which the linear system promises less than `ENOUGH`.
+    the error by less than this share. Failed steps count, and increase the damping of the next one. It ends before a
+    step for which the linear system predicts less than `ENOUGH`.
     """
     shape = now.shape
     low, high = limits.bounds
@@ -471,7 +474,7 @@ def search(
         least = 0.5 * ENOUGH / now.samples
         residual = system[:, -1] - system[:, :-1] @ np.concatenate([p, moved - now.shape])
         promised = root_mean_square(float(residual @ residual), now.samples)
-        if now.rms - promised < least * now.rms:  # most such steps fail, at full cost
+        if now.rms - promised < least * now.rms:  # most steps like that fail, at full cost
             break
         trial = linear(moved, p) if _allowed(limits, moved) else None
         if trial is not None and trial.rms < now.rms:
@@ -485,11 +488,11 @@ def search(
 
 
 def _grained(found: Array, sizes: Array, rms: float, most: float = math.inf) -> Array:
-    """Solutions of a linear system, rounded to what the records tell of them; `sizes`: lengths of its columns.
+    """Solutions of a linear system, rounded to what the records can tell about them; `sizes`: lengths of its columns.
 
-    The units are powers of two, `most` the largest. Linear algebra libraries differ in the last bits, from processor to
-    processor, and a search that carried these on from step to step could end in another minimum; rounded, its steps
-    are the same everywhere.
+    The rounding units are powers of two, `most` the largest. Linear algebra libraries differ in the last bits from
+    processor to processor, and a search that carried those along from step to step could end in another minimum; with
+    rounding, its steps are the same everywhere.
     """
     rounded = found.copy()
     known = (sizes > 0.0) & (rms > 0.0)
@@ -532,7 +535,7 @@ def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[
 def _rows_with_derivatives(
     course: Course, thresholds: Array, versions: Sequence[Sequence[Stage]], p: Array, every: int
 ) -> Source:
-    """The plays behind the first version of a front, and the changes of their weighted sum by the other versions."""
+    """The plays behind the first version of a front, and the changes in their weighted sum with the other versions."""
     carried = []
     for stages in versions:
         rising, visited = _session(course, stages)

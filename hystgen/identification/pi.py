@@ -1,8 +1,8 @@
-"""Fitting a PI model to records: places, number and weights of the plays.
+"""Fitting a PI model to records: positions, number and weights of the plays.
 
 The weights are non-negative least squares on the triangular system of `reduction`, whose offsets are projected out and
-hence free, by Lawson and Hanson's active set algorithm (Solving Least Squares Problems, 1974, chapter 23) as scipy
-implements it.
+hence free, by Lawson and Hanson's active set algorithm (Solving Least Squares Problems, 1974, chapter 23) as
+implemented in scipy.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ DIGITS = 10
 
 WEIGHT_DIGITS = 8
 """Significant digits of weights. With the tie break below, a millionth remains of a direction in which plays move
-alike: the last bits of the linear algebra library reach the tenth digit, and two more are left out."""
+alike: the last bits of the linear algebra library reach the tenth digit, and two more are dropped."""
 
 DUST = 1e-9
 """A weight below this share of their sum is rounding, not a play."""
 
 FALLS = (
     "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign of y, "
-    "else check which column is which"
+    "otherwise check which column is which"
 )
 """The message if no play is left in the model."""
 
@@ -93,14 +93,14 @@ def solve(
     if reach == 0.0:
         names = ", ".join(dict.fromkeys(item.name for item in courses))
         raise IdentificationError(
-            f"{names}: once the start memory is known the drive does not move any more; record more cycles, or give "
+            f"{names}: the drive no longer moves once the start memory is known; record more cycles, or give "
             "--history"
         )
     if isinstance(wanted, tuple):
         lists = [Candidate(wanted)]
     else:
         wide = once(courses, reach)
-        if wanted is not None and len(wide) > wanted // 2:  # hardly any would be left for what comes back
+        if wanted is not None and len(wide) > wanted // 2:  # too few samples would be left
             wide = ()
         count = None if wanted is None else wanted - len(wide)
         lists = candidates(reach, sum(item.used for item in courses), count)
@@ -142,10 +142,10 @@ def compare(item: Course, r: Array, p: Array) -> Errors:
     return Errors(item, offset, error - offset)
 
 
-# Sense of the output, and direction of its loops. A play sum with positive weights rises with its drive, and its loops
-# run counterclockwise: on the way back the output is above that of the way there. Which way recorded loops run is read
-# from the recording alone: weights of either sign also follow a saturating output, with negative ones in loops that run
-# counterclockwise.
+# Direction of the output, and direction of its loops. A play sum with positive weights rises with its drive, and its
+# loops run counterclockwise: the output is higher on the way back than on the way there. The direction of recorded
+# loops is determined from the recording alone: weights of either sign also follow a saturating output, with negative
+# ones in loops that run counterclockwise.
 
 
 CLEARLY = 0.9
@@ -165,31 +165,32 @@ LEVELS = 32
 
 SIGMAS = 4.0
 """[standard deviations] Loops have a direction if their width differs from zero by more than this: of 60 straight lines
-and saturating curves with noise none has. Set by: tests/test_start.py TestDirection."""
+and saturating curves with noise, none has. Set by: tests/test_start.py TestDirection."""
 
 ONE_WAY = 0.5
-"""[share of the area between the legs] Least of it that is left when areas of both directions cancel: the wings of a
-butterfly run opposite ways. Set by: tests/test_start.py TestDirection."""
+"""[share of the area between the legs] Least net area when areas of both directions cancel: the wings of a butterfly
+run in opposite directions. Set by: tests/test_start.py TestDirection."""
 
 SLOWEST, SAME_SPEED = (0.125, 0.25, 0.5, 1.0), 1.05
-"""Shares of the time that the slowest turns take, tried one by one; turns faster by no more than a twentieth join them.
-Set by: tests/test_start.py TestDirection."""
+"""Shares of the time taken by the slowest turns, tried one by one; turns that are at most a twentieth faster are
+included. Set by: tests/test_start.py TestDirection."""
 
 FALLING = (
-    "y falls where v rises; if the sensor counts the other way, change the sign of y, else check which column is which"
+    "y falls when v rises; if the sensor counts the other way, change the sign of y, otherwise check which column "
+    "is which"
 )
 
 CLOCKWISE = (
-    "the loops run clockwise: y is ahead of v, where every play is behind its drive, so that no weights follow them. "
+    "the loops run clockwise: y is ahead of v, while every play lags its drive, so no weights can follow them. "
     "If y is a force and v the displacement that goes with it, exchange the columns (--columns v=..,y=..): the model "
     "then gives the displacement"
 )
 
-NO_PLAYS = "no hysteresis was found: the model has no play beside r_0, and its output follows its input without a loop"
+NO_PLAYS = "no hysteresis was found: the model has no play besides r_0, and its output follows its input without a loop"
 
 
 def sense_of(reduced: Reduced, courses: Sequence[Course], squares: float) -> Sense:
-    """The sense of reduced records; `squares`: the sum of squared errors that positive weights leave."""
+    """The sense of reduced records; `squares`: the sum of squared errors left by positive weights."""
     together = sum(_covaried(item) for item in courses if item.used)
     some = np.unique(np.linspace(0, len(reduced.thresholds) - 1, SENSED_PLAYS + 1).astype(int))
     matrix, target = reduced.whole[:, some], reduced.whole[:, -1]
@@ -205,9 +206,9 @@ def _covaried(item: Course) -> float:
 
 
 def runs_clockwise(courses: Sequence[Course]) -> bool:
-    """Whether the recorded loops enclose their area clockwise, beyond what noise, drift and lags make of loops.
+    """Whether the recorded loops enclose their area clockwise, beyond what noise, drift and lags can produce.
 
-    A lag of either signal adds a width that vanishes with the speed: the slowest turns that show a direction decide.
+    A lag in either signal adds a width that vanishes with the speed: the slowest turns that show a direction decide.
     """
     turns = sorted((turn for item in courses for turn in _turns(item)), key=lambda turn: turn.speed)
     spent = np.cumsum([abs(turn.later) for turn in turns])
@@ -220,12 +221,12 @@ def runs_clockwise(courses: Sequence[Course]) -> bool:
 
 
 def _direction(turns: Sequence[_Turn], both: bool) -> int:
-    """1 if these loops run counterclockwise, -1 clockwise, 0 if that cannot be said. `both`: only from turns at the top
-    and at the bottom.
+    """1 if these loops run counterclockwise, -1 if clockwise, 0 if undecided. `both`: only from turns at the top and at
+    the bottom.
 
-    The width of a loop, the output of the leg that comes down less that of the leg that goes up, is taken as
-    proportional to the span of drive that both share. A drift adds to it behind a turn at the top what it takes away
-    behind one at the bottom, and is fitted beside it.
+    The width of a loop, the output of the downward leg minus that of the upward leg, is taken as proportional to the
+    span of drive that both share. A drift adds as much to it after a turn at the top as it takes away after one at the
+    bottom, and is fitted as well.
     """
     width = np.array([np.mean(turn.widths) for turn in turns])
     later = np.array([turn.later for turn in turns])
@@ -244,7 +245,8 @@ def _direction(turns: Sequence[_Turn], both: bool) -> int:
 
 
 def _deviation(error: Array, noise: Array, row: Array) -> float:
-    """Standard deviation of a fitted number, `row @ width`: by the noise of the widths, or by their scatter if more."""
+    """Standard deviation of a fitted number, `row @ width`, from the noise of the widths, or from their scatter if that
+    is larger."""
     spare = len(error) - (2 if len(error) > 2 else len(error))
     scatter = math.sqrt(float(error @ error) / spare) if spare > 0 else 0.0
     return float(np.linalg.norm(row * np.maximum(noise, scatter)))
@@ -252,10 +254,10 @@ def _deviation(error: Array, noise: Array, row: Array) -> float:
 
 @dataclass(frozen=True)
 class _Turn:
-    """The two legs of the drive beside a turning point, over the `span` of drive that they share.
+    """The two legs of the drive on either side of a turning point, over the `span` of drive that they share.
 
-    `widths` (LEVELS,): outputs on the way down less those on the way up; `later`: samples by which the way down is
-    later; `deviation`: of the mean width, by the noise of the output.
+    `widths` (LEVELS,): outputs on the way down minus those on the way up; `later`: samples by which the way down is
+    later; `deviation`: of the mean width, due to the noise of the output.
     """
 
     span: float
@@ -265,7 +267,7 @@ class _Turn:
 
     @property
     def speed(self) -> float:
-        """Drive a sample."""
+        """Change of the drive per sample."""
         return self.span / abs(self.later)
 
 
@@ -290,7 +292,7 @@ def _turns(item: Course) -> Iterator[_Turn]:
 
 
 def _corners(v: Array) -> list[int]:
-    """First sample, turning points and last sample of the legs of a drive; fewer than three without a turn.
+    """First sample, turning points and last sample of the legs of a drive; fewer than three if there is no turn.
 
     A play of half of `LEAST_TURN` follows the drive without its smaller moves, and last moved where the drive turned.
     """
@@ -308,7 +310,7 @@ def _corners(v: Array) -> list[int]:
 
 
 def _leg(v: Array, y: Array, place: NDArray[np.intp], a: int, b: int) -> tuple[Array, Array, Array, float]:
-    """Drive, output and sample of the points of one leg in the order of the drive, and samples a point."""
+    """Drive, output and sample of the points of one leg in the order of the drive, and samples per point."""
     order = a + np.argsort(v[a : b + 1], kind="stable")
     edges = np.unique(np.linspace(0, len(order), min(len(order), LEVELS) + 1).astype(int))[:-1]
     sizes = np.diff(np.append(edges, len(order)))
@@ -325,15 +327,17 @@ LEAST_TRAVEL = 0.15
 A play of threshold r moves over `p-p - 2 r` in a settled loop. As that goes to zero, its weight depends only on the
 last few samples before each reversal and can take any value, while a slightly larger drive multiplies it by a real
 travel. At 15 % of the range (r = 0.85 of half the range) the weight is a slope measured over about as much drive as the
-gap to the play below, and the error at the ends of the loop is within 10 % of that with plays up to 0.9.
+gap to the next smaller play, and the error at the ends of the loop is within 10 % of that with plays up to 0.9.
 """
 
 LEAST_VISIBLE = 0.05
-"""The same for a play that moves visibly, if only at the ends of the range: less is hardly more than a straight line.
+"""The same for a play that moves visibly, if only at the ends of the range: a fit up to a smaller threshold is hardly
+more than a straight line.
 
-The diagnosis fits plays up to there, since the movement of wider ones than a fit has would stand for an effect. So does
-a fit beside an unknown start that shows them: without that play, the held-out error was 1.4 to 1.6 times that with a
-known start in one of ten plants whose drive grew both ways (`benchmarks/start_memory.py`, seeds 20 to 39), with it 1.2.
+The diagnosis fits plays up to there, since otherwise the movement of wider plays could be mistaken for an effect. So
+does a fit with an unknown start that shows them: without that play, the held-out error was 1.4 to 1.6 times that with a
+known start in one of ten plants whose drive grew both ways (`benchmarks/start_memory.py`, seeds 20 to 39); with it,
+1.2.
 """
 
 COUNTS = (6, 8, 12, 16, 24)
@@ -346,7 +350,7 @@ PLAYS_PARSIMONY = 1.01
 """The fewest plays whose validation error is within this factor of the best are chosen."""
 
 DENSE = 16
-"""Plays in the list with which other parts of a model are searched for."""
+"""Number of plays used while other parts of a model are searched for."""
 
 MANY_PLAYS = 100
 """More plays than this are spaced evenly."""
@@ -372,8 +376,8 @@ def largest(courses: Sequence[Course], least: float = LEAST_TRAVEL) -> float:
 
     `least`: the distance that is far enough, as a share of the drive's range.
 
-    The movement of a play decreases with its threshold, so bisection finds the place; nothing is assumed about the
-    waveform, and a first loading from a known start counts as such.
+    The movement of a play decreases with its threshold, so bisection finds the largest one; nothing is assumed about
+    the waveform, and a first loading from a known start counts as such.
     """
     found = 0.0
     for course in courses:
@@ -395,7 +399,7 @@ def loop_reach(swing: float, least: float = LEAST_TRAVEL) -> float:
 
 
 def once(courses: Sequence[Course], reach: float) -> tuple[float, ...]:
-    """Thresholds beyond `reach` of plays that move once, from start memories that were found."""
+    """Thresholds beyond `reach` of plays that move only once, taken from the start memories found."""
     starts = [item.start for item in courses if item.history is None and item.start is not None]
     return tuple(sorted({each.once for each in starts if each.once is not None and each.once > reach}))
 
@@ -408,7 +412,7 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
         counts = [n for n in COUNTS if n * SAMPLES_A_PLAY <= samples] or (max(1, samples // SAMPLES_A_PLAY),)
     lists = []
     for n in counts:
-        # a single play has one place; with very many the spacing does not matter
+        # a single play has only one position; with very many the spacing does not matter
         for power in POWERS[: 1 if n < 2 or n > MANY_PLAYS else None]:
             places = (rounded(reach * (i / n) ** power, 6) for i in range(1, n + 1))
             lists.append(Candidate((0.0, *places)))
@@ -416,12 +420,12 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
 
 
 def dense(reach: float, samples: int, most: int = DENSE) -> Candidate:
-    """One list of `most` plays, fine enough to show the other effects in a record."""
+    """A single list of `most` plays, fine enough to reveal the other effects in a record."""
     return candidates(reach, samples, min(most, max(1, samples // SAMPLES_A_PLAY)))[:2][-1]
 
 
 def written(weights: Array) -> Array:
-    """Weights as a parameter file has them: rounded, and 0 where only rounding is left."""
+    """Weights as written to a parameter file: rounded, and 0 if only rounding is left."""
     p = np.array([rounded(float(x), WEIGHT_DIGITS) for x in weights])
     p[p < DUST * float(np.sum(p))] = 0.0
     return p
@@ -528,9 +532,9 @@ def fit_weights(reduced: Reduced, columns: Columns, floor: float) -> Weights:
 
     p_0 is the slope just after a reversal, and the inverse divides by it. A record shows it only over the first,
     smallest travel, where a slight lag of sensor or amplifier already flattens the loop and drives the least-squares
-    p_0 to zero. If it falls below the floor, the fit is repeated under `p_0 >= floor * sum p`. The result is taken if
-    the rms error grows by at most 5 %, so that the data hardly determine p_0. Otherwise the smaller p_0 belongs to the
-    actuator (series backlash for p_0 = 0: no inverse) and stays.
+    p_0 to zero. If it falls below the floor, the fit is repeated under `p_0 >= floor * sum p`. That result is used if
+    the rms error grows by at most 5 %, since the data then hardly determine p_0. Otherwise the smaller p_0 belongs to
+    the actuator (series backlash for p_0 = 0: no inverse) and is kept.
     """
     matrix, target = reduced.whole[:, columns], reduced.whole[:, -1]
 
@@ -540,7 +544,7 @@ def fit_weights(reduced: Reduced, columns: Columns, floor: float) -> Weights:
     free = _least_squares(matrix, target)
     if len(free) < 2 or free[0] >= floor * float(np.sum(free)):
         return Weights(free, rms(free))
-    # p_0 = q_0 + share * sum of the others, all >= 0, is the bounded problem as another non-negative one
+    # with p_0 = q_0 + share * sum of the others, all >= 0, the bounded problem is another non-negative one
     share = floor / (1.0 - floor)
     bounded_matrix = matrix.copy()
     bounded_matrix[:, 1:] += share * matrix[:, :1]
@@ -610,7 +614,7 @@ def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array, pl
 
 
 def at_least(lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Bounds on single unknowns, infinite ones left out, as the inequalities of `least_squares`."""
+    """Bounds on single unknowns, without infinite ones, as the inequalities of `least_squares`."""
     k = len(lower)
     eye = np.eye(k)
     below, above = np.isfinite(lower), np.isfinite(upper)

@@ -1,7 +1,7 @@
 """Records as a fit compares them: cut at gaps, faults of the drive bridged, wrong samples of the output left out.
 
 Faults that show without a model are found when a course is made, before any fit; isolated samples far from a first,
-robust fit of their neighbours are found after it.
+robust fit to their neighbours are found after it.
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from hystgen.records import LARGEST, SHORTEST, Record, no_value
 Array = NDArray[np.float64]
 
 LEAST_SOUND = 0.1
-"""Least share of a record that has to be left without the samples at a converter's end."""
+"""Least share of a record that must remain without the samples at the end of a converter's range."""
 
 MOST_FITS = 4
-"""Most robust fits; the first that finds the same faults as the one before is the last."""
+"""Maximum number of robust fits; they end with the first that finds the same faults as the one before."""
 
 LESS_MISSED = 0.25
 """The drive, not the output, is wrong if bridging it reduces the squared error to less than this share."""
 
 
 LEAST_MOVEMENT = 1e-20
-"""Drive or output that moves by less is no measurement: its squares, and its ratios to the other one, leave the range
+"""A smaller motion of drive or output is not a measurement: its squares, and its ratios to the other, leave the range
 of double precision and of parameter files."""
 
 
@@ -64,7 +64,7 @@ def courses(
             raise IdentificationError(f"{record.name}: no part between its gaps can be used; record without gaps")
         reported.append(
             f"{record.name}: cut at {counted(len(pieces) - 1, 'gap')} of more than "
-            f"{faults.LONG_GAP:g} steps; what the drive did in them is not known, so that each part starts anew"
+            f"{faults.LONG_GAP:g} steps; what the drive did in them is unknown, so each part starts anew"
         )
         made += found
     for k, item in enumerate(made):
@@ -79,8 +79,8 @@ def samples_in(record: Record, seconds: float) -> int:
 
 
 def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
-    """The record as it takes part in a fit: without the start for which the memory is unknown, and with isolated faults
-    that show without a model bridged (drive) or left out (output).
+    """The record as it enters a fit: without the start where the memory is unknown, and with isolated faults that show
+    without a model bridged (drive) or left out (output).
 
     Raises IdentificationError for a record that a fit cannot use.
     """
@@ -100,7 +100,7 @@ def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> C
         missing = int(np.count_nonzero(no_value(x)))
         if missing > faults.most(len(x)):
             raise IdentificationError(
-                f"{record.name}: {missing} of {len(x)} samples of {name} stand for no value, "
+                f"{record.name}: {missing} of {len(x)} samples of {name} stand for a missing value, "
                 f"{x[no_value(x)][0]:.6g} for one; from {LARGEST:g} on numbers are none in any unit. Record again, or "
                 f"convert {name}"
             )
@@ -110,20 +110,20 @@ def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> C
         raise IdentificationError(f"{record.name}: the drive is constant; a fit needs a drive that moves")
     measured = y[skip:][np.isfinite(y[skip:])]
     if not len(measured) or np.ptp(measured) == 0.0:
-        raise IdentificationError(f"{record.name}: the measured output is constant; is the right column y?")
+        raise IdentificationError(f"{record.name}: the measured output is constant; is y the right column?")
     for name, x in (("v", v), ("y", measured)):
         if np.ptp(x) < LEAST_MOVEMENT:
             raise IdentificationError(
-                f"{record.name}: {name} moves by {np.ptp(x):.3g} in all, which is no movement in any unit; convert it "
+                f"{record.name}: {name} moves by {np.ptp(x):.3g} in all, which is too little in any unit; convert it "
                 "to a smaller unit, or name another column"
             )
     return Course(record.name, v, y, history, skip, len(v), skip).resettled(math.inf)
 
 
 def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
-    """The course without the samples at a converter's end; name, level and number of samples of each end.
+    """The course without the samples at the ends of a converter's range; name, level and number of samples of each end.
 
-    Raises IdentificationError if hardly anything is left.
+    Raises IdentificationError if hardly anything remains.
     """
     levels = faults.rails(item.y, item.v)
     if not levels:
@@ -132,14 +132,14 @@ def without_rails(item: Course) -> tuple[Course, list[tuple[str, float, int]]]:
     left, before = np.count_nonzero(np.isfinite(item.y) & ~at), np.count_nonzero(np.isfinite(item.y))
     if left < max(LEAST_SOUND * before, SHORTEST):
         raise IdentificationError(
-            f"{item.name}: y stands at the converter's end in {before - left} of {len(at)} samples; set the sensor's "
-            "range so that the whole motion lies inside it, and record again"
+            f"{item.name}: y is at the limit of the converter in {before - left} of {len(at)} samples; set the "
+            "sensor's range to cover the whole motion, and record again"
         )
     return _less(item, at), [(name, level, int(np.count_nonzero(item.y == level))) for name, level in levels]
 
 
 def _without_runs(item: Course) -> tuple[Course, list[tuple[str, list[tuple[int, int]]]]]:
-    """The course without drop-outs and held samples, and their places."""
+    """The course without drop-outs and held samples, and where these are."""
     found = []
     for what, find in (("drop-out", faults.drop_outs), ("run", faults.held)):
         runs = find(item.y, item.v)
@@ -159,7 +159,8 @@ def _without_stretches(item: Course) -> tuple[Course, list[str]]:
     """The course without the samples of y in stretches that are plainly wrong, and a sentence about each kind."""
     left, ends = without_rails(item)
     reported = [
-        f"{item.name}: {counted(number, 'sample')} of y at the converter's end, the {name} of {level:.6g}, not compared"
+        f"{item.name}: {counted(number, 'sample')} of y at the limit of the converter, the {name} of {level:.6g}, not "
+        "compared"
         for name, level, number in ends
     ]
     left, runs = _without_runs(left)
@@ -178,11 +179,11 @@ def mask_outliers(
 ) -> None:
     """Leave out isolated samples of y that lie far from the prediction of a play sum fitted to their neighbours.
 
-    This includes the start, since only the final fit decides how much of it is compared. If the drive is wrong instead,
-    it is bridged. Pulses of the drive take no part in the first fit, which then decides whether they are real: a false
-    one could make the memory seem known. The play sum is fitted by least trimmed squares (Rousseeuw and Van Driessen,
-    Data Mining and Knowledge Discovery 12, 2006): again without the samples that it misses most, as many as may be left
-    out, so that none of them attracts it.
+    This includes the start, since only the final fit decides how much of it is compared. If it is the drive that is
+    wrong, it is bridged. Pulses of the drive take no part in the first fit, which then decides whether they are real: a
+    false one could make the memory seem known. The play sum is fitted by least trimmed squares (Rousseeuw and Van
+    Driessen, Data Mining and Knowledge Discovery 12, 2006): refitted without the samples with the largest errors, as
+    many as may be left out, so that none of them attracts it.
     """
     first = start.needed([_without_pulses(_without_runs(item)[0]) for item in to_fit])
     solution, _ = pi.solve(first, wanted, floor)
@@ -214,14 +215,14 @@ def _without_pulses(item: Course) -> Course:
 
 
 def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Course:
-    """The course with its drive bridged at isolated samples that the output does not bear out.
+    """The course with its drive bridged at isolated samples that the output does not confirm.
 
-    A sample of the drive is wrong if bridging it makes the model's error there far smaller and the rest no larger: a
-    wrong drive stays in the memory, a wrong output does not. Or if the whole row is wrong, which shows in the output
-    there or after it: a real pulse would have left its memory. A pulse right before the end of a record does not help a
-    fit and looks like a fault: it would only widen the range and hide when the memory became known. With a `robust`
-    solution the largest and the least drive are also tested, if its error there is among the largest: the samples that
-    they spoil may hide them, and the range of the model ends at them.
+    A sample of the drive is wrong if bridging it makes the model's error there far smaller and no larger elsewhere: a
+    wrong drive stays in the memory, a wrong output does not. It is also wrong if the whole row is, which shows in the
+    output there or after it: a real pulse would have left its memory. A pulse right before the end of a record does not
+    help a fit and looks like a fault: it would only widen the range and hide when the memory became known. With a
+    `robust` solution the largest and the least drive are also tested, if its error there is among the largest: the
+    samples that they spoil may hide them, and the range of the model ends at them.
     """
     error = _errors(item, solution)
     far = faults.far_from_others(error, item.output_range)
@@ -245,17 +246,17 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
 
 
 def _neither(error: Array, less: Array) -> bool:
-    """Whether outputs lie further from the predictions with and without a pulse of the drive than these are apart, so
-    that neither following the drive nor lagging behind it explains them."""
+    """Whether outputs lie further from the predictions with and without a pulse of the drive than these two lie apart,
+    so that neither following the drive nor lagging behind it explains them."""
     known = np.isfinite(error)
     nearer = np.minimum(np.abs(error[known]), np.abs(less[known]))
     return bool(known.any() and (nearer > np.abs(error[known] - less[known])).all())
 
 
 def _not_remembered(error: Array, less: Array) -> bool:
-    """Whether the errors beside a pulse of the drive show a memory without the pulse, because its effect is missing.
+    """Whether the errors around a pulse of the drive show a memory without the pulse, because its effect is missing.
 
-    Judged where that effect exceeds the model's own errors without the pulse, `less`, and only if the sum is as
+    Samples count where that effect exceeds the model's own errors without the pulse, `less`, and only if the sum is as
     significant as an outlier.
     """
     own = np.abs(less[np.isfinite(less)])
@@ -272,12 +273,12 @@ def _not_remembered(error: Array, less: Array) -> bool:
 
 
 def _size(error: Array) -> float:
-    """Sum of squares of the errors that are known."""
+    """Sum of squares of the known errors."""
     return float(np.nansum(error**2))
 
 
 def _errors(item: Course, solution: pi.Solution) -> Array:
-    """Errors (N,) of a course, its whole start included."""
+    """Errors (N,) of a course, including its whole start."""
     return pi.compare(replace(item, first=0, last=len(item.v)), solution.thresholds, solution.weights).error
 
 
@@ -288,7 +289,7 @@ def _most_missed(item: Course, error: Array) -> NDArray[np.intp]:
 
 
 def _trimmed(item: Course, error: Array) -> Course:
-    """The course without its most missed samples."""
+    """The course without the samples with the largest errors."""
     y = item.y.copy()
     y[_most_missed(item, error)] = np.nan
     return replace(item, y=y)

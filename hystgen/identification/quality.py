@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 class Row:
     """One line of the fit table.
 
-    `part`: 'fit', 'held out' or 'all'; `model`: 'written' or 'trial'; `samples` were compared, `ignored` were not;
-    `rms`, `max`: errors in output units with a free offset per record; `output_range`: the largest compared
+    `part`: 'fit', 'held out' or 'all'; `model`: 'written' or 'trial'; `samples`: number compared; `ignored`: number not
+    compared; `rms`, `max`: errors in output units with a free offset per record; `output_range`: the largest compared
     peak-to-peak output of one of the row's records, to which `rms_percent` and `max_percent` refer; both rows of a
     trial have the larger one.
     """
@@ -43,7 +43,7 @@ class Row:
 
     @classmethod
     def of(cls, part: str, model: str, errors: Sequence[Errors]) -> Row:
-        """The row for the errors of some courses."""
+        """The row that summarises the errors of some courses."""
         joined = np.concatenate([e.error for e in errors])
         joined = joined[np.isfinite(joined)]
         return cls(
@@ -77,7 +77,7 @@ class Row:
 
 
 WORD_COLUMNS = (0, 1, 8)
-"""Columns of the table that hold words."""
+"""Text columns of the table."""
 
 
 def cells(rows: Sequence[Row], unit: str) -> list[tuple[str, ...]]:
@@ -116,14 +116,14 @@ def table(rows: Sequence[Row], unit: str, remarks: Sequence[str]) -> str:
 
 
 REDRAWS = 1000
-"""Fits with random signs of the residuals' blocks: an end of a 95 % interval then scatters by 0.08 standard deviations,
-sqrt(0.025 * 0.975/1000) over the normal density there."""
+"""Fits with random signs of the residuals' blocks: the ends of a 95 % interval then scatter by 0.08 standard
+deviations, sqrt(0.025 * 0.975/1000) over the normal density there."""
 
 TAILS = (0.025, 0.975)
 """Quantiles of 95 % intervals."""
 
 FEWEST_BLOCKS, MOST_BLOCKS = 40, 4000
-"""Fewest blocks, however long the residuals' memory, and most, since more do not improve the intervals."""
+"""Fewest blocks, however long the correlation of the residuals, and most, since more do not improve the intervals."""
 
 MANY_WEIGHTS = 100
 """With more weights than this, zero weights stay zero in every redraw, so that one factorisation serves all."""
@@ -132,19 +132,19 @@ MEMORY = 4.0
 """Length of a block in correlation times of the residuals."""
 
 SEED = 1
-"""Of the random numbers, so that the same records give the same intervals."""
+"""Seed of the random numbers, so that the same records give the same intervals."""
 
 UNKNOWN = 1e-9
 """Singular values below this share of the largest belong to directions that the records do not determine, in which
-nothing is redrawn: seven digits are then the same with every linear algebra library, of which four are shown."""
+nothing is redrawn: seven digits are then the same with every linear algebra library, and four are shown."""
 
 
 @dataclass(frozen=True)
 class Intervals:
-    """95 % intervals, and the redraws behind them.
+    """95 % intervals, and the redraws from which they come.
 
     `weights`: low and high end for each; `width`: for the widest loop; `held_out`: for the held-out rms error, None if
-    nothing was held out; `redrawn`: the weights of every redraw (REDRAWS, n+1); `block`: samples in a block.
+    nothing was held out; `redrawn`: the weights of every redraw (REDRAWS, n+1); `block`: samples per block.
     """
 
     weights: tuple[tuple[float, float], ...]
@@ -163,8 +163,8 @@ class Intervals:
 def intervals(fitted: Fitted, courses: Sequence[Course], errors: Sequence[Errors], held: Sequence[Errors]) -> Intervals:
     """Intervals of a fit to `courses` (drive as measured) with those `errors`; `held`: errors of held-out records.
 
-    The residuals of a hysteresis model are coloured: what it misses comes back at every reversal. They are therefore
-    not redrawn one by one but in blocks longer than their correlation. A block enters the normal equations only by its
+    The residuals of a hysteresis model are coloured: model errors come back at every reversal. They are therefore not
+    redrawn one by one but in blocks longer than their correlation. A block enters the normal equations only by its
     score `X_b^T e_b`; random signs of all scores (a dependent wild bootstrap; Shao, Journal of the American Statistical
     Association 105, 2010, 218-235) redraw the record, and the weights of each redraw are found under the constraints of
     the fit. The cost does not grow with the number of samples.
@@ -183,7 +183,7 @@ def intervals(fitted: Fitted, courses: Sequence[Course], errors: Sequence[Errors
     )
     random = np.random.default_rng(SEED)
     signs = random.integers(0, 2, (REDRAWS, len(scores))) * 2.0 - 1.0
-    lost = min(unknowns / len(scores), 0.5)  # a fit takes away some of the scatter of the residuals
+    lost = min(unknowns / len(scores), 0.5)  # a fit removes some of the scatter of the residuals
     moved = signs @ scores / np.sqrt(1.0 - lost)
     target = triangle[:, : len(p)] @ p
     back, *_ = np.linalg.lstsq(triangle.T, moved.T, rcond=UNKNOWN)
@@ -299,7 +299,7 @@ def about_model(
     if solution.reach < SMALL_REACH * (high - low):
         reported.append(
             f"the records show little hysteresis: no play above {solution.reach:.3g} moves enough in them; "
-            "record full cycles, several times, or give --history"
+            "record several full cycles, or give --history"
         )
     if isinstance(wanted, tuple):
         beyond = [r for r in wanted if r > solution.reach * (1.0 + 1e-9)]
@@ -307,7 +307,7 @@ def about_model(
             above = f" above {solution.reach:.6g}"
             reported.append(
                 f"{counted(len(beyond), f'threshold{above} hardly moves', f'thresholds{above} hardly move')} in these "
-                "records; do not trust the weights there for larger drives"
+                "records; do not trust their weights for larger drives"
             )
     outputs = [y[np.isfinite(y)] for y in (item.y[item.first : item.last] for item in compared)]
     spread = sum(float(np.sum((y - np.mean(y)) ** 2)) for y in outputs) / own.samples
@@ -330,8 +330,9 @@ def about_inverse(p: NDArray[np.float64], made: Weights) -> list[str]:
         ]
     if p[0] == 0.0:
         return [
-            "p_0 is 0: after each reversal the output stands still (series backlash). The model has no inverse and is "
-            "of use forward only. If the actuator has no backlash, record more slowly or with more samples per second"
+            "p_0 is 0: after each reversal the output does not move (series backlash). The model has no inverse and "
+            "can only be used forward. If the actuator has no backlash, record more slowly or with more samples per "
+            "second"
         ]
     if np.sum(p) > AMPLIFIES * p[0]:
         return [
@@ -363,11 +364,11 @@ def repeated(to_fit: Sequence[Record], held: Sequence[Record]) -> list[str]:
         for other in to_fit[: min(k, len(to_fit))]:
             if np.array_equal(record.v, other.v) and np.array_equal(np.asarray(record.y), np.asarray(other.y)):
                 if k < len(to_fit):
-                    reported.append(f"{record.name}: fitted twice, as {other.name} too; leave one of them out")
+                    reported.append(f"{record.name}: fitted twice, also as {other.name}; leave one of them out")
                 else:
                     alike = "" if record.name == other.name else f", as {other.name}"
                     reported.append(
-                        f"{record.name}: held out, but also fitted{alike}, so that it judges nothing; leave it out of "
+                        f"{record.name}: held out, but also fitted{alike}, so it judges nothing; leave it out of "
                         "one of the two"
                     )
                 break

@@ -1,11 +1,11 @@
-"""From records to a small triangular system, all that a fit needs of any number of samples.
+"""From records to a small triangular system, which is all that a fit needs however many samples there are.
 
 The regressors of a PI model are its plays, `y = sum p_i play_(r_i)[v] + offset`. They are formed a few thousand
 samples at a time and reduced by QR (a sequential TSQR; Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci. Comput. 34,
 2012, A206-A239), so that memory does not grow with samples times thresholds.
 The column of ones comes first: the rows below its own are the system with the offset projected out exactly.
 
-While the same plays follow a move, each of them is the drive plus a constant, and the others stand still: all plays are
+While the same plays follow a move, each of them is the drive plus a constant, and the others do not move: all plays are
 straight lines over the drive. However many samples such a segment has, two rows hold all that least squares can learn
 about its plays, and one number the part of y that no play can follow.
 """
@@ -26,14 +26,14 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 CHUNK = 8192
-"""Samples that are reduced at a time."""
+"""Number of samples reduced at a time."""
 
 BLOCKED = 64
-"""Columns that the linear algebra library gets work space to treat at a time."""
+"""Number of columns for which the linear algebra library gets work space at a time."""
 
 AS_FAR = 1e-3
 """[share of its range] A drive that comes within this of its largest or least value counts as having been there: four
-codes of a 12-bit converter. The error for plays that reach further is no more than this share of the motion."""
+codes of a 12-bit converter. The error for plays with larger thresholds is no more than this share of the motion."""
 
 FOLDS = 4
 """Consecutive blocks of each record for the blocked validation."""
@@ -44,8 +44,8 @@ class Start:
     """A start memory found by a fit (`start`).
 
     `turns`: drive values that lead virgin plays to it; `uncertainty`: half the width of the 95 % interval of its
-    contribution to the output at the first sample, output units; `once`: threshold of a play that moves from it and is
-    so wide that it hardly moves back in the record, None if there is none.
+    contribution to the output at the first sample, output units; `once`: threshold of a play that moves away from it
+    and is so wide that it hardly moves back in the record, None if there is none.
     """
 
     turns: tuple[float, ...]
@@ -57,11 +57,11 @@ class Start:
 class Course:
     """The samples of one record that take part: drive and output from the record's start, compared over [first, last).
 
-    The drive before `first` also runs through the plays, as it does at samples whose `y` is NaN, which are not
-    compared. `history`: drive values visited before the record; None if they are not known, and `start` is then the
-    memory found instead, if one was searched for. `begin`: first sample that may be compared, apart from the start
-    memory. `origin`: index of the record it is part of, and of its first sample there. `stretches`: samples whose y was
-    left out as part of a stretch, not as isolated; None for none.
+    The drive before `first` also runs through the plays, and so does the drive at samples whose `y` is NaN, which are
+    not compared. `history`: drive values visited before the record; None if unknown, and `start` is then the estimated
+    memory, if one was searched for. `begin`: first sample that may be compared, regardless of the start memory.
+    `origin`: index of the record it is part of, and of its first sample there. `stretches`: samples whose y was left
+    out as part of a stretch, not as isolated; None if there are none.
     """
 
     name: str
@@ -77,32 +77,32 @@ class Course:
 
     @property
     def visited(self) -> tuple[float, ...] | None:
-        """Drive values that lead virgin plays to the start memory, known or found; None for neither."""
+        """Drive values that lead virgin plays to the start memory, known or found; None if there is neither."""
         return self.start.turns if self.history is None and self.start is not None else self.history
 
     @property
     def used(self) -> int:
-        """Number of samples compared."""
+        """Number of compared samples."""
         return int(np.count_nonzero(np.isfinite(self.y[self.first : self.last])))
 
     @property
     def compared(self) -> NDArray[np.intp]:
-        """Indices of the samples compared."""
+        """Indices of the compared samples."""
         return self.first + np.flatnonzero(np.isfinite(self.y[self.first : self.last]))
 
     @property
     def drive_range(self) -> tuple[float, float]:
-        """Least and largest drive of the samples compared; if there are none, of all from `first` to `last`."""
+        """Least and largest drive of the compared samples; if there are none, of all from `first` to `last`."""
         part = self.v[self.compared] if self.used else self.v[self.first : self.last]
         return float(part.min()), float(part.max())
 
     @property
     def output_range(self) -> float:
-        """Peak-to-peak output of the samples compared."""
+        """Peak-to-peak output of the compared samples."""
         return float(np.ptp(self.y[self.compared])) if self.used else 0.0
 
     def resettled(self, largest: float) -> Course:
-        """The course with only so much of its start ignored as a largest threshold requires."""
+        """The course, ignoring only as much of its start as a largest threshold requires."""
         first = 0 if self.visited is not None else settled(self.v[: self.last], largest)
         return replace(self, first=max(first, self.begin))
 
@@ -122,17 +122,17 @@ def start_states(v: Array, history: Sequence[float] | None, thresholds: Array) -
 
 @functools.lru_cache(maxsize=256)
 def _behind(history: tuple[float, ...], thresholds: bytes) -> Array:
-    """Virgin plays after a history; cached, since a search asks for the same few again and again."""
-    r = np.frombuffer(thresholds).copy()  # writable: for a read-only array the plays would be compiled once more
+    """Virgin plays after a history; cached, since a search requests the same few again and again."""
+    r = np.frombuffer(thresholds).copy()  # writable: the plays would be compiled again for a read-only array
     return operators.plays(history, r, 0.0)[:, -1]
 
 
 def settled(v: Array, reach: float) -> int:
-    """First sample at which the plays depend on an unknown start memory only by an offset.
+    """First sample from which an unknown start memory affects the plays only by an offset.
 
     Once the drive has swept `2 reach`, every play up to threshold `reach` is exact. Once it has visited its own largest
-    and least value, plays that reach further never move again in this record: they are constant. Whichever comes first.
-    Values within `AS_FAR` of each other count as equal; otherwise noise of the drive would choose among turns.
+    and least value, plays with larger thresholds never move again in this record: they are constant. Whichever comes
+    first. Values within `AS_FAR` of each other count as equal; otherwise noise of the drive would decide between turns.
     """
     extremes = max(_reached(v), _reached(-v))
     swept = np.maximum.accumulate(v) - np.minimum.accumulate(v) >= 2.0 * reach
@@ -148,10 +148,10 @@ def _reached(v: Array) -> int:
 
 
 def travel(course: Course, threshold: float) -> float:
-    """Peak-to-peak movement of one play over the samples compared.
+    """Peak-to-peak movement of one play over the compared samples.
 
-    If they begin before the memory of that play is known, no more counts than it would move in a settled loop over the
-    range of the drive: the rest depends on the start, which is at best estimated.
+    If they begin before the memory of that play is known, it counts at most as much as it would move in a settled loop
+    over the range of the drive: the rest depends on the start, which is at best estimated.
     """
     start = start_states(course.v, course.visited, np.array([threshold]))[0]
     moved = operators.play(course.v[: course.last], threshold, float(start))[course.first :]
@@ -162,7 +162,7 @@ def travel(course: Course, threshold: float) -> float:
 
 
 def ways(x: Array) -> tuple[float, float]:
-    """The longest ways up and down that a signal goes, regardless of turns in between."""
+    """The longest moves up and down of a signal, regardless of turns in between."""
     return float(np.max(x - np.minimum.accumulate(x))), float(np.max(np.maximum.accumulate(x) - x))
 
 
@@ -254,7 +254,7 @@ def triangle(*parts: Array) -> Array:
 
 @dataclass(frozen=True)
 class Reflected:
-    """A table reduced to its triangular factor, with the reflections that did it, to be applied to later columns."""
+    """A table reduced to its triangular factor, with the reflections used, to be applied to later columns."""
 
     triangle: Array
     reflections: Array
@@ -329,10 +329,10 @@ def _close_segment(
 
 @jit
 def _segment_rows(v: Array, y: Array, thresholds: Array, states: Array, sums: Array, out: Array) -> int:
-    """Write the rows of the samples whose y is a number into `out`, none if it has no room; return their number.
+    """Write the rows of the samples whose y is a number into `out`, or none if it has no room; return their number.
 
-    Updates `states` of the plays. `sums`: room for seven numbers. The memory is admissible: if a play stands still, so
-    do all larger ones.
+    Updates `states` of the plays. `sums`: room for seven numbers. The memory is admissible: if a play does not move,
+    nor do any larger ones.
     """
     wanted = len(out) > 0
     sums[:] = 0.0

@@ -1,4 +1,4 @@
-"""Settings that a fit takes over from the parameter file that it replaces: everything that records do not determine."""
+"""Settings that a fit keeps from the parameter file it replaces: everything that records do not determine."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ MEASURED = {"drive_lsb": "input", "output_lsb": "output", "compensation.max_rate
 class Settings:
     """Settings of an older parameter file.
 
-    `values`: its values for `KEPT_KEYS`; `name` and `units`: used where the user gives none, and records are converted
-    to the units; `effects`: names of its effects, which are dropped with its weights; `problem`: why nothing could be
-    read.
+    `values`: its values for `KEPT_KEYS`; `name` and `units`: used if the user gives none, and records are converted to
+    these units; `effects`: names of its effects, which are dropped along with its weights; `problem`: why nothing could
+    be read.
     """
 
     file: str = ""
@@ -46,25 +46,25 @@ class Settings:
         return replace(fit, parameters=make_parameters(data))
 
     def sentences(self, fit: Fit) -> list[str]:
-        """Sentences about settings kept and left out; `fit`: without these settings."""
+        """Sentences about settings kept and dropped; `fit`: without these settings."""
         said = []
         if self.problem:
-            said.append(f"{self.file}: nothing of what was there is kept, it is not a parameter file: {self.problem}")
+            said.append(f"{self.file}: nothing in the old file is kept, it is not a parameter file: {self.problem}")
         names = [key for key in KEPT_KEYS if key in self.values]
         if self._kept(fit):
             names.insert(0, "units")
         if self.name == fit.parameters.name:
             names.insert(0, "name")
         if names:
-            said.append(f"{self.file}: {', '.join(names)} kept from the file that was there")
+            said.append(f"{self.file}: {', '.join(names)} kept from the existing file")
         _, lost = self._emit(fit)
         if lost:
             keys = ", ".join(f"emit.{key}" for key in lost)
-            said.append(f"{self.file}: {keys} left out, given in other units than the model now has")
+            said.append(f"{self.file}: {keys} left out, since they are in units other than the model's")
         if self.effects:
             said.append(
-                f"{self.file}: the effects of the file that was there ({', '.join(self.effects)}) are left out, they "
-                "were fitted with its weights; find them anew with hystgen diagnose"
+                f"{self.file}: the effects of the existing file ({', '.join(self.effects)}) are left out, since "
+                "they were fitted with its weights; find them again with hystgen diagnose"
             )
         return said
 
@@ -86,11 +86,11 @@ class Settings:
                 lost.append(path)
                 del holder[last]
             elif not how.same:
-                holder[last] = float(f"{float(how.times) * float(holder[last]):.12g}")  # without rounding's last digits
+                holder[last] = float(f"{float(how.times) * float(holder[last]):.12g}")  # without rounding noise
         return emit, lost
 
     def _units(self, fit: Fit) -> dict[str, str]:
-        """Units of the file that the fit has none for."""
+        """Units in the file that the fit lacks."""
         units = fit.parameters.units.model_dump()
         return {key: unit for key, unit in (self.units or {}).items() if unit and not units[key]}
 

@@ -1,4 +1,4 @@
-"""The start memory of records whose history is not known, estimated together with the weights.
+"""The start memory of records with an unknown history, estimated together with the weights.
 
 A memory is admissible if `s(0) = v_0` and it changes over the thresholds by no more than these do:
 `s_i = s_(i-1) + d_i (r_i - r_(i-1))` with every `d_i` from -1 to 1. Until the drive moves it for the first time, a play
@@ -30,27 +30,27 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 STARTS, UNLIKE = 8, 3.0
-"""Fewest samples of a start, and the ratio of its rms error to that of the rest above which the memory given or found
-for it is not that of the actuator."""
+"""Fewest samples of a start, and the ratio of its rms error to that of the rest above which the given or estimated
+memory is not that of the actuator."""
 
 ROUNDING = 1e-6
 """Share of the output range below which errors are only rounding, as in records computed without noise."""
 
 LEAST_KNOWN = 0.5
-"""If at least this share of a record's samples has a known memory, those before are left out: a start memory fitted to
-them would flatter the model that it judges. This rejects none of 56 simulated records without a history, with a median
-held-out error of 1.00 times that with the true history; 0.25 makes it 1.02."""
+"""If at least this share of a record's samples has a known memory, the samples before are left out: a start memory
+fitted to them would flatter the model that it judges. This rejects none of 56 simulated records without a history, with
+a median held-out error of 1.00 times that with the true history; 0.25 makes it 1.02."""
 
 PLAYS = 12
 """Thresholds over which start memories are searched for: the middle of the numbers that default fits choose from. Given
-thresholds are taken instead if they are no more than this and the records move them: time grows with the cube of their
+thresholds are used instead if they are no more than this and the records move them: time grows with the cube of their
 number."""
 
 SPREAD = math.sqrt(3.0)
 """Reciprocal of the standard deviation of a slope that is uniform from -1 to 1."""
 
 NORMAL = 1.96
-"""Standard deviations on either side that hold 95 % of a normal distribution."""
+"""Half the width, in standard deviations, of the interval that holds 95 % of a normal distribution."""
 
 ZIGZAGS = 4
 """Pairs of turns that approximate a slope between two thresholds, with an error of at most 1/16 of their distance."""
@@ -59,13 +59,13 @@ TOGETHER = 6
 """Most courses that share weights in a search: its cost grows with the cube of their number."""
 
 ROUNDS = 2
-"""Searches; the errors of the first one set the weight of the prior in the next."""
+"""Number of searches; the errors of the first one set the weight of the prior in the next."""
 
 
 def estimated(
     courses: Sequence[Course], stages: Sequence[Stage] = (), wanted: int | tuple[float, ...] | None = None
 ) -> list[Course]:
-    """The courses compared from their beginning, with a start memory for those whose history is not known.
+    """The courses compared from their beginning, with a start memory for those with an unknown history.
 
     `stages`: the front of the plays; `wanted`: their thresholds, for which the memory is then exact, or any other value
     of that option. A start stays ignored if its errors are far larger than those after it (a transient), or if its
@@ -103,8 +103,8 @@ def needed(
 ) -> list[Course]:
     """The courses, with a start memory (`estimated`) for those of which too little could be compared without one.
 
-    `least`: share of the samples of a course that is enough; `largest`: threshold above which plays hardly move, whose
-    memory is left out of account where too little could be compared with it and no start memory is found.
+    `least`: share of the samples of a course that is enough; `largest`: threshold above which plays hardly move; their
+    memory is ignored if including it would leave too little to compare and no start memory is found.
     """
     known = [_enough(item, least, largest) for item in courses]
     short = [lacking(item, least) for item in courses]
@@ -125,11 +125,11 @@ def of_model(
     least: float = LEAST_KNOWN,
     largest: float = math.inf,
 ) -> list[Course]:
-    """Courses by which a model is judged: its weights stay, and the starts of courses not `lacking` are ignored.
+    """Courses on which a model is judged: its weights stay fixed, and the starts of courses not `lacking` are ignored.
 
     `least`, `largest`: as in `needed`.
     """
-    if len(thresholds) == 1:  # without plays there is nothing to know
+    if len(thresholds) == 1:  # without plays there is nothing to estimate
         return [replace(item, start=Start((), 0.0), first=item.begin) for item in courses]
     begun = [_enough(item, least, largest) for item in courses]
     places = [k for k, item in enumerate(begun) if lacking(item, least)]
@@ -149,7 +149,8 @@ def unknown(item: Course, largest: float = math.inf) -> Course:
 
 
 def _enough(item: Course, least: float, largest: float) -> Course:
-    """The course from where every play is known, or, if that leaves too little, those up to the threshold `largest`."""
+    """The course from where every play is known or, if that leaves too little, from where those up to the threshold
+    `largest` are."""
     exact = unknown(item)
     return exact if exact.used >= least * _whole(item).used else unknown(item, largest)
 
@@ -172,8 +173,9 @@ def _started(
 ) -> list[Course]:
     """The courses with the start memories that were found, except for transients.
 
-    `once`: threshold of a play that joins those of `r` (n+1,) if the error is then clearly smaller. It stands for all
-    that the drive moves once, on its way beyond where it has been: an actuator that came from a wider range has them.
+    `once`: threshold of a play added to those of `r` (n+1,) if that makes the error clearly smaller. It represents
+    everything that the drive moves once, on its way beyond where it has been: an actuator that came from a wider range
+    has such plays.
     """
     inner = [joint.through_front(item, stages) for item in courses]
     search = _Search.of(inner, r, weights)
@@ -223,7 +225,7 @@ def _transient(item: Course, settled: int, r: Array, p: Array) -> bool:
 
 
 def memory_of(slopes: Array, r: Array) -> Array:
-    """States (n+1,) less the first drive, from the slopes (n,) of a memory over the thresholds (n+1,)."""
+    """States (n+1,) minus the first drive, from the slopes (n,) of a memory over the thresholds (n+1,)."""
     return np.concatenate([[0.0], np.cumsum(slopes * np.diff(r))])
 
 
@@ -302,7 +304,8 @@ class _System:
         return [np.zeros(n), np.diff(virgin) / np.diff(self.r), *turned]
 
     def rows(self, slopes: Array, p: Array) -> Array:
-        """Rows `[plays (n+1), change with the slopes.., y]` about these slopes and weights, the offset projected out.
+        """Rows `[plays (n+1), change with the slopes.., y]` linearised about these slopes and weights, the offset
+        projected out.
 
         A play that has not moved yet is a constant; once it has moved, the output does not depend on its start.
         """
@@ -323,7 +326,7 @@ class _System:
         return table[1:, 1:]
 
     def left(self, slopes: Array, p: Array) -> float:
-        """Root of the sum of squares that a memory and weights leave; no table of all plays is reduced for it."""
+        """Root of the sum of squares left by a memory and weights; no table of all plays is reduced for it."""
         item, begin = self.item, min(self.item.begin, self.settled)
         states = float(item.v[0]) + memory_of(slopes, self.r)
         output = operators.play_sum(item.v[: self.settled], self.r, states, p)
@@ -357,7 +360,7 @@ class _Search:
 
     @classmethod
     def of(cls, courses: Sequence[Course], r: Array, known: Array | None) -> _Search:
-        """The search for the courses, as plays of thresholds r (n+1,) see them, from their beginning."""
+        """The search for the courses, as seen by plays of thresholds r (n+1,), from their beginning."""
         return cls(tuple(_System.of(_whole(item), r) for item in courses), r, known)
 
     @property
@@ -401,14 +404,14 @@ class _Search:
         return np.concatenate(shape)
 
     def _left(self, system: _System, slopes: Array) -> float:
-        """What a memory leaves of one course, with the best weights for it alone unless they are known."""
+        """The error that a memory leaves on one course, with the best weights for it alone unless they are known."""
         if self.known is not None:
             return system.left(slopes, self.known)
         alone = replace(self, systems=(system,))
         return alone._linear(0.0, slopes, alone._first_weights(slopes)).rms
 
     def _first_weights(self, shape: Array) -> Array:
-        """Weights that fit best for some slopes."""
+        """Weights that fit best for given slopes."""
         if self.known is not None:
             return np.empty(0)
         system = self._whole(shape, np.zeros(len(self.r)), 0.0)

@@ -1,6 +1,6 @@
-"""From plain data to checked parameters: every problem at once, each in one plain sentence and at its place.
+"""From plain data to checked parameters: every problem at once, each in one plain sentence and at its position.
 
-First the structure (pydantic's findings, reworded), then how values fit together, for every part whose
+It checks the structure first (pydantic's findings, reworded), then how values fit together, for every part whose
 structure is sound.
 """
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hystgen.effects import Effect
 
 Shapes = tuple["type[Effect]", ...]
-"""Classes of one name."""
+"""Classes that share a name."""
 
 _FRONT = effects.CATALOGUE.index("saturation")
 
@@ -51,9 +51,9 @@ _PLACES: dict[str, type[BaseModel]] = {
     "in emit": schema.EmitDefaults,
     "in emit.compensation": schema.Compensation,
 }
-"""Where a key belongs that stands at another place."""
+"""Where a misplaced key belongs."""
 
-# How a key is written, where it is missing.
+# How a key is written, for messages about a missing one.
 _WRITTEN = {
     "hystgen": "hystgen: 1",
     "name": "name: stage_x",
@@ -74,10 +74,10 @@ _WRITTEN = {
 def check(
     data: Mapping[str, Any], document: Document | None = None, user: Mapping[str, Shapes] | None = None
 ) -> tuple[schema.Parameters | None, list[Problem]]:
-    """Parameters of `data` (lists as tuples), or None and every problem.
+    """Parameters made from `data` (lists as tuples), or None, and every problem.
 
-    `document` gives the positions and what reading has refused already; its poisoned values are not judged again.
-    `user`: classes of the user's own effects by name.
+    `document` gives the positions and the values already refused while reading, which are not checked again. `user`:
+    classes of the user's own effects by name.
     """
     checker = _Checker(data, document, user or {})
     parameters = checker.structure()
@@ -114,7 +114,7 @@ class _Checker:
     # Bookkeeping ------------------------------------------------------------------------------------------
 
     def add(self, path: Path, message: str, at_key: bool = False) -> None:
-        """Note a problem of the value (or key) at `path`, or, if it is missing, of what should hold it."""
+        """Note a problem with the value (or key) at `path` or, if it is missing, with what should hold it."""
         line, column = self.document.position(path, at_key) if self.document else (None, None)
         self.problems.append(Problem(path_text(path), message, line, column))
 
@@ -124,7 +124,7 @@ class _Checker:
         self._above_bad.update(path[:n] for n in range(len(path)))
 
     def sound(self, path: Path) -> bool:
-        """Whether the structure is sound at `path`, below it and in what holds it."""
+        """Whether the structure is sound at `path`, below it and in everything that holds it."""
         return path not in self._above_bad and not self.judged(path)
 
     def judged(self, path: Path) -> bool:
@@ -161,7 +161,7 @@ class _Checker:
         return parameters
 
     def _path(self, location: Sequence[str | int]) -> Path:
-        """Pydantic's location as a path in the data: without union members, and without 0 for a lone stage."""
+        """Pydantic's location as a path in the data: without union members, and without 0 for a single stage."""
         path: list[str | int] = []
         value: Any = self.data
         for part in location:
@@ -179,13 +179,13 @@ class _Checker:
     def _structural(self, path: Path, kind: str, context: Mapping[str, Any], said: str) -> None:
         value = self.at(path)
         key = _last_key(path)
-        if kind.startswith("union_tag") and isinstance(value, Mapping):  # a stage of neither kind
+        if kind.startswith("union_tag") and isinstance(value, Mapping):  # a stage of unknown kind
             path, value, key = (*path, "kind"), value.get("kind"), "kind"
             kind = "literal_error" if "kind" in self.at(path[:-1]) else "missing"
             if self.judged(path):
                 return
         if kind == "too_short" and len(value) >= context.get("min_length", 0):
-            return  # too few sound values, each unsound one being reported itself
+            return  # too few sound values, after each unsound one has been reported
         self._mark(path)
         effect = self._classes.get(path[:3])
         hint = f" ({effect.hint})" if effect and effect.hint else ""
@@ -226,7 +226,7 @@ class _Checker:
         return list(part.model_fields)
 
     def _empty_values(self) -> None:
-        """Keys without a value, which pydantic lets pass where None is the default."""
+        """Keys without a value, which pydantic accepts if None is the default."""
         todo: list[tuple[Path, Any]] = [((), self.data)]
         while todo:
             path, value = todo.pop()
@@ -241,7 +241,7 @@ class _Checker:
     # How values fit together ------------------------------------------------------------------------------
 
     def fit(self) -> None:
-        """Everything that pydantic does not judge, on the parts whose structure is sound."""
+        """Everything that pydantic does not check, on the parts whose structure is sound."""
         name = self.get("name")
         if name is not None and (problem := name_problem(name)):
             self.add(("name",), problem)
@@ -301,7 +301,7 @@ class _Checker:
         state = self.get(*path, "initial_state")
         if isinstance(state, tuple) and len(state) != count:
             what = f"has {_entries(len(state))} for {count} thresholds (r_0 included)"
-            self.add((*path, "initial_state"), f"{what}; write one number, or one a threshold")
+            self.add((*path, "initial_state"), f"{what}; write one number, or one per threshold")
 
     def _same_length(self, path: Path, key: str, reference: str) -> None:
         first, second = self.at((*path, key)), self.get(*path, reference)
@@ -422,14 +422,14 @@ class _Checker:
             self._shaped(path, effect, shapes)
         elif given.startswith("user:"):
             there = f", only {', '.join(map(printable, self.user))}" if self.user else ""
-            self.add(name, f"{printable(given)} is defined in no file given{there}; give its file (--effects)")
+            self.add(name, f"{printable(given)} is not defined in any given file{there}; give its file (--effects)")
         else:
             names = (*EFFECT_NAMES, *self.user)
             advice = _nearest(given, names) or f"known are {', '.join(names)}"
             self.add(name, f"unknown effect {printable(given)}; {advice}")
 
     def _shaped(self, path: Path, effect: Mapping[str, Any], shapes: Shapes) -> None:
-        """An effect whose name is known: the class of its shape, its own checks, whether it stands there already."""
+        """An effect with a known name: the class of its shape, its own checks, and whether it is there already."""
         chosen, selector = shapes[0], shapes[0].selector
         if selector in effect and selector in chosen.model_fields:
             if self.judged((*path, selector)):
@@ -455,14 +455,14 @@ class _Checker:
         if chosen.moves_plays():
             first = self._mover = self._mover or (made.name, path_text(path))
             if first != (made.name, path_text(path)):
-                said = f"says how the plays move, as {printable(first[0])} does (in {first[1]}); keep one of them"
+                said = f"says how the plays move, as does {printable(first[0])} does (in {first[1]}); keep one of them"
                 self.add((*path, "name"), f"{printable(made.name)} {said}")
         for keys, message in made.problems(self._thresholds()):
             self.add((*path, *keys), message)
         self.effects.append(made)
 
     def _thresholds(self) -> tuple[float, ...] | None:
-        """The model's thresholds, None where they are not sound."""
+        """The model's thresholds, None if they are not sound."""
         if self.discretisation is not None:
             return tuple(self.discretisation.thresholds)
         found = self.get("model", "pi", "thresholds")
@@ -470,7 +470,7 @@ class _Checker:
 
 
 def _literals(shape: type[Effect], key: str) -> tuple[str, ...]:
-    """The words that a shape of an effect goes by."""
+    """The words by which a shape of an effect is called."""
     found: Any = shape.model_fields[key].annotation
     words: tuple[str, ...] = found.__args__
     return words
@@ -493,7 +493,7 @@ def _entries(count: int) -> str:
 
 
 def _nearest(word: str, known: Sequence[str]) -> str:
-    """`did you mean ..?` if one of the known words is near, or several are equally near; else nothing."""
+    """`did you mean ..?` if one of the known words is near, or several are equally near; otherwise empty."""
     near = difflib.get_close_matches(word.lower(), known, len(known), 0.6) if len(word) <= 60 and known else []
     shares = [difflib.SequenceMatcher(None, each, word.lower()).ratio() for each in near]
     nearest = [each for each, share in zip(near, shares, strict=True) if share == shares[0]]
@@ -509,7 +509,7 @@ def _choice(value: Any, known: Sequence[Any]) -> str:
 
 
 def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said: str) -> str:
-    """A finding of pydantic in the words of this package."""
+    """A finding of pydantic in our own words."""
     wrong = {
         "float_type": "must be a number",
         "float_parsing": "must be a number",

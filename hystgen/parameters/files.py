@@ -1,7 +1,7 @@
 """Parameter files: read and check (every problem at once), write, and identify by a hash.
 
-`load_parameters`, `parse_parameters` and `make_parameters` are the ways to checked `Parameters`; whatever they
-return can be written by `dump_parameters` and read again to the same value.
+`load_parameters`, `parse_parameters` and `make_parameters` are the ways to get checked `Parameters`; `dump_parameters`
+can write whatever they return, and reading it again gives the same value.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def parameter_data(path: str | os.PathLike[str]) -> Mapping[str, Any]:
 
 
 def located(path: str | os.PathLike[str], problems: Iterable[tuple[Path, str]]) -> ParameterError:
-    """Problems found later with values of a file that was read before, at their positions in it."""
+    """Problems found later in the values of a file already read, at their positions in it."""
     file = os.fspath(path)
     try:
         document = read(_text(file).removeprefix("\ufeff"))
@@ -134,10 +134,10 @@ def parse_parameters(text: str, file: str = "<string>", user_effects: Sequence[t
 def make_parameters(
     data: Mapping[str, Any], file: str = "<data>", user_effects: Sequence[type[Effect]] = ()
 ) -> Parameters:
-    """The checked parameters in plain data of the file's form (lists or tuples; None is as if left out).
+    """The checked parameters from plain data in the form of the file (lists or tuples; None means left out).
 
-    An entry of `effects` may be an `Effect` as it is.
-    Raises ParameterError; its problems have no positions, `file` names the data in messages.
+    An entry of `effects` may also be an `Effect`. Raises ParameterError; its problems have no positions, `file` names
+    the data in messages.
     """
     parameters, problems = check(_plain(data), user=_by_name(user_effects))
     if parameters is None:
@@ -171,7 +171,7 @@ def _plain(value: Any) -> Any:
 
 
 def _data(parameters: Parameters) -> dict[str, Any]:
-    """The parameters in the file's form, in its order, with every default filled in but those of `Effect.later`."""
+    """The parameters in the file's form and order, with every default filled in except those of `Effect.later`."""
     data = parameters.model_dump()
     pi = data["model"]["pi"]
     for key in ("thresholds", "weights") if pi["density"] else ("density",):
@@ -184,11 +184,11 @@ def _data(parameters: Parameters) -> dict[str, Any]:
 
 
 def canonical_json(parameters: Parameters) -> str:
-    """The one text of these parameters: JSON with sorted keys, defaults filled in, shortest round-trip numbers.
+    """The canonical text of these parameters: JSON with sorted keys, defaults filled in, shortest round-trip numbers.
 
-    A density stands as it was given, not as the plays made from it. What came later, `emit.optimize`,
-    `emit.compensation`, `not_separable` and keys of effects, stands there only where it is not the default, so that
-    files without it keep their hash.
+    A density appears as given, not as the plays made from it. Later additions, `emit.optimize`, `emit.compensation`,
+    `not_separable` and keys of effects, appear only if they differ from the default, so that files without them keep
+    their hash.
     """
     data = _data(parameters)
     if parameters.emit.optimize == "auto":
@@ -213,9 +213,9 @@ def parameters_sha256(parameters: Parameters) -> str:
 def dump_parameters(parameters: Parameters, comments: Mapping[str, str] | None = None, header: str = "") -> str:
     """A YAML text that reads back to exactly these parameters; defaults are left out.
 
-    `comments` maps dotted paths of keys (`model.pi.weights`) to a comment that is set above the key, which is
-    then written even at its default; `header` is set above everything. Both may have several lines. Raises
-    ValueError for a comment on no key of the file's block form.
+    `comments` maps dotted paths of keys (`model.pi.weights`) to a comment that is set above the key, which is then
+    written even at its default; `header` is set above everything. Both may span several lines. Raises ValueError for a
+    comment on a key that is not in the file's block form.
     """
     notes = dict(comments or {})
     lines = _comment(header, "")
@@ -296,12 +296,12 @@ def _flow(value: Any) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A text as a YAML scalar: plain if that is safe in any place, else in double quotes."""
+    """A text as a YAML scalar: plain if that is safe everywhere, otherwise in double quotes."""
     plain = re.fullmatch(r"[A-Za-z][A-Za-z0-9_/%^.]*(?:[ -][A-Za-z0-9_/%^.()]+)*", text) and resolve(text) == text
     return text if plain else json.dumps(text, ensure_ascii=False)
 
 
 def _comment(text: str, indent: str) -> list[str]:
-    """Comment lines; characters that YAML does not take become `?`."""
+    """Comment lines; characters that YAML does not allow become `?`."""
     lines = ["".join(c if c.isprintable() else "?" for c in line.expandtabs()) for line in text.splitlines()]
     return [f"{indent}# {line}".rstrip() for line in lines]

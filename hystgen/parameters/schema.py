@@ -1,6 +1,6 @@
 """The parameter file's structure: frozen pydantic models with the names of the YAML keys, and their JSON Schema.
 
-Only what can be said of one value by itself is said here; how values must fit together is in `param_checks`.
+Only constraints on a single value are expressed here; how values must fit together is in `checks`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from hystgen.basics.quantities import MAX_PLAYS, NotNegative, Number, Positive
 MAX_STAGES = 16
 MAX_EFFECTS = 64
 MAX_DESCRIPTION = 500
-"""Stages, effects, and characters of a description: no model needs as many, and checks stay quick."""
+"""Limits on stages, effects, and characters of a description: no model needs as many, and checks stay fast."""
 
 STAGE_KINDS = ("dead_zone", "tanh")
 
@@ -36,7 +36,7 @@ SCHEMA_ID = "urn:hystgen:parameters:1"
 
 _MEMBER = "\0member "
 MEMBERS = frozenset(_MEMBER + name for name in ("number", "list", *STAGE_KINDS))
-"""Names of union members: steps of pydantic's locations that are no keys of the file."""
+"""Names of union members: steps of pydantic's locations that are not keys of the file."""
 
 
 def _whole(value: Any) -> Any:
@@ -220,8 +220,8 @@ def _auto(value: Any) -> Any:
 
 
 MOST_REFERENCES = 1000
-"""[samples] References that a compensator keeps, ahead of the motion or behind it: 4000 bytes in float32, and as many
-products in a step; a preview of 1 s at 1 kHz."""
+"""[samples] References that a compensator stores, ahead of the motion or behind it: 4000 bytes in float32, and as many
+products per step; a preview of 1 s at 1 kHz."""
 
 
 class Compensation(_Part):
@@ -339,7 +339,7 @@ def schema() -> dict[str, Any]:
 
 
 def _effects(definitions: dict[str, Any]) -> list[dict[str, Any]]:
-    """Schemas of the shapes of all effects, put among the definitions; a user's own has any keys."""
+    """Schemas of the shapes of all effects, added to the definitions; a user's own may have any keys."""
     from hystgen import effects
 
     found: list[dict[str, Any]] = []
@@ -352,7 +352,7 @@ def _effects(definitions: dict[str, Any]) -> list[dict[str, Any]]:
 
 
 def _tidy(node: Any) -> Any:
-    """Without what only Python needs: titles of fields, null as a value, defaults that stand for nothing."""
+    """Remove what only Python needs: titles of fields, null as a value, defaults that only mark absence."""
     if isinstance(node, list):
         return [_tidy(entry) for entry in node]
     if not isinstance(node, dict):

@@ -1,9 +1,9 @@
 """YAML 1.2 text to plain Python data, with the position of every key and value.
 
 Only what a parameter file needs: one document of mappings with text keys, lists and plain scalars (core
-schema). Aliases, anchors, merge keys, tags and duplicate keys are refused. The data is built from the
-parser's events without recursion, and reading stops at the first event that breaks a limit, so that no text
-of the permitted size can exhaust time or memory.
+schema). Aliases, anchors, merge keys, tags and duplicate keys are refused. The data is built from the parser's events
+without recursion, and reading stops at the first event that exceeds a limit, so that no text of the permitted size can
+exhaust time or memory.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ from hystgen.basics.problems import Path, Problem, path_text, printable
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 16
 MAX_VALUES = 100_000
-"""Limits of a file, so that one that is no parameter file is refused at once. One of 4096 plays has 8200 values."""
+"""Limits of a file, so that anything that is not a parameter file is refused at once. One with 4096 plays has 8200
+values."""
 
 _NULL = re.compile(r"(?:~|null|Null|NULL|)\Z")
 _TRUE = re.compile(r"(?:true|True|TRUE)\Z")
@@ -53,9 +54,9 @@ Position = tuple[int, int]
 class Document:
     """The result of reading: the data (None if nothing is usable), its positions, and the problems.
 
-    Lists arrive as tuples. `values` and `keys` map a path to the 1-based (line, column) of the value and of
-    the key in front of it. `poisoned` holds the paths whose value was refused here and is None in `data`.
-    `complete`: whether `data` is a mapping that was read to the end of the file.
+    Lists arrive as tuples. `values` and `keys` map a path to the 1-based (line, column) of the value and of the key
+    before it. `poisoned` holds the paths whose value was refused here and is None in `data`. `complete`: whether `data`
+    is a mapping that was read to the end of the file.
     """
 
     data: Any = None
@@ -66,7 +67,7 @@ class Document:
     complete: bool = False
 
     def position(self, path: Path, at_key: bool = False) -> Position:
-        """Position of the value (or key) at `path`, or, if it is missing, of what should hold it."""
+        """Position of the value (or key) at `path` or, if it is missing, of what should hold it."""
         places = self.keys if at_key else self.values
         held = next(path[:n] for n in range(len(path), -1, -1) if path[:n] in places or n == 0)
         return places.get(held) or self.values[held]
@@ -76,11 +77,11 @@ class Document:
 
 
 class _LimitError(Exception):
-    """The rest of the file is not looked at."""
+    """The rest of the file is not read."""
 
 
 class _Unusable:
-    """Key of an entry that is walked through for its problems and then dropped."""
+    """Key of an entry that is scanned for problems and then dropped."""
 
 
 _UNUSABLE = _Unusable()
@@ -88,7 +89,7 @@ _UNUSABLE = _Unusable()
 
 @dataclass
 class _Level:
-    """One open mapping or list."""
+    """A mapping or list still being read."""
 
     path: Path
     live: bool
@@ -155,7 +156,7 @@ def _next(events: Iterator[Any], text: str, builder: _Builder) -> Any:
         message = f"not valid YAML: {_clean(error.problem or 'cannot be read')}{context}; correct the text there"
     except Exception:
         # The parser has failures of its own, such as OverflowError for the escape "\UFFFFFFFF".
-        position, message = builder.position, "not valid YAML soon after this place; correct the text there"
+        position, message = builder.position, "not valid YAML soon after this position; correct the text there"
     builder.document.refuse((), position, message)
     builder.document.data = None
     raise _LimitError
@@ -184,7 +185,7 @@ _WORDS = (
 
 
 def _clean(said: str) -> str:
-    """The parser's wording in the words of this package."""
+    """The parser's message in our own words."""
     said = " ".join(said.split())
     for theirs, ours in _WORDS:
         said = said.replace(theirs, ours)
@@ -214,7 +215,7 @@ class _Builder:
         self.documents = 0
 
     def take(self, event: Any, position: Position) -> None:
-        """Take the parser's next event; raise _LimitError when the rest is not to be looked at."""
+        """Take the parser's next event; raise _LimitError if the rest is not to be read."""
         self.position = position
         if isinstance(event, DocumentStartEvent):
             self.documents += 1
@@ -260,7 +261,7 @@ class _Builder:
             self._key(event, position, path)
 
     def _plain(self, event: Any, path: Path, position: Position) -> bool:
-        """Refuse aliases, anchors and tags; False if the value itself is lost with that."""
+        """Refuse aliases, anchors and tags; False if the value itself is lost along with them."""
         if isinstance(event, AliasEvent):
             self.document.refuse(path, position, "aliases (*) are not accepted; write the value itself")
             return False

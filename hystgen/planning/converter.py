@@ -15,20 +15,21 @@ CODINGS = ("straight", "twos-complement")
 """How codes are written: straight (offset) binary from 0 up, or two's complement with 0 in the middle of the range."""
 
 FEWEST_BITS, MOST_BITS = 8, 32
-"""Of a converter: with fewer than eight, a code is more than the margin that drives keep; more than 32 do not fit the
-C header."""
+"""Fewest and most bits of a converter: with fewer, a code is more than the margin that drives keep; with more, codes do
+not fit the C header."""
 
 FEWEST_CODES = 100
-"""Codes between the lowest and the highest drive: at fewer a code is more than the margin that drives keep."""
+"""Fewest codes between the lowest and the highest drive: with fewer, a code is more than the margin that drives
+keep."""
 
 
 @dataclass(frozen=True)
 class Dac:
-    """A converter as the drive sees it, amplifier included.
+    """A converter as seen by the drive, including the amplifier.
 
     `low`: drive at the lowest code; `high`: drive one code above the highest, the reference of the data sheet times the
     gain: `drive = low + k (high - low)/2^bits`, k = 0 .. 2^bits - 1. `coding`: one of `CODINGS`; k is written as it is,
-    or less 2^(bits-1).
+    or minus 2^(bits-1).
     """
 
     bits: int
@@ -38,7 +39,7 @@ class Dac:
 
     @property
     def lsb(self) -> float:
-        """Drive by which one code moves it."""
+        """Change of the drive by one code."""
         return (self.high - self.low) / 2.0**self.bits
 
     @property
@@ -57,11 +58,11 @@ class Dac:
         return k.astype(np.int64) - self.zero
 
     def drives(self, codes: ArrayLike) -> NDArray[np.float64]:
-        """The drives (N,) that codes (N,) give."""
+        """The drives (N,) produced by codes (N,)."""
         return self.low + (np.asarray(codes) + self.zero) * self.lsb
 
     def problems(self, low: float, high: float) -> Iterator[str]:
-        """Everything that is wrong with it for drives from `low` to `high`."""
+        """All problems of this converter with drives from `low` to `high`."""
         own = [*wrong_bits(self.bits), *wrong_range(self.low, self.high)]
         yield from own
         if own:
@@ -97,11 +98,12 @@ def wrong_bits(bits: int) -> Iterator[str]:
 def wrong_range(low: float, high: float) -> Iterator[str]:
     """Problems with the range of a converter."""
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        yield f"the DAC range {low:g} to {high:g} does not rise; give its lower end first"
+        yield f"the DAC range {low:g} to {high:g} is not increasing; give its lower end first"
 
 
 def filled(codes: ArrayLike, every: int) -> Codes:
-    """Codes (N,) that are `every` ticks apart, at every tick: whole numbers nearest to the straight lines between."""
+    """Codes (N,) at every tick, from codes given at every `every`-th one: the integers nearest to straight lines
+    between them."""
     nodes = np.asarray(codes, dtype=np.int64)
     steps = np.diff(nodes)[:, None] * (2 * np.arange(every)) + every
     return np.append((nodes[:-1, None] + steps // (2 * every)).ravel(), nodes[-1])

@@ -1,4 +1,4 @@
-"""Drive and time of a plan in whole steps of decimal grids."""
+"""Drive and time of a plan in integer steps of decimal grids."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ REST = 0.125
 """[durations of a slow record] Pause between records."""
 
 LONGEST_MOVE = 60.0
-"""[s] Longest move over the range; a plan with slower ones would take a day, and is refused."""
+"""[s] Longest move over the range; a plan with slower ones would take a day and is refused."""
 
 SLOW_SAMPLES = 480
 """[samples] Length of a slow record."""
@@ -45,7 +45,7 @@ SLOW_SAMPLES = 480
 
 @dataclass(frozen=True)
 class Grid:
-    """Drive values as whole numbers of 10^-digits, from the lowest to the highest that a record visits."""
+    """Drive values as multiples of 10^-digits, from the lowest to the highest that a record visits."""
 
     digits: int
     low: int
@@ -53,11 +53,11 @@ class Grid:
 
     @classmethod
     def over(cls, low: float, high: float) -> Grid:
-        """A grid of a millionth of the range or finer. Raises PlanError where numbers are too coarse for it."""
+        """A grid of a millionth of the range or finer. Raises PlanError if double precision is too coarse for it."""
         a, b = Decimal(low), Decimal(high)
         digits = 6 - (b - a).adjusted()
         if max(abs(low), abs(high)) > 1e8 * (high - low):
-            raise PlanError([f"input_range [{low!r}, {high!r}] is too narrow for numbers of its size"])
+            raise PlanError([f"input_range [{low!r}, {high!r}] is too narrow for numbers of its magnitude"])
         margin = Decimal(str(MARGIN)) * (b - a)
         first, last = (x.scaleb(digits) for x in (a + margin, b - margin))
         return cls(digits, math.ceil(first), math.floor(last))
@@ -68,13 +68,14 @@ class Grid:
         return [code / unit if self.digits >= 0 else float(code * unit) for code in codes]
 
     def rate(self, per_second: float, seconds: float) -> int:
-        """The largest number of codes that the drive moves in `seconds`."""
+        """The largest number of codes by which the drive moves in `seconds`."""
         return math.floor(Decimal(OF_RATE * per_second) * Decimal(seconds) * Decimal(1).scaleb(self.digits))
 
 
 @dataclass(frozen=True)
 class Tempo:
-    """Times in whole numbers of the sample time: between samples of `fast`, a duration of `slow` records, the `rest`.
+    """Times as multiples of the sample time: the spacing of samples of `fast` records, the duration of `slow` ones, the
+    `rest`.
 
     `move`: samples of a full-scale move of the fast triangles.
     """
@@ -88,7 +89,8 @@ class Tempo:
 
     @classmethod
     def of(cls, grid: Grid, max_rate: float, sample_time: float) -> Tempo:
-        """Fast records as fast as sampling and rate allow, slow ones slower. Raises PlanError for days of drive."""
+        """Fast records as fast as sampling and rate allow, slow ones slower. Raises PlanError if a drive would take
+        days."""
         span = grid.high - grid.low
         across = float(span) * 10.0**-grid.digits / (OF_RATE * max_rate * sample_time)
         seconds = max(across, FULL_SCALE) * sample_time
@@ -110,5 +112,5 @@ class Tempo:
 
     @property
     def middle(self) -> int:
-        """Between fast and slow, halfway in the logarithm."""
+        """Between fast and slow, halfway on a logarithmic scale."""
         return max(self.fast, math.isqrt(self.fast * self.every_of(1.0, SLOW_SAMPLES)))

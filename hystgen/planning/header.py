@@ -1,4 +1,4 @@
-"""The codes of a session as a C header, for firmware that plays it."""
+"""The codes of a session as a C header, for firmware that plays them."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from hystgen.planning.session import Session
 
 
 def file(parameters: Parameters) -> str:
-    """Name of the header of a model's session."""
+    """Name of the header for a model's session."""
     return f"{parameters.name}_session.h"
 
 
 def nodes(stretches: Sequence[tuple[int, int]]) -> Codes:
-    """The samples between which the drive is straight, for stretches of steps and samples of each."""
+    """Indices of the samples between which the drive is straight, from pairs of a number of steps and their length."""
     return np.cumsum([0, *(every for steps, every in stretches for _ in range(steps))], dtype=np.int64)
 
 
@@ -29,7 +29,8 @@ def header(
 ) -> str:
     """`NAME_session.h`: the codes between which the drive is straight, and how many samples lie between them.
 
-    `codes`: of all samples; `stretches`: numbers of steps and the samples of each; `words`: options of the plan.
+    `codes`: of all samples; `stretches`: pairs of a number of steps and the samples per step; `words`: options of the
+    plan.
     """
     name, unit = parameters.name, parameters.units.input
     kind = f"{'' if dac.zero else 'u'}int{8 * dac.bytes}_t"

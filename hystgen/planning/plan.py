@@ -31,24 +31,24 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SAMPLE_TIME = 1e-4
-"""[s] Default where neither the caller nor the parameter file gives one."""
+"""[s] Default if neither the caller nor the parameter file gives one."""
 
 MEASURED = "measured"
 """Folder for the measured records, next to the drives."""
 
 WHOLE, CODES, RECORDING = "session.csv", "session_codes.txt", "recording.csv"
-"""Files of a session at one rate: its drives, its codes, and where its recording is looked for."""
+"""Files of a session at one rate: its drives, its codes, and where its recording is expected."""
 
 MOST_SAMPLES = 10_000_000
-"""Most samples of a session at one rate: about 500 MB of text."""
+"""Most samples in a session at one rate: about 500 MB of text."""
 
 
 @dataclass(frozen=True)
 class Drive:
     """A record to be measured: `t` (N,) in s of the session, `v` (N,) in input units; `shows`: catalogue names.
 
-    `corner_time`: s from each sample that was drawn to the next, at one rate with others on a straight line between;
-    `codes` (N,): what a converter is given for `v`, None without one.
+    `corner_time`: spacing of the drawn points in s; at one rate, samples between them are interpolated; `codes` (N,):
+    the converter codes for `v`, None without a converter.
     """
 
     name: str
@@ -69,12 +69,12 @@ class Drive:
 
 @dataclass(frozen=True)
 class Plan:
-    """Drive records of one session, in the order in which they are recorded.
+    """Drive records of one session, in recording order.
 
     `source`, `effects`: files of the model and of the user's own effects; `history`: drive values visited before every
     record; `rest`: seconds of pause before each; `max_rate`: input/s; `defaults`: a sentence for each of these that was
-    chosen here. `session`: where the records are in one drive at one rate, which is `whole`, with codes of `dac`; None
-    where no rate was given. `stretches` of it: numbers of steps between samples that were drawn, and ticks of each.
+    chosen by default. `session`: where the records are in `whole`, the single drive at one rate, with codes for `dac`;
+    None if no rate was given. `stretches` of it: numbers of steps between drawn points, and ticks per step.
     """
 
     parameters: Parameters
@@ -99,23 +99,23 @@ class Plan:
 
     @property
     def samples(self) -> int:
-        """Samples of all records."""
+        """Number of samples in all records."""
         return sum(len(drive.t) for drive in self.drives)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The files that `write` makes."""
+        """The files that `write` creates."""
         codes = (CODES, header.file(self.parameters)) if self.dac else ()
         whole = () if self.whole is None else (WHOLE, *codes, session.FILE)
         return (*(drive.name for drive in self.drives), *whole, "plan.html")
 
     def left_over(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Files in `folder` of an earlier plan with a session, which belong to other drives than these."""
+        """Files in `folder` from an earlier plan with a session, which belong to other drives."""
         session_files = (WHOLE, CODES, header.file(self.parameters), session.FILE)
         return [path for name in session_files if name not in self.names and (path := Path(folder) / name).exists()]
 
     def sentence(self) -> str:
-        """Number of records and samples, and the time they take."""
+        """Number of records and samples, and their duration."""
         held_out = sum(drive.held_out for drive in self.drives)
         return (
             f"{len(self.drives)} records, {held_out} of them held out, {self.samples} samples; the session takes "
@@ -123,7 +123,7 @@ class Plan:
         )
 
     def command(self, folder: str | os.PathLike[str]) -> str:
-        """The command line that diagnoses the measured records, those in `folder`/measured, or the one recording."""
+        """The command line that diagnoses the measured records, those in `folder`/measured, or the single recording."""
         home = PurePath(os.fspath(folder))
         own = [word for path in self.effects for word in ("--effects", path)]
         out = ["-o", (home / "diagnosis").as_posix()]
@@ -162,7 +162,7 @@ class Plan:
         return {**made, session.FILE: self.session.to_json()}
 
     def _options(self) -> str:
-        """Options of the command line that makes the same session."""
+        """Command line options that make the same session."""
         said = [f"--max-rate {self.max_rate!r}"]
         if self.session is not None:
             said.append(f"--rate {self.session.rate!r}")
@@ -186,14 +186,14 @@ def plan(
 ) -> Plan:
     """The drive records that make all effects of the catalogue separable.
 
-    `source`: a `Model` or a parameter file, with `effects`, files of effects of the user's own; `max_rate`: the
-    fastest that the drive may change, input/s (default: the whole range in `FULL_SCALE` sample times); `sample_time`:
-    shortest time between samples, s (default: the file's, else `SAMPLE_TIME`). Every drive stays inside `input_range`
-    and below `max_rate`.
+    `source`: a `Model` or a parameter file; `effects`: files with effects of the user's own; `max_rate`: the fastest
+    that the drive may change, input/s (default: the whole range in `FULL_SCALE` sample times); `sample_time`: shortest
+    time between samples, s (default: the file's, else `SAMPLE_TIME`). Every drive stays inside `input_range` and below
+    `max_rate`.
 
-    `rate`: the one sample rate of a converter, Hz, instead of `sample_time`: every drive has one sample per tick, and
-    all are parts of one session, with the rests between them. `dac_bits`, `dac_range` and `dac_coding` say how its
-    codes are made (see `Dac`); drives are then what the codes give, and pass `max_rate` by no more than a code.
+    `rate`: the sample rate of a converter, Hz, instead of `sample_time`: every drive has one sample per tick, and all
+    are parts of one session, with the rests between them. `dac_bits`, `dac_range` and `dac_coding` say how its codes
+    are made (see `Dac`); drives are then what the codes produce, and exceed `max_rate` by no more than a code.
 
     Raises ParameterError, PlanError with every problem.
     """
@@ -219,7 +219,7 @@ def plan(
         if value is not None and not 0.0 < value < math.inf
     ]
     if rate is not None and sample_time is not None:
-        problems.append("a rate is one over a sample time; give one or the other")
+        problems.append("a rate is one over a sample time; give only one of them")
     low, high = file.input_range
     grid = Grid.over(low, high)
     top, bottom = grid.values((grid.high, grid.low))
@@ -233,14 +233,14 @@ def plan(
         sample_time = 1.0 / rate
     elif sample_time is None:
         sample_time = file.sample_time or SAMPLE_TIME
-        whose = "the parameter file's" if file.sample_time else "chosen here, since the parameter file has none"
+        whose = "the parameter file's" if file.sample_time else "chosen by default, since the parameter file has none"
         defaults.append(f"The sample time of {sample_time:g} s is {whose}; --sample-time gives another.")
     if max_rate is None:
         max_rate = (high - low) / (FULL_SCALE * sample_time)
         unit = f" {file.units.input}/s" if file.units.input else "/s"
         defaults.append(
-            f"The rate limit of {max_rate:.4g}{unit} was chosen here: the whole range in {FULL_SCALE} sample times. If "
-            "amplifier or stage must not see that, plan again with --max-rate."
+            f"The rate limit of {max_rate:.4g}{unit} was chosen by default: the whole range in {FULL_SCALE} sample "
+            "times. If that is too fast for the amplifier or the stage, plan again with --max-rate."
         )
     tempo = Tempo.of(grid, max_rate, sample_time)
     records = [(each, every := each.every(tempo), written(each, grid, tempo, every)) for each in RECORDS]
@@ -266,12 +266,12 @@ def plan(
 def _dac(
     rate: float | None, bits: int | None, ends: Sequence[float] | None, coding: str, problems: list[str]
 ) -> Dac | None:
-    """The converter that is asked for; what is missing for it goes to `problems`."""
+    """The requested converter; anything missing is added to `problems`."""
     arguments.choice("dac_coding", coding, converter.CODINGS)
     if bits is None and ends is None:
         return None
     if rate is None:
-        problems.append("codes of a DAC are for one rate; give the rate at which it is played, Hz")
+        problems.append("codes of a DAC need a rate; give the rate at which they are played, Hz")
     if bits is None or ends is None:
         problems.append("codes of a DAC need its bits and its range, the drive at its lower and upper end; give both")
     if bits is not None:
@@ -282,7 +282,7 @@ def _dac(
         low_high = None
     if bits is not None and low_high is not None:
         return Dac(bits, *low_high, coding)
-    # What is there is judged all the same
+    # The given options are still checked
     problems += () if bits is None else converter.wrong_bits(bits)
     problems += () if low_high is None else converter.wrong_range(*low_high)
     return None
@@ -292,7 +292,7 @@ def _dac(
 class _Player:
     """A converter at one rate: its ticks between the samples of a drive, and all drives in one session.
 
-    `nodes`, `every`: the lead-in that makes the history true; `first`: tick at which the first record begins.
+    `nodes`, `every`: the lead-in that establishes the history; `first`: tick at which the first record begins.
     """
 
     grid: Grid
@@ -304,7 +304,7 @@ class _Player:
 
     @classmethod
     def of(cls, grid: Grid, tempo: Tempo, rate: float, dac: Dac | None, lengths: Sequence[int]) -> _Player:
-        """`lengths`: of the records, ticks. Raises PlanError for more samples than a file should have."""
+        """`lengths`: of the records, ticks. Raises PlanError if there are more samples than a file should have."""
         every = tempo.every_of(1.0, SLOW_SAMPLES)
         made = cls(grid, tempo, rate, dac, lead_in(grid, tempo, every), every)
         samples = made.first + sum(lengths) + (len(lengths) - 1) * tempo.rest + 1
@@ -321,14 +321,14 @@ class _Player:
         return (len(self.nodes) - 1) * self.every + self.tempo.rest
 
     def played(self, nodes: Sequence[int], every: int) -> tuple[Array, Codes | None]:
-        """Drives and codes at every tick of samples that are `every` ticks apart."""
+        """Drives and codes at every tick, from samples spaced `every` ticks apart."""
         if self.dac is None:
             return np.array(self.grid.values(converter.filled(nodes, every).tolist())), None
         codes = converter.filled(self.dac.codes(self.grid.values(nodes)), every)
         return self.dac.drives(codes), codes
 
     def session(self, plan: Plan) -> Plan:
-        """The plan with its drives as one."""
+        """The plan with its drives joined into one."""
         parts, at, stretches = [], self.first, [(len(self.nodes) - 1, self.every)]
         lead = self.played(self.nodes, self.every)
         pieces = [lead]

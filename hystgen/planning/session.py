@@ -1,4 +1,4 @@
-"""A planned session as it is played in one go, and a recording of it, cut into its records."""
+"""A planned session, played in one go, and its recording, cut into records."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from hystgen.records import Record
 FILE = "session.json"
 
 OFF = 0.05
-"""Share of the drives' span by which a record may begin and end beside the lowest drive: gain and noise of a monitor.
-A recording that is out of step with its session begins and ends anywhere."""
+"""Share of the drives' span by which a record may start and end away from the lowest drive, to allow for the gain and
+noise of a monitor. A recording that is out of step with its session starts and ends anywhere."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +36,11 @@ class Part:
 
 @dataclass(frozen=True)
 class Session:
-    """What is played: `samples` at `rate`, Hz, with `records` in it.
+    """The signal played: `samples` at `rate`, Hz, containing `records`.
 
     `history`: drives visited before the first record and at the end of each, the highest and the lowest of all; `rest`:
-    s between them; `rise`: s from the first sample to the first crossing of the middle between both, by which a
-    recording is aligned; `dac`: the converter, as its fields, if there are codes.
+    s between them; `rise`: s from the first sample to the first crossing of the middle between both, used to align a
+    recording; `dac`: the converter, as its fields, if there are codes.
     """
 
     rate: float
@@ -57,7 +57,7 @@ class Session:
 
     @classmethod
     def read(cls, path: str | os.PathLike[str]) -> Session:
-        """The session of a file that `--plan` wrote. Raises ParameterError with every problem in it, OSError."""
+        """Read the session from a file written by `--plan`. Raises ParameterError with every problem in it, OSError."""
         file = os.fspath(path)
         with open(file, "rb") as stream:
             content = stream.read(MAX_BYTES + 1)
@@ -67,7 +67,7 @@ class Session:
             text = content.decode("utf-8")
         except UnicodeDecodeError:
             raise ParameterError(file, [Problem("", f"is not UTF-8; {GIVE}")]) from None
-        document = read(text)  # JSON is YAML, which is read without recursion and with the place of every value
+        document = read(text)  # JSON is YAML; our reader does not recurse and knows positions
         problems = list(document.problems)
         if document.complete:
             problems += [
@@ -82,10 +82,10 @@ class Session:
         return cls(**{**given, "records": parts})
 
     def cut(self, recording: Record) -> tuple[list[Record], list[Record]]:
-        """The records to fit and those held out of a recording of the whole session.
+        """The records to fit, and the held-out ones, from a recording of the whole session.
 
         The recording has its own clock, sample rate and start; it is aligned where the drive first rises through the
-        middle, which is before the first record. Raises PlanError where it does not fit the session.
+        middle, which is before the first record. Raises PlanError if it does not fit the session.
         """
         top, bottom = self.history
         start = self._start(recording.name, recording.t, recording.v)
@@ -116,7 +116,7 @@ class Session:
         return to_fit, held
 
     def _start(self, name: str, t: NDArray[np.float64], v: NDArray[np.float64]) -> float:
-        """When the session began, on the recording's clock. Raises PlanError."""
+        """Start of the session on the recording's clock. Raises PlanError."""
         top, bottom = self.history
         span, middle = top - bottom, 0.5 * (top + bottom)
         low, high = (float(np.quantile(v, share)) for share in (0.001, 0.999)) if len(v) else (0.0, 0.0)
@@ -137,7 +137,7 @@ GIVE = f"give the {FILE} that hystgen diagnose --plan --rate wrote"
 
 
 def _number(low: float, strict: bool = False) -> Callable[[Any], str]:
-    """What is wrong with a value that has to be a finite number from `low` on, or above it; empty if nothing."""
+    """The problem with a value that has to be a finite number from `low` on, or above it; empty if there is none."""
     wanted = f"a number {'above' if strict else 'from'} {low:g}{'' if strict else ' on'}"
 
     def wrong(value: Any) -> str:
@@ -150,7 +150,7 @@ def _number(low: float, strict: bool = False) -> Callable[[Any], str]:
 def _whole(low: int) -> Callable[[Any], str]:
     def wrong(value: Any) -> str:
         right = isinstance(value, int) and not isinstance(value, bool) and low <= value < HUGE
-        return "" if right else f"a whole number from {low} on, not {shown(value)}"
+        return "" if right else f"a whole number, at least {low}, not {shown(value)}"
 
     return wrong
 
@@ -161,7 +161,7 @@ def _history(value: Any) -> str:
 
 
 HUGE = 1e30
-"""Numbers of a session are smaller, as those of a parameter file are."""
+"""Numbers of a session stay below this, like those of a parameter file."""
 
 FIELDS: Mapping[str, Callable[[Any], str]] = {
     "hystgen": lambda value: "" if value == 1 and isinstance(value, int) else f"1, not {shown(value)}",
@@ -173,7 +173,7 @@ FIELDS: Mapping[str, Callable[[Any], str]] = {
     "records": lambda value: "" if isinstance(value, tuple) and value else f"a list of records, not {shown(value)}",
     "dac": lambda value: "" if value is None or isinstance(value, dict) else f"a mapping or null, not {shown(value)}",
 }
-"""Keys of the file, and what is wrong with their values."""
+"""Keys of the file, each with a function that returns the problem with a value."""
 
 PART_FIELDS: Mapping[str, Callable[[Any], str]] = {
     "name": lambda value: "" if isinstance(value, str) and value else f"text, not {shown(value)}",
@@ -190,7 +190,7 @@ DAC_FIELDS: Mapping[str, Callable[[Any], str]] = {
 }
 
 Wrong = tuple[Place, str, bool]
-"""Where a problem is, what it is, and whether the key there is meant and not its value."""
+"""Where a problem is, what it is, and whether it concerns the key rather than its value."""
 
 
 def _of_fields(place: Place, content: Mapping[str, Any], fields: Mapping[str, Callable[[Any], str]]) -> Iterator[Wrong]:
@@ -205,7 +205,7 @@ def _of_fields(place: Place, content: Mapping[str, Any], fields: Mapping[str, Ca
 
 
 def _problems(content: Mapping[str, Any]) -> Iterator[Wrong]:
-    """Everything that is wrong with the content of a file."""
+    """All problems in the content of a file."""
     found = list(_of_fields((), content, FIELDS))
     yield from found
     wrong = {place for place, _, _ in found}
@@ -227,9 +227,9 @@ def _problems(content: Mapping[str, Any]) -> Iterator[Wrong]:
         if own:
             continue
         if part["name"] in names:
-            yield (*place, "name"), f"{shown(part['name'])} is the name of a record before; {GIVE}", False
+            yield (*place, "name"), f"{shown(part['name'])} is the name of an earlier record; {GIVE}", False
         if part["first"] < end:
-            yield (*place, "first"), f"begins in the record before, which ends at sample {end}; {GIVE}", False
+            yield (*place, "first"), f"begins within the previous record, which ends at sample {end}; {GIVE}", False
         names.add(part["name"])
         end = part["first"] + part["samples"]
         if ("samples",) not in wrong and "samples" in content and end > content["samples"]:
@@ -237,7 +237,7 @@ def _problems(content: Mapping[str, Any]) -> Iterator[Wrong]:
 
 
 def crossing(t: NDArray[np.float64], v: NDArray[np.float64], middle: float) -> float | None:
-    """When a drive first rises through `middle`, s; None where it does not."""
+    """When a drive first rises through `middle`, s; None if it does not."""
     rising = np.flatnonzero((v[:-1] < middle) & (v[1:] >= middle))
     if not len(rising):
         return None

@@ -1,6 +1,6 @@
-"""The records of a plan: what each is for, and the waveform that it drives.
+"""The records of a plan: the purpose and the waveform of each.
 
-Drives are computed in whole steps of a decimal grid and with only the four basic operations, so that the files have
+Drives are computed in integer steps of a decimal grid and with only the four basic operations, so that the files have
 the same bytes on every machine.
 """
 
@@ -23,7 +23,7 @@ ROUND = 3
 
 
 class Course:
-    """A drive as it is written: codes sample by sample, from the lowest on; places are shares of the range.
+    """A drive being built up: codes sample by sample, counted from the lowest; positions are shares of the range.
 
     `pace`: samples of a quick full-scale move.
     """
@@ -34,14 +34,14 @@ class Course:
 
     @property
     def place(self) -> float:
-        """Where the drive is."""
+        """Current position of the drive."""
         return (self.codes[-1] - self._grid.low) / (self._grid.high - self._grid.low)
 
     def go(self, place: float, pace: float = 0.0) -> None:
-        """A straight move at `pace` samples a full-scale one, in `EDGE` samples or more, within the rate limit.
+        """A straight move at `pace` samples per full-scale move, in `EDGE` samples or more, within the rate limit.
 
-        Then the drive stands still, so that with round corners two samples remain at the turning point: it is sampled
-        behind a delay of any fraction of a sample, too.
+        Then the drive rests, so that two samples remain at the turning point even with round corners: it is sampled
+        even behind a delay of any fraction of a sample.
         """
         begin, end = self.codes[-1], self._code(place)
         size = abs(end - begin)
@@ -51,11 +51,12 @@ class Course:
         self.hold(ROUND)
 
     def hold(self, samples: int) -> None:
-        """The drive stands still."""
+        """The drive rests."""
         self.codes += [self.codes[-1]] * samples
 
     def wave(self, values: Sequence[float]) -> None:
-        """A wave about the middle of the range, as large as range and rate limit allow; a move to it comes first."""
+        """A wave about the middle of the range, as large as range and rate limit allow, preceded by a move to its
+        start."""
         steepest = max(abs(b - a) for a, b in itertools.pairwise(values))
         size = 0.5 * (self._grid.high - self._grid.low - 2) / max(map(abs, values))
         size = min(size, (self._step - 1) / steepest)
@@ -65,7 +66,7 @@ class Course:
         self.codes += codes[1:]
 
     def rounded(self) -> list[int]:
-        """The drive with round corners."""
+        """The drive with rounded corners."""
         half = ROUND // 2
         padded = [self.codes[0]] * half + self.codes + [self.codes[-1]] * half
         return [(2 * sum(padded[k : k + ROUND]) + ROUND) // (2 * ROUND) for k in range(len(self.codes))]
@@ -75,7 +76,7 @@ class Course:
 
 
 def sine(turns: float) -> float:
-    """sin(2 pi turns), to 1e-13: the C library's differs from machine to machine in the last bit."""
+    """sin(2 pi turns), to 1e-13: the C library's sine differs in the last bit from machine to machine."""
     x = turns - math.floor(turns + 0.5)
     if abs(x) > 0.25:
         x = math.copysign(0.5, x) - x
@@ -88,7 +89,7 @@ def sine(turns: float) -> float:
 
 
 def _ends(course: Course, pace: float) -> None:
-    """Moves to the top and the bottom: the history of the record that comes next."""
+    """Moves to the top and the bottom: the history of the next record."""
     course.go(1.0, pace)
     course.go(0.0, pace)
     course.hold(EDGE)
@@ -151,7 +152,7 @@ def _steps(course: Course, hold: int, levels: Sequence[float]) -> None:
 
 
 def _sweep(course: Course, samples: int = 1100) -> None:
-    """Frequency rises with time squared to an eighth of the sampling rate, amplitude falls as the limit demands."""
+    """Frequency rises with time squared to an eighth of the sampling rate; amplitude falls as the limit requires."""
     first, last = 1.0 / (16.0 * course.pace), 1.0 / 8.0
     turns, values = 0.0, []
     for k in range(samples):
@@ -163,7 +164,7 @@ def _sweep(course: Course, samples: int = 1100) -> None:
 
 
 def _multisine(course: Course, period: int = 240, periods: int = 4) -> None:
-    """Odd lines with random phases, whole periods."""
+    """Odd harmonics with random phases, in whole periods."""
     phases = random.Random(1)
     lines = [(line, phases.random()) for line in range(1, 24, 2)]
     one = [sum(sine(line * k / period + phase) / line for line, phase in lines) for k in range(period)]
@@ -191,7 +192,7 @@ def _staircase(course: Course) -> None:
 
 
 def _reversals(course: Course, seed: int, turns: int, slowest: float) -> None:
-    """Random turning points at random speeds, now and then a hold; both ends come first."""
+    """Random turning points at random speeds, with an occasional hold; both ends come first."""
     chance = random.Random(seed)
     course.go(1.0, slowest * course.pace)
     course.go(0.0, slowest * course.pace)
@@ -203,7 +204,7 @@ def _reversals(course: Course, seed: int, turns: int, slowest: float) -> None:
 
 @dataclass(frozen=True)
 class Kind:
-    """A record: file name, purpose, effects that it shows, waveform and time between samples."""
+    """A record: file name, purpose, the effects it shows, waveform and time between samples."""
 
     name: str
     purpose: str
@@ -230,11 +231,11 @@ LONG_HOLDS = (1.0, 0.0, 0.5, 1.0, 0.5, 0.0)
 
 RECORDS = (
     Kind(
-        "slow", "One slow full loop, then nested ones: the hysteresis itself, and what bends it at every amplitude.",
+        "slow", "One slow full loop, then nested ones: the hysteresis itself, and its bends at every amplitude.",
         ("asymmetry", "saturation", "sensor_nonlinearity"), _slow, _lasting(1.0),
     ),
     Kind(
-        "fast_triangles", "The same loops at the rate limit and two and four times slower: what widens them with rate.",
+        "fast_triangles", "The same loops at the rate limit and two and four times slower: how they widen with rate.",
         ("rate_dependence", "lag", "delay", "slew_limit"), _triangles, _fast,
     ),
     Kind(
@@ -247,7 +248,7 @@ RECORDS = (
         ("creep", "drift", "thermal"), partial(_steps, hold=100, levels=LONG_HOLDS), _lasting(4.0, 700),
     ),
     Kind(
-        "staircase", "Steps of other sizes and speeds, to judge what the fast records say.",
+        "staircase", "Steps of other sizes and speeds, to judge the findings of the fast records.",
         ("lag", "delay", "slew_limit", "resonance"), _staircase, _fast, True,
     ),
     Kind(
@@ -259,7 +260,7 @@ RECORDS = (
         ("rate_dependence", "lag", "noncongruent"), _fast_minor, _fast,
     ),
     Kind(
-        "slow_reversals", "Random turning points with pauses, to judge what the slow records say.",
+        "slow_reversals", "Random turning points with pauses, to judge the findings of the slow records.",
         ("creep", "asymmetry", "saturation", "sensor_nonlinearity", "noncongruent"),
         partial(_reversals, seed=2, turns=14, slowest=3.0), _lasting(1.25, 600), True,
     ),
@@ -268,11 +269,11 @@ RECORDS = (
         ("resonance", "lag", "delay"), _sweep, _fast,
     ),
     Kind(
-        "cycles", "Many equal full loops: they travel and heat; later ones differ from earlier ones.",
+        "cycles", "Many equal full loops: they accumulate travel and heat; later ones differ from earlier ones.",
         ("ageing", "thermal"), _cycles, _lasting(1.0, 720),
     ),
     Kind(
-        "settling", "Nested loops and short holds at a middle pace, while it cools: creep and rate in between.",
+        "settling", "Nested loops and short holds at a medium pace, while it cools: creep and rate in between.",
         ("creep", "rate_dependence", "thermal"), _settling, _middle,
     ),
     Kind(
@@ -281,19 +282,19 @@ RECORDS = (
         True,
     ),
     Kind(
-        "multisine", "Equal periods of an odd multisine with random phases: the noise without a model, what is even.",
+        "multisine", "Equal periods of an odd multisine with random phases: noise without a model, even nonlinearity.",
         ("asymmetry", "sensor_nonlinearity", "resonance"), _multisine, _fast,
     ),
     Kind(
-        "reversals", "Random turning points at a middle pace, to judge what lies between slow and fast.",
+        "reversals", "Random turning points at a medium pace, to judge what lies between slow and fast.",
         ("creep", "rate_dependence", "noncongruent"), partial(_reversals, seed=5, turns=25, slowest=3.0), _middle, True,
     ),
     Kind(
-        "slow_again", "The first record once more: what has changed in the session, and is neither rate nor amplitude.",
+        "slow_again", "The first record once more: changes in the session due to neither rate nor amplitude.",
         ("drift", "ageing", "thermal"), _slow, _lasting(1.0),
     ),
 )  # fmt: skip
-"""The records of a session, in their order."""
+"""The records of a session, in order."""
 
 
 def written(record: Kind, grid: Grid, tempo: Tempo, every: int) -> list[int]:

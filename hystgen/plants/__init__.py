@@ -1,8 +1,8 @@
 """Hysteretic plants to compensate, other than Prandtl-Ishlinskii models: for examples and tests.
 
-All of them are rate-independent, so that `simulate(v)` takes the input samples alone and no time: between two samples
-the input moves straight, and how fast it does changes nothing. Every call starts anew from the start state that the
-plant was made with, and goes from there to the first sample in one move.
+All of them are rate-independent, so `simulate(v)` takes only the input samples and no time: between two samples the
+input moves in a straight line, and its speed makes no difference. Every call starts again from the start state of the
+plant, and goes from there to the first sample in one move.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ PLANTS = {
     "MaxwellSlip": "maxwell_slip",
     "Preisach": "preisach",
 }
-"""Plants by name, each with the module that it is imported from when it is first used."""
+"""Plants by name, each with the module from which it is imported when first used."""
 
 _PLACES = {**PLANTS, "EverettTable": "preisach"}
 

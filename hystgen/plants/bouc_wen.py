@@ -16,7 +16,7 @@ from hystgen.plants import integration
 
 @jit
 def _back(m: float, s: float, amplitude: float, c: float, exponent: float) -> tuple[float, float]:
-    """The part of a move that undoes |z| = m > 0, `dm/ds = -A + c m^n`, c <= 0: |z| after it, and what is left of s.
+    """The part of a move that reduces |z| = m > 0, `dm/ds = -A + c m^n`, c <= 0: |z| after it, and the remainder of s.
 
     n = 1 and 2 only.
     """
@@ -37,7 +37,7 @@ def _back(m: float, s: float, amplitude: float, c: float, exponent: float) -> tu
 
 @jit
 def _on(x: float, s: float, amplitude: float, c: float, exponent: float) -> float:
-    """|z| >= 0 after a move that builds it up, `dx/ds = A - c x^n` with c > 0; n = 1 and 2 only."""
+    """|z| >= 0 after a move that increases it, `dx/ds = A - c x^n` with c > 0; n = 1 and 2 only."""
     if exponent == 1.0:
         return x * math.exp(-c * s) - amplitude * math.expm1(-c * s) / c
     limit = math.sqrt(amplitude / c)
@@ -51,7 +51,7 @@ def _exactly(v: Array, v0: float, z0: float, p: tuple[float, ...], out: Array) -
     z = z0
     last = v0
     for k in range(len(v)):
-        if v[k] != last:  # there and back by the formulas would not keep every bit
+        if v[k] != last:  # computing there and back by the formulas would not preserve every bit
             s = abs(v[k] - last) / distance
             sign = 1.0 if v[k] > last else -1.0
             x = sign * z
@@ -69,10 +69,10 @@ def _exactly(v: Array, v0: float, z0: float, p: tuple[float, ...], out: Array) -
 class BoucWen:
     """Force `y = alpha k v + (1 - alpha) k D z`, `D dz/dv = A - (beta sgn(z dv) + gamma) |z|^n`.
 
-    `alpha` >= 0: stiffness after yielding over that before it; above 1 the output lags the input, as a piezo drive's
-    does, below 1 it leads; `k`: stiffness in output per input unit; `D`: input units; `A`, `beta`, `gamma`: numbers
-    with -beta < gamma <= beta, which keeps the model bounded and dissipative; `n` >= 1; `start`: z at the input 0.
-    Closed form over every monotone move for n = 1 (exponential) and n = 2 (tan and tanh), else integrated to the
+    `alpha` >= 0: ratio of the stiffness after yielding to that before; above 1 the output lags the input, like a piezo
+    drive's, below 1 it leads; `k`: stiffness in output per input unit; `D`: input units; `A`, `beta`, `gamma`: numbers
+    with -beta < gamma <= beta, which keeps the model bounded and dissipative; `n` >= 1; `start`: z at the input 0. In
+    closed form over every monotone move for n = 1 (exponential) and n = 2 (tan and tanh), otherwise integrated to the
     tolerance in `integration`. Raises ValueError. Sources: Y. K. Wen, Method for random vibration of hysteretic
     systems, J. Eng. Mech. Div. ASCE 102, 1976; F. Ikhouane, J. Rodellar, Systems with Hysteresis, Wiley, 2007 (the
     classes); T. S. Low, W. Guo, Modeling of a three-layer piezoelectric bimorph beam with hysteresis, J. MEMS 4, 1995.
@@ -93,7 +93,7 @@ class BoucWen:
         if self.alpha < 0.0:
             raise ValueError(f"alpha has to be at least 0, not {self.alpha}")
         if self.n < 1.0:
-            raise ValueError(f"n has to be at least 1, not {self.n}: below, z is not unique")
+            raise ValueError(f"n has to be at least 1, not {self.n}: below that, z is not unique")
         if not -self.beta < self.gamma <= self.beta:
             raise ValueError(f"gamma has to be above -beta and at most beta = {self.beta}, not {self.gamma}")
         if abs(self.start) > self.bound:
@@ -105,7 +105,7 @@ class BoucWen:
         return float((self.A / (self.beta + self.gamma)) ** (1.0 / self.n))
 
     def simulate(self, v: ArrayLike) -> Array:
-        """Force (N,) at the displacements `v` (N,); needs no time."""
+        """Force (N,) at the displacements `v` (N,); does not depend on time."""
         samples = finite_samples(v)
         return self.alpha * self.k * samples + (1.0 - self.alpha) * self.k * self.D * self.hysteretic(samples)
 
@@ -119,9 +119,9 @@ class BoucWen:
             return z
         up, down = (functools.partial(self._slope, sign) for sign in (1.0, -1.0))
         z = integration.integrate(samples, float(self.start), up, down, self.bound)
-        return np.clip(z, -self.bound, self.bound)  # which the tolerance may pass
+        return np.clip(z, -self.bound, self.bound)  # which the tolerance may exceed
 
     def _slope(self, sign: float, v: float, z: float) -> float:  # noqa: ARG002, the input does not enter
-        # A / (beta + gamma) at the bound; a trial step far beyond may not leave the numbers
+        # A / (beta + gamma) at the bound; a trial step far beyond must not overflow
         built: float = self.A / (self.beta + self.gamma) * min(abs(z) / self.bound, 2.0 ** (1.0 / self.n)) ** self.n
         return (self.A - (self.gamma + math.copysign(self.beta, sign * z)) * built) / self.D

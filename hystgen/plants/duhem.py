@@ -20,8 +20,8 @@ class Duhem:
     """General Duhem model: `dy/dv = rising(v, y)` where the input rises and `falling(v, y)` where it falls.
 
     `rising`, `falling`: functions of two floats, in output per input unit; `start`: y at the input 0; `scale` > 0: size
-    of y that near zero stands for it in the tolerance of `integration`. Raises ValueError, also where the integration
-    fails. Source: J. W. Macki, P. Nistri, P. Zecca, Mathematical models for hysteresis, SIAM Review 35, 1993.
+    of y that replaces it near zero in the tolerance of `integration`. Raises ValueError, also if the integration fails.
+    Source: J. W. Macki, P. Nistri, P. Zecca, Mathematical models for hysteresis, SIAM Review 35, 1993.
     """
 
     rising: Slope
@@ -57,7 +57,7 @@ class Duhem:
         )
 
     def simulate(self, v: ArrayLike) -> Array:
-        """Output (N,) at the inputs `v` (N,); needs no time."""
+        """Output (N,) at the inputs `v` (N,); does not depend on time."""
         return integration.integrate(finite_samples(v), float(self.start), self.rising, self.falling, float(self.scale))
 
 
@@ -66,7 +66,7 @@ def _dahl(v: Array, v0: float, start: float, sigma: float, limit: float, exponen
     force = start
     last = v0
     for k in range(len(v)):
-        if v[k] != last:  # there and back by the formulas would not keep every bit
+        if v[k] != last:  # computing there and back by the formulas would not preserve every bit
             sign = 1.0 if v[k] > last else -1.0
             s = sigma * abs(v[k] - last) / limit
             rest = 1.0 - sign * force / limit  # 0 when fully developed in this direction, 2 in the other
@@ -78,7 +78,7 @@ def _dahl(v: Array, v0: float, start: float, sigma: float, limit: float, exponen
                     rest = 0.0
                 elif change < math.inf:
                     rest *= math.exp(-math.log1p(change) / (exponent - 1.0))
-                else:  # where the 1 of log1p does not count
+                else:  # where the 1 of log1p is negligible
                     rest = ((exponent - 1.0) * s) ** (1.0 / (1.0 - exponent))
             force = sign * limit * (1.0 - rest)
             last = v[k]
@@ -90,10 +90,10 @@ class Dahl:
     """Solid friction `dF/dv = sigma (1 - sgn(dv) F / F_c)^i`, the Duhem model of friction.
 
     `sigma` > 0: stiffness at rest in output per input unit; `limit` > 0: F_c, the sliding force in output units;
-    `exponent`: i >= 0, below 1 for brittle materials, which slide fully after a finite way (i = 0 is the stop
-    operator), from 1 on for ductile ones; `start`: F at the input 0, within the limit. Closed form over every monotone
-    move for every i. The output leads the input. Raises ValueError. Source: P. R. Dahl, A solid friction model,
-    The Aerospace Corporation TOR-0158(3107-18)-1, 1968.
+    `exponent`: i >= 0, below 1 for brittle materials, which slide fully after a finite move (i = 0 is the stop
+    operator), 1 and above for ductile ones; `start`: F at the input 0, within the limit. In closed form over every
+    monotone move for every i. The output leads the input. Raises ValueError. Source: P. R. Dahl, A solid friction
+    model, The Aerospace Corporation TOR-0158(3107-18)-1, 1968.
     """
 
     sigma: float
@@ -110,7 +110,7 @@ class Dahl:
             raise ValueError(f"start has to be within the limit {self.limit}, not {self.start}")
 
     def simulate(self, v: ArrayLike) -> Array:
-        """Friction force (N,) at the displacements `v` (N,); needs no time."""
+        """Friction force (N,) at the displacements `v` (N,); does not depend on time."""
         samples = finite_samples(v)
         out = np.empty_like(samples)
         start, sigma, limit, exponent = map(float, (self.start, self.sigma, self.limit, self.exponent))

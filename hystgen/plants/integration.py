@@ -1,4 +1,4 @@
-"""Rate-independent differential models `dy/dv = slope(v, y)`, one slope a direction, integrated over the input."""
+"""Rate-independent differential models `dy/dv = slope(v, y)`, one slope per direction, integrated over the input."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hystgen.basics.arguments import Array
 Slope = Callable[[float, float], float]
 
 RTOL = 1e-11
-"""Error that a step may add, as a share of the state."""
+"""Error allowed per step, as a share of the state."""
 
 ATOL = 1e-13
 """The same as a share of the state's scale, for states near zero."""
@@ -27,8 +27,8 @@ MOST_STEPS = 100_000
 def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: float) -> Array:
     """State (N,) at the input samples, from the state `start` at the input 0.
 
-    By LSODA (scipy), with a call for each move between two turning points, where the slope jumps; the slope is asked at
-    inputs of the move alone. Raises ValueError where the integration fails.
+    By LSODA (scipy), with a call for each move between two turning points, where the slope jumps; the slope is
+    evaluated only at inputs within the move. Raises ValueError if the integration fails.
     """
     extras.require_fit("this plant")
     from scipy.integrate import ODEintWarning, odeint
@@ -49,19 +49,19 @@ def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: floa
                     slope, y[first], places, tfirst=True, rtol=RTOL, atol=ATOL * scale, mxstep=MOST_STEPS,
                     tcrit=places[-1:], full_output=True,
                 )  # fmt: skip
-            # with tcrit LSODA does not say that its steps became too small to move on
+            # with tcrit LSODA does not report that its steps became too small to move on
             done = places[-1] == places[0] or np.isclose(details["tcur"][-1], places[-1], rtol=0.0, atol=1e-12 * reach)
         except (ODEintWarning, OverflowError):
             done = False
         if not (done and np.all(np.isfinite(found))):
             raise ValueError(
                 f"the integration fails between the inputs {path[first]:g} and {path[last]:g}: with this slope the "
-                "output runs away, or it needs a finer step than there is"
+                "output runs away, or it would need too fine a step"
             )
         y[first : last + 1] = found[:, 0]
     return y[1:]
 
 
 def _at(slope: Slope, sign: float, along: float, y: Array) -> float:
-    """Along a variable that always rises: odeint heeds tcrit, beyond which no slope is asked for, only there."""
+    """Along a variable that always increases: only then does odeint heed tcrit, beyond which no slope is evaluated."""
     return sign * slope(sign * along, float(y[0]))

@@ -21,7 +21,7 @@ def langevin(x: float) -> float:
 def langevin_slope(x: float) -> float:
     if abs(x) < 0.05:
         return 1.0 / 3.0 - x * x * (1.0 / 15.0 - x * x * (2.0 / 189.0 - x * x / 675.0))
-    if abs(x) > 40.0:  # the other term is below rounding, and further on it overflows
+    if abs(x) > 40.0:  # the other term is below rounding, and further on it would overflow
         return 1.0 / (x * x)
     return 1.0 / (x * x) - 1.0 / math.sinh(x) ** 2
 
@@ -31,14 +31,14 @@ class JilesAtherton:
     """Magnetization M over the field H, with `H_e = H + alpha M` and `M_an = M_s (coth(H_e/a) - a/H_e)`.
 
     `dM/dH = (1 - c) dM_irr/dH + c dM_an/dH`, `dM_irr/dH = (M_an - M_irr) / (k sgn(dH) - alpha (M_an - M_irr))`,
-    `M = (1 - c) M_irr + c M_an`. `Ms`, `a`, `k` > 0 in the unit of the field (A/m); `alpha` >= 0 and 0 <= `c` < 1 plain
-    numbers. Starts demagnetised at the field 0. Right after a reversal the equation has a negative slope, which is not
-    physical; dM_irr/dH is zero until M_an is ahead of M again, as in J. H. B. Deane, Modeling the dynamics of nonlinear
-    inductor circuits, IEEE Trans. Magn. 30, 1994. Raises ValueError for wrong parameters, also for alpha M_s >= 3 a:
-    then the anhysteretic curve is not a function; and where the integration fails. Integrated to the tolerance in
-    `integration`. Sources: D. C. Jiles, D. L. Atherton, Theory of ferromagnetic hysteresis, J. Magn. Magn. Mater. 61,
-    1986; D. C. Jiles, J. B. Thoelke, M. K. Devine, Numerical determination of hysteresis parameters, IEEE Trans. Magn.
-    28, 1992 (this form).
+    `M = (1 - c) M_irr + c M_an`. `Ms`, `a`, `k` > 0 in the unit of the field (A/m); `alpha` >= 0 and 0 <= `c` < 1
+    dimensionless. Starts demagnetised at the field 0. Right after a reversal the equation has a negative slope, which
+    is unphysical; dM_irr/dH is zero until M_an is ahead of M again, as in J. H. B. Deane, Modeling the dynamics of
+    nonlinear inductor circuits, IEEE Trans. Magn. 30, 1994. Raises ValueError for wrong parameters, including alpha M_s
+    >= 3 a, for which the anhysteretic curve is not a function, and if the integration fails. Integrated to the
+    tolerance in `integration`. Sources: D. C. Jiles, D. L. Atherton, Theory of ferromagnetic hysteresis, J. Magn. Magn.
+    Mater. 61, 1986; D. C. Jiles, J. B. Thoelke, M. K. Devine, Numerical determination of hysteresis parameters, IEEE
+    Trans. Magn. 28, 1992 (this form).
     """
 
     Ms: float
@@ -58,7 +58,7 @@ class JilesAtherton:
             )
 
     def simulate(self, v: ArrayLike) -> Array:
-        """Magnetization M (N,) at the fields `v` (N,), both in A/m; needs no time."""
+        """Magnetization M (N,) at the fields `v` (N,), both in A/m; does not depend on time."""
         up, down = (functools.partial(self._slope, sign) for sign in (1.0, -1.0))
         return integration.integrate(finite_samples(v), 0.0, up, down, self.Ms)
 

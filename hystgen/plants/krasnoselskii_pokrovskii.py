@@ -1,4 +1,4 @@
-"""Krasnosel'skii-Pokrovskii: relays whose switching is a ramp, in parallel."""
+"""Krasnosel'skii-Pokrovskii: parallel relays that switch along a ramp."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def _add_kernel(v: Array, p1: float, p2: float, ramp: float, weight: float, stat
 class KrasnoselskiiPokrovskii:
     """Weighted sum of KP kernels `s_k = max(r(v_k - p_2), min(r(v_k - p_1), s_(k-1)))`.
 
-    `r(x)` rises straight from -1 at x = 0 to 1 at x = `ramp` > 0. `lower`, `upper`: p_1 <= p_2 of every kernel, in
-    input units, where it begins to fall back to -1 and to rise from -1; `weights`: of any sign, in output units;
-    `start` in [-1, 1]: state of all kernels before the first sample. Raises ValueError. With a narrow ramp a kernel is
-    a relay; with one wider than the input's range a play. Source: H. T. Banks, A. J. Kurdila, G. Webb, Identification
-    of hysteretic control influence operators representing smart actuators, Math. Probl. Eng. 3, 1997.
+    `r(x)` rises along a straight line from -1 at x = 0 to 1 at x = `ramp` > 0. `lower`, `upper`: p_1 <= p_2 of every
+    kernel, in input units, where it begins to fall back to -1 and to rise from -1; `weights`: of any sign, in output
+    units; `start` in [-1, 1]: state of all kernels before the first sample. Raises ValueError. With a narrow ramp a
+    kernel is a relay; with one wider than the input's range a play. Source: H. T. Banks, A. J. Kurdila, G. Webb,
+    Identification of hysteretic control influence operators representing smart actuators, Math. Probl. Eng. 3, 1997.
     """
 
     lower: Sequence[float]
@@ -47,19 +47,19 @@ class KrasnoselskiiPokrovskii:
             object.__setattr__(self, name, finite_numbers(getattr(self, name), name))
         if not len(self.lower) == len(self.upper) == len(self.weights):
             raise ValueError(
-                f"{len(self.lower)} lower and {len(self.upper)} upper places but {len(self.weights)} weights"
+                f"{len(self.lower)} lower and {len(self.upper)} upper positions but {len(self.weights)} weights"
             )
         if any(p1 > p2 for p1, p2 in zip(self.lower, self.upper, strict=True)):
-            raise ValueError("the lower place of a kernel is not above its upper one")
+            raise ValueError("the lower position of a kernel must not be above its upper one")
 
     @classmethod
     def on_grid(
         cls, low: float, high: float, divisions: int, weights: Callable[[Array, Array], ArrayLike]
     ) -> KrasnoselskiiPokrovskii:
-        """Kernels at all p_1 <= p_2 of a grid over [low, high - ramp], the ramp as wide as the grid's step.
+        """Kernels at all p_1 <= p_2 of a grid over [low, high - ramp], with a ramp as wide as the grid's step.
 
-        `low`, `high`: input units; `divisions`: steps between them, at least 2; `weights(p1, p2)`: of arrays of places
-        an array of as many weights, or one for all, in output units. Raises ValueError.
+        `low`, `high`: input units; `divisions`: steps between them, at least 2; `weights(p1, p2)`: from arrays of
+        positions, an array of as many weights, or one for all, in output units. Raises ValueError.
         """
         finite(low=low, high=high)
         whole_from(2, divisions=divisions)
@@ -72,7 +72,7 @@ class KrasnoselskiiPokrovskii:
         return cls(places[i].tolist(), places[j].tolist(), each.tolist(), (high - low) / divisions)
 
     def simulate(self, v: ArrayLike) -> Array:
-        """Output (N,) at the inputs `v` (N,); needs no time."""
+        """Output (N,) at the inputs `v` (N,); does not depend on time."""
         samples = finite_samples(v)
         out = np.zeros_like(samples)
         for p1, p2, weight in zip(self.lower, self.upper, self.weights, strict=True):

@@ -1,4 +1,4 @@
-"""Maxwell-slip: springs in parallel, each of which slips where its force reaches a limit."""
+"""Maxwell-slip: springs in parallel, each of which slips when its force reaches a limit."""
 
 from __future__ import annotations
 
@@ -15,11 +15,12 @@ from hystgen.plays import operators
 
 @dataclass(frozen=True)
 class MaxwellSlip:
-    """Force of elastic elements that slip, beside a spring that does not: `F = k v + sum k_i stop_(W_i / k_i)[v]`.
+    """Force of elastic elements that slip, together with a spring that does not:
+    `F = k v + sum k_i stop_(W_i / k_i)[v]`.
 
     `stiffnesses`: k_i > 0 in output per input unit; `slip_forces`: W_i > 0 in output units, the force at which element
     i slips; `spring`: k >= 0, the spring that never does. All start relaxed at the input 0. The output leads the input,
-    so that as a play sum it has negative weights. Raises ValueError. Source: M. Goldfarb, N. Celanovic, Modeling
+    so as a play sum it has negative weights. Raises ValueError. Source: M. Goldfarb, N. Celanovic, Modeling
     piezoelectric stack actuators for control of micromanipulation, IEEE Control Systems 17(3), 1997.
     """
 
@@ -39,7 +40,7 @@ class MaxwellSlip:
         object.__setattr__(self, "slip_forces", slip_forces)
 
     def simulate(self, v: ArrayLike) -> Array:
-        """Force (N,) at the displacements `v` (N,); needs no time."""
+        """Force (N,) at the displacements `v` (N,); does not depend on time."""
         samples = finite_samples(v)
         force = self.spring * samples
         for stiffness, slip in zip(self.stiffnesses, self.slip_forces, strict=True):

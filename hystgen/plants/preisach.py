@@ -18,10 +18,10 @@ Everett = Callable[[Array, Array], Array]
 
 @jit
 def _staircase(v: Array, stack: Places, corner: Places) -> None:
-    """The corner that each sample's move began at, as a place in v, negative for a fall.
+    """The corner at which each sample's move began, as a position in v, negative for a fall.
 
-    The stack holds a minimum, maximum, minimum, ...; v[0] is the lowest input there is, the minimum below all others,
-    and no fall begins at it.
+    The stack holds a minimum, maximum, minimum, ...; v[0] is the lowest possible input, the minimum below all others,
+    and no fall begins there.
     """
     depth = 1
     stack[0] = 0
@@ -55,9 +55,9 @@ def _add_up(corner: Places, change: Array, out: Array) -> None:
 class EverettTable:
     """Everett surface between grid points: `values[i][j]` is E at alpha = `edges[i]`, beta = `edges[j]`, j <= i.
 
-    `edges`: rising inputs, at least two; `values`: square, in output units, 0 on the diagonal, those above it are not
-    read. Bilinear in a cell, linear in the half cells on the diagonal. Raises ValueError for other tables, and for
-    places that are not between the edges.
+    `edges`: increasing inputs, at least two; `values`: square, in output units, 0 on the diagonal; those above it are
+    ignored. Bilinear in a cell, linear in the half cells on the diagonal. Raises ValueError for other tables, and for
+    points that are not between the edges.
     """
 
     edges: Sequence[float]
@@ -66,7 +66,7 @@ class EverettTable:
     def __post_init__(self) -> None:
         edges = finite_numbers(self.edges, "edges")
         if len(edges) < 2 or any(b <= a for a, b in itertools.pairwise(edges)):
-            raise ValueError("edges rise strictly and are at least two")
+            raise ValueError("edges must be strictly increasing, and at least two")
         given = list(self.values) if np.iterable(self.values) else []
         if len(given) != len(edges):
             raise ValueError(f"{len(edges)} edges but {len(given)} rows")
@@ -81,7 +81,7 @@ class EverettTable:
 
     @classmethod
     def of_density(cls, edges: Sequence[float], density: Everett) -> EverettTable:
-        """Table of a density `density(alpha, beta)` of relays, constant in a cell; half a cell on the diagonal."""
+        """Table for a density `density(alpha, beta)` of relays, constant in each cell; half a cell on the diagonal."""
         ends = np.asarray(edges, dtype=np.float64)
         middle, size = (ends[1:] + ends[:-1]) / 2.0, np.diff(ends)
         alpha, beta = np.meshgrid(middle, middle, indexing="ij")
@@ -93,11 +93,11 @@ class EverettTable:
         return cls(ends.tolist(), np.tril(table).tolist())
 
     def __call__(self, alpha: Array, beta: Array) -> Array:
-        """E at arrays of places within the edges, alpha >= beta."""
+        """E at arrays of points within the edges, alpha >= beta."""
         edges, table = np.array(self.edges), np.array(self.values)
         if not np.all((edges[0] <= beta) & (beta <= alpha) & (alpha <= edges[-1])):
             span = f"{edges[0]:g} to {edges[-1]:g}"
-            raise ValueError(f"an Everett table from {span} knows no place beyond, nor alpha < beta")
+            raise ValueError(f"an Everett table from {span} has no values outside, nor for alpha < beta")
         last = len(edges) - 2
         i = np.clip(np.searchsorted(edges, alpha, side="right") - 1, 0, last)
         j = np.clip(np.searchsorted(edges, beta, side="right") - 1, 0, last)
@@ -110,15 +110,15 @@ class EverettTable:
 
 @dataclass(frozen=True)
 class Preisach:
-    """Relays that switch up at alpha and down at beta <= alpha, summed: exact, through the remembered extrema.
+    """Sum of relays that switch up at alpha and down at beta <= alpha: exact, through the remembered extrema.
 
-    `everett(alpha, beta)`: change of the output when the input rises from beta to alpha, 0 for alpha = beta, rising in
-    alpha and falling in beta, a function of two arrays; in output units. `low`, `high`: range of the relays, an input
-    beyond changes nothing; `offset`: output with all relays down. Starts there, and visits `history` before the first
-    sample. A rise from the remembered minimum m gives `y = y_m + E(v, m)`, a fall from a maximum M `y = y_M - E(M, v)`;
-    an input that passes an extremum wipes it out. Raises ValueError for wrong arguments or a surface that is no
-    Everett surface on 33 x 33 points. Sources: D. H. Everett, A general approach to hysteresis, part 4, Trans. Faraday
-    Soc. 51, 1955; I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer, 1991.
+    `everett(alpha, beta)`: change of the output when the input rises from beta to alpha, 0 for alpha = beta, increasing
+    in alpha and decreasing in beta, a function of two arrays; in output units. `low`, `high`: range of the relays,
+    outside which an input changes nothing; `offset`: output with all relays down. Starts there, and visits `history`
+    before the first sample. A rise from the remembered minimum m gives `y = y_m + E(v, m)`, a fall from a maximum M
+    `y = y_M - E(M, v)`; an input that passes an extremum wipes it out. Raises ValueError for wrong arguments or a
+    surface that is not an Everett surface on 33 x 33 points. Sources: D. H. Everett, A general approach to hysteresis,
+    part 4, Trans. Faraday Soc. 51, 1955; I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer, 1991.
     """
 
     everett: Everett
@@ -142,10 +142,10 @@ class Preisach:
             raise ValueError("an Everett surface is finite, and 0 for alpha = beta")
         along = np.diff(surface, axis=0)[:, :-1][inside[:-1, :-1]], -np.diff(surface, axis=1)[1:][inside[1:, 1:]]
         if any(np.any(part < -slack) for part in along):
-            raise ValueError("an Everett surface rises in alpha and falls in beta")
+            raise ValueError("an Everett surface increases in alpha and decreases in beta")
 
     def simulate(self, v: ArrayLike) -> Array:
-        """Output (N,) at the inputs `v` (N,); needs no time."""
+        """Output (N,) at the inputs `v` (N,); does not depend on time."""
         samples = finite_samples(v)
         before = [self.low, *self.history]
         path = np.clip(np.concatenate([before, samples]), self.low, self.high)

@@ -1,14 +1,14 @@
 """Measured data in, computed columns out: one file is one experiment.
 
 Text tables (`t` time, `v` drive, `y` measured, any further columns) as instruments and programs export them, and
-`.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. Every problem of a file is reported, all at
-once and each with its place; small faults of a recording are repaired and counted in `Record.notes`.
+`.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. All problems of a file are reported at once, each with its place;
+small faults in a recording are repaired and counted in `Record.notes`.
 
-Of a text file, `csv_file` makes lines and reads the rows, once `layout` has found what is where in them; `cells` reads
-single cells. For every format, `columns` finds the columns asked for and sample rates, and `reading` makes the record
-of them.
+For a text file, `layout` finds out how the table is written, `csv_file` splits it into lines and reads the rows, and
+`cells` reads single cells. For every format, `columns` finds the requested columns and the sample rate, and `reading`
+turns them into the record.
 
-A format is a file of this package and an entry of `FORMATS`.
+A format is a file in this package and an entry in `FORMATS`.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _HDF5 = b"\x89HDF\r\n\x1a\n"
 
 
 def _any_mat(reading: Reading, stream: IO[bytes]) -> Table:
-    """A MATLAB file of either kind: v7.3 is HDF5 behind 512 bytes of MATLAB's own."""
+    """A MATLAB file of either kind: v7.3 is HDF5 after a 512-byte header of MATLAB's own."""
     start = stream.read(520)
     stream.seek(0)
     if start[:10] == b"MATLAB 7.3" or _HDF5 in (start[:8], start[512:]):
@@ -72,12 +72,12 @@ def read_records(
     progress: bool = False,
     points: bool = False,
 ) -> list[Record]:
-    """Read several data files as `read_record` does; records that are in memory already are kept.
+    """Read several data files as `read_record` does; records already in memory are kept.
 
-    Samples in memory are called `record`, or `record 1`, `record 2`, .. where there are several. `points`: samples
-    without a time are points taken one by one, and not refused.
+    Samples in memory are called `record`, or `record 1`, `record 2`, .. if there are several. `points`: accept samples
+    without a time, as points taken one by one.
 
-    `progress`: says on stderr once how files were understood ("read as: .."), with a bar on a terminal when it takes
+    `progress`: says once on stderr how files were interpreted ("read as: .."), with a bar on a terminal when it takes
     more than a second. Raises RecordError with every problem in all files, ValueError and TypeError for other
     arguments.
     """
@@ -99,7 +99,7 @@ def read_records(
                 else:
                     name = f"record {unnamed.index(k) + 1}" if len(unnamed) > 1 else "record"
                     record = read_memory(source, name, columns, sample_time, need)
-                if record.read_as and record is not source:  # what is a record already has been announced
+                if record.read_as and record is not source:  # an existing record has been announced already
                     ways.setdefault(record.read_as, []).append(record.name)
                 found.append(record)
             except RecordError as error:
@@ -122,15 +122,15 @@ def read_record(
 ) -> Record:
     """Read one data file, or make a record of samples in memory.
 
-    `path`: of a file; or a mapping or data frame of columns, an array (N, 3) or a tuple of arrays (N,) in the order t,
-    v, y. `columns`: our names to the file's (`{"t": "Time"}`), each the whole name (`session1/drive` in HDF5, `data.v`
-    for the field of a MATLAB struct), its last part or that without a unit, as long as only one column is meant, or
-    its number, `#2`. `t`, `v` and `y` are found the same way, else by what the name of one column alone means
-    (`Drive (V)`, `Zeit [ms]`). `sample_time`: seconds, for a file without time; `delimiter`: one character, default
-    what the file shows; `need`: the columns that must be there. When `y` is among them the record is meant for a fit:
-    it then has at least 16 samples and a drive that moves. Samples without a value in `t` or a needed column, and
-    samples whose time does not rise, are dropped with a note up to 5 % of the record. A time in another unit is
-    converted to seconds.
+    `path`: path of a file; or a mapping or data frame of columns, an array (N, 3) or a tuple of arrays (N,) in the
+    order t, v, y. `columns`: our names to the file's (`{"t": "Time"}`). The file's name may be the whole name
+    (`session1/drive` in HDF5, `data.v` for the field of a MATLAB struct), its last part, or that without a unit, as
+    long as it matches only one column; or the column's number, `#2`. `t`, `v` and `y` are found the same way, or else
+    by the meaning of a name that only one column has (`Drive (V)`, `Zeit [ms]`). `sample_time`: seconds, for a file
+    without time; `delimiter`: one character, by default the one found in the file; `need`: the columns that must be
+    there. If `need` includes `y`, the record is meant for a fit: it must then have at least 16 samples and a drive that
+    moves. Samples without a value in `t` or a needed column, and samples whose time does not increase, are dropped with
+    a note, up to 5 % of the record. A time in another unit is converted to seconds.
 
     Raises RecordError with every problem in the file.
     """
@@ -146,12 +146,13 @@ def in_units(
     named: tuple[str, Mapping[str, str] | None] = ("units", None),
     sources: Sequence[object] = (),
 ) -> list[Record]:
-    """The records with their columns `need`, and temperatures, in one unit each; each conversion is one of its notes.
+    """The records with their columns `need`, and temperatures, each in one unit throughout; each conversion adds a note
+    to the record.
 
-    Wanted are the units that the user names, by which option and what for `input` and `output`, else those of a
-    parameter file, by its path and with its units, else those of a model; where there are none the first record with a
-    unit decides. Columns without a unit are taken to be in the one wanted. `sources`: as given for the records, for
-    messages. Raises RecordError with every column of another quantity, or in a unit that nobody knows.
+    The target units are those that the user gave (with the option's name and the units of `input` and `output`), else
+    those of a parameter file (its path and units), else those of a model; if there are none, the first record with a
+    unit decides. Columns without a unit are assumed to be in the target unit. `sources`: the records as given, for
+    messages. Raises RecordError with every column of a different quantity or in an unknown unit.
     """
     everything = list(records)
     if not any(record.units for record in everything):
@@ -167,7 +168,7 @@ def several(sources: Source | Iterable[Source]) -> list[Source]:
     listed = isinstance(sources, list) or (isinstance(sources, tuple) and not sources)
     if not listed and in_memory(sources):
         return [sources]
-    stream = isinstance(sources, bytes) or hasattr(sources, "readline")  # which would give lines
+    stream = isinstance(sources, bytes) or hasattr(sources, "readline")  # iterating over it would give lines
     found: list[Any] = [] if stream or not isinstance(sources, Iterable) else list(sources)
     strange = [each for each in found if not (isinstance(each, Record | str | os.PathLike) or in_memory(each))]
     if stream or strange or not isinstance(sources, Iterable):
@@ -180,17 +181,17 @@ def several(sources: Source | Iterable[Source]) -> list[Source]:
 
 
 def _check_options(columns: object, sample_time: object, delimiter: object) -> None:
-    """Raise TypeError for options of `read_record` that are of another type."""
+    """Raise TypeError for options of `read_record` that have the wrong type."""
     if columns is not None:
         arguments.texts("columns", columns, (), "{'t': 'Time', 'v': 'U', 'y': 'Pos'}")
     if sample_time is not None:
         arguments.real("sample_time", sample_time, "seconds")
     if delimiter is not None and not isinstance(delimiter, str):
-        raise TypeError(f"delimiter is a character such as ';', not {arguments.kind(delimiter)}")
+        raise TypeError(f"delimiter has to be a character such as ';', not {arguments.kind(delimiter)}")
 
 
 def _check_arrays(record: Record) -> None:
-    """Raise ValueError or TypeError unless a record is made of arrays of numbers with one dimension."""
+    """Raise ValueError or TypeError unless a record consists of one-dimensional arrays of numbers."""
     if not isinstance(record.name, str):
         raise TypeError(f"a record's name is text, not {arguments.kind(record.name)}; Record(name, t, v, y)")
     for name, values in record.columns().items():
@@ -213,7 +214,7 @@ def _read(
     reading = Reading(file, columns or {}, sample_time, delimiter, tuple(need), tick, points)
     mark = reading.delimiter
     if mark is not None and (len(mark) != 1 or mark in "\"'.\r\n" or mark.isalnum()):
-        reading.problem(f'the delimiter "{printable(mark)}" is not usable; give one character such as ;')
+        reading.problem(f'the delimiter "{printable(mark)}" is not usable; give a single character such as ;')
     if sample_time is not None and not (0.0 < sample_time < float("inf")):
         reading.problem(f"the sample time {sample_time:g} is not positive; give seconds per sample")
     reading.refuse_if_any()
@@ -225,7 +226,7 @@ def _read(
         ) from None
     with stream:
         if not stream.peek(1):
-            raise reading.refuse("is empty; record again or give another file")
+            raise reading.refuse("is empty; record again, or give another file")
         table = FORMATS.get(Path(file).suffix.lower(), read_csv)(reading, stream)
     return repaired(reading, table)
 

@@ -18,17 +18,17 @@ from hystgen.records.reading import Reading, Table, in_matrix, one_dimension
 MATLAB_NUMBERS = frozenset(
     ("double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 )
-"""MATLAB's classes of arrays whose values are numbers."""
+"""MATLAB's numeric array classes."""
 
 TOGETHER = 1 << 20
-"""Samples of a .mat file loaded at a time, in several vectors as long as these are short."""
+"""Samples of a .mat file loaded at a time; short vectors are loaded together up to this number."""
 
 MOST_TOGETHER = 1000
-"""Vectors loaded at a time; the library looks each name of the file up among theirs one by one."""
+"""Vectors loaded at a time; the library compares each name in the file with theirs one by one."""
 
 
 def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
-    """Read a NumPy archive; only the arrays that the record takes are loaded."""
+    """Read a NumPy archive; only the arrays that the record needs are loaded."""
     with reading.parsing("a NumPy .npz archive"), np.load(stream, allow_pickle=False) as archive:
         columns = []
         ignored = []
@@ -48,7 +48,7 @@ def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
 
 
 def _scalar(name: str, of: str, read: Callable[[], NDArray[Any]], shape: tuple[int, ...], steps: list[Step]) -> bool:
-    """Whether one number beside the vectors says their sample rate, which is then among `steps`."""
+    """Whether the number is the sample rate of the vectors; it is then added to `steps`."""
     if int(np.prod(shape)) != 1 or not is_named(name):
         return False
     step = from_number(name, float(read()[0]), of)
@@ -57,7 +57,7 @@ def _scalar(name: str, of: str, read: Callable[[], NDArray[Any]], shape: tuple[i
 
 
 def _npy_shape(archive: Any, file: str) -> tuple[int, ...]:
-    """Shape of an archived array of numbers from its header alone; that of nothing for anything else."""
+    """Shape of an archived array of numbers, from its header alone; (0,) for anything else."""
     with archive.zip.open(file) as member:
         header: Mapping[tuple[int, int], Callable[..., Any]] = {
             (1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0,
@@ -121,7 +121,8 @@ def _mat_variable(stream: IO[bytes], name: str) -> NDArray[Any]:
 
 
 class _MatVectors:
-    """Vectors of a file that is searched from its start for each: neighbours are therefore loaded together."""
+    """Vectors of a file that has to be searched from its start for each of them: neighbours are therefore loaded
+    together."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self._stream = stream
@@ -131,7 +132,7 @@ class _MatVectors:
         self._loaded: tuple[int, dict[str, Any]] = (-1, {})
 
     def add(self, name: str, length: int) -> None:
-        """A vector of the file, in its order."""
+        """A vector of the file, in file order."""
         if not self._groups or self._samples + length > TOGETHER or len(self._groups[-1]) == MOST_TOGETHER:
             self._groups.append([])
             self._samples = 0
@@ -148,18 +149,18 @@ class _MatVectors:
 
 
 Parts = tuple[dict[str, str], dict[str, tuple[int, Callable[[], NDArray[Any]]]]]
-"""Fields of a struct of a list: its texts, and its vectors with length and numbers."""
+"""Fields of a struct in a list: its texts, and its vectors with length and numbers."""
 
 _LABELS, _UNITS = ("label", "name"), ("unit", "units")
 
 HOLDING = ("data", "values")
-"""Fields of a struct whose numbers are what its label says."""
+"""Fields of a struct whose label says what its numbers are."""
 
 
 def list_of_structs(folder: str, structs: Sequence[Parts]) -> list[Column]:
-    """The vectors of a list of structs, by the text beside them: signals of Simulink, traces of ControlDesk.
+    """The vectors of a list of structs, named by the text next to them: signals of Simulink, traces of ControlDesk.
 
-    Those without a text of their own are called by their number in the list, `(2).values`.
+    Vectors without a text of their own are named by their number in the list, `(2).values`.
     """
 
     def beside(texts: dict[str, str], keys: Sequence[str]) -> str:
@@ -195,7 +196,7 @@ def _parts(struct: NDArray[Any], place: int) -> Parts:
 def _fields(
     struct: NDArray[Any], folder: str, columns: list[Column], ignored: list[str], steps: list[Step]
 ) -> None:
-    """The vectors among the fields of a struct, and of the structs in it."""
+    """The vectors among the fields of a struct, and of the structs inside it."""
     alone = struct.shape == (1, 1)
     if not alone or [name.casefold() for name in _parts(struct, 0)[1]] in ([each] for each in HOLDING):
         listed = list_of_structs(folder, [_parts(struct, k) for k in range(struct.size)])

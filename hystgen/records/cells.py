@@ -1,4 +1,4 @@
-"""Lines of a text table into cells, and cells into numbers or times, once it is known how a file writes them."""
+"""Split lines of a text table into cells, and convert cells to numbers or times, given how the file writes them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ DAY = 86400
 NANO = 10**9
 
 PAST_MIDNIGHT = 0.5
-"""[days] A clock without a date that goes back by at least this much has passed midnight."""
+"""[days] A clock without a date that jumps back by at least this much has passed midnight."""
 
 
 def is_time(cell: str) -> bool:
@@ -46,11 +46,11 @@ class Clock:
         self.problem = ""
 
     def copy(self) -> Clock:
-        """A clock that goes on from here, for an attempt that may be given up."""
+        """A clock that continues from here, for an attempt that may be abandoned."""
         return copy(self)
 
     def seconds(self, cell: str) -> float:
-        """Seconds from the column's first time. Raises ValueError for a cell that is no time."""
+        """Seconds from the column's first time. Raises ValueError for a cell that is not a time."""
         match = _TIME.fullmatch(cell.strip())
         if match is None:
             raise ValueError("no time of day")
@@ -73,11 +73,11 @@ class Clock:
         self._latest = time
         if self._first is None:
             self._first = time
-        # The difference is whole, so that the only rounding is that of the quotient
+        # The difference is an integer, so the quotient is the only rounding
         return (time - self._first) / NANO
 
     def _day(self, text: str) -> int:
-        """Number of a date. Which of its numbers is the month matters only where dates change."""
+        """Day number of a date. Which of its numbers is the month matters only if the date changes."""
         one, two, three = (int(part) for part in re.split("[-/.]", text))
         if one > 31:
             return date(one, two, three).toordinal()
@@ -87,8 +87,8 @@ class Clock:
             self._dates |= {text}
         if len(self._dates) > 1:
             self.problem = (
-                f'the date "{text}" may begin with the day or with the month, and dates change; export ISO dates such '
-                "as 2024-03-05, or seconds"
+                f'the date "{text}" may begin with the day or with the month, and the date changes; export ISO dates '
+                "such as 2024-03-05, or seconds"
             )
         return date(three, one, two).toordinal()
 
@@ -108,10 +108,10 @@ MISSING = frozenset(
     ("", "nan", "na", "n/a", "null", "none", "inf", "+inf", "-inf", "infinity", "-infinity", "\N{INFINITY}",
      "+\N{INFINITY}", "-\N{INFINITY}")
 )  # fmt: skip
-"""Cells, in lower case, that hold no value."""
+"""Cells, in lower case, that stand for a missing value."""
 
 BLANKS = " "
-"""The delimiter of columns that any number of blanks separates, as aligned ones."""
+"""The delimiter of columns separated by any number of blanks, such as aligned ones."""
 
 COMMENT = re.compile(r"^[^\S\n]*(?:#|%|//)", re.MULTILINE)
 """The beginning of a comment line."""
@@ -131,13 +131,13 @@ _WORD = re.compile(r"\S+")
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a file separates its cells and writes the decimals of its numbers."""
+    """How a file separates its cells and writes its decimals."""
 
     delimiter: str = ","
     decimal: str = "."
 
     def cells(self, line: str) -> list[tuple[int, str]]:
-        """Cells of a line with the position at which each starts; quotes are taken off."""
+        """Cells of a line with the position at which each starts; quotes are removed."""
         if '"' in line:
             return list(_quoted_cells(line, self.delimiter))
         if self.delimiter == BLANKS:
@@ -169,11 +169,11 @@ class Dialect:
         return 1
 
     def either(self, cell: str) -> bool:
-        """Whether a decimal comma of this cell may as well be a thousands mark."""
+        """Whether the decimal comma in this cell may also be a thousands mark."""
         return _EITHER.fullmatch(cell.strip()) is not None
 
     def fault(self, cell: str) -> tuple[str, str]:
-        """The fault of a cell that is not a number: its kind, empty for a unique one, and what to do."""
+        """The fault of a cell that is not a number: its kind (empty if it is unique), and what to do."""
         text = cell.strip()
         if self.either(text):
             return "comma", "its comma may be a decimal comma or a thousands mark, write decimals with a point"
@@ -182,14 +182,14 @@ class Dialect:
         if any(marks.fullmatch(text) for marks in _THOUSANDS):
             return "thousands marks", "thousands marks are not read, export numbers without them"
         if "." in text and self.decimal != "." and _reads(text):
-            return "decimal point", "the file has decimal commas, write every number with one"
+            return "decimal point", "the file uses decimal commas, write every number with one"
         if _MINUTES.fullmatch(text):
             return "minutes", "write times as hours, minutes and seconds, 0:01:30.5, or in seconds"
-        return "", "write a number, or nothing where there is no value"
+        return "", "write a number, or leave the cell empty if there is no value"
 
 
 def shape(cell: str) -> str:
-    """A key that cells with the same fault share: a word itself, or for text with digits its kinds of characters."""
+    """A key shared by cells with the same fault: the word itself, or for text with digits its character classes."""
     text = cell.strip()
     if not any(map(str.isdigit, text)):
         return text

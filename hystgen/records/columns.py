@@ -1,4 +1,4 @@
-"""Columns of a file: their names, units and sample rates, and which of them are ours."""
+"""Columns of a file: their names, units and sample rates, and which of them we use."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TIMES: dict[str, tuple[float, float]] = {
     **dict.fromkeys(("min", "mins", "minute", "minutes"), (60.0, 1.0)),
     **dict.fromkeys(("h", "hr", "hour", "hours"), (3600.0, 1.0)),
 }
-"""Factor and divisor to seconds: x/1000 is the double nearest to the time meant, 0.001*x need not be."""
+"""Factor and divisor to seconds: x/1000 is the double nearest to the intended time, 0.001*x may not be."""
 
 _ONE = (
     r"(?:(?:[fpnumkMG]|d[am]?|c)?(?:s|V|A|m|rad|N|Hz|F|C|K|Pa|g|W|J|T|bar|Ohm|strain)"
@@ -39,7 +39,7 @@ _UNIT = re.compile(rf"{_ONE}(?:\^?-?\d)?(?:\s?[*/·]\s?{_ONE}(?:\^?-?\d)?)*")
 
 _LENGTH = re.compile(r"(?:[pnumc]?m|(?i:(?:pico|nano|micro|milli|centi)?met(?:er|re)s?|microns?))")
 
-# After an underscore a word is a unit only when it is hardly anything else: v_in, y_min and v_m are names
+# After an underscore, only an unmistakable word is a unit: v_in, y_min and v_m are names
 _AFTER_UNDERSCORE = re.compile(
     r"[mun]?s|sec|seconds|[muk]?V|volts|[mu]A|k?Hz|[munp]m|microns|deg|[mu]rad|degC|[mk]N|counts"
 )
@@ -50,7 +50,7 @@ def split_unit(header: str) -> tuple[str, str]:
     """Name and unit of a header: `pos [um]`, `pos (um)`, `U / V`, `time_ms`; the unit may be empty."""
     text = header.strip()
     match = re.fullmatch(r"(.*?\S)\s*\[\s*([^\[\]]*?)\s*\]", text)
-    # In square brackets anything is a unit but a number, which counts channels
+    # In square brackets anything is a unit except a number, which counts channels
     if match and not match[2].isdecimal() and len(match[2]) <= MAX_UNIT and match[2].isprintable():
         return match[1], "" if match[2] == "-" else match[2]
     match = re.fullmatch(r"(.*?\S)\s*\(\s*([^()]*?)\s*\)", text) or re.fullmatch(r"(.*?[^\s/])\s*/\s*(\S+)", text)
@@ -71,12 +71,12 @@ def unit_alone(text: str) -> str | None:
 
 
 def is_time_unit(unit: str) -> bool:
-    """Whether a unit is one of time."""
+    """Whether a unit is a unit of time."""
     return plain(unit).casefold() in TIMES
 
 
 def headers(names: Iterable[str], units: Mapping[str, str]) -> list[str]:
-    """Names of columns with their units, `v [V]`, wherever that is read back as the same name and unit."""
+    """Column names with their units, `v [V]`, wherever that reads back as the same name and unit."""
     made = []
     for name in names:
         unit = units.get(name, "")
@@ -86,10 +86,10 @@ def headers(names: Iterable[str], units: Mapping[str, str]) -> list[str]:
 
 
 def to_seconds(t: Array, unit: str) -> tuple[Array, str]:
-    """Times in seconds, and what the user should know about it, empty when they were seconds already."""
+    """Times in seconds, and a note for the user, empty if they were in seconds already."""
     scale = TIMES.get(plain(unit).partition(" since ")[0].casefold())
     if scale is None:
-        return t, f'the unit "{printable(unit)}" of t is not a known unit of time; its numbers were taken as seconds'
+        return t, f'the unit "{printable(unit)}" of t is not a known unit of time; its numbers were read as seconds'
     factor, divisor = scale
     if factor == divisor:
         return t, ""
@@ -99,10 +99,10 @@ def to_seconds(t: Array, unit: str) -> tuple[Array, str]:
 
 
 def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = None) -> tuple[dict[str, str], list[str]]:
-    """Units `input` and `output` of a model made from `records`, and a sentence for each that is strange.
+    """Units `input` and `output` of a model made from `records`, and a sentence for each unusual one.
 
-    `given` wins over the records, the first record that has a unit over later ones. All are in one unit each, as
-    `in_units` makes them.
+    `given` takes precedence over the records, and the first record with a unit over later ones. Each quantity is in a
+    single unit, as `in_units` leaves it.
     """
     units = {}
     strange = []
@@ -113,7 +113,7 @@ def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = No
             own = record.units.get(column, "")
             if len(own) > MAX_UNIT or not own.isprintable():
                 strange.append(
-                    f'the unit "{printable(own)}" of {column} in {record.name} is not taken over: a unit has up to '
+                    f'the unit "{printable(own)}" of {column} in {record.name} is ignored: a unit has at most '
                     f"{MAX_UNIT} characters on one line"
                 )
             elif not unit:
@@ -130,7 +130,7 @@ def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = No
 
 
 def plain(unit: str) -> str:
-    """A unit with the letter u for either of Unicode's two micro signs."""
+    """A unit with the letter u in place of either of Unicode's two micro signs."""
     return unit.strip().replace("\u00b5", "u").replace("\u03bc", "u")
 
 
@@ -142,7 +142,7 @@ RATES = {
     "S/s": 1.0, "kS/s": 1e3, "MS/s": 1e6, "GS/s": 1e9, "Sa/s": 1.0, "kSa/s": 1e3, "MSa/s": 1e6, "GSa/s": 1e9,
     "sps": 1.0, "SPS": 1.0, "ksps": 1e3, "kSPS": 1e3, "MSPS": 1e6,
 }  # fmt: skip
-"""Units of sample rates in Hz; m and M differ, so letters count."""
+"""Units of sample rates in Hz; m and M differ, so case matters."""
 
 _RATE = r"(?i:sampl(?:e|ing)[ _-]?(?:rate|freq(?:uency)?)|f_?s(?:ample)?|srate|abtast(?:rate|frequenz))"
 _STEP = (
@@ -158,10 +158,10 @@ _LINE = re.compile(
 
 @dataclass(frozen=True)
 class Step:
-    """`seconds` between two samples, and how the file gives them.
+    """`seconds` between two samples, and how the file states them.
 
-    `of`: the column, or with its separator the group or struct, to which they belong; empty for all of the file;
-    `start`: when the first sample was, where the file gives that for each column.
+    `of`: the column they belong to, or the group or struct including its separator; empty for the whole file; `start`:
+    time of the first sample, if the file gives one per column.
     """
 
     seconds: float
@@ -170,20 +170,20 @@ class Step:
     start: str = ""
 
     def belongs(self, names: Iterable[str]) -> bool:
-        """Whether they are those of any of the columns."""
+        """Whether they apply to any of the columns."""
         group = self.of[-1:] in ("", ".", "/")
         return not self.of or any(name.startswith(self.of) if group else name == self.of for name in names)
 
 
 def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
-    """The sample rate according to numbered lines of text."""
+    """The sample rate found in numbered lines of text."""
     found = []
     for number, line in lines:
         for match in _LINE.finditer(line.replace('"', "")):
             text = match["number"]
             if "," in text and (decimal != "," or text.count(",") > 1 or "." in text):
                 continue
-            # What has a value of its own is not a unit but the next entry of the line
+            # A word with a value of its own is not a unit but the next entry of the line
             after = "" if match["entry"] else match["after"]
             unit = match["unit"] or (match["suffix"] or "").lstrip("_") or after or ""
             step = _step(bool(match["rate"]), float(text.replace(",", ".")), unit, f"line {number}")
@@ -199,7 +199,7 @@ def is_named(name: str) -> bool:
 
 
 def from_number(name: str, value: float, of: str = "", unit: str = "") -> Step | None:
-    """The sample rate according to a number beside the columns, by its name; `of` as in `Step`."""
+    """The sample rate given by a number next to the columns, identified by its name; `of` as in `Step`."""
     key, own_unit = split_unit(name)
     rate = re.fullmatch(_RATE, key) is not None
     if not rate and re.fullmatch(_STEP, key) is None:
@@ -224,14 +224,14 @@ def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
         factor, divisor = TIMES.get(text.casefold(), (1.0, 1.0))
         said = f"sample time {value:g} {text or 's'}"
         seconds = value / divisor * factor
-    return Step(seconds, f"{said} ({printable(where)}{'' if text else ', which gives no unit'})")
+    return Step(seconds, f"{said} ({printable(where)}{'' if text else ', without a unit'})")
 
 
 # Which column of a file is which of ours: t, v, y, u ---------------------------------------------------------
 
 
 LISTED = 20
-"""Columns or bad cells named one by one before the rest is only counted."""
+"""Columns or bad cells listed one by one before the rest is only counted."""
 
 STANDARD = ("t", "v", "y")
 
@@ -245,22 +245,22 @@ MEANINGS = {
          "auslenkung", "déplacement", "deplacement", "desplazamiento")
     ),
 }  # fmt: skip
-"""Words in the names of columns that may be meant if no column has our name."""
+"""Words in column names that suggest one of our columns if none has our name."""
 
 DECIDE = {
     "y": frozenset(("measured", "sensor", "actual", "istwert", "messwert")),
     "u": frozenset(("target", "reference", "ref", "setpoint", "desired", "commanded", "command", "soll", "sollwert")),
 }
-"""Words that decide which column is meant, despite other words beside them."""
+"""Words that decide which column is meant, whatever other words are in the name."""
 
 OTHERWISE = frozenset(
     ("error", "err", "deviation", "std", "sigma", "noise", "velocity", "speed", "rate", "limit", "min", "max", "status",
      "state", "offset", "gain", "scale", "constant", "range")
 )  # fmt: skip
-"""Words of names that belong to something else than the quantity itself."""
+"""Words for things other than the quantity itself."""
 
 COUNTING = frozenset(("index", "scan", "sample", "chunk", "no", "nr", "number", "row", "point", "count", "segment"))
-"""Words of names of columns that count rows."""
+"""Words in the names of columns that count rows."""
 
 _WORDS = re.compile(r"[^\W\d_]+")
 
@@ -269,11 +269,11 @@ _HUMP = re.compile(r"(?<=[a-zß-ÿ])(?=[A-ZÀ-Þ])")
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """A column that a file offers; others may be called alike.
+    """A column of the file; its name need not be unique.
 
     `name`: how it is addressed, `session1/drive [V]`; `own`: the last part, `drive [V]`; `label`: that without a unit,
-    `drive`; `unit`: empty when the file gives none; `length`: samples, 0 where they are not counted before reading;
-    `read`: its numbers, an array of one dimension that nobody else holds; `also`: another name that the file gives it.
+    `drive`; `unit`: empty if the file gives none; `length`: samples, 0 if unknown before reading; `read`: returns its
+    numbers as a one-dimensional array that nobody else holds; `also`: another name that the file gives it.
     """
 
     name: str
@@ -286,7 +286,7 @@ class Column:
 
     @property
     def folder(self) -> str:
-        """The part before the last one: the group or struct it is in, empty at the top."""
+        """Everything before the last part: the group or struct it is in, empty at the top level."""
         return self.name.removesuffix(self.own)
 
 
@@ -298,21 +298,21 @@ def column(
     read: Callable[[], NDArray[Any]] | None = None,
     also: str = "",
 ) -> Column:
-    """A column called `name` in `folder` (with its separator); a `unit` the file has beside the name wins over that
-    in the name."""
+    """A column called `name` in `folder` (with its separator); a `unit` that the file stores separately takes
+    precedence over one in the name."""
     label, own_unit = split_unit(name)
     return Column(folder + name, name, label, unit or own_unit, length, read, also)
 
 
 def meaning(c: Column) -> str:
-    """Our column that the words of a name mean; empty if they mean none, or more than one."""
+    """The column of ours that the words of a name mean; empty if they mean none, or more than one."""
     words = _words(c)
     if words & OTHERWISE:
         return ""
     timed = is_time_unit(c.unit)
     found = {ours for ours, known in DECIDE.items() if words & known}
     found = found or {ours for ours, known in MEANINGS.items() if words & known}
-    # What has a unit is a time if and only if it is one of time
+    # A column with a unit is a time if and only if that is a unit of time
     if c.unit and timed != ("t" in found):
         return ""
     return found.pop() if len(found) == 1 else ""
@@ -328,8 +328,8 @@ def _words(c: Column) -> set[str]:
 
 
 def parse_columns(text: str) -> dict[str, str]:
-    """Mapping of our names to a file's: `t=Time,v=U,y=Pos`, or columns by their numbers from 1 on, `1,2,3` for t, v, y
-    and `1,2` for v, y, which become `#1` and so on. Raises ValueError with what is wrong with it."""
+    """Mapping of our names to a file's: `t=Time,v=U,y=Pos`, or columns by number, starting at 1: `1,2,3` for t, v, y
+    and `1,2` for v, y, which become `#1` and so on. Raises ValueError saying what is wrong with it."""
     numbers = [part.strip() for part in text.split(",")]
     if all(part.isdecimal() for part in numbers):
         if len(numbers) not in (2, 3):
@@ -338,7 +338,7 @@ def parse_columns(text: str) -> dict[str, str]:
                 "others are written t=#1,v=#3"
             )
         if len(set(numbers)) < len(numbers) or any(int(number) == 0 for number in numbers):
-            raise ValueError(f'"{printable(text)}" names no columns; each has a number of its own, from 1 on')
+            raise ValueError(f'"{printable(text)}" names no columns; write different numbers, starting at 1')
         return dict(zip(STANDARD[-len(numbers) :], (f"#{int(number)}" for number in numbers), strict=True))
     mapping: dict[str, str] = {}
     for part in text.split(","):
@@ -356,10 +356,10 @@ def parse_columns(text: str) -> dict[str, str]:
 
 
 class Finder:
-    """Finds the columns that are asked for; `problems` says what is wrong with the others.
+    """Finds the requested columns; `problems` says what is wrong with the others.
 
-    `understood`: those found by what their names mean, by our names; `steps`: what the file says of the sample rate of
-    the columns found, where it has no time.
+    `understood`: columns found by the meaning of their names, by our names; `steps`: the file's sample rate for the
+    columns found, if it has no time.
     """
 
     def __init__(
@@ -385,9 +385,9 @@ class Finder:
     ) -> dict[str, Column]:
         """Our names to columns.
 
-        `need`: ours that must be there; `timed`: the user gives the sample time, so that the file need not have a time;
-        `steps`: what the file says of it, which counts only where it has no time; `points`: nor need it have one where
-        there is no further column that might be one.
+        `need`: names that must be there; `timed`: the user gives the sample time, so the file need not have a time;
+        `steps`: sample rates in the file, used only if it has no time; `points`: no time is needed either, if no
+        remaining column could be one.
         """
         found: dict[str, Column] = {}
         wanted = dict.fromkeys([*need, *STANDARD, *self.mapping])
@@ -399,7 +399,7 @@ class Finder:
                 found[ours] = chosen
             elif required and ours not in self._asked:
                 missing.append(ours)
-        # By their meaning only what is left: a name always comes first
+        # Names come first; meaning only decides among the remaining columns
         for ours in missing:
             chosen = None if ours in self.mapping else self._meant(ours, found)
             if chosen is not None:
@@ -416,7 +416,7 @@ class Finder:
         return found
 
     def _apart(self, named: Mapping[str, Column], found: Mapping[str, Column], need: Sequence[str]) -> None:
-        """One column cannot be two of those that are needed."""
+        """One column cannot stand for two needed ones."""
         for ours, c in found.items():
             if ours in named or ours not in (*need, "t"):
                 continue
@@ -430,7 +430,7 @@ class Finder:
             self.problems.append(f'column "{printable(twice)}" is given two names; name it once')
 
     def _meant(self, ours: str, found: Mapping[str, Column]) -> Column | None:
-        """The only column whose name means ours; a time is the first column with a unit of time, too."""
+        """The only column whose name has our meaning; for a time, also the first column with a unit of time."""
         taken = {c.name for c in found.values()}
         free = [c for c in self.columns if c.name and c.name not in taken]
         meant = [c for c in free if meaning(c) == ours]
@@ -441,7 +441,7 @@ class Finder:
         return meant[0] if len(meant) == 1 else None
 
     def _name_together(self, found: Mapping[str, Column]) -> None:
-        """One question for all columns that nothing identifies, or for which there are several candidates."""
+        """One question for all columns that are unidentified or have several candidates."""
         if not self._unnamed:
             for ours, meant in self._several.items():
                 self._ask(ours, ours, meant)
@@ -457,7 +457,7 @@ class Finder:
         )
 
     def _example(self, unnamed: Sequence[str], found: Mapping[str, Column]) -> str:
-        """An answer to the question for columns, in their order, where no more of them are left than are asked for."""
+        """A suggested answer to the question for columns, in file order, if no more columns remain than are needed."""
         taken = set(found.values())
         free = [c for c in self.columns if c.name and c not in taken and not _words(c) & COUNTING]
         times = [c for c in free if is_time_unit(c.unit) or meaning(c) == "t"]
@@ -468,7 +468,8 @@ class Finder:
         return f', for example --columns "{",".join(f"{ours}={self._address(c)}" for ours, c in answers.items() if c)}"'
 
     def _address(self, c: Column) -> str:
-        """The word for a column in `--columns`: its name, or its number if the name is not unique or has a comma."""
+        """How to refer to a column in `--columns`: its name, or its number if the name is not unique or contains a
+        comma."""
         alone = sum(each.name == c.name for each in self.columns) == 1
         return printable(c.name) if alone and not set(",=") & set(c.name) else f"#{self.columns.index(c) + 1}"
 
@@ -529,7 +530,7 @@ class Finder:
         self.problems.append(f'there is no column "{printable(theirs)}" among {_listed(self.columns)}; {advice}')
 
     def _advice(self, ours: str) -> str:
-        """Which column may be meant, by its name without units, else how to name one."""
+        """The likely column, judged by its name without a unit, or else how to name one."""
         known = MEANINGS.get(ours, frozenset()) | DECIDE.get(ours, frozenset()) | {ours}
         for c in self.columns:
             if _words(c) & known and self.mapping.get(ours) != c.name:
@@ -543,7 +544,7 @@ class Finder:
 
 
 def further_names(others: Sequence[Column], taken: Sequence[str]) -> dict[str, Column]:
-    """The other columns, each under its shortest unique name; those without one are left out."""
+    """The other columns, each under its shortest unique name; those without one are omitted."""
     names: dict[str, Column] = {}
     times = [Counter(getattr(c, part) for c in others) for part in ("label", "own", "name")]
     for c in others:

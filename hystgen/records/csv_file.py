@@ -1,6 +1,6 @@
-"""Text tables, read in blocks: numpy's C reader takes those that are sound, the others go line by line.
+"""Text tables, read in blocks: numpy's C reader takes the sound blocks, the others are read line by line.
 
-A file of any size then needs little more memory than its columns, and every fault is reported with its place.
+A file of any size thus needs little more memory than its columns, and every fault is reported with its place.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ LOOKED_AT = 1 << 10
 
 
 def texts(reading: Reading, stream: IO[bytes]) -> Iterator[str]:
-    """The file's text in blocks of whole lines that end in a line feed, as every line does but perhaps the last."""
+    """The file's text in blocks of whole lines; every line ends in a line feed, except perhaps the last."""
     latin = False
     for data in _blocks(reading, _eight_bit(reading, stream)):
         if b"\0" in data:
@@ -83,7 +83,7 @@ def _eight_bit(reading: Reading, stream: IO[bytes]) -> Iterator[bytes]:
 
 
 def _wide_without_mark(start: bytes) -> str:
-    """UTF-16 when every other byte is zero, as in text that is mostly digits; else nothing."""
+    """UTF-16 if every other byte is zero, as in text that is mostly digits; otherwise an empty string."""
     pairs = len(start) // 2
     for encoding, zeros, others in (
         ("utf-16-le", start[1::2].count(0), start[: 2 * pairs : 2].count(0)),
@@ -104,7 +104,7 @@ def _blocks(reading: Reading, chunks: Iterator[bytes]) -> Iterator[bytes]:
             yield data[:end]
         rest = data[end:]
         if len(rest) > BLOCK:
-            raise reading.refuse(f"has a line of more than {BLOCK >> 20} MB; export one row per line")
+            raise reading.refuse(f"has a line longer than {BLOCK >> 20} MB; export one row per line")
     if rest:
         yield rest
 
@@ -113,16 +113,16 @@ def _blocks(reading: Reading, chunks: Iterator[bytes]) -> Iterator[bytes]:
 
 
 SAMPLE = 1 << 16
-"""Characters at the start of a file, in whole lines, that show its layout."""
+"""Characters read from the start of a file, in whole lines, to determine its layout."""
 
 SAMPLE_LINES = 8
-"""Fewest lines that show it, however long they are: a header, units and a few rows."""
+"""Minimum number of those lines, however long they are: a header, units and a few rows."""
 
 PARAMETERS = re.compile(r"^hystgen\s*:", re.MULTILINE)
-"""How the text of a model begins, which no table does."""
+"""How the text of a model begins; no table begins like this."""
 
 SPARE = 1.05
-"""Ratio of the rows that room is made for to the number that the first block suggests."""
+"""Ratio of the rows allocated to the number that the first block suggests."""
 
 
 def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
@@ -132,9 +132,9 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
     while (len(sample) < SAMPLE or sample.count("\n") < SAMPLE_LINES) and (text := next(blocks, "")):
         sample += text
     if not sample.strip():
-        raise reading.refuse("is empty; record again or give another file")
+        raise reading.refuse("is empty; record again, or give another file")
     if PARAMETERS.search(sample):
-        raise reading.refuse("is a parameter file; give a recording, a table of time, drive and displacement")
+        raise reading.refuse("is a parameter file; give a recording, which is a table of time, drive and displacement")
     found = _layout(reading, sample)
     names = found.names
     units = found.units or [""] * len(names)
@@ -152,7 +152,7 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
 
 
 def _layout(reading: Reading, sample: str) -> Layout:
-    """The layout that the first lines show; notes how it was understood."""
+    """The layout of the first lines; notes how the file was interpreted."""
     fewest = len("\n".join(sample.split("\n", SAMPLE_LINES)[:SAMPLE_LINES]))
     start = sample[: sample.find("\n", max(SAMPLE, fewest)) + 1]
     lines = (start or sample).split("\n")
@@ -178,7 +178,7 @@ def _layout(reading: Reading, sample: str) -> Layout:
 
 
 def _refuse_wrong_delimiter(reading: Reading, found: Layout, lines: Sequence[str]) -> None:
-    """Raise RecordError if the given delimiter yields one column where another one would yield a table."""
+    """Raise RecordError if the given delimiter yields a single column where another one would yield a table."""
     if reading.delimiter is None or len(found.names) != 1 or not found.header:
         return
     shown = [line for line in lines[found.header - 1 :] if line.strip() and not is_comment(line)][:2]
@@ -192,13 +192,13 @@ def _refuse_wrong_delimiter(reading: Reading, found: Layout, lines: Sequence[str
 
 
 def _is_below_text(lines: Sequence[str], header: int) -> bool:
-    """Whether a header is a comment, or lines above it are not comments."""
+    """Whether a header is a comment, or the lines above it are not comments."""
     above = (line for line in lines[: header - 1] if line.strip())
     return is_comment(lines[header - 1]) or not all(map(is_comment, above))
 
 
 def _below(text: str, first: int) -> str:
-    """The text from a line on, counted from 1."""
+    """The text from a given line on, counted from 1."""
     start = 0
     for _ in range(first - 1):
         start = text.find("\n", start) + 1
@@ -214,7 +214,7 @@ def _size(stream: IO[bytes]) -> int:
 
 @dataclass
 class _Fault:
-    """A fault in words, with its first place, number of occurrences and last line."""
+    """Description of a fault, with its first place, number of occurrences and last line."""
 
     text: str
     line: int
@@ -224,7 +224,7 @@ class _Fault:
 
 
 class _Body:
-    """The rows below the header, as they come in."""
+    """The rows below the header, read block by block."""
 
     def __init__(self, reading: Reading, layout: Layout, wanted: Mapping[str, int], size: int) -> None:
         self.reading = reading
@@ -233,20 +233,20 @@ class _Body:
         self.dialect = layout.dialect
         self.wanted = frozenset(wanted.values())
         self.size = size
-        # The time alone may be a time of day; elsewhere that is text
+        # Only the time may be a time of day; in other columns that is text
         self.clock_column = wanted["t"] if wanted.get("t") in layout.clocks else None
         self.clock = Clock()
         self.time_column = wanted.get("t")
-        # A header of a segment whose end is in the next block; first row, line and seconds of each segment
+        # A segment header that continues in the next block; first row, line and seconds of each segment
         self.kept = ""
         self.segments: list[tuple[int, int, float]] = []
-        # Columns of numbers, as far as is known; those with text, and those called alike, are not stored
+        # The columns known to be numeric; text columns and duplicates are not stored
         alike = Counter(self.names)
         self.stored: dict[int, Array] = {
             k: np.empty(0) for k, name in enumerate(self.names) if (name and alike[name] == 1) or k in self.wanted
         }
         self.text_columns: set[int] = set()
-        # Cells at the end of a line that have no name and are not asked for may be missing
+        # Cells at the end of a line may be missing if they have no name and are not needed
         named = [k + 1 for k, name in enumerate(self.names) if name or k in self.wanted]
         self.fewest = max(named, default=len(self.names))
         self.rows = 0
@@ -255,7 +255,7 @@ class _Body:
         self.faults: dict[tuple[str, ...], _Fault] = {}
 
     def take(self, text: str) -> None:
-        """Rows of one block of whole lines, and headers of further segments among them."""
+        """Rows of one block of whole lines, which may contain headers of further segments."""
         segments = self.layout.segments
         if segments is None:
             self._take_rows(text)
@@ -267,7 +267,7 @@ class _Body:
             if end < 0:
                 self.kept = text[begin:]
                 if len(self.kept) > BLOCK:
-                    raise self.reading.refuse("has a segment whose header does not end; export it again", self.line + 1)
+                    raise self.reading.refuse("has a segment with an unfinished header; export it again", self.line + 1)
                 return
             seconds, rows = segments.read(text[begin:end], self.line + 1)
             self.segments.append((self.rows, self.line + 1, seconds))
@@ -281,7 +281,7 @@ class _Body:
         another = text.find(self.layout.another) if self.layout.another else -1
         if another >= 0:
             raise self.reading.refuse(
-                f"has a second table in it ({self.layout.kind}); one file is one experiment, export each by itself",
+                f"contains a second table ({self.layout.kind}); one file is one experiment, export each separately",
                 self.line + 1 + text.count("\n", 0, another),
             )
         lines = text.count("\n") + (not text.endswith("\n") and bool(text))
@@ -299,7 +299,7 @@ class _Body:
         self.line += lines
 
     def table(self, columns: Sequence[Column], chosen: dict[str, Column]) -> Table:
-        """Everything read so far. Raises RecordError when a cell or a line was wrong."""
+        """Everything read so far. Raises RecordError if a cell or a line was wrong."""
         reading = self.reading
         faults = list(self.faults.values())
         for fault in faults[:LISTED]:
@@ -324,7 +324,7 @@ class _Body:
         return reading.finished(numbers, taken, self.lines)
 
     def _join_segments(self) -> None:
-        """Give the rows of all segments one time. Raises RecordError where one begins before another ends."""
+        """Put the rows of all segments on a common time axis. Raises RecordError if one begins before another ends."""
         layout = self.layout.segments
         if layout is None:
             return
@@ -342,12 +342,12 @@ class _Body:
             if 0 < row < end and not t[row] > t[row - 1]:
                 raise self.reading.refuse(
                     f"has a segment that begins at {t[row]:g} s, when the one before it has come to {t[row - 1]:g} s; "
-                    "one file is one experiment, export each by itself",
+                    "one file is one experiment, export each separately",
                     line,
                 )
 
     def _room(self, rows: int, size: int) -> None:
-        """Make room for `more` rows, at once for all that may follow if these have `size` bytes."""
+        """Make room for `more` rows, and at once for all that may follow if these take `size` bytes."""
         needed = self.rows + rows
         have = min((len(x) for x in self.stored.values()), default=needed)
         if needed <= have:
@@ -355,13 +355,13 @@ class _Body:
         expected = int(SPARE * rows * self.size / max(size, 1)) if not self.rows else needed + needed // 4
         for k in self.stored:
             if not self.rows:
-                # Not by resize, which fills with zeros what may never be needed
+                # Not by resize, which fills memory with zeros that may never be needed
                 self.stored[k] = np.empty(max(needed, expected))
             else:
                 self.stored[k].resize(max(needed, expected), refcheck=False)
 
     def _fast(self, text: str, lines: int) -> NDArray[np.float64] | None:
-        """All cells by numpy's C reader; None when a line may have to be left out or has a fault."""
+        """All cells, read by numpy's C reader; None if a line may have to be left out or has a fault."""
         stored = list(self.stored)
         everything = len(stored) == len(self.names)
         dialect = self.dialect
@@ -388,7 +388,7 @@ class _Body:
         return cells
 
     def _regular(self, text: str, lines: int) -> bool:
-        """Whether every line has as many cells as the header; numpy looks only at those it is asked for."""
+        """Whether every line has as many cells as the header; numpy only checks the ones it is asked for."""
         try:
             data = np.frombuffer(text.encode("latin-1"), dtype=np.uint8)
         except UnicodeEncodeError:
@@ -398,7 +398,7 @@ class _Body:
             if '"' in text:
                 return False
             blank = (data == ord(" ")) | (data == ord("\t")) | ends
-            # Where a cell begins; a line has one more than it has places between cells
+            # Where a cell begins; a line has one cell more than it has separators
             between = ~blank & np.concatenate([[True], blank[:-1]])
             extra = 1
         else:
@@ -408,7 +408,7 @@ class _Body:
             quotes = data == ord('"')
             quoted = np.logical_xor.accumulate(quotes)
             before = np.concatenate([[True], (ends | between)[:-1]])
-            # Quotes that open in the middle of a cell, or stay open at the end of a line, are read differently by numpy
+            # numpy differs in how it reads quotes that open in the middle of a cell, or stay open at the end of a line
             if np.any(quotes & quoted & ~before) or np.any(ends & quoted) or quoted[-1]:
                 return False
             between &= ~quoted
@@ -417,7 +417,7 @@ class _Body:
         return bool(np.all((self.fewest <= found) & (found <= len(self.names))))
 
     def _slow(self, text: str) -> None:
-        """Line by line: reports wrong cells with their place, and accepts missing ones."""
+        """Read line by line: reports wrong cells with their place, and accepts missing ones."""
         names = self.names
         values: dict[int, list[float]] = {k: [] for k in self.stored}
         lines: list[int] = []
@@ -459,7 +459,7 @@ class _Body:
         return self.dialect.number(cell)
 
     def _bad_cell(self, column: int, cell: str, line: int, place: int) -> None:
-        """A cell of a column that is needed is not a number. The same fault in many cells is one problem."""
+        """Report a cell of a needed column that is not a number. The same fault in many cells counts as one problem."""
         name = printable(self.names[column])
         if column == self.clock_column:
             kind, what, advice = "", "a time of day", "write every time as the first one"

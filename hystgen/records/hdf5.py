@@ -1,7 +1,7 @@
-"""HDF5 (`.h5`, `.hdf5`) and MATLAB `.mat` v7.3, which is HDF5 with a header of its own; by h5py.
+"""HDF5 (`.h5`, `.hdf5`) and MATLAB `.mat` v7.3, which is HDF5 with a header of its own; uses h5py.
 
-A record is one file: datasets behind external links, with external storage, or put together from others (virtual) would
-have whatever the file names opened, and are not read.
+A record is one file: datasets behind external links, with external storage, or assembled from others (virtual) are not
+read, since that would open whatever the file names.
 """
 
 from __future__ import annotations
@@ -24,13 +24,14 @@ SLICE = 1 << 18
 _UNITS = ("units", "unit", "Units", "Unit")
 
 LONGEST = 1 << 10
-"""Characters of a text that may be a label or a unit; longer ones are not read."""
+"""Characters of a text that may be a label or a unit; longer texts are not read."""
 
 DEEPEST = 32
-"""[levels] Groups in each other, as structs of `mat_nesting`: paths of 20,000 take minutes, as each holds all above."""
+"""[levels] Nesting limit of groups, like that of structs in `mat_nesting`: paths of 20,000 levels take minutes, since
+each holds all those above it."""
 
 _MATLAB_OWN = ("#refs#", "#subsystem#")
-"""Groups in which MATLAB keeps what its cell arrays and objects refer to."""
+"""Groups in which MATLAB keeps the contents of its cell arrays and objects."""
 
 
 def read_hdf5(reading: Reading, _stream: IO[bytes]) -> Table:
@@ -57,7 +58,7 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
         outside: list[str] = []
         steps: list[Step] = []
         matrices: dict[str, Any] = {}
-        join = "." if matlab else "/"  # MATLAB writes a field of a struct with a point
+        join = "." if matlab else "/"  # MATLAB writes a field of a struct with a dot
 
         def link(path: str, found: Any) -> None:
             if isinstance(found, h5py.ExternalLink):
@@ -99,7 +100,7 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
 
 
 def _list_of_structs(reading: Reading, file: Any, group: Any, folder: str) -> list[Column]:
-    """The vectors of a list of structs, of which MATLAB keeps one dataset per field, with one reference per struct."""
+    """The vectors of a list of structs, which MATLAB stores as one dataset per field, with one reference per struct."""
     import h5py
 
     fields = {
@@ -115,7 +116,7 @@ def _list_of_structs(reading: Reading, file: Any, group: Any, folder: str) -> li
 
 
 def _fields(group: Any) -> dict[str, Any]:
-    """The datasets of a group; a link to another file, or to anywhere by a path, is not followed."""
+    """The datasets of a group; links to other files or to arbitrary paths are not followed."""
     import h5py
 
     own = [name for name in group if isinstance(group.get(name, getlink=True), h5py.HardLink)]
@@ -123,7 +124,7 @@ def _fields(group: Any) -> dict[str, Any]:
 
 
 def _parts(reading: Reading, fields: Mapping[str, Any]) -> Parts:
-    """The texts and vectors among the fields of a struct that the file holds itself."""
+    """The texts and vectors among the fields of a struct that are stored in the file itself."""
     import h5py
 
     parts: Parts = {}, {}
@@ -139,7 +140,7 @@ def _parts(reading: Reading, fields: Mapping[str, Any]) -> Parts:
 
 
 def _attributes(found: Any, of: str) -> list[Step]:
-    """The sample rate according to the attributes of a file, group or dataset."""
+    """The sample rate from the attributes of a file, group or dataset."""
     numbers = {name: np.asarray(found.attrs[name]) for name in found.attrs if is_named(name)}
     steps = [
         from_number(name, float(value.ravel()[0]), of)
@@ -150,14 +151,14 @@ def _attributes(found: Any, of: str) -> list[Step]:
 
 
 def _scalar(dataset: Any, name: str, folder: str, matlab: bool) -> Step | None:
-    """The sample rate according to one number beside the vectors."""
+    """The sample rate from a single number next to the vectors."""
     if dataset.shape is None or dataset.dtype.kind not in "fiu" or dataset.size != 1 or not is_named(name):
         return None
     return from_number(name, float(np.asarray(dataset[()]).ravel()[0]), folder, "" if matlab else _unit(dataset))
 
 
 def _length(dataset: Any, matlab: bool) -> int:
-    """Length of a vector of numbers; 0 for anything else, among it MATLAB's text, which is stored as numbers."""
+    """Length of a vector of numbers; 0 for anything else, including MATLAB's text, which is stored as numbers."""
     if dataset.shape is None or dataset.dtype.kind not in "fiub":
         return 0
     kind = dataset.attrs.get("MATLAB_class", b"double")
@@ -179,10 +180,10 @@ def _unit(dataset: Any) -> str:
 
 
 def _vector(reading: Reading, dataset: Any) -> NDArray[np.float64]:
-    """A vector, slice by slice: HDF5's own buffers stay small, and a bar can move."""
+    """A vector, slice by slice, so that HDF5's own buffers stay small and a progress bar can move."""
     axis = int(np.argmax(dataset.shape))
     length = dataset.shape[axis]
-    # Whole chunks, as a part of a compressed one costs as much as all of it
+    # Whole chunks, since reading part of a compressed chunk costs as much as all of it
     chunk = dataset.chunks[axis] if dataset.chunks else 1
     step = chunk * max(1, SLICE // chunk)
     numbers = np.empty(length, dtype=np.float64)

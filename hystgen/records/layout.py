@@ -1,7 +1,7 @@
-"""The layout of a text table: the separator of its cells, the lines of its header, its units and its numbers.
+"""The layout of a text table: its separator, header lines, units and number format.
 
-The numbers reveal it: a file uses the separator and the decimal mark with which most cells of its first lines are
-numbers. Header and units are then the lines above with the same number of cells. The headers of some instruments state
+The numbers reveal it: the file's separator and decimal mark are the ones with which most cells of its first lines are
+numbers. Header and units are then the lines above with the same number of cells. Headers of some instruments state
 their layout.
 """
 
@@ -19,15 +19,15 @@ from hystgen.records.columns import STANDARD, Step, column, meaning, unit_alone
 from hystgen.records.reading import Reading
 
 DELIMITERS = {"\t": "tabs", ";": "semicolons", ",": "commas", "|": '"|"', BLANKS: "blanks"}
-"""Separators of cells, the least ambiguous first, and their names."""
+"""Separators of cells, least ambiguous first, and their names."""
 
 _RULE = re.compile(r"\s*([-=_*~])\1{2,}[\s\-=_*~+]*")
-"""A line that is drawn, not written."""
+"""A ruled line, made of dashes and the like."""
 
 _MARKS = re.compile(r"^[\s#%/]+")
 
 EXAMPLES = {1: "v=#1", 2: "1,2 --sample-time SECONDS"}
-"""How to name columns by their numbers in a table with this many columns."""
+"""How to name columns by number in a table with this many columns."""
 
 EXAMPLE = "1,2,3"
 """The same for every wider table."""
@@ -35,12 +35,12 @@ EXAMPLE = "1,2,3"
 
 @dataclass
 class Layout:
-    """A text table: `names` and `units` of its columns, in lines counted from 1.
+    """A text table: `names` and `units` of its columns; lines count from 1.
 
-    `also`: second names of columns; `header`: line of the names, None where there is none; `first`: line from which on
-    there are rows; `steps`: what the lines above say of the sample rate; `kind`: the instrument's format, empty for
-    text in general; `clocks`: columns of times of day; `rows`: number of rows the file says it has; `another`: text
-    that would begin another table; `segments`: headers among the rows behind which the table goes on.
+    `also`: second names of columns; `header`: line of the names, None if there is none; `first`: first line of the
+    rows; `steps`: sample rates given in the lines above; `kind`: the instrument's format, empty for text in general;
+    `clocks`: columns of times of day; `rows`: number of rows the file says it has; `another`: text that would begin
+    another table; `segments`: headers among the rows after which the table continues.
     """
 
     dialect: Dialect
@@ -66,7 +66,7 @@ class _Line:
 
 @dataclass(frozen=True)
 class _View:
-    """The lines as one dialect sees them: rows of `width` cells, `score` more of them numbers than text."""
+    """The lines as one dialect sees them: rows of `width` cells, with `score` more numbers than texts among them."""
 
     dialect: Dialect
     width: int
@@ -76,16 +76,16 @@ class _View:
 
 
 def find(reading: Reading, lines: Sequence[str]) -> Layout:
-    """The layout of a table, from its first lines if an instrument wrote them, else from the numbers.
+    """The layout of a table: from its header if an instrument wrote it, else from the numbers.
 
-    Raises RecordError where nothing or more than one thing fits.
+    Raises RecordError if nothing fits, or more than one layout does.
     """
     said = (header(reading, lines) for header in (labview, pi_gcs, tektronix, rigol, yokogawa))
     return next((layout for layout in said if layout is not None), None) or _shown(reading, lines)
 
 
 def _shown(reading: Reading, lines: Sequence[str]) -> Layout:
-    """The layout that the numbers show."""
+    """The layout inferred from the numbers."""
     seen = [
         _Line(number, text, is_comment(text))
         for number, text in enumerate(lines, 1)
@@ -125,7 +125,7 @@ def _dialects(reading: Reading, lines: Sequence[str]) -> list[Dialect]:
 
 
 def _view(dialect: Dialect, lines: Sequence[_Line]) -> _View | None:
-    """The lines seen by a dialect; None if it makes no table of numbers of them."""
+    """The lines as read by a dialect; None if they do not form a table of numbers."""
     rows = [[cell for _, cell in dialect.cells(line.text)] if not line.comment else [] for line in lines]
     weights = [[dialect.weight(cell) for cell in row] for row in rows]
     widths = Counter(len(row) for row in weights if 1 in row)
@@ -145,7 +145,7 @@ def _view(dialect: Dialect, lines: Sequence[_Line]) -> _View | None:
 
 
 def _with_header(reading: Reading, view: _View, lines: Sequence[_Line]) -> Layout | None:
-    """The layout with the header in plain text, or that in a comment right above the numbers where it means more."""
+    """The layout with the header in plain text, or the one in a comment right above the numbers if that says more."""
     plain, comment = _plain_header(view, lines), _comment_header(view, lines)
     if plain is None or comment is None:
         return plain or comment
@@ -175,7 +175,7 @@ def _plain_header(view: _View, lines: Sequence[_Line]) -> Layout | None:
             more = block[place + 1 : place + 3]
             if len(more) == 2 and not _are_units(names) and _are_units(more[0][1]) and _may_be_names(view, more[1][1]):
                 made = _made(view, more[1][1], more[1][0].number, _next(lines, line), more[0][1])
-                made.also = names  # as Origin has them: long names, units, comments
+                made.also = names  # as Origin writes them: long names, units, comments
                 return made
             if _are_units(names) and place + 1 < len(block) and _may_be_names(view, block[place + 1][1]):
                 above, upper = block[place + 1]
@@ -188,7 +188,7 @@ def _plain_header(view: _View, lines: Sequence[_Line]) -> Layout | None:
 
 
 def _next(lines: Sequence[_Line], above: _Line) -> int:
-    """Number of the line below one that has rows below it."""
+    """Number of the line below a given one, if it has rows below it."""
     return next(line.number for line in lines if line.number > above.number)
 
 
@@ -198,7 +198,7 @@ def _made(view: _View, names: list[str], header: int, first: int, units: Sequenc
 
 
 def _names(view: _View, text: str) -> list[str] | None:
-    """Cells of a line with the same number of cells as the rows; None for any other line.
+    """Cells of a line with as many cells as the rows; None for any other line.
 
     A last cell without a name may be missing in the header or in the rows.
     """
@@ -216,7 +216,7 @@ def _names(view: _View, text: str) -> list[str] | None:
 
 
 def _comment_header(view: _View, lines: Sequence[_Line]) -> Layout | None:
-    """The header that stands in the comments right above the numbers."""
+    """The header found in the comments right above the numbers."""
     comments: list[_Line] = []
     for line in reversed(lines[: view.start]):
         if not line.comment or len(comments) == 2:
@@ -243,7 +243,7 @@ def _comment_header(view: _View, lines: Sequence[_Line]) -> Layout | None:
 
 
 def _headerless(reading: Reading, view: _View, lines: Sequence[_Line]) -> Layout:
-    """The layout of a table whose columns are called by their numbers. Raises RecordError when they are not."""
+    """The layout of a table whose columns are named by number. Raises RecordError if they are not."""
     start = view.start
     while start and not lines[start - 1].comment and len(view.dialect.cells(lines[start - 1].text)) == view.width:
         start -= 1
@@ -274,7 +274,7 @@ def _without_numbers(reading: Reading, lines: Sequence[_Line], dialects: Sequenc
         raise reading.refuse(
             "has no header row; the first line names the columns, for example t,v,y"
             if lines
-            else "is empty; record again or give another file"
+            else "is empty; record again, or give another file"
         )
     dialect = max(dialects, key=lambda each: len(each.cells(header.text)), default=Dialect())
     if reading.delimiter is None and len(Dialect().cells(header.text)) > 1:
@@ -305,7 +305,7 @@ def _decided(reading: Reading, view: _View, lines: Sequence[_Line]) -> None:
 
 
 def _clocks(view: _View, lines: Sequence[_Line]) -> frozenset[int]:
-    """The columns whose first cells are times of day and no numbers."""
+    """The columns whose first cells are times of day and not numbers."""
     cells = [cell for _, cell in view.dialect.cells(lines[view.start].text)]
     found = set()
     for k in view.numeric:
@@ -317,13 +317,13 @@ def _clocks(view: _View, lines: Sequence[_Line]) -> frozenset[int]:
 
 
 def _are_units(cells: Sequence[str]) -> bool:
-    """Whether cells are units and nothing else, at least half of them."""
+    """Whether all cells are units or empty, with at least half of them units."""
     units = [unit_alone(cell) for cell in cells if cell]
     return None not in units and 2 * len(units) >= len(cells) > 0
 
 
 def _may_be_names(view: _View, cells: Sequence[str]) -> bool:
-    """Whether a line may hold names, even if some are numbers, such as those of channels."""
+    """Whether a line may hold names, even if some are numbers, such as channel numbers."""
     text = {cell for cell in cells if view.dialect.weight(cell) < 0}
     numbers = all(cell in text or cell.isdecimal() for cell in cells if cell)
     return numbers and cells[0] in text and not _are_units(cells)
@@ -340,16 +340,16 @@ END = "***End_of_Header***"
 _SEGMENT = re.compile(r"^(?:Channels\b|\*\*\*Start_Special)", re.MULTILINE)
 """How the header of a further segment begins."""
 
-_OWN_TIMES = "its channels have times of their own (X0, Delta_X); export them with one time, X_Columns One"
+_OWN_TIMES = "its channels have separate times (X0, Delta_X); export them with a common time, X_Columns One"
 
 _SPECIAL = ("***Start_Special***", "***End_Special***")
 
 
 def labview(reading: Reading, lines: Sequence[str]) -> Layout | None:
-    """The layout that the tags give, by NI's "Specification for the LabVIEW Measurement File (.lvm)".
+    """The layout given by the tags, according to NI's "Specification for the LabVIEW Measurement File (.lvm)".
 
-    Tags of the file, then those of a segment, each up to `***End_of_Header***`, then names and rows. Further segments
-    go on with the rows, see `Segments`; without a column of times they are refused.
+    Tags of the file, then tags of a segment, each up to `***End_of_Header***`, then names and rows. Further segments
+    continue the rows, see `Segments`; without a time column they are refused.
     """
     if not lines[0].startswith("LabVIEW Measurement"):
         return None
@@ -363,7 +363,7 @@ def labview(reading: Reading, lines: Sequence[str]) -> Layout | None:
     header = ends[1] + 1
     names = [cell.strip() for _, cell in dialect.cells(lines[header - 1])] if len(lines) >= header else []
     if len(names) < 2:
-        raise reading.refuse("has no names of channels below the header of the segment; export it again", ends[1])
+        raise reading.refuse("has no channel names below the header of the segment; export it again", ends[1])
     return _of_segment(reading, dialect, file, segment, names, header)
 
 
@@ -417,11 +417,11 @@ def _of_segment(
 
 @dataclass
 class Segments:
-    """Segments behind the first one of a LabVIEW file: rows of the same channels, each under a header of its own.
+    """Segments after the first one of a LabVIEW file: rows of the same channels, each under a header of its own.
 
-    By NI's specification times are seconds since the date and time of the segment where `Time_Pref` is `Relative`, and
-    since one moment for the whole file where it is `Absolute`. `place`: column of the times; `names`, `tags`: of the
-    first segment.
+    By NI's specification, times are seconds since the date and time of the segment if `Time_Pref` is `Relative`, and
+    since one moment for the whole file if it is `Absolute`. `place`: column of the times; `names`, `tags`: of the first
+    segment.
     """
 
     reading: Reading
@@ -432,12 +432,12 @@ class Segments:
     absolute: bool
 
     def begin(self, text: str) -> int:
-        """Where the next header begins; -1 for none."""
+        """Start of the next header; -1 if there is none."""
         found = _SEGMENT.search(text)
         return found.start() if found else -1
 
     def end(self, text: str, begin: int) -> int:
-        """Where the rows below a header begin; -1 where the text ends before them."""
+        """Start of the rows below a header; -1 if the text ends before them."""
         mark = text.find(END, begin)
         names = text.find("\n", mark) + 1 if mark >= 0 else 0
         return text.find("\n", names) + 1 or -1 if names else -1
@@ -445,7 +445,7 @@ class Segments:
     def read(self, header: str, line: int) -> tuple[float, int | None]:
         """Seconds from the first segment to this one, and the number of rows that it says it has.
 
-        Raises RecordError where it has other channels.
+        Raises RecordError if it has other channels.
         """
         *lines, last = header.rstrip("\n").split("\n")
         tags = _tags(lines, self.dialect.delimiter)
@@ -464,7 +464,7 @@ class Segments:
         return self._since(tags, line), int(text) if len(rows) == 1 and (text := rows.pop()).isdecimal() else None
 
     def _since(self, tags: dict[str, list[str]], line: int) -> float:
-        """Seconds from the date and time of the first segment to those of another; 0 where either has none."""
+        """Seconds from the date and time of the first segment to those of another; 0 if either has none."""
         parts = [[next(iter(each.get(tag, ())), "") for tag in ("Date", "Time")] for each in (self.tags, tags)]
         stamps = [" ".join(each).replace(",", ".") if all(each) else "" for each in parts]
         if self.absolute or not all(stamps):
@@ -478,7 +478,7 @@ class Segments:
 
 
 def _tags(lines: Sequence[str], delimiter: str) -> dict[str, list[str]]:
-    """Tags and their values, those of special blocks left out."""
+    """Tags and their values, without those of special blocks."""
     tags: dict[str, list[str]] = {}
     special = False
     for line in lines:
@@ -486,14 +486,14 @@ def _tags(lines: Sequence[str], delimiter: str) -> dict[str, list[str]]:
             special = line.startswith(_SPECIAL[0])
         elif not special and line.strip():
             tag, *values = line.split(delimiter)
-            # A separator may stand behind the last value
+            # The last value may be followed by a separator
             tags[tag.strip()] = [value.strip() for value in values]
     return tags
 
 
 def _number(reading: Reading, dialect: Dialect, text: str, tag: str, line: int) -> float:
     try:
-        # Versions differ in whether tags follow the decimal separator of the rows
+        # Versions differ in whether tags use the decimal separator of the rows
         return float(text.replace(dialect.decimal, "."))
     except ValueError:
         raise reading.refuse(f'{tag} has "{printable(text)}", which is not a number; export it again', line) from None
@@ -503,13 +503,13 @@ def _number(reading: Reading, dialect: Dialect, text: str, tag: str, line: int) 
 
 
 LARGEST_CODE = 1 << 16
-"""Numbers of columns and codes of characters are smaller."""
+"""Column numbers and character codes are smaller than this."""
 
 _ENTRY = re.compile(r"\s*#\s*(\w+)\s*(?:=\s*(.*?))?\s*")
 
 
 def pi_gcs(reading: Reading, lines: Sequence[str]) -> Layout | None:
-    """The layout that the header of a GCS array gives, as controllers send it (`DRR?`) and PIMikroMove saves it.
+    """The layout given by the header of a GCS array, as controllers send it (`DRR?`) and PIMikroMove saves it.
 
     `# KEY = VALUE` up to `# END_HEADER`: SEPARATOR is the code of a character, SAMPLE_TIME is in seconds, NAME0 and so
     on are the names of the DIM columns of NDATA rows.
@@ -548,7 +548,7 @@ def pi_gcs(reading: Reading, lines: Sequence[str]) -> Layout | None:
 def _whole(reading: Reading, entries: dict[str, tuple[int, str]], key: str) -> int:
     line, text = entries[key]
     if not text.isdecimal() or (key != "NDATA" and not 0 < int(text) < LARGEST_CODE):
-        raise reading.refuse(f"{key} is not a possible whole number; correct it, or export the table again", line)
+        raise reading.refuse(f"{key} is not a valid whole number; correct it, or export the table again", line)
     return int(text)
 
 
@@ -560,9 +560,9 @@ _SETTINGS = ("Sample Interval", "Record Length", "Vertical Units")
 
 
 def tektronix(reading: Reading, lines: Sequence[str]) -> Layout | None:
-    """The layout that the settings give: one per line and one cell per channel, then `TIME,CH1,CH2` and the rows.
+    """The layout given by the settings: one per line and one cell per channel, then `TIME,CH1,CH2` and the rows.
 
-    They have what the header lacks: units of time and of each channel, and the label that a user gave it.
+    They hold what the header lacks: units of time and of each channel, and the label that a user gave it.
     """
     delimiter = reading.delimiter or next((mark for mark in ",;\t" if f"TIME{mark}" in "\n".join(lines)), ",")
     dialect = Dialect(delimiter, "," if delimiter != "," and _decimal_commas(lines, delimiter) else ".")
@@ -604,7 +604,7 @@ _RIGOL_CHANNEL = re.compile(r"(CH\d+|MATH\d*)(V|A|W)")
 
 
 def rigol(reading: Reading, lines: Sequence[str]) -> Layout | None:
-    """The layout of a table without time, whose first lines have its start and its increment instead.
+    """The layout of a table without time, whose first lines give its start and increment instead.
 
     `X,CH1,CH2,Start,Increment` above `Sequence,Volt,Volt,-0.2,0.001`, newer ones `CH1V,CH2V,t0 = -0.2, tInc = 0.001`.
     """
@@ -633,9 +633,10 @@ def rigol(reading: Reading, lines: Sequence[str]) -> Layout | None:
 
 
 def yokogawa(reading: Reading, lines: Sequence[str]) -> Layout | None:
-    """The layout that the settings give, one per line and one cell per channel; rows begin with an empty cell.
+    """The layout given by the settings, one per line and one cell per channel; rows begin with an empty cell.
 
-    They have no time. `"TraceName","CH1","CH2"` has the names, `VUnit` the units, `HResolution` the time between rows.
+    There is no time column. `"TraceName","CH1","CH2"` has the names, `VUnit` the units, `HResolution` the time between
+    rows.
     """
     dialect = Dialect()
     settings: dict[str, tuple[int, list[str]]] = {}
@@ -657,7 +658,7 @@ def yokogawa(reading: Reading, lines: Sequence[str]) -> Layout | None:
     )  # fmt: skip
     seconds = {_number(reading, dialect, step, "HResolution", place) for step in steps if step}
     if len(seconds) > 1:
-        raise reading.refuse("its channels have sample rates of their own; export them with one rate", place)
+        raise reading.refuse("its channels have different sample rates; export them with one rate", place)
     if settings.get("HUnit", (0, ["s"]))[1][:1] == ["s"] and seconds and min(seconds) > 0.0:
         step = seconds.pop()
         found.steps = [Step(step, f"HResolution {step:g} s (line {place})")]

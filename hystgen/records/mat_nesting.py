@@ -1,7 +1,7 @@
-"""How deep structs and cells lie in each other in a MATLAB v5 file, from its headers alone.
+"""How deep structs and cells are nested in a MATLAB v5 file, from its headers alone.
 
-scipy reads them by recursion in C, and a file of some hundred kilobytes takes the process down. The elements are
-therefore walked here first, in the order in which scipy reads them, with a stack that costs nothing.
+scipy reads them by recursion in C, and a file of some hundred kilobytes can crash the process. So the elements are
+walked here first, in the order in which scipy reads them, with an explicit stack.
 """
 
 from __future__ import annotations
@@ -13,21 +13,21 @@ from collections.abc import Callable, Iterator
 from typing import IO
 
 MOST = 32
-"""[levels] Structs and cells in each other: ControlDesk and Simulink save up to five. scipy 1.17 reads 1000, and ends
+"""[levels] Nesting of structs and cells: ControlDesk and Simulink save up to five. scipy 1.17 reads 1000, and crashes
 the process at 5000 with 8 MB of stack. Set by: tests/test_record_formats.py TestNesting."""
 
 MANY = 10_000_000
-"""[structs or cells in one array] scipy makes room for as many as the header says, and goes through them all before it
-sees that they are not there: 2^31 of them without a field take minutes."""
+"""[structs or cells in one array] scipy allocates as many as the header says, and visits them all before it notices
+that they are missing: 2^31 of them without a field take minutes."""
 
 HEADER = 128
-"""Bytes in front of the first variable; the last two say which end of a number comes first."""
+"""Bytes before the first variable; the last two give the byte order."""
 
 MATRIX, COMPRESSED = 14, 15
 """Types of elements."""
 
 CELL, STRUCT, OBJECT, CHAR, SPARSE, FUNCTION, OPAQUE = 1, 2, 3, 4, 5, 16, 17
-"""Classes of arrays; the others are numbers."""
+"""Classes of arrays; all others are numeric."""
 
 COMPLEX = 0x800
 """Flag of an array with an imaginary part."""
@@ -37,13 +37,13 @@ PIECE = 1 << 16
 
 
 def problem(stream: IO[bytes]) -> str:
-    """What of a file scipy must not be given, in words; empty if nothing.
+    """Why a file must not be passed to scipy, in words; empty if it may.
 
-    What ends too early or is no array stops the walk; scipy stops there as well, with a message.
+    An element that is truncated or not an array stops the walk; scipy stops there as well, with a message.
     """
     stream.seek(0)
     head = stream.read(HEADER)
-    if len(head) < HEADER or 0 in head[:4]:  # version 4, which has numbers alone
+    if len(head) < HEADER or 0 in head[:4]:  # version 4, which holds only numbers
         return ""
     order = "<" if head[126:127] == b"I" else ">"
     place = HEADER
@@ -73,7 +73,7 @@ class _Unpacked:
         self._packed = b""
 
     def read(self, size: int) -> bytes:
-        """As many bytes, or fewer at the end."""
+        """That many bytes, or fewer at the end."""
         found = b""
         while len(found) < size and not self._unpack.eof:
             if not self._packed:
@@ -107,13 +107,13 @@ class _Elements:
             self._bytes(min(PIECE, size - start))
 
     def _tag(self) -> tuple[int, int, bytes | None]:
-        """Type and size of an element, and its content where it stands beside them."""
+        """Type and size of an element, and its content if it is stored next to them."""
         raw = self._bytes(8)
         kind, size = struct.unpack(f"{self._order}II", raw)
         return (kind & 0xFFFF, kind >> 16, raw[4 : 4 + (kind >> 16)]) if kind >> 16 else (kind, size, None)
 
     def _element(self) -> int:
-        """The size of an element, which is passed."""
+        """The size of an element, which is skipped."""
         _, size, inside = self._tag()
         if inside is None:
             self._skip(size + -size % 8)
@@ -134,7 +134,7 @@ class _Elements:
         return size
 
     def depths(self) -> Iterator[int]:
-        """How deep each array in a variable lies, beginning behind the tag of the variable itself."""
+        """Depth of each array in a variable, starting after the tag of the variable itself."""
         open_ = [1]
         top = True
         while open_:
@@ -147,7 +147,7 @@ class _Elements:
                 open_.pop()
 
     def _inside(self, top: bool) -> int:
-        """How many arrays an array has in itself; all else of it is passed."""
+        """How many arrays an array contains; everything else in it is skipped."""
         self._bytes(8)
         (flags, _) = struct.unpack(f"{self._order}II", self._bytes(8))
         sort = flags & 0xFF

@@ -1,8 +1,8 @@
 """Records from data in memory: columns by name, data frames, arrays side by side.
 
 A data frame is recognised by its interface (`columns` or `column_names`, and columns by name), so that pandas, polars
-and Arrow tables are read without importing any of them. Names, units in them, missing values and times are treated as
-in a file.
+and Arrow tables can be read without importing those packages. Names, units in them, missing values and times are
+treated as in a file.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from hystgen.records.record import Record
 
 
 class Frame(Protocol):
-    """A data frame, as far as it is looked at."""
+    """The part of a data frame's interface that we use."""
 
     @property
     def columns(self) -> Any:
@@ -34,18 +34,18 @@ class Frame(Protocol):
 
 
 Columns = Mapping[str, ArrayLike] | Frame | NDArray[Any] | tuple[ArrayLike, ...]
-"""Samples in memory: a mapping or data frame of named columns; an array (N, 2) or (N, 3), or a tuple of arrays (N,), of
-drive and displacement, with the time before them where there are three."""
+"""Samples in memory: a mapping or data frame of named columns; or an array (N, 2) or (N, 3), or a tuple of arrays (N,),
+of drive and displacement, preceded by the time if there are three."""
 
 _OPTION = re.compile(r'--columns "([^"]*)"|--sample-time|--columns')
-"""Options in messages about files, in place of which arguments are meant here."""
+"""Options named in messages about files, and the arguments that replace them here."""
 
 
 def in_memory(source: object) -> TypeGuard[Columns]:
-    """Whether something holds the samples of one record; judged by its kind alone."""
+    """Whether something holds the samples of one record, judged by its type alone."""
     if isinstance(source, Mapping | np.ndarray) or _names(source) is not None:
         return True
-    # One of paths or records is a list of sources
+    # A list of paths or records is a list of sources
     return isinstance(source, tuple) and bool(source) and all(_is_samples(each) for each in source)
 
 
@@ -68,9 +68,9 @@ def _names(source: object) -> list[Any] | None:
 def read(
     source: Columns, name: str, columns: Mapping[str, str] | None, sample_time: float | None, need: Sequence[str]
 ) -> Record:
-    """The record of samples in memory, called `name` in messages; the other arguments as in `read_record`.
+    """The record made from samples in memory, called `name` in messages; the other arguments are as in `read_record`.
 
-    Raises RecordError with every problem; ValueError and TypeError for arrays of another shape or type.
+    Raises RecordError with every problem; ValueError and TypeError for arrays of the wrong shape or type.
     """
     reading = Reading(name, columns or {}, sample_time, None, tuple(need), lambda _: None)
     try:
@@ -80,7 +80,7 @@ def read(
 
 
 def _as_call(problem: str) -> str:
-    """A message about a file with the arguments of a call in place of options."""
+    """A message about a file, reworded to name arguments of a call instead of options."""
 
     def argument(option: re.Match[str]) -> str:
         if option[1] is None:
@@ -102,7 +102,7 @@ def _named(source: Columns, name: str, sample_time: float | None) -> dict[str, A
     if doubled:
         raise ValueError(f'{name} has several columns called "{doubled[0]}"; give them different names')
     found = {str(each): source[each] for each in names}
-    index = getattr(source, "index", None)  # of pandas, which often holds the time
+    index = getattr(source, "index", None)  # the pandas index, which often holds the time
     kind = getattr(getattr(index, "dtype", None), "kind", "")
     label = getattr(index, "name", None)
     if (kind in "mM" and kind) or (label is not None and kind in "fiu"):
@@ -111,7 +111,7 @@ def _named(source: Columns, name: str, sample_time: float | None) -> dict[str, A
 
 
 def _by_place(source: NDArray[Any] | tuple[Any, ...], name: str, sample_time: float | None) -> Sequence[str]:
-    """Our names for columns that have none."""
+    """Our names for unnamed columns."""
     number = len(source) if isinstance(source, tuple) else source.shape[1] if source.ndim == 2 else 0
     if number == 3 or (number == 2 and sample_time is not None):
         return STANDARD[-number:]
@@ -139,7 +139,7 @@ def _table(reading: Reading, named: Mapping[str, Any]) -> Table:
 
 
 def _numbers(values: Any) -> NDArray[Any] | None:
-    """An array of real numbers, times in seconds from the first; None for anything else."""
+    """An array of real numbers, with times as seconds from the first; None for anything else."""
     try:
         found = np.asarray(values)
     except ValueError:  # lists of different lengths
@@ -150,7 +150,7 @@ def _numbers(values: Any) -> NDArray[Any] | None:
         return np.asarray((found - origin) / np.timedelta64(1, "s"), dtype=np.float64)
     if found.dtype.kind == "O":
         try:
-            return np.asarray(values, dtype=np.float64)  # a data frame knows what its missing values are
+            return np.asarray(values, dtype=np.float64)  # a data frame knows which of its values are missing
         except (TypeError, ValueError):
             return None
     return found if found.dtype.kind in "fiub" else None

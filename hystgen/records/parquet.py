@@ -1,4 +1,4 @@
-"""Parquet files, by pyarrow."""
+"""Parquet files, read with pyarrow."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
 def read_parquet(reading: Reading, stream: IO[bytes]) -> Table:
-    """Read a Parquet file: its columns of numbers, and times and durations in seconds; nothing is a NaN."""
+    """Read a Parquet file: its columns of numbers, and times and durations in seconds; nulls become NaN."""
     try:
         import pyarrow.parquet as pq
     except ImportError:
@@ -63,7 +63,7 @@ def _unit(field: Any) -> str:
 
 
 def _vector(reading: Reading, file: Any, field: Any) -> NDArray[np.float64]:
-    """A column batch by batch; a time stamp counts from the first of its column."""
+    """A column, batch by batch; time stamps count from the first in the column."""
     import pyarrow as pa
     from pyarrow import compute, types
 
@@ -77,9 +77,9 @@ def _vector(reading: Reading, file: Any, field: Any) -> NDArray[np.float64]:
             values = values.cast(pa.int64())
             if origin is None and values.null_count < len(values):
                 origin = values.drop_null()[0].as_py()
-                reading.notes.append(f"{field.name} holds times of day; it was converted to seconds from its first")
+                reading.notes.append(f"{field.name} holds times of day; it was converted to seconds since the first")
             if origin:
-                # Before rounding to a double: nanoseconds since 1970 need more than 53 bits
+                # Subtract before rounding to a double: nanoseconds since 1970 need more than 53 bits
                 values = compute.subtract_checked(values, origin)
         part = values.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False)
         if timed:

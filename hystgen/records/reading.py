@@ -1,4 +1,4 @@
-"""Steps that every format shares: the request, the problems found, the columns chosen, and the record made of them."""
+"""Steps shared by all formats: the request, the problems found, the columns chosen, and the record made from them."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ SAME_STEP = 1e-6
 """Largest relative difference between sample times that count as equal: files write at least seven digits, or round."""
 
 BESIDE = 2
-"""[times] Memory for a record over that of its numbers, because of sorted copies and marks: 1.7 with 2e7 samples of
-HDF5 (2026-11-26)."""
+"""[times] Memory needed for a record relative to that of its numbers, because of sorted copies and marks: 1.7 with 2e7
+samples of HDF5 (2026-11-26)."""
 
 NO_SECONDS = 1e11
-"""Times from here on are not seconds: those since 1970 get there in the year 5138, milliseconds did in 1973."""
+"""Times from here on are not seconds: seconds since 1970 get there in the year 5138, milliseconds did in 1973."""
 
 
 def _memory() -> float:
-    """Bytes of memory here; unlimited where the system does not say."""
+    """Bytes of memory on this machine; unlimited if the system does not say."""
     try:
         return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
@@ -40,14 +40,14 @@ def _memory() -> float:
 
 
 class Lines:
-    """Line of the file that each row of a table came from, kept by stretches of rows."""
+    """Line of the file that each row of a table came from, stored as runs of rows."""
 
     def __init__(self) -> None:
         self._rows: list[int] = []
         self._lines: list[int | NDArray[np.int64]] = []
 
     def add(self, first_row: int, lines: int | NDArray[np.int64]) -> None:
-        """Rows from `first_row` on: their lines, or the first line where the others follow one by one."""
+        """Rows from `first_row` on: their lines, or the first line if the others follow one by one."""
         self._rows.append(first_row)
         self._lines.append(lines)
 
@@ -61,9 +61,9 @@ class Lines:
 
 @dataclass
 class Table:
-    """The content of a file before it is judged: columns under our names, NaN for missing values.
+    """The content of a file before it is checked: columns under our names, NaN for missing values.
 
-    `units`: those the file gives; `lines`: where the file has lines.
+    `units`: the units in the file; `lines`: present if the file has lines.
     """
 
     numbers: dict[str, Array]
@@ -71,16 +71,16 @@ class Table:
     lines: Lines | None = None
 
     def line(self, row: int) -> int | None:
-        """Line of the file that a row came from; None where the file has no lines."""
+        """Line of the file that a row came from; None if the file has no lines."""
         return None if self.lines is None else self.lines.line(row)
 
 
 class Reading:
-    """One file being read: the request, and the problems and notes about it.
+    """A file being read: the request, and the problems and notes so far.
 
-    `delimiter`: what separates cells, None where the file has to show it; `fills`: of each column with numbers that
-    stand for no value which ones these are, in words; `points`: whether it may be without a time; `read_as`: what was
-    understood that the file does not say in the plainest way.
+    `delimiter`: what separates cells, None to find it from the file; `fills`: for each column with numbers that stand
+    for "no value", which ones, in words; `points`: whether it may lack a time; `read_as`: interpretations that the file
+    does not state plainly.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class Reading:
         self.read_as: list[str] = []
 
     def understood(self, text: str) -> None:
-        """Add a finding about the file to the line that says how it was read."""
+        """Add to the line that says how the file was interpreted."""
         self.read_as.append(text)
 
     def problem(self, text: str, line: int | None = None, column: int | None = None) -> None:
@@ -120,7 +120,7 @@ class Reading:
         return RecordError(self.problems)
 
     def refuse_if_any(self) -> None:
-        """Raise RecordError with the problems found so far."""
+        """Raise RecordError with the problems found so far, if any."""
         if self.problems:
             raise RecordError(self.problems)
 
@@ -144,9 +144,9 @@ class Reading:
         line: int | None = None,
         steps: Sequence[Step] = (),
     ) -> dict[str, Column]:
-        """The columns that are asked for, by our names. Raises RecordError for those that are not there.
+        """The requested columns, by our names. Raises RecordError for those that are missing.
 
-        `steps`: what the file says of its sample rate; it counts where there is neither a time nor `sample_time`.
+        `steps`: sample rates in the file, used if there is neither a time nor `sample_time`.
         """
         finder = Finder(columns, self.columns, ignored, outside)
         found = finder.find(self.need, self.sample_time is not None, steps, self.points)
@@ -155,10 +155,10 @@ class Reading:
         steps = finder.steps
         if len({step.start for step in steps}) > 1:
             starts = " and ".join(f"{printable(step.of)} at {step.start}" for step in steps)
-            self.problem(f"the columns do not start together, {starts}; export them with one time", line)
+            self.problem(f"the columns start at different times,  {starts}; export them with a common time", line)
         if any(abs(step.seconds - steps[0].seconds) > SAME_STEP * steps[0].seconds for step in steps):
             said = " and ".join(dict.fromkeys(step.said for step in steps))
-            self.problem(f"there is no time, and the file has {said}; give --sample-time", line)
+            self.problem(f"there is no time, but the file has {said}; give --sample-time", line)
         self.refuse_if_any()
         if finder.understood:
             no_unit = "t" in finder.understood and not found["t"].unit
@@ -174,7 +174,7 @@ class Reading:
         return found
 
     def further(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> dict[str, Column]:
-        """The columns that were not asked for, by the names they get; one whose name is taken is noted."""
+        """The columns that were not requested, by the names they get; a column whose name is taken is noted."""
         used = {c.name for c in chosen.values()}
         others = [c for c in columns if c.name not in used]
         names = further_names(others, list(chosen))
@@ -183,7 +183,7 @@ class Reading:
         return names
 
     def left_out(self, which: str, names: Sequence[str]) -> None:
-        """Note columns that the record does not have."""
+        """Note columns that are left out of the record."""
         if names:
             more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
             self.notes.append(f"columns {which} were left out: {', '.join(map(printable, names[:LISTED]))}{more}")
@@ -198,9 +198,9 @@ class Reading:
     ) -> Table:
         """The table of a file whose columns are read one by one.
 
-        Read are the columns asked for and, out of the groups that hold these, all others of the same length; not those
-        that are not numbers (`ignored`) or whose numbers the file does not hold itself (`outside`). `matrices`: name to
-        shape and numbers; the only one of a file without vectors is the record.
+        It reads the requested columns and, from the groups that hold them, all others of the same length, except those
+        that are not numeric (`ignored`) or whose numbers are stored outside the file (`outside`). `matrices`: name to
+        shape and numbers; in a file without vectors, the only matrix is the record.
         """
         if not columns and len(matrices) == 1:
             ((name, (shape, read)),) = matrices.items()
@@ -218,7 +218,7 @@ class Reading:
         self.left_out("of another length", [c.name for c in near if c.length not in lengths])
         taken = {**chosen, **self.further([c for c in near if c.length in lengths], chosen)}
         if BESIDE * 8 * len(taken) * next(iter(lengths)) > _memory():
-            raise MemoryError  # a system that promises more than it has would end the process later
+            raise MemoryError  # a system that overcommits memory would kill the process later
         numbers: dict[str, Array] = {}
         for name, c in taken.items():
             assert c.read is not None
@@ -226,7 +226,7 @@ class Reading:
         return self.finished(numbers, taken)
 
     def _of_matrix(self, name: str, shape: tuple[int, ...], read: Callable[[], NDArray[Any]]) -> list[Column]:
-        """The columns of a matrix, called by their numbers. Raises RecordError when they are not."""
+        """The columns of a matrix, named by number. Raises RecordError if they are not."""
         width = in_matrix(shape)
         if not any(theirs.lstrip("#").isdecimal() for theirs in self.columns.values()):
             example = "1,2 (drive, measured) with --sample-time" if width == 2 else "1,2,3 (time, drive, measured)"
@@ -252,7 +252,7 @@ class Reading:
         if "t" in numbers and "t" not in units and np.any(numbers["t"] >= NO_SECONDS):
             name = printable(taken["t"].own)
             raise self.refuse(
-                f'the numbers of "{name}" are too large to be seconds, and it has no unit; write the unit behind its '
+                f'the numbers of "{name}" are too large to be seconds, and it has no unit; write the unit after its '
                 f'name, "{name} [ms]"'
             )
         if "t" in units:
@@ -268,17 +268,17 @@ def _standard_first(entry: tuple[str, Column]) -> int:
 
 
 MOST_TOGETHER = 64
-"""Columns of a matrix that is a record; a wider one is an image or a map."""
+"""Largest number of columns of a matrix that is a record; a wider one is an image or a map."""
 
 
 def in_matrix(shape: tuple[int, ...]) -> int:
-    """Number of columns of a matrix that may be a record, whichever way it lies; 0 for anything else."""
+    """Number of columns of a matrix that may be a record, in either orientation; 0 for anything else."""
     two = len(shape) == 2 and shape[0] != shape[1]
     return min(shape) if two and 2 <= min(shape) <= MOST_TOGETHER else 0
 
 
 def one_dimension(shape: tuple[int, ...]) -> int:
-    """Length of a vector, whether it is a row, a column or neither; 0 where it is not a vector."""
+    """Length of a vector, as a row, a column or one-dimensional; 0 if it is not a vector."""
     length = int(np.prod(shape, dtype=np.int64))
     return length if length > 1 and length == max(shape) else 0
 
@@ -301,17 +301,17 @@ class CountingFile(io.FileIO):
 
 
 SHORTEST = 16
-"""Fewest samples of a record that a model is fitted to."""
+"""Fewest samples of a record that a model can be fitted to."""
 
 REPAIRABLE = 0.05
-"""Largest share of samples that is dropped with a note; beyond it a file is refused."""
+"""Largest share of samples dropped with a note; beyond it the file is refused."""
 
 NOTED_GAP = 3.0
 """A step longer than this many median steps is a gap."""
 
 
 def repaired(reading: Reading, table: Table) -> Record:
-    """The record of a table, which is used up. Raises RecordError with every problem."""
+    """The record made from a table, which is consumed. Raises RecordError with every problem."""
     columns = table.numbers
     length = len(next(iter(columns.values()), ()))
     keep = np.ones(length, dtype=bool)
@@ -330,7 +330,7 @@ def repaired(reading: Reading, table: Table) -> Record:
         keep = _rising(reading, table, columns["t"], keep)
     samples = int(np.count_nonzero(keep))
     if samples < length:
-        # One at a time, so that only one column is there twice
+        # One at a time, so that only one column exists twice
         for name in columns:
             columns[name] = columns[name][keep]
     fit = "y" in reading.need
@@ -359,7 +359,7 @@ def repaired(reading: Reading, table: Table) -> Record:
 
 
 def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_], which: str) -> None:
-    """Note the samples that are dropped, or refuse when they are too many."""
+    """Note the dropped samples, or refuse the file if there are too many."""
     number = int(np.count_nonzero(wrong))
     if not number:
         return
@@ -369,7 +369,7 @@ def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_],
     if number > REPAIRABLE * length:
         reading.problem(
             f"{number} of {length} samples {'is' if number == 1 else 'are'} {which}, {first}; more than "
-            f"{100 * REPAIRABLE:g} % is not repaired, record or export again",
+            f"{100 * REPAIRABLE:g} % is too much to repair, record or export again",
             line,
         )
     else:
@@ -377,7 +377,8 @@ def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_],
 
 
 def _repeats(t: Array) -> bool:
-    """Whether a time that never goes back stands still too often to be repaired: it is written with too few digits."""
+    """Whether a time that never goes back repeats too often to be repaired, because it was written with too few
+    digits."""
     steps = np.diff(t)
     if not len(steps) or float(steps.min()) != 0.0 or float(steps.max()) == 0.0:
         return False
@@ -385,7 +386,7 @@ def _repeats(t: Array) -> bool:
 
 
 def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> Array:
-    """Times at the sample time given in place of times that repeat, as long as these do not speak against it."""
+    """Replace repeated times by times at the given sample time, unless the repeated ones contradict it."""
     rows = np.flatnonzero(keep)
     steps = np.diff(t[rows])
     finest = float(np.min(steps[steps > 0.0]))
@@ -394,17 +395,17 @@ def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> 
     if given is None:
         mean = float(t[rows[-1]] - t[rows[0]]) / float(rows[-1] - rows[0])
         reading.problem(
-            f"the time repeats in {np.count_nonzero(steps == 0.0)} of {len(t)} samples, it is written in steps of "
-            f"{finest:.3g} s; give --sample-time (here about {mean:.3g}), or export it with more digits",
+            f"the time repeats in {np.count_nonzero(steps == 0.0)} of {len(t)} samples, because it was written in "
+            f"steps of {finest:.3g} s; give --sample-time (here about {mean:.3g}), or export it with more digits",
             table.line(row),
         )
         return t
     even: Array = np.arange(len(t)) * given + t[rows[0]]
-    # Rounding to such steps moves a time by up to one of them; a sample may be counted to either neighbour
+    # Rounding to such steps moves a time by up to one step; a sample may be assigned to either neighbour
     apart = float(np.ptp(even[rows] - t[rows]))
     if apart > finest + given:
         reading.problem(
-            f"the sample time {given:g} s given does not fit the time of the file: over the record they come apart by "
+            f"the sample time {given:g} s given does not fit the time of the file: over the record they diverge by "
             f"{apart:.3g} s; correct it, or export the time with more digits",
             table.line(row),
         )
@@ -433,7 +434,7 @@ def _step(reading: Reading, t: Array) -> float:
     step = float(np.median(steps, overwrite_input=True))
     number = int(np.count_nonzero(steps > NOTED_GAP * step))
     if number:
-        np.subtract(t[1:], t[:-1], out=steps)  # the median has put them in another order
+        np.subtract(t[1:], t[:-1], out=steps)  # the median has reordered them
         worst = int(np.argmax(steps))
         reading.notes.append(
             f"{counted(number, 'gap')} longer than {NOTED_GAP:g} median steps kept, the largest {steps[worst]:.4g} s "
@@ -447,11 +448,11 @@ def _step(reading: Reading, t: Array) -> float:
     return step
 
 
-# Numbers that stand for no value: what instruments write instead of a reading, what no reading can be -------
+# Numbers that stand for "no value": what instruments write instead of a reading, and impossible readings -------
 
 
 LARGEST = 1e20
-"""Numbers from here on are not readings, in any unit.
+"""Numbers from here on are not readings, whatever the unit.
 
 Instruments write 9.9E37 for an overload and 9.91E37 for no number at all (SCPI-99, volume 1, section 7.2.1.4 and 5),
 others the largest float32 or 1e30; counters end at 1.8e19. Parameter files end at 1e30, and the rate of a drive, in
@@ -459,20 +460,20 @@ units per second, may be 1e10 times the drive itself.
 """
 
 NINES = 3
-"""Fewest digits of a fill value that is written in nines, as -999 or 99999.9."""
+"""Fewest digits of a fill value written in nines, such as -999 or 99999.9."""
 
 ENDS_OF_INTEGERS = frozenset(
     float(x) for bits in (16, 32, 64) for x in (2 ** (bits - 1) - 1, 2 ** (bits - 1), 2**bits - 1)
 )
-"""Sizes of the numbers at which integer types end."""
+"""Magnitudes at which integer types end."""
 
 
 def no_value(x: Array) -> NDArray[np.bool_]:
-    """Whether each number (N,) of a column stands for no value, as everything does that is not finite.
+    """Whether each number (N,) of a column stands for "no value", as every non-finite number does.
 
-    A number below `LARGEST` stands for no value if it is a usual fill value (all nines, the end of an integer type) and
-    lies farther from all others of the column than these spread: a column may also pass through -999. The end of an
-    integer type counts only in a column with fractions; in a column of codes it is a code.
+    A number below `LARGEST` stands for "no value" if it is a usual fill value (all nines, the end of an integer type)
+    and lies farther from all others of the column than their spread: a column may also pass through -999. The end of an
+    integer type counts only in a column with fractions; in a column of codes it is an ordinary code.
     """
     wrong = ~np.isfinite(x) | (x >= LARGEST) | (x <= -LARGEST)
     rest, fills = x[~wrong] if wrong.any() else x, []

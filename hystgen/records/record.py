@@ -15,12 +15,12 @@ Array = NDArray[np.float64]
 class Record:
     """One experiment: arrays of N samples.
 
-    `name`: file name without its folder; `t`: seconds, strictly rising; `v`: drive (empty when the file has no such
+    `name`: file name without its folder; `t`: seconds, strictly increasing; `v`: drive (empty if the file has no such
     column and none was needed); `y`: measured displacement or None; `extra`: further numeric columns by name;
-    `sample_time`: median step of `t`; `notes`: what was repaired or left out, one sentence each; `units`: the units
-    that the file gives, by column (`{"t": "s", "v": "V"}`), the numbers of `v` and `y` as they are in the file;
-    `read_as`: how the file was understood, empty where it is plain CSV or arrays under our names; `timed`: whether `t`
-    is a time, and no mere count of points taken one by one.
+    `sample_time`: median step of `t`; `notes`: what was repaired or left out, one sentence each; `units`: the units in
+    the file, by column (`{"t": "s", "v": "V"}`), with the numbers of `v` and `y` as in the file; `read_as`: how the
+    file was interpreted, empty for plain CSV or arrays under our names; `timed`: whether `t` is a time rather than a
+    count of points taken one by one.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Record:
         return len(self.t)
 
     def columns(self) -> dict[str, Array]:
-        """Every column by name: t, v, y where there, then the further ones."""
+        """Every column by name: t, v, y if present, then the others."""
         found = {"t": self.t}
         if len(self.v) or not len(self.t):
             found["v"] = self.v
@@ -51,7 +51,7 @@ class Record:
         return {**found, **self.extra}
 
     def section(self, first: int | None = None, last: int | None = None, name: str | None = None) -> Record:
-        """Samples `first` to `last` (exclusive, both as in a slice) as a record of their own."""
+        """Samples `first` to `last` (exclusive, both as in a slice) as a separate record."""
         part = slice(first, last)
         return replace(
             self,

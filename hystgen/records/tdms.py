@@ -1,4 +1,5 @@
-"""TDMS files of LabVIEW and other programs of NI, by npTDMS: channels in groups, with unit and sampling beside them."""
+"""TDMS files from LabVIEW and other NI programs, read with npTDMS: channels in groups, with their units and
+sampling."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ NANO = 1e9
 
 
 def read_tdms(reading: Reading, stream: IO[bytes]) -> Table:
-    """Read a TDMS file: its channels of numbers, `group/channel`; time stamps as seconds from the first of them."""
+    """Read a TDMS file: its numeric channels, `group/channel`; time stamps become seconds from the first of them."""
     try:
         from nptdms import TdmsFile
     except ImportError:
@@ -48,7 +49,7 @@ def _unit(channel: Any) -> str:
 
 
 def _steps(channel: Any, name: str) -> list[Step]:
-    """The sampling of a waveform; a channel that is not a waveform has an increment of 0, or no such property."""
+    """The sampling of a waveform; for other channels the increment is 0 or missing."""
     seconds = channel.properties.get("wf_increment")
     if not isinstance(seconds, float | int) or not 0.0 < seconds < float("inf"):
         return []
@@ -62,6 +63,6 @@ def _vector(reading: Reading, channel: Any) -> NDArray[Any]:
     numbers = np.asarray(channel[:])
     if numbers.dtype.kind != "M":
         return numbers
-    reading.notes.append(f"{channel.name} holds times of day; it was converted to seconds from its first")
+    reading.notes.append(f"{channel.name} holds times of day; it was converted to seconds since the first")
     seconds: NDArray[np.float64] = (numbers - numbers[0]).astype("timedelta64[ns]").astype(np.int64) / NANO
     return seconds

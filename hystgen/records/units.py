@@ -1,7 +1,7 @@
-"""Units of columns: which ones are the same quantity, and records in the units of a model.
+"""Units of columns: which ones measure the same quantity, and how to convert records to the units of a model.
 
-Lengths, voltages and so on are converted by their SI prefixes, and temperatures are. A unit that is not known is
-compared by its text alone, and never guessed.
+Lengths, voltages and so on are converted by their SI prefixes, temperatures by scale and zero. An unknown unit is
+compared only as text, and never guessed.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from hystgen.records.columns import TIMES, plain
 from hystgen.records.record import Array, Record
 
 TEMPERATURE = "temperature"
-"""Column that effects take in degC."""
+"""The column that effects take in degC."""
 
 PREFIXES = {"f": -15, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "": 0, "k": 3, "M": 6, "G": 9}
 WORDS = {"pico": -12, "nano": -9, "micro": -6, "milli": -3, "centi": -2, "": 0, "kilo": 3, "mega": 6}
-"""Powers of ten of prefixes, of symbols and of whole words."""
+"""Powers of ten of prefixes, for symbols and for whole words."""
 
 _DEGREE = Fraction(math.pi) / 180
 _OERSTED = Fraction(1000) / (4 * Fraction(math.pi))
@@ -54,7 +54,7 @@ NAMES = {
     "volt": "V", "ampere": "A", "amp": "A", "meter": "m", "metre": "m", "newton": "N", "radian": "rad", "tesla": "T",
     "pascal": "Pa", "hertz": "Hz", "kelvin": "K", "oersted": "Oe",
 }  # fmt: skip
-"""Whole words for symbols, in the singular."""
+"""Whole words and their symbols, in the singular."""
 
 _ZERO = Fraction("273.15")
 TEMPERATURES = {
@@ -64,11 +64,11 @@ TEMPERATURES = {
         ("degF", "deg F", "\u00b0F", "\u2109", "fahrenheit", "F"), (Fraction(5, 9), _ZERO - Fraction(160, 9))
     ),
 }
-"""Size in K, and temperature at 0. C and F are temperatures in a column of temperatures alone."""
+"""Size in K, and temperature at 0. C and F are temperatures only in a temperature column."""
 
 
 class Quantity(NamedTuple):
-    """What a unit measures: `kind`, by the unit that names it, the unit's `size` in that, and what its 0 is there."""
+    """What a unit measures: `kind`, named by its base unit; the unit's `size` in that, and the position of its zero."""
 
     kind: str
     size: Fraction
@@ -76,7 +76,7 @@ class Quantity(NamedTuple):
 
 
 def quantity(unit: str, column: str = "") -> Quantity | None:
-    """The quantity of a unit, in a column; None for a unit that is not known."""
+    """The quantity of a unit in a column; None for an unknown unit."""
     text = plain(unit)
     if text[:1] + text[-1:] in ("[]", "()"):
         text = plain(text[1:-1])
@@ -98,13 +98,14 @@ def quantity(unit: str, column: str = "") -> Quantity | None:
 
 
 class Conversion(NamedTuple):
-    """From numbers in one unit to those in another: `times` the number, then `plus`."""
+    """Conversion of numbers from one unit to another: `times` the number, then `plus`."""
 
     times: Fraction
     plus: Fraction = Fraction(0)
 
     def __call__(self, x: Array) -> Array:
-        """The numbers (N,) in the other unit; by a power of ten each is the double nearest to the number meant."""
+        """The numbers (N,) in the other unit; with a power of ten, each is the double nearest to the intended
+        number."""
         top, bottom = self.times.numerator, self.times.denominator
         found: Array = x / bottom if top == 1 else x * float(top if bottom == 1 else self.times)
         return found + float(self.plus) if self.plus else found
@@ -116,9 +117,9 @@ class Conversion(NamedTuple):
 
 
 def conversion(unit: str, to: str, column: str = "") -> Conversion | None:
-    """From numbers in `unit` to those in `to`; None where these are different quantities, or not known to be the same.
+    """Conversion from `unit` to `to`; None if these are different quantities, or not known to be the same.
 
-    Where one is not known they are the same if their texts are, capitals aside.
+    If one is unknown, they are the same if their texts are, ignoring case.
     """
     a, b = quantity(unit, column), quantity(to, column)
     if a is not None and b is not None:
@@ -127,10 +128,10 @@ def conversion(unit: str, to: str, column: str = "") -> Conversion | None:
 
 
 class Wanted(NamedTuple):
-    """The unit that the drive or the displacement of records is wanted in.
+    """The target unit for the drive or the displacement of records.
 
-    `unit`: empty where the first record that has one decides; `whose`: the quantity as messages call it; `named`: by
-    the user, who thereby says what a unit is that is not known; `told`: whether to say so where a record decides.
+    `unit`: empty if the first record with a unit decides; `whose`: the quantity as messages call it; `named`: given by
+    the user, who thereby declares what an unknown unit is; `told`: whether to report it when a record decides.
     """
 
     unit: str = ""
@@ -144,25 +145,25 @@ class HasUnits(Protocol):
 
     @property
     def input(self) -> str:
-        """That of the drive."""
+        """Unit of the drive."""
 
     @property
     def output(self) -> str:
-        """That of the displacement."""
+        """Unit of the displacement."""
 
 
 QUANTITIES = {"input": "drive", "output": "output"}
-"""Keys of a parameter file's `units`, and what they are the units of."""
+"""Keys of a parameter file's `units`, and the quantity each belongs to."""
 
 
 KEYS = {"v": "input", "y": "output", "u": "output"}
-"""Of columns in a parameter file's `units`."""
+"""Columns and their keys in a parameter file's `units`."""
 
 
 def wanted(
     model: HasUnits | None, file: tuple[str, Mapping[str, str]], named: tuple[str, Mapping[str, str]]
 ) -> dict[str, Wanted]:
-    """What is wanted of `input` and `output`: what the user names, else what a file has, else what a model has."""
+    """Target units for `input` and `output`: the user's, else the file's, else the model's."""
     found: dict[str, Wanted] = {}
     for key, quantity in QUANTITIES.items():
         if model is not None:
@@ -191,7 +192,7 @@ def converted(
                 continue
             goal = taken.get(key, Wanted()) if key else Wanted("degC", "a temperature", named=True)
             if not goal.unit:
-                said = f"{goal.whose} has no unit; it was taken to be in {own}, as column {column} is"
+                said = f"{goal.whose} has no unit; it was assumed to be in {own}, as column {column} is"
                 notes += [said] if goal.told and said not in record.notes else []
                 taken[key] = Wanted(own, f"column {column} of {printable(record.name)}")
                 continue
@@ -217,20 +218,20 @@ def _named(column: str, unit: str) -> str:
 
 
 def _apart(column: str, own: str, goal: Wanted, option: str) -> str:
-    """That a column cannot be in the unit wanted, and what to do."""
+    """The message that a column cannot be converted to the target unit, and what to do."""
     said = f"column {column} is in {own} and {goal.whose} in {goal.unit}"
     strange = [unit for unit in (own, goal.unit) if quantity(unit, column) is None]
     if not strange:
-        return f"{said}, which are different quantities; take another column, or correct the unit behind its name"
+        return f"{said}, which are different quantities; choose another column, or correct the unit after its name"
     more = f", or name the units with {option}" if option else ""
     return (
-        f'{said}, and "{strange[0]}" is no known unit; convert the column and write the same unit behind its name, or '
-        f"none{more}"
+        f'{said}, and "{strange[0]}" is not a known unit; convert the column and write the same unit after its name, '
+        f"or none{more}"
     )
 
 
 def _with(record: Record, columns: Mapping[str, Array], units: Mapping[str, str], notes: Sequence[str]) -> Record:
-    """The record with some of its columns, and the units and notes, changed."""
+    """The record with some of its columns, units and notes replaced."""
     if not columns and not notes and units == record.units:
         return record
     extra = {name: columns.get(name, values) for name, values in record.extra.items()}

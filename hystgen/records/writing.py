@@ -1,4 +1,4 @@
-"""Computed columns out."""
+"""Writing computed columns."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from hystgen.basics.writing import write_atomically
 
 
 def columns_text(header: Sequence[str], arrays: Sequence[ArrayLike]) -> str:
-    """Columns of equal length as CSV: shortest digits that read back to the same number."""
+    """Columns of equal length as CSV: with the fewest digits that read back as the same number."""
     columns = [_texts(np.asarray(values)) for values in arrays]
     if len(columns) != len(header) or len({len(column) for column in columns}) > 1:
-        raise ValueError("a CSV table takes one name per column and columns of equal length")
+        raise ValueError("a CSV table needs one name per column and columns of equal length")
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerow(header)
     text.writelines(",".join(row) + "\n" for row in zip(*columns, strict=True))

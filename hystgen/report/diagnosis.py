@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hystgen.effects.base import Effect
 
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
-"""How exactly a compensator corrects a stage in front of the plays, and how."""
+"""How exactly a compensator corrects a stage in front of the plays, and by what means."""
 
 VISIBLE = 0.01
 """Relative difference above which an error is visibly larger than another."""
@@ -105,7 +105,7 @@ def _refitted(result: Result) -> list[Text]:
     return [
         Text(
             f"Refitting changes the {label('rms error', result.unit)} of the fitted records from {fitted}, and that of "
-            f"the held-out ones from {given.holdout:.4g} to {refitted.holdout:.4g}: fitted weights take over some of a "
+            f"the held-out ones from {given.holdout:.4g} to {refitted.holdout:.4g}: fitted weights absorb some of a "
             "missing effect, which may show differently in other records."
         )
     ]
@@ -113,8 +113,8 @@ def _refitted(result: Result) -> list[Text]:
 
 NOISE_FROM = {
     "holds": "the holds of the drive",
-    "periods": "what does not repeat from one period of the drive to the next",
-    "differences": "the differences of neighbouring samples, since the records have no holds and no equal periods",
+    "periods": "the part that does not repeat from one period of the drive to the next",
+    "differences": "the differences between neighbouring samples, since the records have no holds and no equal periods",
     "resolution": "the resolution of the recorded numbers, since every other estimate is smaller",
 }
 """The source of the noise floor, in words."""
@@ -128,7 +128,7 @@ def _noise(result: Result) -> Text:
 def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Text | Table]:
     """`not_emitted`: why the compensators in the table cannot be emitted as C; empty if they can."""
     if not result.effects:
-        return [Text("No effect of the catalogue removes enough of the held-out error to get a name.")]
+        return [Text("No effect in the catalogue removes enough of the held-out error to be named.")]
     unit = result.unit
     rows = [["effect", label("held-out rms before", unit), label("after", unit), "share of the gap", "p"]]
     means = [["effect", "compensation", "how"]]
@@ -166,7 +166,7 @@ def _kind(effect: NamedEffect, there: Sequence[Effect]) -> type[Effect] | None:
 
 
 def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
-    """Rows of name, value, low and high, one per number; the first of equal lists stands for all."""
+    """Rows of name, value, low and high, one per number; the first of equal lists represents them all."""
     if isinstance(value, Mapping):
         known = sure or {}
         return [
@@ -205,18 +205,18 @@ def _left(result: Result) -> list[Text | Listing | Table]:
             rows = [["the remaining error depends on", "share of its variance"]]
             shares = each.share_by_variable.items()
             rows += [[VARIABLE_NAMES[name], f"{100.0 * share:.0f} %"] for name, share in shares]
-            blocks += [Table(rows, (0,)), Text("Each variable by itself, judged on samples that it has not seen.")]
+            blocks += [Table(rows, (0,)), Text("Each variable alone, judged on samples that it has not seen.")]
     more = [text for each in seen for text in each.advice()]
     return [*blocks, Text("To learn more:"), Listing(more)] if more else blocks
 
 
 WHAT = {
-    "saturated": "converter at its end",
+    "saturated": "converter at its limit",
     "drop_outs": "drop-outs",
     "held_samples": "held samples",
     "isolated_samples": "isolated samples",
     "swapped_channels": "drive and displacement exchanged",
-    "history": "another history than was given",
+    "history": "a history other than the given one",
 }
 
 
@@ -257,7 +257,7 @@ def _rivals(result: Result) -> list[Text | Listing]:
 
 def _where(result: Result) -> list[Text | Table]:
     if not result.where:
-        return [Text("The error of the refitted model is far above the noise in no stretch of a record.")]
+        return [Text("No stretch of a record has an error of the refitted model far above the noise.")]
     rows = [["record", "what happens there", "from (s)", "to (s)", label("rms", result.unit)]]
     rows += [
         [each.record, each.kind.replace("_", " "), *(f"{x:.6g}" for x in each.interval), f"{each.rms:.3g}"]

@@ -34,7 +34,7 @@ FAR = 25.0
 """Ratio of the largest to the smallest value above which an axis is logarithmic."""
 
 HOLD = 16
-"""Fewest samples for which the drive rests, for errors to be drawn over the time since it stopped."""
+"""Fewest samples with the drive at rest for errors to be drawn over the time since it stopped."""
 
 WINDOWS = 12
 """Number of stretches of a record whose rms is drawn over the session."""
@@ -140,7 +140,7 @@ def records(found: Diagnosis, width: float) -> Any:
     axes.plot(values[1], places, "o", color=AFTER, markersize=6, label=_last(found))
     axes.axvline(found.result.noise_floor, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
     axes.set_yticks(places, [f"{each.name}{' (held out)' if each.held_out else ''}" for each in shown])
-    axes.set_ylim(len(shown) - 0.5, -0.5)  # half a place beyond the first and the last
+    axes.set_ylim(len(shown) - 0.5, -0.5)  # half a slot beyond the first and the last
     _range(axes, [*values[0], *values[1], found.result.noise_floor])
     axes.set(xlabel=label("rms error", found.result.unit))
     drawing.legend_above(axes, 3)
@@ -317,14 +317,14 @@ FIGURES = {
 }  # fmt: skip
 
 CAPTIONS = {
-    "gap": "rms error on the held-out records: of the model as given, refitted, and with one effect after the other; "
-    "dotted: what each step takes away. The dashed line is the noise, measured without a model.",
-    "overlay": "The held-out records on which the refitted model does worst. Below each: measured less predicted.",
+    "gap": "rms error on the held-out records: of the model as given, refitted, and with one effect after another; "
+    "dotted: what each step removes. The dashed line is the noise, measured without a model.",
+    "overlay": "The held-out records on which the refitted model does worst. Below each: measured minus predicted.",
     "records": "rms error of every record, against the noise.",
     "time": "rms error in stretches of the records, along the session.",
-    "against": "Mean and scatter of the error on all records against what it may go with. A mean that leaves the "
+    "against": "Mean and scatter of the error on all records against possible causes. A mean that leaves the "
     "dashed band of the noise, or a scatter that widens, is structure. Loop centre: the middle between the last two "
-    "reversals of the drive. While the drive stands still the error is counted in the direction of its last move.",
+    "reversals of the drive. While the drive rests, the error is counted in the direction of its last move.",
     "frequency": "Spectral density of the error on the held-out record on which the refitted model does worst.",
 }
 

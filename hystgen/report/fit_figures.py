@@ -62,7 +62,7 @@ class Shown:
 
     @cached_property
     def residual(self) -> Array:
-        """Measured less model; NaN where not compared."""
+        """Measured minus model; NaN where not compared."""
         return np.where(self.used.compared, self.measured - self.model, np.nan)
 
     @property
@@ -87,14 +87,14 @@ class Shown:
         """Standard deviation of white noise in y; None if the residual is not white on the scale of samples.
 
         Second differences take the smooth part out of a residual and leave noise times the root of 6 (Gasser,
-        Sroka and Jennen-Steinmetz, Biometrika 73, 1986, 625-633). Only where noise is white and all else is smooth do
-        neighbours agree with that from every other sample.
+        Sroka and Jennen-Steinmetz, Biometrika 73, 1986, 625-633). Only where noise is white and all else is smooth does
+        the estimate from neighbours agree with that from every other sample.
         """
         found = []
         for lag in (1, 2):
             parts = [self.residual[a:b] for a, b in self.used.parts]
             second = np.concatenate([e[2 * lag :] - 2.0 * e[lag:-lag] + e[: -2 * lag] for e in parts])
-            # without the few kinks at reversals, which are no noise
+            # ignoring the few kinks at reversals, which are not noise
             found.append(1.4826 * float(np.nanmedian(np.abs(second))) / np.sqrt(6.0))
         if not 0.0 < max(found) <= AGREE * min(found):
             return None
@@ -104,7 +104,7 @@ class Shown:
 def of_fit(fit: Fit, records: Sequence[Record]) -> list[Shown]:
     """The records of a fit as they are drawn, held-out records last, as in `fit.used`."""
     if len(records) != len(fit.used):
-        raise ValueError(f"the fit compared {len(fit.used)} records, those held out among them, not {len(records)}")
+        raise ValueError(f"the fit compared {len(fit.used)} records, including the held-out ones, not {len(records)}")
     return [Shown(record, used, fit.along(record, used)) for record, used in zip(records, fit.used, strict=True)]
 
 
@@ -121,7 +121,7 @@ def role(each: Shown) -> str:
 
 @dataclass(frozen=True)
 class Units:
-    """Units of drive and output, empty where not known."""
+    """Units of drive and output, empty if unknown."""
 
     drive: str
     output: str
@@ -378,7 +378,7 @@ def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
         branches = [(True, drawing.MEASURED, "drive rising" if cascade.branches_differ else "front")]
         if cascade.branches_differ:
             branches.append((False, drawing.RESIDUAL, "drive falling"))
-        for ax, straight, title in ((front[0], 0.0, "Front"), (front[1], 1.0, "Its departure from the line")):
+        for ax, straight, title in ((front[0], 0.0, "Front"), (front[1], 1.0, "Its deviation from the line")):
             for up, colour, name in branches:
                 ax.plot(v, cascade.front(v, up) - straight * v, color=colour, linewidth=1.4, label=name)
             ax.plot(v, (1.0 - straight) * v, color=drawing.QUIET, linewidth=0.9, linestyle="--", label="straight line")

@@ -32,7 +32,7 @@ class Listing:
 
 @dataclass(frozen=True)
 class Table:
-    """`rows[0]` is the head; columns in `words` hold words, the others numbers; row `marked` stands out."""
+    """`rows[0]` is the head; columns in `words` hold text, the others numbers; row `marked` is highlighted."""
 
     rows: Sequence[Sequence[str]]
     words: Sequence[int]
@@ -42,7 +42,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture as SVG, in a layout for wide pages and one for phones; `alt` describes it in words."""
+    """A picture as SVG, in one layout for wide pages and one for phones; `alt` describes it in words."""
 
     name: str
     wide: bytes
@@ -54,7 +54,7 @@ class Figure:
 
 @dataclass(frozen=True)
 class Details:
-    """Preformatted text that opens at a click on its summary."""
+    """Preformatted text that opens when its summary is clicked."""
 
     summary: str
     text: str

@@ -1,4 +1,4 @@
-"""The report of an identification: one page, and its figures as files beside it."""
+"""The report of an identification: one page, with its figures as separate files."""
 
 from __future__ import annotations
 
@@ -76,8 +76,8 @@ def report_fit(
     """Write the report of a fit: `report.html`, which is self-contained, and its pictures. Returns the page's path.
 
     `records`, `holdout`: as given to `identify`, in the same order; records read with options such as `columns` have to
-    be given as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder stay. Raises ValueError for
-    other records, RecordError, OSError.
+    be given as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder are left alone. Raises
+    ValueError for other records, RecordError, OSError.
     """
     if not isinstance(fit, Fit):
         raise TypeError(f"fit is what hystgen.identify returns, not {arguments.kind(fit)}")
@@ -90,8 +90,8 @@ def write(
 ) -> Path:
     """Write report.html and every picture as SVG and PNG into a folder, all or nothing. Returns the page's path.
 
-    `records`: those of the fit, then those held out. `parameter_file`: its name in the command for the next step.
-    Raises PlotError without matplotlib, ValueError for other records than those of the fit, OSError.
+    `records`: those of the fit, then the held-out ones. `parameter_file`: its name in the command for the next step.
+    Raises PlotError without matplotlib, ValueError for records other than those of the fit, OSError.
     """
     check_folder(folder)
     shown = fit_figures.of_fit(fit, records)
@@ -147,7 +147,7 @@ def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
         own = fit.rows[-1]
         error = (
             f" follows the records it was fitted to within {own.rms:.3g}{unit} rms ({_of_range(own)}); nothing was "
-            "held out, so that its error on others is not known"
+            "held out, so its error on other records is unknown"
         )
     else:
         which = (
@@ -237,7 +237,7 @@ def _data(shown: Sequence[Shown]) -> list[Text | Table | Listing]:
         Text(
             "Three kinds of samples are not compared: those at the start, before the drive has wiped an unknown "
             "memory; outliers of y, which are isolated samples far from their neighbours; and faulty stretches, which "
-            "are drop-outs, samples held while the drive moves, and a converter at its end. Isolated samples of v "
+            "are drop-outs, samples held while the drive moves, and a converter at its limit. Isolated samples of v "
             "without a response in y are bridged by a straight line. A record is cut at gaps, after which the memory "
             "is unknown again; every part has a free offset."
         ),
@@ -314,7 +314,7 @@ def _fingerprint(record: Record) -> str:
 def _several(shown: Sequence[Shown]) -> str:
     """A sentence for the caption if not all records are drawn."""
     drawn = fit_figures.drawn_ones(shown)
-    return " Of several records the one with the largest error is drawn." if len(drawn) < len(shown) else ""
+    return " Of several records, the one with the largest error is drawn." if len(drawn) < len(shown) else ""
 
 
 def _errors(shown: Sequence[Shown], fit: Fit) -> str:
@@ -350,7 +350,7 @@ def _time_caption(_fit: Fit, shown: Sequence[Shown]) -> str:
         counts += [counted(left_out, "sample") + " left out between gaps"] if left_out else []
         said.append(f"{each.used.name}: {', '.join(counts)}")
     return (
-        "Measured and model over time; below, measured less model where samples were compared. Grey: ignored; yellow: "
+        "Measured and model over time; below, measured minus model where samples were compared. Grey: ignored; yellow: "
         f"gaps; crosses: outliers. {'; '.join(said)}.{_several(shown)}"
     )
 
@@ -395,7 +395,7 @@ def _loading_caption(fit: Fit, _shown: Sequence[Shown]) -> str:
     if cascade.stages:
         said += (
             " The horizontal axis is the input of the plays, that is, the drive behind the front. Below: the front and "
-            "the straight line with slope one, and the difference of the two"
+            "the straight line with slope one, and the difference between the two"
         )
         said += ", while the drive rises and while it falls." if cascade.branches_differ else "."
     return said
@@ -406,7 +406,7 @@ def _loading_alt(fit: Fit, _shown: Sequence[Shown]) -> str:
     top = max(abs(end) for end in curve.play_range)
     unit = f" {fit.unit}" if fit.unit else ""
     rises = f"Initial loading curve with its 95 % band, rising to {float(curve.pi.loading_curve(top)):.4g}{unit}"
-    return rises + ("; the front and its departure from a straight line" if curve.stages else "")
+    return rises + ("; the front and its deviation from a straight line" if curve.stages else "")
 
 
 def _weights_caption(fit: Fit, _shown: Sequence[Shown]) -> str:

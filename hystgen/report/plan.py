@@ -20,7 +20,7 @@ from hystgen.planning.waveforms import EDGE
 from hystgen.report.html import Figure, Listing, Section, Table, Text, page
 
 WIDE, NARROW = (9.0, 5), (4.2, 3)
-"""Width in inches and panels side by side."""
+"""Width in inches and number of panels side by side."""
 
 FIT, JUDGE = drawing.MEASURED, drawing.MODEL
 
@@ -30,7 +30,7 @@ class Plan(planning.Plan):
     """Drive records of one session, in the order in which they are recorded; fields as in `hystgen.planning.plan`."""
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write the CSV files and `plan.html`, which explains them, into a folder, all or nothing; the paths.
+        """Write the CSV files and `plan.html`, which explains them, into a folder, all or nothing; returns the paths.
 
         Raises PlotError without matplotlib, OSError.
         """
@@ -104,9 +104,9 @@ def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
         f"Go to {bottom} slowly, then play {WHOLE} at {session.rate:g} Hz to its end: {samples} samples in "
         f"{lasting(plan.duration)}. It goes to {top} and {bottom} first, which is the history of the first record, and "
         f"rests {plan.rest:g} s before each.",
-        f"Record drive and displacement all the while into one file, {home}/{RECORDING}, with columns t, v and y, at "
+        f"Record drive and displacement throughout into one file, {home}/{RECORDING}, with columns t, v and y, at "
         "this rate or another. It may start before the drive; the first rise aligns the two.",
-        f"{SESSION} says at which sample each record begins, and which are held out: the recording is cut by it.",
+        f"{SESSION} says at which sample each record begins, and which are held out; it is used to cut the recording.",
         "Let v be the drive as measured at the time of y. A converter that holds each value until the next is half a "
         "sample late, and a commanded v would show that as a delay.",
     ]
@@ -162,8 +162,8 @@ def _limits(plan: Plan) -> list[str]:
     ]
     if fast > 1.5 * plan.sample_time:
         said.append(
-            f"Fast records are sampled every {fast:.3g} s, not every {plan.sample_time:g} s, because of the time that "
-            "a move over the range takes at this rate limit. A larger --max-rate shows more, and sooner."
+            f"Fast records are sampled every {fast:.3g} s, not every {plan.sample_time:g} s, because of the time it "
+            "takes to cross the range at this rate limit. A larger --max-rate shows more in less time."
         )
     return said
 
@@ -187,6 +187,6 @@ def _drives(plan: Plan, width: float, columns: int) -> Any:
     return drawn
 
 
-CAPTION = "All drives in the order of recording, each on its own time axis; blue: to fit, orange: held out, to judge."
+CAPTION = "All drives in recording order, each on its own time axis; blue: to fit, orange: held out, to judge."
 
 ALTERNATIVE = "A panel for every record: its drive over time, with the names of the records as titles."

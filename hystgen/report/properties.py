@@ -68,8 +68,8 @@ def properties(model: Model, within: float = SETTLED) -> str:
         lines += _fixed(model, drive, output)
     else:
         lines.append(
-            f"inverse            exists; references {c.output_range[0]:.6g} to {c.output_range[1]:.6g}{output} are "
-            f"answered with drives inside {c.input_range[0]:.6g} to {c.input_range[1]:.6g}{drive}"
+            f"inverse            exists; references {c.output_range[0]:.6g} to {c.output_range[1]:.6g}{output} "
+            f"map to drives inside {c.input_range[0]:.6g} to {c.input_range[1]:.6g}{drive}"
         )
         for arithmetic in (each.name for each in ARITHMETICS.values() if not each.fixed):
             bounds = error_bounds(c, arithmetic, model.engine(arithmetic=arithmetic))
@@ -79,7 +79,7 @@ def properties(model: Model, within: float = SETTLED) -> str:
             )
         lines += _fixed(model, drive, output)
         if c.branches_differ:
-            lines.append("branches           the errors of the inverse hold while it takes the exact model's branch")
+            lines.append("branches           the errors of the inverse hold while it is on the exact model's branch")
     if not model.effects and (words := cost(model)):
         lines.append(f"cost of the C      {words}")
     return "\n".join(lines)
@@ -110,7 +110,7 @@ def facts(model: Model, within: float = SETTLED) -> dict[str, Any]:
 
 
 def settling(model: Model, within: float = SETTLED) -> str:
-    """Settling of the model in a sentence, or the reason why it is not known."""
+    """Settling of the model in a sentence, or the reason why it is unknown."""
     try:
         return model.settling(within).sentence(model.parameters.units.output)
     except EffectsError as error:
@@ -118,7 +118,8 @@ def settling(model: Model, within: float = SETTLED) -> str:
 
 
 def cost(model: Model) -> str:
-    """Cost of the C that `emit` would write, that of the forward operator if there is no inverse; "" if it refuses."""
+    """Cost of the C that `emit` would write, or of the forward operator if there is no inverse; "" if `emit` refuses
+    it."""
     try:
         options = emit_options(model, operator="forward" if model.cascade.inverse_problems() else None)
         found = module.cost_of(model.parameters, model.cascade, options)
@@ -153,7 +154,7 @@ def _effects(model: Model) -> list[str]:
 
 
 def _compensation(effect: Effect, how: Compensation) -> str:
-    """How far the inverse can correct an effect; of a mode, what `emit.compensation.resonance` makes of that."""
+    """How well the inverse can correct an effect; for a mode, how `emit.compensation.resonance` changes that."""
     if not isinstance(effect, Resonance) or how.resonance == "inverse":
         return effect.compensation
     if how.resonance == "none":
@@ -162,7 +163,7 @@ def _compensation(effect: Effect, how: Compensation) -> str:
 
 
 def _reading(model: Model) -> list[str]:
-    """How the inverse reads the reference, as the banner of its C says; nothing where `emit` refuses it."""
+    """How the inverse treats the reference, in the words of the C banner; empty if `emit` refuses it."""
     try:
         options = emit_options(model, operator="inverse")
         return module.reading_of(model.parameters, model.cascade, options)
@@ -202,7 +203,7 @@ def warnings(model: Model) -> list[str]:
         return []
     if c.slope_ratio > HARD_RATIO:
         return [
-            f"the slope ratio is {c.slope_ratio:.3g}: the inverse amplifies rounding and model errors by as much; "
+            f"the slope ratio is {c.slope_ratio:.3g}: the inverse amplifies rounding and model errors by that factor; "
             "raise p_0 or narrow input_range"
         ]
     arithmetic = model.parameters.emit.arithmetic

@@ -1,4 +1,4 @@
-"""Verification: do emitted files, compiled and run, give the bits of the Python reference?"""
+"""Verification: does the emitted C, compiled and run, give the bits of the Python reference?"""
 
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ __all__ = ["Report", "Reports", "Row", "verify"]
 
 
 def __getattr__(name: str) -> Any:
-    # Late, because the command line asks this package for the names of targets whenever it starts
+    # Imported late, because the command line only needs the names of targets whenever it starts
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from hystgen.verification import report, run

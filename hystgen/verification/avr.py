@@ -18,10 +18,10 @@ from hystgen.verification.sources import Sources
 from hystgen.verification.targets import Board
 
 SECONDS = 120
-HERTZ = "16000000"  # simavr asks for a clock; the firmware needs none
+HERTZ = "16000000"  # simavr needs a clock; the firmware does not
 REPORT = "selftest returned"
-STACK = 512  # bytes for the firmware's stack and serial port; filling up the RAM, two branches in q31 failed below 264
-CONSTANTS = (".data", ".rodata")  # both lie in RAM, and in flash with what fills it at the start
+STACK = 512  # bytes for firmware stack and serial port; with a full RAM, two branches in q31 failed below 264
+CONSTANTS = (".data", ".rodata")  # both are in RAM, and in flash with the data that initialises it
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,8 @@ class Size:
 
 @dataclass(frozen=True)
 class Built:
-    """Object files, and as measured: bytes of flash of the module, of its constants, of an instance of each operator,
-    and of RAM of module and self-test."""
+    """Object files with their sizes in bytes: flash of the module, its constants, an instance of each operator, and RAM
+    of module and self-test."""
 
     objects: tuple[Path, ...]
     flash: int
@@ -57,8 +57,8 @@ def rows(
     folder: Path,
     progress: Callable[[str], None],
 ) -> list[Row]:
-    """One row: result of the self-test on the emulated board, and memory of the module. `size`: by
-    which a model that is too large for the board is judged; None where it cannot be built for one.
+    """One row: result of the self-test on the emulated board, and memory of the module. `size`: decides whether a model
+    is too large for the board; None if the model cannot be built for one.
     """
     if compiler and "gcc" not in compiler:
         words = f"does not build for {board.name}; use gcc"
@@ -75,7 +75,7 @@ def rows(
         row = replace(row, flash=built.flash, ram=built.ram)
         if size is not None and max(built.ram, built.with_selftest + STACK) > board.ram:
             return [replace(row, error=_too_large(board, built, size))]
-        words = f"RAM has the {built.constants} bytes of constants, which lie there on an AVR"
+        words = f"RAM includes the {built.constants} bytes of constants, which are in RAM on an AVR"
         row = replace(row, note=f"{words}, and an instance of each operator")
         result = run(board, link(board, sources, built.objects, folder / board.name))
         return [selftest(row, sources.name, result)]
@@ -87,11 +87,11 @@ def _too_large(board: Board, built: Built, size: Size) -> str:
     if built.ram <= board.ram:
         return (
             f"the self-test does not fit: with the module it takes {built.with_selftest} of {board.ram} bytes of RAM, "
-            f"and {STACK} are for the stack; the module alone takes {built.ram}"
+            f"of which {STACK} are for the stack; the module alone takes {built.ram}"
         )
     fit = size.plays - -(-(built.ram - board.ram) // size.memory.play)
     return (
-        f"{built.ram} bytes of RAM are needed, {built.constants} of them for constants, which lie in RAM on an AVR; "
+        f"{built.ram} bytes of RAM are needed, {built.constants} of them for constants, which are in RAM on an AVR; "
         f"{board.name} has {board.ram}: at {size.memory.play} bytes for each play not more than {fit} of the "
         f"{size.plays} plays fit, fewer beside a stack and other firmware; reduce the plays, or emit one operator"
     )
@@ -102,7 +102,8 @@ def _gcc(board: Board) -> compilers.Compiler:
 
 
 def build(board: Board, sources: Sources, folder: Path) -> Built:
-    """Compile the emitted files in the new folder `folder`, with the warnings of the host. Raises CompileError."""
+    """Compile the emitted files in the new folder `folder`, with the same warnings as on the host. Raises
+    CompileError."""
     folder.mkdir(parents=True)
     gcc = _gcc(board)
     objects = {source: folder / f"{source.stem}.o" for source in sources.emitted}
@@ -129,7 +130,8 @@ def sections(board: Board, objects: Iterable[Path]) -> list[tuple[str, int]]:
 
 
 def link(board: Board, sources: Sources, objects: Sequence[Path], folder: Path) -> Path:
-    """Link a firmware in `folder`, its main, which is never shipped, compiled without warnings. Raises CompileError."""
+    """Link a firmware in `folder`; its main, which is never shipped, is compiled without warnings. Raises
+    CompileError."""
     main = folder / "firmware.c"
     values = SimpleNamespace(name=sources.name, report=REPORT)
     main.write_text(module.render("firmware_avr.c.j2", values), encoding="ascii")

@@ -1,4 +1,4 @@
-"""The records that are verified, with the answers of the bit reference, and how compiled answers differ from them."""
+"""The records that are verified, with the output of the bit reference, and how compiled output differs from it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hystgen.verification import signals
 
 @dataclass(frozen=True)
 class Expected:
-    """A record and the reference's answers to it."""
+    """A record and the reference's output for it."""
 
     name: str
     call: Bytes
@@ -29,7 +29,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Difference:
-    """Number of samples compared and of those that differ, largest difference (None: infinite), first that differs."""
+    """Number of samples compared and number that differ, largest difference (None: infinite), first that differs."""
 
     samples: int
     different: int
@@ -40,7 +40,7 @@ class Difference:
 def expected_record(
     numbers: Tables | FixedTables | ChainTables, real: np.dtype[Any], inverse: bool, calls: signals.Calls
 ) -> Expected:
-    """A record of calls, in numbers of type `real`, with the answers of the bit reference."""
+    """A record of calls, in numbers of type `real`, with the output of the bit reference."""
     name, op, values = calls
     x = values.astype(real).astype(numbers.threshold.dtype)
     answer, status = reference.answers(numbers, inverse, op, x)
@@ -50,13 +50,13 @@ def expected_record(
 def expected_records(
     numbers: Tables | FixedTables | ChainTables, real: np.dtype[Any], inverse: bool, length: int
 ) -> list[Expected]:
-    """The verification records of an operator with the answers of the bit reference."""
+    """The verification records of an operator with the output of the bit reference."""
     suite = signals.suite(numbers, real, inverse, length)
     return [expected_record(numbers, real, inverse, calls) for calls in suite]
 
 
 def _ulps(a: NDArray[Any], b: NDArray[Any]) -> float:
-    """Largest distance in units of the last place of `b`, or in codes."""
+    """Largest distance in units in the last place of `b`, or in codes."""
     if a.dtype.kind == "i":
         return float(np.max(np.abs(a.astype(np.int64) - b.astype(np.int64)), initial=0))
     with np.errstate(all="ignore"):
@@ -67,7 +67,7 @@ def _ulps(a: NDArray[Any], b: NDArray[Any]) -> float:
 def compare(
     run: Callable[[Bytes, NDArray[Any]], tuple[NDArray[Any], Bytes]], records: Sequence[Expected]
 ) -> Difference:
-    """Run every record through `run` (calls and arguments to answers and status) and compare it bit for bit."""
+    """Run every record through `run` (calls and arguments to outputs and status) and compare it bit for bit."""
     samples = different = 0
     first = ""
     worst = 0.0

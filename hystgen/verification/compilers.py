@@ -1,4 +1,4 @@
-"""C compilers on this machine and the flags that emitted code has to be clean under."""
+"""C compilers on this machine, and the flags under which emitted code must compile without warnings."""
 
 from __future__ import annotations
 
@@ -25,8 +25,9 @@ WARNINGS = [
 ]  # fmt: skip
 C_WARNINGS = [*WARNINGS, "-Wmissing-prototypes", "-Wstrict-prototypes"]
 
-# The strict build, and the one a user makes who passes nothing: gcc's and clang's default dialect, in which they may
-# contract a * b + c to one rounding. Where the CPU's baseline has no such instruction, its own set has to be asked for
+# The strict build, and that of a user who passes no flags: the default dialect of gcc and clang, in which they may
+# contract a * b + c to one rounding. If the CPU's baseline has no such instruction, its instruction set has to be
+# enabled
 STRICT = ["-std=c99", "-O2", "-ffp-contract=off"]
 USER = ["-std=gnu11", "-O2"]
 DEFAULTS = [*USER, *(["-march=native"] if platform.machine() in ("x86_64", "AMD64") else [])]
@@ -39,15 +40,15 @@ DEBIAN = {
     "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf", "avr-gcc": "gcc-avr avr-libc", "avr-size": "binutils-avr",
     "simavr": "simavr",
 }  # fmt: skip
-"""Debian's packages of the commands that a verification calls."""
+"""Debian packages of the commands that a verification calls."""
 
 
 class CompileError(RuntimeError):
-    """The compiler refused; the message holds its output."""
+    """The compiler failed; the message holds its output."""
 
 
 class MissingError(CompileError):
-    """A tool that is asked for cannot be used on this machine; the message says what to install."""
+    """A requested tool that is not usable on this machine; the message says what to install."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,8 @@ class Compiler:
     command: tuple[str, ...]
 
     def run(self, arguments: Sequence[str | Path]) -> None:
-        """Run the compiler; its temporary files go where its output goes. Raises CompileError with what it printed."""
+        """Run the compiler; its temporary files go where its output goes. Raises CompileError with the compiler's
+        output."""
         folder = Path(arguments[list(arguments).index("-o") + 1]).parent
         try:
             done = subprocess.run(
@@ -66,7 +68,7 @@ class Compiler:
                 check=False, stdin=subprocess.DEVNULL, env={**os.environ, **_own(self.name), "TMPDIR": str(folder)},
             )  # fmt: skip
         except OSError as failure:
-            raise MissingError(f"{self.name} cannot be started: {failure.strerror}; install it anew") from None
+            raise MissingError(f"{self.name} cannot be started: {failure.strerror}; reinstall it") from None
         if done.returncode:
             raise CompileError(f"{self.name} failed:\n{(done.stderr or done.stdout).strip()}")
 
@@ -83,15 +85,15 @@ class Compiler:
 def find(name: str) -> Compiler | None:
     """The compiler of that name, or None if it is not installed.
 
-    Any other name is a command as a shell takes it, words and quotes: `ccache gcc`, `gcc -m32`. Raises ValueError for a
-    quote that is not closed, and for no command at all.
+    Any other name is a command in shell syntax, with words and quotes: `ccache gcc`, `gcc -m32`. Raises ValueError for
+    an unclosed quote or an empty command.
     """
     if name.split() in (["zig"], ["zig", "cc"]):
         if importlib.util.find_spec("ziglang"):
             return Compiler("zig", (sys.executable, "-m", "ziglang", "cc"))
         path = shutil.which("zig")
         return Compiler("zig", (path, "cc")) if path else None
-    path = shutil.which(name)  # first as it stands: a path may have spaces
+    path = shutil.which(name)  # first unsplit: a path may have spaces
     if path:
         return Compiler(name, (path,))
     try:
@@ -99,7 +101,7 @@ def find(name: str) -> Compiler | None:
     except ValueError as failure:
         raise ValueError(f"the compiler {name!r} is not a command: {failure}; correct it") from None
     if not words:
-        raise ValueError("a compiler is named by a command; write gcc, clang, zig or another")
+        raise ValueError("a compiler is given as a command; write gcc, clang, zig or another")
     path = shutil.which(words[0])
     return Compiler(name, (path, *words[1:])) if path else None
 
@@ -115,7 +117,7 @@ def missing(name: str) -> MissingError:
 
 
 def uninstalled(commands: Sequence[str]) -> MissingError:
-    """The error for commands that are not installed, with Debian's packages of those that have one."""
+    """The error for commands that are not installed, with the Debian packages that provide them."""
     packages = " ".join(DEBIAN[command] for command in commands if command in DEBIAN)
     advice = f"; on Debian: apt install {packages}" if packages else "; install them"
     are = "are" if len(commands) > 1 else "is"
@@ -123,17 +125,17 @@ def uninstalled(commands: Sequence[str]) -> MissingError:
 
 
 def none_found() -> MissingError:
-    """The error for a machine without any compiler."""
+    """The error for a machine without a compiler."""
     return MissingError(f"no C compiler found; install gcc or clang, or: {extras.install('zig')}")
 
 
 @functools.cache
 def _own(name: str) -> dict[str, str]:
-    """Environment that a compiler needs; zig a folder for what it builds, if the home folder cannot have it."""
+    """Environment that a compiler needs; for zig a cache folder, if it cannot be in the home folder."""
     if not name.startswith("zig") or "ZIG_GLOBAL_CACHE_DIR" in os.environ:
         return {}
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    # zig makes this folder, or waits for ever where that fails (under /proc, say): permissions alone do not show it
+    # zig creates this folder, or waits for ever if that fails (under /proc, say), which permissions alone do not show
     with contextlib.suppress(OSError):
         os.makedirs(os.path.join(home, "zig"), exist_ok=True)
         with tempfile.TemporaryFile(dir=os.path.join(home, "zig")):

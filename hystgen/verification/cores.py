@@ -24,9 +24,9 @@ def rows(
     folder: Path,
     progress: Callable[[str], None],
 ) -> Iterator[Row]:
-    """One row per operator, compiler and build. Where the core has an FPU, also built without flags, which lets
-    compilers contract a product and a sum, with a row for the self-test; where qemu is installed, also the self-test as
-    a whole firmware.
+    """One row per operator, compiler and build. If the core has an FPU, it is also built without flags, which lets
+    compilers contract a product and a sum, with a row for the self-test; if qemu is installed, the self-test also runs
+    as a whole firmware.
     """
     try:
         cross.check_wheels()

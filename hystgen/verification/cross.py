@@ -1,4 +1,4 @@
-"""C compilers for the cores of `targets`: zig from its wheel, and Debian's cross gcc where it is installed."""
+"""C compilers for the cores of `targets`: zig from its wheel, and Debian's cross gcc if installed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FREESTANDING = ["-ffreestanding", "-fno-unwind-tables", "-fno-asynchronous-unwin
 
 @dataclass(frozen=True)
 class Layout:
-    """Where an image lies in memory."""
+    """Where an image is placed in memory."""
 
     flash: int = 0x0800_0000
     flash_size: int = 0x0100_0000
@@ -57,7 +57,8 @@ class CrossCompiler:
     ) -> Path:
         """Compile and link a flat image in `folder`, which must be new. Raises CompileError.
 
-        The emitted files have to be clean under the warnings of the host; `more`, which is never shipped, need not be.
+        The emitted files must compile with the host's warning flags and no warning; `more`, which is never shipped,
+        need not.
         """
         folder.mkdir(parents=True)
         common = [*self.flags, *flags, *FREESTANDING]
@@ -92,15 +93,15 @@ def find(target: Target, name: str) -> CrossCompiler:
         path = shutil.which(target.gcc)
         if path is None:
             raise compilers.uninstalled([target.gcc])
-        # No library but the compiler's own: emitted code needs none
+        # Only the compiler's own library: emitted code needs no other
         return CrossCompiler(compilers.Compiler("gcc", (path,)), (*target.gcc_flags, "-nostdlib"), ("-lgcc",))
     raise compilers.MissingError(f"{name} does not build for {target.name}; use {' or '.join(NAMES)}")
 
 
 def chosen(target: Target, compiler: Sequence[str]) -> tuple[str, ...]:
-    """Names of the compilers to use: those asked for, else zig and, where it is installed, gcc.
+    """Names of the compilers to use: the requested ones, else zig and, if installed, gcc.
 
-    One that builds for the host alone is passed over where another is asked for too.
+    A compiler that only builds for the host is skipped if another is requested too.
     """
     if compiler:
         return tuple(name for name in compiler if name in NAMES) or tuple(compiler)
@@ -108,7 +109,7 @@ def chosen(target: Target, compiler: Sequence[str]) -> tuple[str, ...]:
 
 
 def check_wheels() -> None:
-    """Raise MissingError where the wheels of the emulator cannot be used."""
+    """Raise MissingError if the emulator's wheels cannot be used."""
     wheels = {"unicorn": "unicorn", "elftools": "pyelftools"}
     missing = [wheel for package, wheel in wheels.items() if importlib.util.find_spec(package) is None]
     if missing:

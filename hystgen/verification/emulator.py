@@ -21,10 +21,10 @@ from hystgen.verification.cross import Layout
 from hystgen.verification.loading import LoadError, load
 from hystgen.verification.targets import Target
 
-RECORDS = 0x6000_0000  # where the arrays of a record are put
+RECORDS = 0x6000_0000  # address of a record's arrays
 STACK = 0x0000_8000  # bytes below the top of RAM that are painted
 PAINT = 0xA5
-SECONDS = 600  # after which a call is given up
+SECONDS = 600  # instructions after which a call is aborted
 PAGE = 0x1000
 
 
@@ -61,7 +61,7 @@ class Image:
 
 
 class _Counter(ctypes.Structure):
-    """`hystgen_counter_t` of templates/instruction_counter.c."""
+    """`hystgen_counter_t` from templates/instruction_counter.c."""
 
     _fields_ = [
         ("entry", ctypes.c_uint64),
@@ -82,7 +82,7 @@ class _Counter(ctypes.Structure):
 
 @functools.cache
 def _hook() -> Any:
-    """The counting hook as machine code of this machine. Raises EmulatorError and MissingError."""
+    """The counting hook as machine code for this machine. Raises EmulatorError and MissingError."""
     found = compilers.available()
     if not found:
         raise compilers.none_found()
@@ -153,7 +153,7 @@ class Core:
 
     @property
     def counts(self) -> NDArray[np.uint32]:
-        """Instructions of every counted call that the harness made, in order."""
+        """Instructions of every counted call made by the harness, in order."""
         return np.concatenate(self._counts) if self._counts else np.zeros(0, dtype=np.uint32)
 
     @property
@@ -195,7 +195,7 @@ class Core:
     def run(
         self, name: str, op: str, call: Bytes, x: NDArray[Any], counted: str = "step"
     ) -> tuple[NDArray[Any], Bytes]:
-        """Have the harness of operator `op` make the calls of a record; counts the instructions of NAME_OP_step, or of
+        """Let the harness of operator `op` make the calls of a record; counts the instructions of NAME_OP_step, or of
         NAME_OP_commit."""
         sizes = (len(x), x.nbytes, x.nbytes, len(x))
         places, end = [], RECORDS
@@ -235,7 +235,8 @@ class Core:
         def run(action: Callable[[], object]) -> None:
             handle = uc_hook_h()
             hook = ctypes.cast(_hook(), ctypes.c_void_p)
-            # The binding's own hook_add would wrap a Python function; the address of compiled code goes in directly
+            # The binding's own hook_add would wrap a Python function; here the address of compiled code is passed
+            # directly
             failed = uclib.uc_hook_add(
                 self._uc._uch, ctypes.byref(handle), UC_HOOK_CODE, hook, ctypes.addressof(counter), 1, 0
             )

@@ -16,7 +16,7 @@ from hystgen.verification.targets import Machine, Target
 
 QEMU = "qemu-system-arm"
 SECONDS = 120
-SIZES = {"flash_size": 0x0004_0000, "ram_size": 0x0000_4000}  # what the smallest of the boards has
+SIZES = {"flash_size": 0x0004_0000, "ram_size": 0x0000_4000}  # the size of the smallest board's
 FAULT = 255
 
 
@@ -39,7 +39,7 @@ def build(
 def run(machine: Machine, image: Path) -> int:
     """The self-test's result (0, or 1 + first failing index, at most 253). Raises EmulatorError.
 
-    The exit code is one more: 0 would be that of an emulator that ran nothing.
+    The exit code is one more: 0 would mean that the emulator ran nothing.
     """
     command = [
         QEMU, "-M", machine.name, "-nographic", "-monitor", "none", "-serial", "none",

@@ -70,7 +70,7 @@ def rows(
     folder: Path,
     progress: Callable[[str], None],
 ) -> Iterator[Row]:
-    """One row per operator, compiler and build; compilers: those named, else all that are installed."""
+    """One row per operator, compiler and build; compilers: the given ones, else all that are installed."""
     chosen = [(name, compilers.find(name)) for name in compiler] or [(c.name, c) for c in compilers.available()]
     if not chosen:
         yield failed(Row(HOST, "-", "-", "-"), compilers.none_found())

@@ -15,11 +15,12 @@ from hystgen.verification.loading import load
 
 
 class Instance:
-    """A context of NAME_OP_init and NAME_OP_step in the C that a model emits; numbers as the C takes them.
+    """An instance driven by NAME_OP_init and NAME_OP_step in the C that a model emits, with numbers as the C takes
+    them.
 
-    `options`: one operator. `compiler`: `gcc`, `clang` or `zig`, else the first that is installed; it is called as
-    users call it, in its default dialect. The files lie in a temporary folder. Raises CompileError, also where there is
-    no compiler, LoadError, and ValueError for another name.
+    `options`: those of `emit`, for a single operator. `compiler`: `gcc`, `clang` or `zig`, else the first that is
+    installed; it is called as users call it, in its default dialect. The files are in a temporary folder. Raises
+    CompileError, also if there is no compiler, LoadError, and ValueError for another name.
     """
 
     def __init__(self, model: Model, options: Options, compiler: str | None = None) -> None:
@@ -35,7 +36,7 @@ class Instance:
             f"size_t hystgen_harness_{op}_size(void); void {name}_{op}_init(void *);"
             f"{real} {name}_{op}_step(void *, {real});"
         )
-        # What is loaded stays so without its file; only Windows keeps the file until then
+        # A loaded library survives without its file; only Windows keeps the file until then
         with writing.temporary() as folder:
             library = folder / "instance.so"
             written = sources.write(folder, model, options)
@@ -48,7 +49,7 @@ class Instance:
         self.reset()
 
     def reset(self) -> None:
-        """Back to the start memory of the parameter file."""
+        """Return to the start memory of the parameter file."""
         self._init(self._context)
 
     def step(self, x: Any) -> Any:

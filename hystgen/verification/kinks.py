@@ -17,19 +17,19 @@ from hystgen.plays.slots import Bytes
 POINTS = 2000
 """Points of a path; following the plays one by one in Python takes about 0.1 s for this number."""
 
-# What a point of the path is: the drive at which a play starts to follow, at which one would after a turn here, a limit
-# of the drive, or any
+# Kinds of points on the path: a drive at which a play starts to follow, one at which a play would start after a turn
+# here, a limit of the drive, or any
 FOLLOWS, TURNS, LIMIT, ANY = range(4)
 SHARES = (0.6, 0.1, 0.2, 0.1)
 
-# Behind a point of the inverse: how often a drive is committed, and how often that of the point
+# Share of the points of the inverse after which a drive is committed, and of these the share with the point's own
 COMMITTED, THERE = 0.6, 0.7
 
 
 @dataclass(frozen=True)
 class Path:
-    """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` what the forward operator
-    answers behind it (of init without meaning), `risen` whether it has risen to there."""
+    """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` that of the forward
+    operator after it (meaningless for init), `risen` whether the move to it was rising."""
 
     op: Bytes
     drive: NDArray[np.float64]
@@ -48,19 +48,19 @@ class _Textbook:
         self.begin(slots.OP_INIT)
 
     def begin(self, op: int) -> None:
-        """The memory of init, or that of reset."""
+        """The memory after init, or after reset."""
         start = self.tables.start.astype(float) if op == slots.OP_INIT else np.zeros(1)
         states = np.broadcast_to(start, len(self.r) + 1)
         self.w, self.s = float(states[0]), states[1:].copy()
         self.drive, self.rising = np.nan, 1
 
     def drive_at(self, w: float, branch: int) -> float:
-        """The drive that gives the input w of the plays, or one beyond the range."""
+        """The drive that gives the plays the input w, or one beyond the range."""
         with plain():
             return float(self.code.front_inverse(self.tables, self.kind(w), branch if self.tables.branches else 1)[0])
 
     def move(self, drive: float) -> None:
-        """The drive goes there."""
+        """Move the drive there."""
         if drive != self.drive and not np.isnan(self.drive):
             self.rising = int(drive > self.drive)
         self.drive = drive
@@ -70,7 +70,7 @@ class _Textbook:
 
 
 def path(tables: Tables | FixedTables, real: np.dtype[Any], length: int, rng: np.random.Generator) -> Path:
-    """A path of kinks, give or take a last bit, of the memory as it is there and of that of init and reset."""
+    """A path of kinks, to within a last bit, for the current memory and for that of init and reset."""
     whole = real.kind == "i"
     low, high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
     memory = _Textbook(tables)
@@ -101,7 +101,7 @@ def path(tables: Tables | FixedTables, real: np.dtype[Any], length: int, rng: np
 
 
 def _outputs(tables: Tables | FixedTables, op: Bytes, drive: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Behind every call; reset answers with nothing, but the same drive once more does."""
+    """The output after every call; reset returns none, but a step with the same drive does."""
     times = np.where(op == slots.OP_RESET, 2, 1)
     last = np.cumsum(times) - 1
     calls = np.full(int(times.sum()), slots.OP_STEP, dtype=np.uint8)
@@ -113,12 +113,12 @@ def _outputs(tables: Tables | FixedTables, op: Bytes, drive: NDArray[np.float64]
 def along(
     path: Path, least: Any, inverse: bool, special: NDArray[np.float64], length: int, rng: np.random.Generator
 ) -> tuple[Bytes, NDArray[np.float64]]:
-    """Operations and arguments that follow a path over and over, each time with other last bits.
+    """Operations and arguments that follow a path over and over, each time with different last bits.
 
-    Some points are crept up to, by last bits or a little more, from the side that the move comes from, and past; some
-    are asked for again, or beyond a limit. Of the inverse the references are the outputs along the path, and the drive
-    of a point is mostly committed, so that its memory stays on the path. Between init and the first sample there may
-    be a commit, and one of the `special` values. `least(x)`: the least step of the type at x.
+    Some points are approached in last bits or a little more, from the side of the move, and passed; some are requested
+    again, or beyond a limit. For the inverse the references are the outputs along the path, and the drive of a point is
+    mostly committed, so that its memory stays on the path. Between init and the first sample there may be a commit, and
+    one of the `special` values. `least(x)`: the least step of the type at x.
     """
     argument = path.output if inverse else path.drive
     span, room = float(np.ptp(argument)), float(np.ptp(path.drive))

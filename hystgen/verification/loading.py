@@ -1,4 +1,4 @@
-"""Loading a shared library that has just been built, also where temporary files may not be executed."""
+"""Loading a freshly built shared library, even if temporary files may not be executed."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ Loaded = TypeVar("Loaded")
 
 
 class LoadError(RuntimeError):
-    """The library was built and cannot be loaded; the message says why and what to do."""
+    """The library was built but cannot be loaded; the message says why and what to do."""
 
 
 def load(library: Path, loader: Callable[[str], Loaded]) -> Loaded:
-    """The result of `loader` for the library, which stays loaded when its file is gone. Raises LoadError.
+    """The result of `loader` for the library, which stays loaded after its file is gone. Raises LoadError.
 
-    Where its folder is mounted noexec, as temporary folders of hardened machines are, a copy elsewhere is loaded.
+    If its folder is mounted noexec, like the temporary folders of hardened machines, a copy elsewhere is loaded.
     """
     try:
         return loader(str(library))

@@ -16,14 +16,14 @@ from hystgen.verification.compilers import MissingError
 
 @dataclass(frozen=True)
 class Row:
-    """One operator in one build: how many samples were compared, what came out, and on emulated cores what it costs.
+    """One operator in one build: how many samples were compared, the result, and on emulated cores its cost.
 
-    Instructions are those of a call of `step`, from its first to its return, over the samples compared. `flash` are the
-    bytes of code and constants of the emitted module, `library` those of what the compiler linked to it (soft float,
-    and whatever else the image called), `ram` the size of an instance, `stack` the bytes below the caller's frame that
-    the deepest call used, as measured. On an AVR, where constants lie in RAM, `ram` has them too, beside an instance of
-    each operator. `note`: what to know about the figures. `missing`: nothing was compared, since a tool cannot be
-    used on this machine.
+    Instructions are those of a call of `step`, from its first to its return, over the samples compared. `flash` is the
+    number of bytes of code and constants of the emitted module, `library` that of what the compiler linked to it (soft
+    float, and anything else the image called), `ram` the size of an instance, `stack` the bytes that the deepest call
+    used below the caller's frame, as measured. On an AVR, where constants are in RAM, `ram` includes them as well as an
+    instance of each operator. `note`: a remark on the figures. `missing`: nothing was compared, since a tool is not
+    usable on this machine.
     """
 
     target: str
@@ -32,7 +32,7 @@ class Row:
     operator: str
     samples: int = 0
     different: int = 0
-    max_ulp: float | None = 0.0  # None: an answer is not a finite number
+    max_ulp: float | None = 0.0  # None: an output is not a finite number
     first: str = ""
     mean_instructions: float | None = None
     max_instructions: int | None = None
@@ -55,7 +55,7 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """What the table says about it."""
+        """The result in the words of the table."""
         if self.error:
             return self.error.splitlines()[0]
         if self.ok:
@@ -97,7 +97,7 @@ _RIGHT = {"samples", *(name for name, _ in _WHERE_MEASURED)}
 
 @dataclass(frozen=True, repr=False)
 class Report:
-    """All rows of a model's verification; `file`: its parameter file, where that is known."""
+    """All rows of a model's verification; `file`: its parameter file, if known."""
 
     name: str
     arithmetic: str
@@ -118,16 +118,16 @@ class Report:
 
     @property
     def ok(self) -> bool:
-        """Whether everything that was asked for was built, run and equal."""
+        """Whether everything requested was built, run and equal."""
         return bool(self.rows) and all(row.ok for row in self.rows)
 
     @property
     def wrong(self) -> bool:
-        """Whether the C is at fault: bits differ, or tools that are there cannot build or run it."""
+        """Whether the C is at fault: bits differ, or installed tools cannot build or run it."""
         return not self.rows or any(not row.ok and not row.missing for row in self.rows)
 
     def table(self) -> str:
-        """A table for people; columns that no row has a figure for are left out."""
+        """A table for people; columns without a figure in any row are left out."""
         measured = [(name, cell) for name, cell in _WHERE_MEASURED if any(cell(row) != "-" for row in self.rows)]
         columns = [*_ALWAYS, *measured, ("result", lambda row: row.verdict)]
         texts = []
@@ -141,7 +141,7 @@ class Report:
         return "\n".join(lines + notes + details)
 
     def content(self) -> dict[str, Any]:
-        """The report for JSON."""
+        """The report as plain data for JSON."""
         file = {"file": self.file} if self.file else {}
         about = {"name": self.name, "arithmetic": self.arithmetic, "engine": self.engine, "layout": self.layout}
         rows = [{**asdict(row), "ok": row.ok} for row in self.rows]
@@ -152,8 +152,8 @@ class Report:
         return _json(self.content())
 
     def suite(self, title: str = "") -> ElementTree.Element:
-        """A test suite of JUnit, one test case a row, a failure where the C is at fault and an error where a tool is
-        missing; `title`: in place of the model's name."""
+        """A JUnit test suite with one test case per row, a failure if the C is at fault and an error if a tool is
+        missing; `title`: used in place of the model's name."""
         title = title or self.name
         suite = ElementTree.Element(
             "testsuite", name=f"hystgen verify {title}", tests=str(len(self.rows)),
@@ -182,30 +182,30 @@ class Report:
 
 @dataclass(frozen=True)
 class Reports:
-    """The reports of several models as one; a single report reads as it does alone."""
+    """The reports of several models as one; a single report looks as it does alone."""
 
     reports: Sequence[Report]
 
     @property
     def ok(self) -> bool:
-        """Whether everything that was asked for was built, run and equal."""
+        """Whether everything requested was built, run and equal."""
         return bool(self.reports) and all(report.ok for report in self.reports)
 
     @property
     def wrong(self) -> bool:
-        """Whether the C of a model is at fault: bits differ, or tools that are there cannot build or run it."""
+        """Whether the C of a model is at fault: bits differ, or installed tools cannot build or run it."""
         return not self.reports or any(report.wrong for report in self.reports)
 
     @property
     def titles(self) -> list[str]:
-        """A title a report: the model's name, its file where models share a name, a number where files do too."""
+        """A title per report: the model's name, its file if models share a name, a number if files do too."""
         names = Counter(report.name for report in self.reports)
         found = [report.name if names[report.name] == 1 else report.file or report.name for report in self.reports]
         again = Counter(found)
         return [title if again[title] == 1 else f"{title} {number}" for number, title in enumerate(found, 1)]
 
     def table(self) -> str:
-        """A table a model, below its title."""
+        """A table per model, below its title."""
         if len(self.reports) == 1:
             return self.reports[0].table()
         return "\n\n".join(
@@ -221,7 +221,7 @@ class Reports:
         return _json({"ok": self.ok, "reports": [report.content() for report in self.reports]})
 
     def to_junit(self) -> str:
-        """The reports as JUnit XML, a suite a model."""
+        """The reports as JUnit XML, one suite per model."""
         if len(self.reports) == 1:
             return self.reports[0].to_junit()
         root = ElementTree.Element("testsuites", name="hystgen verify")

@@ -33,12 +33,12 @@ def verify(
 ) -> Report:
     """Compile what `emit` would write and compare it, bit for bit, with the Python reference of the same arithmetic.
 
-    `source`: a model, a parameter file, or what `identify` or `diagnose` found. On the host with every compiler that is
-    installed (or those named in `compiler`: 'gcc', 'clang', 'zig'), each under the strict flags and under its own
-    default dialect, over records of `length` calls. On the cores of `verification.targets` with zig and, where
+    `source`: a model, a parameter file, or a result of `identify` or `diagnose`. On the host it uses every compiler
+    that is installed (or those named in `compiler`: 'gcc', 'clang', 'zig'), each under the strict flags and under its
+    own default dialect, over records of `length` calls. On the cores of `verification.targets` it uses zig and, if
     installed, Debian's cross gcc, emulated, over records of `target_length` calls (default: as many as that core is
-    fast enough for), with the instructions of every sample counted. On the AVR the emitted self-test alone. What is
-    named twice is done once. A tool that is asked for and not on this machine makes a row that is `missing`.
+    fast enough for), and counts the instructions of every sample. On the AVR only the emitted self-test runs. Names
+    given twice are used once. A requested tool that is missing on this machine makes a row that is `missing`.
     `hystgen.verification.Reports` joins the reports of several models. Raises what `emit` raises, and ValueError for a
     target that does not exist.
 

@@ -18,7 +18,7 @@ from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 from hystgen.verification import kinks
 
-# In each part of a record of so many calls, the status of this share of them stays unread
+# In each part of a record of this many calls, the status of this share of them stays unread
 PART, UNREAD = 100, (0.0, 0.5, 0.9)
 
 Calls = tuple[str, Bytes, NDArray[np.float64]]
@@ -36,7 +36,7 @@ def _through(points: NDArray[np.float64], length: int) -> NDArray[np.float64]:
 def _onto_the_plays(
     levels: NDArray[np.float64], least: Any, low: float, high: float, length: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Turns that end where another play starts to follow, give or take last bits; most are asked for again."""
+    """Turns that end where another play starts to follow, give or take last bits; most are requested again."""
     turns = (rng.random(length) < 0.5).tolist()
     ways = (2 * rng.choice(levels, length) * rng.choice([-1.0, 1.0], length)).tolist()
     others = rng.uniform(low, high, length).tolist()
@@ -61,8 +61,8 @@ def _coincidences(
 ) -> tuple[Bytes, NDArray[np.float64]]:  # fmt: skip
     """Turns right where plays start to follow, from other such turns and from the ends of the range.
 
-    With round thresholds several corners end at the same drive, to the last bit or but for it: no search may depend on
-    what it looks at first.
+    With round thresholds several corners end at the same drive, exactly or to within a last bit: no search may depend
+    on what it checks first.
     """
     drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
     finer = 2.0 ** int(tables.limits[slots.FINE]) if isinstance(tables, FixedTables) else 1.0
@@ -118,10 +118,10 @@ def _onto_the_bends(
 def suite(
     tables: Tables | FixedTables | ChainTables, real: np.dtype[Any], inverse: bool, length: int = 100_000
 ) -> Iterator[Calls]:
-    """Records of `length` calls: name, operations and arguments, numbers of type `real`; the same ones every time.
+    """Records of `length` calls: name, operations and arguments, numbers of type `real`; the same every time.
 
-    Of a model with effects those of its plays, and calls of its settings among them. Status is read behind each call,
-    and elsewhere behind one of several, since its bits have to stay until they are read.
+    For a model with effects: those of its plays, with calls of its settings among them. Status is read after each call,
+    and elsewhere after one of several, since its bits have to stay until they are read.
     """
     plays = tables.plays._replace(limits=tables.limits) if isinstance(tables, ChainTables) else tables
     records = _suite(plays, real, inverse, length)
@@ -138,7 +138,7 @@ def suite(
 
 
 def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls]:
-    """Steps with everything else that may be called between them, now and then and often."""
+    """Steps with everything else that may be called between them, sparsely and densely."""
     first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
     low, high = (float(a) for a in tables.limits[first : first + 2])
     drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
@@ -173,14 +173,14 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
         yield name, op, x
     if inverse:
         yield "settled where it is", *_settled(tables, low, high, length)
-    # held for a long time, from where slow states still move
+    # held for a long time, with slow states still moving
     yield "held", _steps(np.empty(length)), np.where(np.arange(length) < 50, low, 0.7 * high + 0.3 * low)
 
 
 def _settled(tables: ChainTables, low: float, high: float, length: int) -> tuple[Bytes, NDArray[np.float64]]:
-    """From init to a reference, 0 among them, held long enough for a quiet drive to stand still, and settled at that
-    drive; often with another one committed right behind it, and a move on. What settling leaves of the past shows where
-    the drive stays."""
+    """From init to a reference, sometimes 0, held long enough for a quiet drive to stop, and settled at that drive;
+    often with another drive committed right after it, and a move on. Where the drive stays shows what settling leaves
+    of the past."""
     rng = np.random.default_rng(20261204)
     steps = max(4, 2 * tables.quiet + 4)
     count = -(-length // (2 * steps + 3))

@@ -25,7 +25,7 @@ class Sources:
     operators: tuple[str, ...]
     module: tuple[Path, ...]
     harness: Path
-    selftest: Path | None = None  # not all that is run is emitted
+    selftest: Path | None = None  # some of what runs is not emitted
 
     @property
     def emitted(self) -> tuple[Path, ...]:
@@ -44,7 +44,7 @@ def harness(
     more: Mapping[str, Sequence[str]] = MappingProxyType({}),
     arithmetic: Arithmetic = FLOAT32,
 ) -> str:
-    """The C that runs recorded calls of NAME_OP_step and the like; `more`: by operator, what it has beside those of
+    """The C that runs recorded calls of NAME_OP_step and the like; `more`: by operator, calls in addition to those of
     every model."""
     chain = {op: list(_chain_calls(name, op, more.get(op, ()), arithmetic)) for op in operators}
     values = SimpleNamespace(
@@ -56,7 +56,8 @@ def harness(
 def _chain_calls(name: str, op: str, more: Sequence[str], arithmetic: Arithmetic) -> Iterator[tuple[int, str]]:
     """The number and the statement of each call that only models with effects have.
 
-    In fixed point travels have more bits than codes: set are multiples of 2^TRAVEL_BITS, and the last bits compared.
+    In fixed point travels have more bits than codes: values set are multiples of 2^TRAVEL_BITS, and the last bits are
+    compared.
     """
     own, fixed = f"{name}_{op}", arithmetic.fixed
     for call, number in SETTINGS.items():

@@ -9,7 +9,7 @@ HOST = "host"
 
 @dataclass(frozen=True)
 class Machine:
-    """A board of qemu-system-arm that a whole firmware image runs on, with its memory map."""
+    """A qemu-system-arm board that a whole firmware image runs on, with its memory map."""
 
     name: str
     flash: int
@@ -20,8 +20,8 @@ class Machine:
 class Target:
     """A core: how compilers name it, and which processor of the emulator it is.
 
-    `fpu`: floating point in hardware, where a user's flags can contract a product and a sum to one rounding.
-    `calls`: calls of a verification record; what a core without FPU does in hundreds of instructions, others do in one.
+    `fpu`: floating point in hardware, where a user's flags can contract a product and a sum to one rounding. `calls`:
+    calls per verification record; a core without FPU needs hundreds of instructions for what others do in one.
     """
 
     name: str
@@ -37,9 +37,9 @@ class Target:
 
 @dataclass(frozen=True)
 class Board:
-    """A controller whose core the emulator of `Target` lacks: gcc alone builds, another emulator runs a firmware.
+    """A controller whose core the emulator of `Target` lacks: only gcc builds, another emulator runs the firmware.
 
-    Of 8 bits, with an `int` of 16: what an expression owes to a wider one shows there. `ram` in bytes.
+    8-bit with a 16-bit `int`: this exposes expressions that rely on a wider one. `ram` in bytes.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Board:
 
 ARM_GCC, RISCV_GCC = "arm-none-eabi-gcc", "riscv64-unknown-elf-gcc"
 
-# Without "+vfp4d16sp" and the like zig's M4, M7 and M33 have no FPU and call the soft-float library, even under eabihf
+# Without "+vfp4d16sp" and the like, zig's M4, M7 and M33 have no FPU and call the soft-float library, even under eabihf
 TARGETS = (
     Target(
         "cortex-m0plus", "arm", "UC_CPU_ARM_CORTEX_M0",

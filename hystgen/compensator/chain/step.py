@@ -405,13 +405,13 @@ def made_of(
     def nearest_ramp(t: ChainTables, before: Any, rest: Any, v: Any) -> tuple[Any, Any]:
         """The drive nearest to v that the amplifier reaches in one step from `before`, of which rounding has left
         `rest`, and what rounding leaves of it."""
-        highest, above = ramp(before, rest, t.number[RISING], t.number[RISING_REST])
-        if v > highest or (v == highest and above < 0):
-            return highest, above
-        lowest, below = ramp(before, rest, -t.number[FALLING], -t.number[FALLING_REST])
-        if v < lowest or (v == lowest and below > 0):
-            return lowest, below
-        return v, t.limits[ZERO]
+        if v > before or (v == before and rest < 0):
+            drive, left = ramp(before, rest, t.number[RISING], t.number[RISING_REST])
+            beyond = v > drive or (v == drive and left < 0)
+        else:
+            drive, left = ramp(before, rest, -t.number[FALLING], -t.number[FALLING_REST])
+            beyond = v < drive or (v == drive and left > 0)
+        return (drive, left) if beyond else (v, t.limits[ZERO])
 
     @jit
     def forward_slewed(t: ChainTables, s: ChainState, v: Any) -> Any:

@@ -14,10 +14,10 @@ from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, P
 EXPONENTIAL = "ageing, exponential"
 
 LEAST, MOST, APART = -3.0, 1.0, 0.6
-"""[decimal logarithms of travels over the recorded one] Bounds of a search, and half the distance between two at its
-start. A thousandth of the travel is two sweeps of a recording of 2000; with ten times the travel, a tenth of an
-exponential loss is seen, a straight line to within 5 %, from which loss and travel do not follow. Two travels start a
-factor of 16 apart, well inside the four decades. Changed by: blind single (ageing)."""
+"""[decimal logarithms of travels over the recorded one] Bounds of a search, and half the distance between two starting
+points. A thousandth of the travel is two sweeps of a recording of 2000; with ten times the travel, only a tenth of an
+exponential loss is seen, which is a straight line to within 5 % and does not determine loss and travel. Two travels
+start a factor of 16 apart, well inside the four decades. Changed by: blind single (ageing)."""
 
 
 class _Ageing(Effect):
@@ -55,17 +55,17 @@ class LogarithmicAgeing(_Ageing):
     travel: Positive = Field(description="travel from which decades count, input units", examples=[1.0e4])
 
     def gain(self, run: Run) -> Array:
-        """The falling gain."""
+        """The decreasing gain."""
         return np.asarray(1.0 - self.loss * run.remembered(("decades", self.travel), lambda: self._decades(run)))
 
     def _decades(self, run: Run) -> Array:
-        """Decades of travel, remembered: a search changes the loss more often than the travel."""
+        """Decades of travel, cached: a search changes the loss more often than the travel."""
         with np.errstate(over="ignore"):
             return np.asarray(np.log10(1.0 + np.minimum(run.travelled / self.travel, 1e300)))
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Loss and travel, the travel from a thousandth of the recorded one to ten."""
+        """Loss and travel, with the travel from a thousandth of the recorded one to ten times it."""
         return [cls._candidate("ageing, logarithmic", about)]
 
 
@@ -77,12 +77,12 @@ class ExponentialAgeing(_Ageing):
     travel: Positive = Field(description="travel after which 63 % is lost, input units", examples=[1.0e4])
 
     def gain(self, run: Run) -> Array:
-        """The falling gain."""
+        """The decreasing gain."""
         return np.asarray(1.0 + self.loss * _worn(run, self.travel))
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Loss and travel, the travel from a thousandth of the recorded one to ten."""
+        """Loss and travel, with the travel from a thousandth of the recorded one to ten times it."""
         return [cls._candidate(EXPONENTIAL, about)]
 
 
@@ -105,7 +105,7 @@ class SeveralAgeing(_Ageing):
         yield from not_as_many("losses", self.losses, "travels", self.travels)
 
     def gain(self, run: Run) -> Array:
-        """The falling gain."""
+        """The decreasing gain."""
         total = np.ones(len(run.t))
         for loss, travel in zip(self.losses, self.travels, strict=True):
             total += loss * _worn(run, travel)
@@ -113,7 +113,7 @@ class SeveralAgeing(_Ageing):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Two losses and travels, where one exponential explains a part of the error."""
+        """Two losses and travels, tried if one exponential explains a part of the error."""
         total = max(about.travel, 1e-12)
 
         def build(x: Array) -> SeveralAgeing:

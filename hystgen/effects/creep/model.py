@@ -16,19 +16,20 @@ from hystgen.basics.quantities import NotNegative, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, not_as_many, span
 
 FASTEST = 0.01
-"""[s] Motion that follows a move faster than this is a lag or friction of the domain walls, not creep."""
+"""[s] Motion that follows a move faster than this is a lag or domain-wall friction, not creep."""
 
 MOST_A_DECADE, MOST_OF_A_STATE = 0.06, 0.2
-"""Largest shares that are tried: stages creep by 1 to 2 % per decade, some up to three times that; one of a few states
-stands for up to three decades. Set by: 16 blind plants with creep (`make blind FIRST=97000`): half the first leaves one
-without a name and 3 and 7 % more in two, half the second 5 % more in one; twice either changes none by 2 %."""
+"""Largest shares that are tried: stages creep by 1 to 2 % per decade, some up to three times that; when there are few
+states, one of them represents up to three decades. Set by: 16 blind plants with creep (`make blind FIRST=97000`): with
+half the first, one gets no name and two are 3 and 7 % worse; with half the second, one is 5 % worse; twice either
+changes none by 2 %."""
 
 SHORTER = 1.0
 """[decades] A search for the ends of a logarithmic spectrum begins this far inside those of the recorded times. Set by:
-the same plants; half leaves 2 % less in one, twice changes none."""
+the same plants; half improves one by 2 %, twice changes none."""
 
 SHORTEST = 0.3
-"""[decades] Least width of such a spectrum: a factor of two, less than one of its states stands for. That of the
+"""[decades] Least width of such a spectrum: a factor of two, less than one of its states represents. That of the
 recorded times (`span`) is never less."""
 
 LOGARITHMIC = "creep, logarithmic"
@@ -42,10 +43,11 @@ def creep(
     u: Array, step: NDArray[np.intp], decay: Array, early: Array, late: Array, weights: Array, states: Array,
     total: Array,
 ) -> None:
-    """Add the first-order filters of every column of `u` (N, R), times the weight of each, to `total`.
+    """Add the first-order filters of every column of `u` (N, R), each times its weight, to `total`.
 
-    `step` (N - 1): the row of `decay`, `early` and `late` (., T) that holds; `states` (T, R) are where the filters
-    begin. Columns side by side, or of one column all filters, since each by itself waits for its own last sample.
+    `step` (N - 1): the row of `decay`, `early` and `late` (., T) that applies; `states` (T, R): where the filters
+    begin. Several columns side by side, or all filters of one column, since each alone waits for its own previous
+    sample.
     """
     taus, rows = states.shape
     for j in range(taus):
@@ -70,7 +72,7 @@ def creep(
 
 
 def _states(h: Array, run: Run, time_constants: Array, weights: Array) -> Array:
-    """`sum c_i x_i` with `tau_i x_i' = h - x_i`, every row of `h` by itself, settled at its first sample."""
+    """`sum c_i x_i` with `tau_i x_i' = h - x_i`, for each row of `h` separately, settled at its first sample."""
     rows = np.ascontiguousarray(np.atleast_2d(h).T)
     total, states = np.zeros_like(rows), np.repeat(rows[:1], len(weights), axis=0)
     decay, early, late = run.spectrum(tuple(time_constants.tolist()))
@@ -128,7 +130,7 @@ class ExponentialCreep(_Creep):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """One state, two, and three where two help; time constants from a few samples to beyond the session."""
+        """One state, two, and three if two help; time constants from a few samples to beyond the session."""
         low, high = span(max(4.0 * about.sample_time, FASTEST), 3.0 * about.session)
 
         def build(x: Array) -> ExponentialCreep:
@@ -161,8 +163,8 @@ class LogarithmicCreep(_Creep):
     """Creep along log t: after a step of the play sum `y = h (1 + g log10(t/t_0))` for t between t_min and t_max.
 
     The law is that of the piezo literature (Jung, Shim, Gweon: New open-loop actuating method of piezoelectric
-    actuators for removing hysteresis and creep, Rev. Sci. Instrum. 71, 2000); it is carried by states with time
-    constants spread evenly over log t from t_min to t_max, of equal weight, and a gain with which a step has its full
+    actuators for removing hysteresis and creep, Rev. Sci. Instrum. 71, 2000); it is realised by states with equal
+    weights and time constants spread evenly over log t from t_min to t_max, and a gain with which a step has its full
     height at t_0.
     """
 
@@ -175,7 +177,7 @@ class LogarithmicCreep(_Creep):
     settled: ClassVar[tuple[str, ...]] = ("t0", "t_min", "t_max")
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """t_min < t_max, and not more decades than states can be spent on."""
+        """t_min < t_max, and no more decades than there may be states for."""
         if not self.t_min < self.t_max:
             yield ("t_max",), f"{self.t_max!r} is not above t_min = {self.t_min!r}; give seconds, t_min < t_max"
         elif self.t_max > 1e12 * self.t_min:
@@ -195,7 +197,7 @@ class LogarithmicCreep(_Creep):
 
     @property
     def at_once(self) -> float:
-        """Share of a step that arrives at once: what makes its height full at t_0."""
+        """Share of a step that arrives at once, chosen so that its height is full at t_0."""
         tau, weight = self.spectrum()
         return 1.0 - weight * float(np.sum(-np.expm1(-self.t0 / tau)))
 
@@ -209,16 +211,16 @@ class LogarithmicCreep(_Creep):
         return _fading(run, self.spectrum()[0][::PER_DECADE])
 
     def largest(self, run: Run) -> Array:
-        """Each stands for the states of a decade, which lag behind the play sum by its span at most."""
+        """Each represents the states of a decade, which lag behind the play sum by its span at most."""
         tau, weight = self.spectrum()
         return np.full(len(tau[::PER_DECADE]), PER_DECADE * weight)
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The share per decade over the whole recorded time; where it helps, with free ends of the spectrum."""
+        """The share per decade over the whole recorded time; if it helps, with free ends of the spectrum."""
         low, high = span(max(0.5 * about.sample_time, FASTEST), 10.0 * about.session)
         t0 = min(max(0.1, about.sample_time), about.duration)
-        # A longer spectrum only changes the gain, which the weights of the plays take up
+        # A longer spectrum only changes the gain, which the weights of the plays absorb
         whole = (10.0**low, 10.0**high)
 
         def even(x: Array) -> LogarithmicCreep:
@@ -234,7 +236,7 @@ class LogarithmicCreep(_Creep):
             )  # fmt: skip
 
         wide = high - low
-        inside = min(SHORTER, 0.5 * (wide - SHORTEST))  # a short session has not as many decades
+        inside = min(SHORTER, 0.5 * (wide - SHORTEST))  # a short session does not have that many decades
         return [
             Candidate(
                 LOGARITHMIC, np.zeros(1), np.array([MOST_A_DECADE / 0.1]), np.array([0.1]), even, np.zeros(1),
@@ -253,6 +255,6 @@ SHAPES = (ExponentialCreep, LogarithmicCreep)
 
 
 def load() -> None:
-    """Have the recursions compiled, or read from the cache, on two samples."""
+    """Compile the recursions, or read them from the cache, on two samples."""
     one, total = np.ones((1, 1)), np.empty((2, 1))
     creep(np.arange(2.0)[:, None], np.zeros(1, dtype=np.intp), one, one, one, np.ones(1), np.ones((1, 1)), total)

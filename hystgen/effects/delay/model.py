@@ -11,14 +11,14 @@ from hystgen.basics.quantities import NotNegative
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run, from_zero
 
 FAR = (0.3, 0.4, 0.5, 0.55, 0.6, 0.7)
-"""Starts as shares of the way from no delay to the longest: the error is wavy over it, with valleys no wider than
-half a period of the fastest drive that is followed."""
+"""Starts as shares of the way from no delay to the longest: the error is wavy over it, with valleys no wider than half
+a period of the fastest drive that is followed."""
 
 
 class Delay(Effect):
-    """Pure delay `a(t) = v(t - T)` of the drive, T any number of seconds.
+    """Pure delay `a(t) = v(t - T)` of the drive, with T any number of seconds.
 
-    The drive is straight between its samples, as for every effect, and constant before its first: steps stay without
+    The drive is a straight line between its samples, as for every effect, and constant before its first: steps do not
     overshoot, ramps are exact, a sine of angular frequency w is off by at most (w dt)^2/8 of its amplitude.
     """
 
@@ -27,15 +27,15 @@ class Delay(Effect):
 
     place: ClassVar[Place] = Place.DRIVE
     compensated: ClassVar[Compensated] = "none without preview"
-    compensation: ClassVar[str] = "the reference is read ahead of its time; without preview the motion is late"
+    compensation: ClassVar[str] = "the reference is read ahead of time; without preview the motion is late"
 
     @property
     def dead_time(self) -> float:
-        """The time itself."""
+        """The delay itself."""
         return self.time
 
     def time_scale(self, drive_range: float) -> float:
-        """The time itself."""
+        """The delay itself."""
         return self.time
 
     def drive(self, a: Array, run: Run) -> Array:
@@ -44,7 +44,7 @@ class Delay(Effect):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The time, from none to a tenth of the longest record."""
+        """The delay, from none to a tenth of the longest record."""
         low, high, start, value = from_zero(0.1 * about.sample_time, 0.1 * about.duration, about.sample_time)
         far = tuple(low + share * (high - low) for share in FAR)
         return [

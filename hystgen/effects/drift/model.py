@@ -60,7 +60,7 @@ class CurvedDrift(_Drift):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Rate and what it changes by, in output ranges per session."""
+        """The rate and its change, in output ranges per session."""
         session = max(about.session, about.sample_time)
         unit = about.output_range / session
 

@@ -14,8 +14,8 @@ from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, P
 class Lag(Effect):
     """First-order lag `tau a' + a = v` of the drive.
 
-    Over a step with straight `v` the solution is exact (first-order hold: Franklin, Powell, Workman, Digital Control of
-    Dynamic Systems). A record starts settled at its first drive.
+    For a `v` that is straight over a step the solution is exact (first-order hold: Franklin, Powell, Workman, Digital
+    Control of Dynamic Systems). A record starts settled at its first drive.
     """
 
     name: Literal["lag"] = Field(description="name of the effect")
@@ -24,7 +24,7 @@ class Lag(Effect):
     place: ClassVar[Place] = Place.DRIVE
     order: ClassVar[int] = 2
     compensated: ClassVar[Compensated] = "approximate"
-    compensation: ClassVar[str] = "a lead, exact on ramps; a quarter of the second difference of the drive is left"
+    compensation: ClassVar[str] = "a lead, exact on ramps; the error is a quarter of the second difference of the drive"
 
     def time_scale(self, drive_range: float) -> float:
         """The time constant."""
@@ -39,7 +39,7 @@ class Lag(Effect):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The time constant, from none to a fifth of the longest record, sought from several places on."""
+        """The time constant, from none to a fifth of the longest record, searched from several starting points."""
         low, high, start, value = from_zero(0.1 * about.sample_time, 0.2 * about.duration, about.sample_time)
 
         def build(x: Array) -> Lag:

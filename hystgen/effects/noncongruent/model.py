@@ -1,4 +1,4 @@
-"""Plays whose loops depend on where they lie: minor loops between the same ends are not congruent."""
+"""Plays whose loops depend on their position: minor loops between the same ends are not congruent."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MAX_TERMS = 8
 CUBIC = "noncongruent, cubic"
 
 PLACES = 101
-"""Places at which a bump is looked for as a start: hundredths of the range."""
+"""Positions at which a starting bump is looked for: hundredths of the range."""
 
 LEAST, MOST = -10.0, 40.0
 """[tenths] Bounds of the coefficients of play functions at the largest drive. The density is 1 where a play is at 0:
@@ -55,15 +55,15 @@ class _Noncongruent(Effect):
     compensation: ClassVar[str] = "exact: one equation per sample is solved"
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """There are plays to bend."""
+        """There must be plays to bend."""
         yield from without_plays(thresholds)
 
     @abstractmethod
     def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
-        """Add to `total` (N,) what the play of a number above 0 gains, times `weight`."""
+        """Add to `total` (N,) what the play of a given number above 0 gains, times `weight`."""
 
     def bent(self, rows: Array, thresholds: Array) -> Array:
-        """The drive itself, and bent plays."""
+        """The drive itself, and the bent plays."""
         out = np.array(rows)
         for i in range(1, len(rows)):
             self.bend(i, rows[i], thresholds, 1.0, out[i])
@@ -81,8 +81,8 @@ class _Noncongruent(Effect):
 class PlayFunctions(_Noncongruent):
     """Play functions `sum p_i g_i(play_i)`, `g_i(s) = s + r_n sum_k c_ik xi^k`, `xi = s/r_n`, k = 2, 3, ...
 
-    r_n is the largest threshold; the drive itself (weight p_0) takes no part. Every Preisach operator is such a sum
-    of functions of plays (Brokate, Sprekels, Hysteresis and Phase Transitions, 1996).
+    r_n is the largest threshold; the drive itself (weight p_0) is not bent. Every Preisach operator is such a sum of
+    functions of plays (Brokate, Sprekels, Hysteresis and Phase Transitions, 1996).
     """
 
     shape: Literal["play_functions"] = Field(default="play_functions", description="a polynomial a play")
@@ -100,7 +100,7 @@ class PlayFunctions(_Noncongruent):
         yield from not_one_a_play("coefficients", self.coefficients, thresholds, "list")
 
     def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
-        """What its polynomial adds to a play."""
+        """The amount that its polynomial adds to a play."""
         curve(row, float(thresholds[-1]), np.array(self.coefficients[i - 1]), weight, total)
 
     @classmethod
@@ -139,8 +139,8 @@ class LoopCentre(_Noncongruent):
     """Preisach density that depends on the centre of a relay's loop: `p_i (1 + A sech^2((c - centre)/width))`.
 
     A play is the sum of relays of its half width over all centres c below its state (Brokate, Sprekels, Hysteresis and
-    Phase Transitions, 1996), so that the density makes every play `g(s) = s + A width (tanh((s - centre)/width) +
-    tanh(centre/width))`. The drive itself (weight p_0) has no relays and takes no part.
+    Phase Transitions, 1996), so the density makes every play `g(s) = s + A width (tanh((s - centre)/width) +
+    tanh(centre/width))`. The drive itself (weight p_0) has no relays and is not bent.
     """
 
     shape: Literal["centre"] = Field(description="Preisach density that depends on the loop's centre")
@@ -151,14 +151,14 @@ class LoopCentre(_Noncongruent):
     width: Positive = Field(description="width of the bump, input units of the plays", examples=[20.0])
 
     def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
-        """What the density's integral adds to a play."""
+        """The amount that the density's integral adds to a play."""
         bump = np.tanh((row - self.centre) / self.width) + np.tanh(self.centre / self.width)
         total += weight * self.amplitude * self.width * bump
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Amplitude, centre within the drive, width; where a cubic explains a part of the error. A search starts at
-        the bump of the cubic's density: from far away it would not find the place.
+        """Amplitude, centre within the drive, width; tried if a cubic explains a part of the error. A search starts at
+        the bump of the cubic's density: from far away it would not find the position.
         """
         if len(about.thresholds) < 2:
             return []
@@ -179,7 +179,7 @@ class LoopCentre(_Noncongruent):
             density = np.maximum(1.0 + 0.2 * cubic[0] * at / largest + 0.3 * cubic[1] * (at / largest) ** 2, 0.05)
             outside = 0.5 * float(density[0] + density[-1])
             above, below = int(np.argmax(density)), int(np.argmin(density))
-            # from one end to the other it may rise or fall evenly: which is further off would be a matter of rounding
+            # it may rise or fall evenly from one end to the other: rounding would then decide which is further off
             k = above if density[above] - outside >= (1.0 - EVEN) * (outside - density[below]) else below
             amplitude = float(np.clip(density[k] / outside - 1.0, LOWEST, HIGHEST))
             return np.array([amplitude, k / (PLACES - 1), start])

@@ -43,20 +43,19 @@ CLOSE = 1e-7
 """Error of a piece of a nonlinear relaxation, in largest thresholds."""
 
 SLOW = 1.0
-"""Share of a disturbance that friction may take in a piece by the Taylor series."""
+"""Share of a disturbance that friction may remove in a piece by the Taylor series."""
 
 NEARLY = 0.3
-"""[share of a stretch] A stretch may change by this much in a piece of which only the leading term of curvature
-counts."""
+"""[share of a stretch] A stretch may change by this much in a piece that uses only the leading term of curvature."""
 
 SLIGHT = 1e-4
-"""Share of the speed that friction may take while what it takes is summed along the way without it."""
+"""Share of the speed that friction may remove while its effect is summed along the move without it."""
 
 
 @jit
 def dilated_plays(w: Array, rate: Array, r: Array, beta: Array, states: Array, out: Array) -> None:
     """Plays whose thresholds are `r + beta rate_k`, from `states`, into the rows of `out`."""
-    # Four side by side, since each by itself waits for its own last sample
+    # Four in parallel, since each alone waits for its own previous sample
     fours = len(r) // 4 * 4
     for i in range(0, fours, 4):
         r0, r1, r2, r3 = r[i], r[i + 1], r[i + 2], r[i + 3]
@@ -92,9 +91,9 @@ def bent_decay(x: float) -> float:
 
 @jit
 def taylor(e: float, c1: float, q0: float, m: float, step: float) -> tuple[float, float]:
-    """What `e` gains over a step of `e' = speed - q`, `q` as `e^m`, by six terms from `c1` on, and the last of them.
+    """Increment of `e` over a step of `e' = speed - q`, `q` as `e^m`, by six terms from `c1` on, and the last of them.
 
-    The terms `q_k` of q follow from `e q' = m q e'`, those of e from the second on are `-step q_(k-1)/k`.
+    The terms `q_k` of q follow from `e q' = m q e'`; those of e from the second on are `-step q_(k-1)/k`.
     """
     d = 1.0 / e
     q1 = m * c1 * q0 * d
@@ -114,9 +113,9 @@ def taylor(e: float, c1: float, q0: float, m: float, step: float) -> tuple[float
 def stretch(e: float, speed: float, duration: float, tau: float, exponent: float, scale: float) -> tuple[float, float]:
     """Stretch `e` after `duration` of `e' = speed - (scale/tau) (e/scale)^exponent`, and the time left when it ends.
 
-    The linear case is exact. Else pieces by the equation's Taylor series where friction takes its time, and where it is
-    fast pieces that are exact for the equation straightened about `e` (exponential Rosenbrock-Euler) with the leading
-    term of the curvature, each as long as what is left out allows.
+    The linear case is exact. Otherwise it is computed in pieces: by the equation's Taylor series where friction is
+    slow, and where it is fast by a scheme that is exact for the equation linearised about `e` (exponential
+    Rosenbrock-Euler) with the leading term of the curvature; each piece is as long as the truncation error allows.
     """
     if exponent == 1.0:
         final = e + (speed - e / tau) * duration * mean_decay(duration / tau)
@@ -131,7 +130,7 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
         if not fall < 1e200:
             return (0.0, 0.0) if speed >= 0.0 else (0.0, left)
         change = speed - fall
-        if fall < 0.5 * SLIGHT * speed:  # hardly anything but the speed counts
+        if fall < 0.5 * SLIGHT * speed:  # hardly anything but the speed matters
             little = scale * (SLIGHT * speed * tau / scale) ** (1.0 / exponent)
             taken = min((little - e) / speed, left)
             final = e + speed * taken
@@ -192,7 +191,8 @@ def stretch(e: float, speed: float, duration: float, tau: float, exponent: float
 def relaxed(
     x: float, target: float, left: float, r: float, tau: float, exponent: float, scale: float, state: float
 ) -> float:
-    """State of a play that follows its input viscously, after the input's way from `x` to `target` in the time `left`.
+    """State of a play that follows its input viscously, after the input has moved from `x` to `target` in the time
+    `left`.
 
     `z' = (scale/tau) (stretch/scale)^exponent` beyond the threshold.
     """
@@ -226,7 +226,7 @@ def relaxing_plays(
 ) -> None:
     """Plays of thresholds `r` that follow their input viscously, from `states`, into the rows of `out`.
 
-    Side by side, since each by itself waits for its own last sample.
+    In parallel, since each alone waits for its own previous sample.
     """
     for i in range(len(r)):
         states[i] = min(max(states[i], w[0] - r[i]), w[0] + r[i])
@@ -243,12 +243,12 @@ class _RateDependence(Effect):
     place: ClassVar[Place] = Place.PLAYS
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """There are plays to depend on the rate."""
+        """There must be plays to depend on the rate."""
         yield from without_plays(thresholds)
 
     @abstractmethod
     def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
-        """Write the plays of these numbers, all above 0, into rows (len(chosen), N)."""
+        """Write the plays with these numbers, all above 0, into rows (len(chosen), N)."""
 
     def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
         """The drive itself, and the plays."""
@@ -258,7 +258,7 @@ class _RateDependence(Effect):
         return out
 
     def summed(self, p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-        """The sum of those that have a weight."""
+        """The sum of those with a weight."""
         chosen = 1 + np.flatnonzero(p[1:])
         rows = np.empty((1 + len(chosen), len(w)))
         rows[0] = w
@@ -271,7 +271,7 @@ class ThresholdRate(_RateDependence):
 
     Al Janaideh, Krejci: Inverse rate-dependent Prandtl-Ishlinskii model for feedforward compensation of hysteresis in a
     piezomicropositioning actuator, IEEE/ASME Trans. Mechatronics 18, 2013; here linear in the rate. `w'` at a sample is
-    the slope from the sample before, 0 at the first. The drive itself (weight p_0) takes no part.
+    the slope from the sample before, 0 at the first. The drive itself (weight p_0) does not depend on the rate.
     """
 
     shape: Literal["threshold"] = Field(default="threshold", description="thresholds grow with the rate")
@@ -281,7 +281,7 @@ class ThresholdRate(_RateDependence):
 
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = (
-        "exact for betas below half a sample time; beyond, relaxing plays stand in, which lag as far behind on ramps"
+        "exact for betas below half a sample time; beyond that, relaxing plays stand in, which lag as much on ramps"
     )
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
@@ -290,7 +290,7 @@ class ThresholdRate(_RateDependence):
         yield from not_one_a_play("betas", self.betas, thresholds)
 
     def remarks(self, thresholds: tuple[float, ...]) -> list[str]:
-        """The rate from which the thresholds are no longer in order, where beta falls along them."""
+        """The rate from which the thresholds are no longer in order, if beta decreases along them."""
         gaps, falls = np.diff(thresholds[1:]), -np.diff(self.betas)
         closing = falls > 0.0
         if not np.any(closing):
@@ -338,8 +338,8 @@ class RelaxingPlays(_RateDependence):
     """Plays that follow viscously: `z' = dz_r(w - z)/tau`, `dz_r` the part of its argument beyond +/- r.
 
     A dashpot parallel to the dry friction of every play; for tau = 0 the play itself. With `exponent` m the dashpot is
-    nonlinear: `z' = (r_n/tau) sign(d) (|d|/r_n)^m`, `d = dz_r(w - z)`, r_n the largest threshold. Over straight `w` the
-    linear case is exact, contacts within a step included; the nonlinear one is within about 1e-6 of r_n per step.
+    nonlinear: `z' = (r_n/tau) sign(d) (|d|/r_n)^m`, `d = dz_r(w - z)`, r_n the largest threshold. For straight `w` the
+    linear case is exact, including contacts within a step; the nonlinear one is within about 1e-6 of r_n per step.
     """
 
     shape: Literal["relaxation"] = Field(description="plays that follow viscously")
@@ -400,7 +400,7 @@ SHAPES = (ThresholdRate, RelaxingPlays)
 
 
 def load() -> None:
-    """Have the recursions compiled, or read from the cache, on two samples."""
+    """Compile the recursions, or read them from the cache, on two samples."""
     w, one = np.arange(2.0), np.ones(1)
     dilated_plays(w, w, one, one, np.zeros(1), np.empty((1, 2)))
     relaxing_plays(w, one, one, 1.0, 1.0, 1.0, np.zeros(1), np.empty((1, 2)))

@@ -32,10 +32,10 @@ def rung(
 def ring(u: Array, c: Array, s: Array, ramp: Array, step: Array, damping: float, out: Array) -> None:
     """Second-order low pass of every row of `u` (R, N), from rest, over steps with straight `u`.
 
-    `c`, `s`: decaying cosine and sine of each step; `ramp`, `step`: what the output, and its rate, gain by a change of
-    `u` by 1 over the step. Rates are per radian of the undamped oscillation.
+    `c`, `s`: decaying cosine and sine of each step; `ramp`, `step`: increments of the output and its rate for a change
+    of `u` by 1 over the step. Rates are per radian of the undamped oscillation.
     """
-    # Four side by side, since each by itself waits for its own last sample
+    # Four in parallel, since each alone waits for its own previous sample
     rows, number = u.shape
     fours = rows // 4 * 4
     for i in range(0, fours, 4):
@@ -60,8 +60,8 @@ def ring(u: Array, c: Array, s: Array, ramp: Array, step: Array, damping: float,
 class _Mode(Effect):
     """`m'' + 2 zeta w0 m' + w0^2 m = w0^2 h`, `w0 = 2 pi frequency`, gain 1 at rest; several in series.
 
-    Over a step with straight `h` the solution is exact, for any damping: a free oscillation about `h - 2 zeta h'/w0`.
-    A record starts at rest: `m = h`, `m' = 0`.
+    For straight `h` over a step the solution is exact, for any damping: a free oscillation about `h - 2 zeta h'/w0`. A
+    record starts at rest: `m = h`, `m' = 0`.
     """
 
     name: Literal["resonance"] = Field(description="name of the effect")
@@ -99,7 +99,7 @@ class _Mode(Effect):
         with np.errstate(divide="ignore", invalid="ignore"):
             ramp = 1.0 + (2.0 * zeta * (c - 1.0) + (2.0 * zeta * zeta - 1.0) * s) / x
             step = (1.0 - c - zeta * s) / x
-        # Digits that cancel for short steps
+        # These digits cancel for short steps
         curved = (4.0 * zeta * zeta - 1.0) * x * x
         short = x < 1e-3 / (1.0 + zeta)
         ramp = np.where(short, x * x * (1.0 / 6.0 - zeta * x / 12.0 + curved / 120.0), ramp)
@@ -107,7 +107,7 @@ class _Mode(Effect):
         return np.stack([c, s, ramp, step])
 
     def filtered(self, h: Array, run: Run) -> Array:
-        """The play sum as the mode passes it on."""
+        """The response of the mode to the play sum."""
         rows = np.ascontiguousarray(np.atleast_2d(h))
         out = np.empty_like(rows)
         factors = run.remembered((self.frequency, self.damping), lambda: run.of_steps(self.forced))
@@ -134,9 +134,8 @@ class Resonance(_Mode):
     def candidates(cls, about: About) -> list[Candidate]:
         """Frequency from two periods per record to three samples per period, damping from 0.3 % to 70 %.
 
-        Starts are spread evenly over log f. What is faster or damped more is not seen to ring: in the records it is a
-        delay or a lag. A light damping rings long, and is found from the frequency at which the error so far rings
-        alone.
+        Starts are spread evenly over log f. Anything faster or more damped is not seen to ring: in the records it is a
+        delay or a lag. A lightly damped mode rings long, and is found from the frequency at which the residual rings.
         """
         low, high = _frequencies(about)
 
@@ -155,8 +154,9 @@ class Resonance(_Mode):
 class PartMode(_Mode):
     """Mode that carries a share of the motion: `y = (1 - share) h + share m`.
 
-    A stage has many modes, and what each adds to the motion at rest is its share of the whole compliance. Those far
-    above what is recorded follow at once (Preumont, Vibration Control of Active Structures, 2011, chapter 2).
+    A stage has many modes; the contribution of each to the motion at rest is its share of the total compliance. Modes
+    far above the recorded frequencies follow at once (Preumont, Vibration Control of Active Structures, 2011, chapter
+    2).
     """
 
     shape: Literal["part"] = Field(description="a mode that carries a share of the motion")
@@ -167,22 +167,22 @@ class PartMode(_Mode):
     block: ClassVar[OwnBlock] = BLOCK
 
     def numbers(self, seconds: float) -> tuple[float, ...]:
-        """Of the block, at steps of `seconds`."""
+        """Numbers of the block, for steps of `seconds`."""
         zeta = self.damping
         c, s, ramp, step = (float(x[0]) for x in self.forced(np.array([seconds])))
         lead = self.share * (ramp - 1.0)
         return c - 1.0 + zeta * s, s, c - 1.0 - zeta * s, lead, self.share * step, 1.0 / (1.0 + lead), 0.0
 
     def filtered(self, h: Array, run: Run) -> Array:
-        """The play sum as the mode passes its share on."""
+        """The play sum, with its share passed through the mode."""
         return np.asarray(h + self.share * (super().filtered(h, run) - h))
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """As of a whole mode, with damping that lets it ring, up to 20 %, and up to half of the motion.
+        """As for a whole mode, with damping that lets it ring, up to 20 %, and up to half of the motion.
 
-        With three samples a period the inverse fades for shares up to 0.6, with more a period for larger ones; what
-        carries most of the motion is a whole mode.
+        With three samples per period the inverse fades for shares up to 0.6, with more samples for larger ones; a mode
+        that carries most of the motion is a whole mode.
         """
         low, high = _frequencies(about)
 
@@ -206,7 +206,7 @@ FIRST_SHARE = 0.1
 
 
 def _frequencies(about: About) -> tuple[float, float]:
-    """Decimal logarithms of the least and largest frequency that is sought."""
+    """Decimal logarithms of the least and largest frequency to search."""
     low = np.log10(2.0 / about.duration)
     return low, max(np.log10(1.0 / about.sample_time) - np.log10(3.0), low)
 
@@ -231,6 +231,6 @@ SHAPES = (Resonance, PartMode)
 
 
 def load() -> None:
-    """Have the recursions compiled, or read from the cache, on two samples."""
+    """Compile the recursions, or read them from the cache, on two samples."""
     one = np.ones(1)
     ring(np.arange(2.0)[None, :], one, one, one, one, 1.0, np.empty((1, 2)))

@@ -19,11 +19,11 @@ MIDDLE = 0.5
 """Centre from which a search starts, as a share of the output range from its lower end."""
 
 INSIDE, GIVE = (0.03, 0.1), 0.2
-"""Stops from which a search starts: shares of the output range inside its ends, and what they give."""
+"""Starting stops for a search: shares of the output range inside its ends, and the slope that remains beyond them."""
 
 AWAY, FARTHEST = -0.3, 0.45
-"""Least and largest distance of the sought stops from the ends, as shares of the range: outside, where they do nothing,
-and inside."""
+"""Least and largest distance of the stops from the ends in a search, as shares of the range: outside, where they do
+nothing, and inside."""
 
 
 class _Saturation(Effect):
@@ -32,7 +32,7 @@ class _Saturation(Effect):
     place: ClassVar[Place] = Place.OUTPUT
     timed: ClassVar[bool] = False
     pointwise: ClassVar[bool] = True
-    hint: ClassVar[str] = "this is saturation behind the plays, one in front is a stage of model.memoryless"
+    hint: ClassVar[str] = "this is saturation behind the plays; one in front is a stage of model.memoryless"
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact inside the range, clamped outside"
 
@@ -48,10 +48,10 @@ class _Level(_Saturation):
 
 
 class TanhSaturation(_Level):
-    """Smooth limit `y = centre + level tanh((h - centre)/level)` of the output in front of the offset.
+    """Smooth limit `y = centre + level tanh((h - centre)/level)` of the output, before the offset is added.
 
-    A stage whose limits are alike in both directions has them around the middle of its travel, which with a drive of
-    one sign is not where the output is 0.
+    A stage whose limits are the same in both directions has them around the middle of its travel, which for a unipolar
+    drive is not where the output is 0.
     """
 
     shape: Literal["tanh"] = Field(default="tanh", description="smooth limit")
@@ -71,9 +71,10 @@ class TanhSaturation(_Level):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The level, from a tenth of the output range to a thousand; then also the centre, within the output."""
+        """The level, from a tenth of the output range to a thousand times it; then also the centre, within the
+        output."""
         low, high = about.drive
-        bottom = about.output_range * low / (high - low)  # of plays without hysteresis
+        bottom = about.output_range * low / (high - low)  # for plays without hysteresis
 
         def build(x: Array) -> TanhSaturation:
             level, centre = about.output_range * float(10.0 ** x[0]), bottom + about.output_range * float(x[1])
@@ -91,7 +92,7 @@ class TanhSaturation(_Level):
 
 
 class HardSaturation(_Level):
-    """Hard limit `y = min(max(h, -level), level)` of the output in front of the offset."""
+    """Hard limit `y = min(max(h, -level), level)` of the output, before the offset is added."""
 
     shape: Literal["hard"] = Field(description="hard limit")
     level: Positive = Field(description="largest output, output units", examples=[50.0])
@@ -102,7 +103,7 @@ class HardSaturation(_Level):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """The level, from a tenth of the output range to ten."""
+        """The level, from a tenth of the output range to ten times it."""
         return [cls._candidate(HARD, about, 1.0)]
 
 
@@ -110,10 +111,10 @@ HARD = "saturation behind, hard"
 
 
 class Stops(_Saturation):
-    """Elastic stops at either end: beyond `upper` and `lower` the output goes on with `give` of its slope.
+    """Elastic stops at either end: beyond `upper` and `lower` the output continues with `give` times its slope.
 
-    A stage that meets a stop moves on by what the stop's stiffness beside its own lets it, and its travel need not be
-    centred between the two.
+    A stage that meets a stop moves on as far as the stop's stiffness in parallel with its own allows, and its travel
+    need not be centred between the two.
     """
 
     shape: Literal["stops"] = Field(description="elastic stops at either end")
@@ -129,16 +130,16 @@ class Stops(_Saturation):
             yield ("upper",), f"{self.upper!r} is not above lower = {self.lower!r}; give lower < upper"
 
     def mapped(self, y: Array, run: Run) -> Array:
-        """The output between the stops, and what they give beyond."""
+        """The output between the stops, and a fraction of it beyond."""
         inside = np.clip(y, self.lower, self.upper)
         return np.asarray(inside + self.give * (y - inside))
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Where they begin and what they give, where a hard limit takes something away."""
+        """Where they begin and how much they give, tried if a hard limit explains something."""
         low, high = about.drive
         wide = about.output_range
-        bottom, top = (wide * v / (high - low) for v in about.drive)  # of plays without hysteresis
+        bottom, top = (wide * v / (high - low) for v in about.drive)  # for plays without hysteresis
 
         def build(x: Array) -> Stops:
             return cls(

@@ -16,12 +16,13 @@ BENT = 1.0
 """Parabolas from which a search starts, 10 % at the range's end: from a straight sensor its step may overshoot."""
 
 PIECES = (6, 12)
-"""Pieces of the monotone curves that are tried where a cubic helps. Of a root over the range six leave 1.3 times the
-noise and twelve 1.03; of an arctangent, or a tanh that ends at a sixth of its middle slope, six leave 9 to 10 times the
-noise and twelve 1.3 (`test_sensor_curves`, noise 0.02 % of the output)."""
+"""Pieces of the monotone curves that are tried if a cubic helps. For a root over the range, six leave 1.3 times the
+noise and twelve 1.03; for an arctangent, or a tanh that ends at a sixth of its middle slope, six leave 9 to 10 times
+the noise and twelve 1.3 (`test_sensor_curves`, noise 0.02 % of the output)."""
 
 STEEP = 3.0
-"""Largest logarithm of the ratio of two pieces' slopes: twenty, beyond which a sensor measures nothing on one side."""
+"""Largest logarithm of the ratio of two pieces' slopes: a factor of twenty, beyond which a sensor measures nothing on
+one side."""
 
 MAX_KNOTS = 64
 """Most knots of a curve: more than any calibration sheet of a sensor has."""
@@ -50,14 +51,14 @@ class SensorPolynomial(_Sensor):
     settled: ClassVar[tuple[str, ...]] = ("scale",)
 
     def mapped(self, y: Array, run: Run) -> Array:
-        """What the sensor shows."""
+        """The sensor reading."""
         shown = np.array(y)
         curve(np.asarray(y), self.scale, np.array(self.coefficients), 1.0, shown)
         return shown
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """A parabola, then a cubic, over the output range; where that helps, with a quartic term."""
+        """A parabola, then a cubic, over the output range; if that helps, with a quartic term."""
 
         def build(x: Array) -> SensorPolynomial:
             return cls(
@@ -77,7 +78,7 @@ CUBIC = "sensor, cubic"
 
 
 class SensorCurve(_Sensor):
-    """Sensor that shows `values` at `knots` and a smooth curve between them that rises everywhere, straight beyond.
+    """Sensor that reads `values` at `knots` and, between them, a smooth curve that rises everywhere; straight beyond.
 
     Pieces of cubics whose slopes at the knots are harmonic means of the pieces' own: the curve then has no turning
     point (F. N. Fritsch, J. Butland, SIAM Journal on Scientific and Statistical Computing 5, 1984, 300-304).
@@ -103,7 +104,7 @@ class SensorCurve(_Sensor):
                     break
 
     def mapped(self, y: Array, run: Run) -> Array:
-        """What the sensor shows."""
+        """The sensor reading."""
         x, c = self._pieces
         at = np.asarray(y)
         k = np.clip(np.searchsorted(x, at, side="right"), 0, len(x))
@@ -112,7 +113,8 @@ class SensorCurve(_Sensor):
 
     @cached_property
     def _pieces(self) -> tuple[Array, Array]:
-        """The knots, and coefficients (4, pieces + 2) of powers of the distance from the knot below; with both ends."""
+        """The knots, and coefficients (4, pieces + 2) of powers of the distance from the knot below, including both end
+        pieces."""
         x, y = np.array(self.knots), np.array(self.values)
         steps, slopes = np.diff(x), np.diff(y) / np.diff(x)
         at = np.concatenate([slopes[:1], 2.0 / (1.0 / slopes[:-1] + 1.0 / slopes[1:]), slopes[-1:]])
@@ -126,9 +128,9 @@ class SensorCurve(_Sensor):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Pieces of equal width over the measured output, whose slopes are free; tried where a cubic helps.
+        """Pieces of equal width over the measured output, with free slopes; tried if a cubic helps.
 
-        The ends stay where they are, since the weights and the offsets of the plays move and stretch the output.
+        The ends stay fixed, since the weights and the offsets of the plays shift and stretch the output.
         """
         low, high = about.output
         if not high > low:

@@ -13,17 +13,17 @@ from hystgen.basics.quantities import Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 
 BELOW = (0.3, 0.5, 0.7, 1.0, 1.6, 2.2)
-"""Starts below the fastest recorded rate, in decades: a limit met never, or always, leaves no trace."""
+"""Starts below the fastest recorded rate, in decades: a limit that acts never, or always, leaves no trace."""
 
 BESIDE = 10.0
-"""[times] A step of the drive is faster than the changes beside it by at least this; those of a smooth drive are alike.
-Steps between levels at rest are far beyond it, up to the noise of the converter. Changed by:
-test_effects::test_sudden_edges_leave_other_drives_alone. What bends by less than this part of a limit's travel in a
-sample counts as straight: with 2 `friction damper, exchanged` of docs/recordings.csv has the limit as a rival, from 10
-to 50 it does not, and steps of `benchmarks.second_plants` (single 23015) are the same."""
+"""[times] A step of the drive is at least this many times faster than the changes next to it; those of a smooth drive
+are about equal. Steps between levels at rest are far beyond it, up to the noise of the converter. Changed by:
+test_effects::test_sudden_edges_leave_other_drives_alone. A bend smaller than this share of a limit's travel per sample
+counts as straight: with 2, `friction damper, exchanged` of docs/recordings.csv has the limit as a rival, from 10 to 50
+it does not, and steps of `benchmarks.second_plants` (single 23015) are the same."""
 
 MIDDLE = 0.5
-"""[samples] Place of a step between two samples of a drive that was measured by averages over each of them. Derived:
+"""[samples] Position of a step between two samples of a drive that was measured by averages over each sample. Derived:
 one average ends and the next begins halfway between the times of both."""
 
 LEAST = 3.0
@@ -32,10 +32,10 @@ LEAST = 3.0
 
 @jit
 def limit(u: Array, up: Array, down: Array, out: Array, off: Array) -> None:
-    """`u`, straight between samples, followed at no more than `up_k` upwards and `down_k` downwards in a step.
+    """`u`, straight between samples, followed by at most `up_k` upwards and `down_k` downwards per step.
 
-    Where it is met within a step, the rest of the step goes along with it, or as fast as it may. `off`: mean distance
-    from `u` over each step.
+    If it is caught within a step, the output follows it for the rest of the step, or as fast as it may. `off`: mean
+    distance from `u` over each step.
     """
     x = u[0]
     out[0] = x
@@ -59,12 +59,13 @@ def limit(u: Array, up: Array, down: Array, out: Array, off: Array) -> None:
 
 @jit
 def sudden(t: Array, u: Array, edge: float, times: Array, drive: Array, given: NDArray[np.intp]) -> int:
-    """Write the drive with sudden edges into `times` and `drive`, and the place of each sample; returns its length.
+    """Write the drive with sudden edges into `times` and `drive`, and the position of each sample; returns its length.
 
-    An edge is a change within one sample or two, `BESIDE` times as fast as those beside it. With `edge` 1/2 it happens
-    at the mean time of the change: halfway between two samples, or, where a converter that averages shows a sample on
-    the way, as long before that sample's time is over as it is far on the way. With another `edge` it happens as much
-    earlier or later as between two samples. A linear filter tells it from a straight edge only by second differences.
+    An edge is a change within one sample or two, `BESIDE` times as fast as those next to it. With `edge` 1/2 it happens
+    at the mean time of the change: halfway between two samples or, if a converter that averages shows a sample on the
+    way, as long before the end of that sample as the sample is far along the step. With another `edge` it happens as
+    much earlier or later as between two samples. A linear filter distinguishes it from a straight edge only by second
+    differences.
     """
     times[0], drive[0], given[0] = t[0], u[0], 0
     n, k, last = 1, 0, len(u) - 1
@@ -110,7 +111,7 @@ class _SlewLimit(Effect):
     place: ClassVar[Place] = Place.DRIVE
     order: ClassVar[int] = 1
     compensated: ClassVar[Compensated] = "none"
-    compensation: ClassVar[str] = "the drive is kept within it, so that the memory is the actuator's"
+    compensation: ClassVar[str] = "the drive is kept within it, so the memory matches the actuator's"
 
     @model_validator(mode="after")
     def _same_rate(self) -> Self:
@@ -123,14 +124,15 @@ class _SlewLimit(Effect):
         return drive_range / min(self.rate, self.falling_rate)
 
     def limited(self, u: Array, steps: Array) -> tuple[Array, Array]:
-        """A drive as fast as it may be, and its mean distance from `u` over each of the steps [s]."""
+        """The drive limited to the rates, and its mean distance from `u` over each of the steps [s]."""
         out, off = np.empty_like(u), np.empty(len(steps))
         limit(u, self.rate * steps, self.falling_rate * steps, out, off)
         return out, off
 
     @classmethod
     def _candidate(cls, label: str, n: int, about: About, anywhere: bool = False, **more: Any) -> Candidate:
-        """One rate, or one for each direction, up to the fastest recorded one; `anywhere`: also the place of edges."""
+        """One rate, or one for each direction, up to the fastest recorded one; `anywhere`: also the position of
+        edges."""
         fastest = np.log10(max(about.fastest, 1e-12))
         shape = cls.model_fields["shape"].annotation.__args__[0]  # type: ignore[union-attr]
 
@@ -163,7 +165,7 @@ class SlewLimit(_SlewLimit):
     later: ClassVar[tuple[str, ...]] = ("shape",)
 
     def drive(self, a: Array, run: Run) -> Array:
-        """The drive as fast as it may be."""
+        """The limited drive."""
         return self.limited(a, run.steps)[0]
 
     @classmethod
@@ -178,13 +180,13 @@ class SlewLimit(_SlewLimit):
 
 
 class SuddenSlewLimit(_SlewLimit):
-    """The same limit behind a drive whose steps take no time (`sudden`); elsewhere it is straight between samples.
+    """The same limit behind a drive whose steps take no time (`sudden`); otherwise it is straight between samples.
 
-    A generator steps where the record has a change within a sample or two. Taken as straight, the limited edge begins
-    up to a sample early, and everything until it arrives is early by as much. When in that time the drive steps depends
-    on how it was recorded: halfway in averages over each sample, at the later sample if a command was recorded as the
-    converter took it, at the earlier one if the converter had been given it by then. What a record of averages shows
-    behind the limit is an average too.
+    A generator steps where the record has a change within a sample or two. If that is taken as straight, the limited
+    edge begins up to a sample early, and everything until it arrives is early by as much. When the drive steps within
+    that time depends on how it was recorded: halfway in averages over each sample, at the later sample if a command was
+    recorded when the converter took it, at the earlier one if the converter already had it by then. In a record of
+    averages, the signal behind the limit is an average too.
     """
 
     shape: Literal["sudden"] = Field(description="steps of the drive within one or two samples take no time")
@@ -196,7 +198,7 @@ class SuddenSlewLimit(_SlewLimit):
     later: ClassVar[tuple[str, ...]] = ("shape", "edge")
 
     def drive(self, a: Array, run: Run) -> Array:
-        """The drive as fast as it may be."""
+        """The limited drive."""
         times, drive, given = np.empty(3 * len(a)), np.empty(3 * len(a)), np.empty(len(a), dtype=np.intp)
         n = sudden(run.t, a, self.edge, times, drive, given)
         times, drive = times[:n], drive[:n]
@@ -204,10 +206,11 @@ class SuddenSlewLimit(_SlewLimit):
         return self._averaged(a, then, run.t, times, drive) if self.edge == MIDDLE and n > len(a) else then
 
     def _averaged(self, a: Array, then: Array, t: Array, times: Array, drive: Array) -> Array:
-        """Mean of the limited drive over each sample, which lasts halfway to those beside it; `then`: its value there.
+        """Mean of the limited drive over each sample, which extends halfway to its neighbours; `then`: its value at the
+        sample.
 
         Where the drive steps or is straight, a sample `a` is its mean, and the mean distance is added. Where it bends,
-        `a` is not, and the bend would pass the limit: `then` stands.
+        `a` is not its mean, and the bend would exceed the limit: `then` is used.
         """
         ends = 0.5 * (t[:-1] + t[1:])
         at = np.searchsorted(times, ends)
@@ -224,7 +227,7 @@ class SuddenSlewLimit(_SlewLimit):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Where a limit helps: one rate, one for each direction, and either with another time of the steps."""
+        """Tried if a limit helps: one rate, one for each direction, and either with another time of the steps."""
         both = "rising and falling"
         return [
             cls._candidate(SUDDEN, 1, about, beyond=STRAIGHT, grown=lambda x: x),
@@ -243,7 +246,7 @@ SHAPES = (SlewLimit, SuddenSlewLimit)
 
 
 def load() -> None:
-    """Have the recursions compiled, or read from the cache, on two samples."""
+    """Compile the recursions, or read them from the cache, on two samples."""
     two, one = np.arange(2.0), np.ones(1)
     limit(two, one, one, np.empty(2), np.empty(1))
     sudden(two, two, MIDDLE, np.empty(6), np.empty(6), np.empty(2, dtype=np.intp))

@@ -26,9 +26,10 @@ SMALLEST, LARGEST, REACH = -2.0, 0.5, -0.8
 
 @jit
 def rubbed(way: float, reach: float) -> float:
-    """What plays of thresholds up to `reach` lose to friction on a way on which more and more of them follow.
+    """Friction loss of plays with thresholds up to `reach` on a move along which more and more of them follow.
 
-    One of threshold r follows behind r and then loses r a unit of the way, all that follow `min(way, reach)^2/2`.
+    One with threshold r follows after r and then loses r per unit of the move; together they lose
+    `min(way, reach)^2/2`.
     """
     rising = min(way, reach)
     return rising * rising * (rising / 6.0 + 0.5 * (way - rising))
@@ -41,9 +42,9 @@ def lost_on(
     """Energy that plays of all thresholds up to `reach`, equally dense and relaxed at `first`, lose on the way from `w`
     to `x`, with the number of turning points and the direction after it.
 
-    Behind a turning point a play follows when the way is twice its threshold. Turning points that are passed are
-    forgotten (Madelung's rules): there the way goes on from an earlier one, or on the initial curve. `corner`: the
-    `depth` turning points of before, which stay as they are; a new one is written behind them.
+    After a turning point a play follows once the move is twice its threshold. Turning points that are passed are
+    forgotten (Madelung's rules): the move then continues from an earlier one, or on the initial curve. `corner`: the
+    `depth` earlier turning points, which are left unchanged; a new one is written after them.
     """
     energy = 0.0
     if x == w:
@@ -71,7 +72,7 @@ def lost_on(
 
 @jit
 def lost(v: Array, reach: float, corner: Array, out: Array) -> None:
-    """The energy lost in each step of `v`, as by `lost_on`, from rest at its first sample."""
+    """The energy lost in each step of `v`, as in `lost_on`, from rest at its first sample."""
     depth, up = 0, True
     for k in range(len(v) - 1):
         out[k], depth, up = lost_on(v[k], v[k + 1], v[0], reach, corner, depth, up)
@@ -104,14 +105,14 @@ class _Thermal(Effect):
 
 
 class LoggedThermal(_Thermal):
-    """Gain `1 + g (T - T_ref)` and offset `o (T - T_ref)` of a temperature in the record's column `temperature`."""
+    """Gain `1 + g (T - T_ref)` and offset `o (T - T_ref)` from a temperature in the record's column `temperature`."""
 
     source: Literal["logged"] = Field(default="logged", description="temperature from the column `temperature`")
 
     timed: ClassVar[bool] = False
     columns: ClassVar[tuple[str, ...]] = (COLUMN,)
     compensated: ClassVar[Compensated] = "needs a sensor"
-    compensation: ClassVar[str] = "exact with the temperature beside the reference"
+    compensation: ClassVar[str] = "exact, given the temperature along with the reference"
 
     def above(self, run: Run) -> Array:
         """The logged temperature above the reference."""
@@ -136,7 +137,7 @@ class LoggedThermal(_Thermal):
 
 
 class OwnHeat(_Thermal):
-    """Gain and offset of a temperature that the drive makes by itself: `tau T' + T = heat`, T 0 at the start."""
+    """Gain and offset from a temperature that the drive itself causes: `tau T' + T = heat`, T 0 at the start."""
 
     time_constant: Positive = Field(description="tau, s", examples=[60.0])
     heating: NotNegative
@@ -155,7 +156,7 @@ class OwnHeat(_Thermal):
         """Final rise at the heat of each step (N - 1,), K."""
 
     def above(self, run: Run) -> Array:
-        """Temperature rise, K; remembered, since a search comes back to it with other gains and offsets."""
+        """Temperature rise, K; cached, since a search comes back to it with other gains and offsets."""
         numbers = self.model_dump(exclude={"gain_per_degree", "offset_per_degree"})
         return run.remembered((type(self), *numbers.values()), lambda: self._rise(run))
 
@@ -169,7 +170,7 @@ class OwnHeat(_Thermal):
 class SelfHeating(OwnHeat):
     """Gain and offset of self-heating: `tau T' + T = heating |v v'|/2`, T above the reference, 0 at the start.
 
-    A drive of amplitude V about 0 and frequency f has `|v v'|/2 = f V^2` in the mean, the law of dielectric loss; one
+    A drive of amplitude V about 0 and frequency f has `|v v'|/2 = f V^2` on average, the law of dielectric loss; one
     thermal resistance and capacity carry the heat away. The heat of a step is spread evenly over it.
     """
 
@@ -201,11 +202,11 @@ class SelfHeating(OwnHeat):
 
 
 class HysteresisHeating(OwnHeat):
-    """Gain and offset of the heat that hysteresis itself loses: `tau T' + T = heating q`, T 0 at the start.
+    """Gain and offset from the heat that hysteresis itself produces: `tau T' + T = heating q`, T 0 at the start.
 
-    `q` is what plays of all thresholds up to `reach`, equally dense, lose to friction, input units^3/s: `2/3 f V^3`
-    for amplitudes V below the reach (Rayleigh's law: Damjanovic, Rep. Prog. Phys. 61 (1998) 1267), wherever the loop
-    lies, and growing with V far above it.
+    `q` is the power that plays of all thresholds up to `reach`, equally dense, lose to friction, input units^3/s:
+    `2/3 f V^3` for amplitudes V below the reach (Rayleigh's law: Damjanovic, Rep. Prog. Phys. 61 (1998) 1267), wherever
+    the loop lies, and growing with V far above it.
     """
 
     source: Literal["hysteresis"] = Field(description="temperature from the heat of the loops")
@@ -223,7 +224,7 @@ class HysteresisHeating(OwnHeat):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Time constant with gain, with gain and offset, and the reach; where the drive's own heat helps."""
+        """Time constant with gain, with gain and offset, and the reach; tried if the drive's own heat helps."""
         low_drive, high_drive = about.drive
         wide = high_drive - low_drive
         rate = about.travel / max(about.session, about.sample_time)
@@ -255,8 +256,8 @@ class HysteresisHeating(OwnHeat):
 def _numbers(row: tuple[int | None, int | None], about: About) -> tuple[Array, Array, Array, tuple[Array, ...]]:
     """Bounds, start and further starts of the numbers: time constant, then a gain, an offset or both.
 
-    Warmth changes from loop to loop, not within one: what follows the drive within a quarter of a loop over its range
-    is not a temperature.
+    The temperature changes from loop to loop, not within one: anything that follows the drive within a quarter of a
+    full-range loop is not a temperature.
     """
     n = sum(place is not None for place in row)
     low, high = span(20.0 * about.sample_time, 3.0 * about.session)
@@ -268,13 +269,14 @@ def _numbers(row: tuple[int | None, int | None], about: About) -> tuple[Array, A
 
 
 def _of_row(x: Array, row: tuple[int | None, int | None], about: About) -> tuple[float, float]:
-    """Gain and offset per degree of such numbers."""
+    """Gain and offset per degree from such numbers."""
     gain, offset = (0.0 if place is None else float(x[place]) for place in row)
     return 0.01 * gain, 0.01 * about.output_range * offset
 
 
 def _kept(share: Array) -> Array:
-    """Of the warmth and of the heat of each step, for steps in time constants; the next step's has no part in it."""
+    """Coefficients of the temperature and of the heat of each step, for steps in time constants; the next step's has no
+    part in it."""
     return np.stack([np.exp(-share), -np.expm1(-share), np.zeros(len(share))])
 
 
@@ -282,5 +284,5 @@ SHAPES = (LoggedThermal, SelfHeating, HysteresisHeating)
 
 
 def load() -> None:
-    """Have the recursions compiled, or read from the cache, on two samples."""
+    """Compile the recursions, or read them from the cache, on two samples."""
     lost(np.arange(2.0), 1.0, np.empty(2), np.empty(1))

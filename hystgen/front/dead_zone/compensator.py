@@ -10,7 +10,7 @@ from hystgen.front.stage import StageTables
 
 @jit
 def dead_zone(t: StageTables, first: int, n: int, x: Any, inverse: int) -> Any:
-    """Follow the straight piece that x lies on; the tables of the inverse are those of the forward map swapped."""
+    """Follow the straight piece that x lies on; the tables of the inverse are those of the forward map, swapped."""
     d = t.stage_data
     breaks = first + n * inverse
     anchor_in = first + 2 * n + (n + 1) * inverse

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 class Pieces(NamedTuple):
-    """A piecewise straight map: breaks and the values there, and of each piece a point and the slope."""
+    """A piecewise straight map: breaks and the values there, and a point and the slope of each piece."""
 
     breaks: tuple[float, ...]
     values: tuple[float, ...]
@@ -32,7 +32,7 @@ class Pieces(NamedTuple):
 class DeadZone:
     """Dead-zone sum `w = eta_0 v + sum eta_j S_(rho_j)(v)` (41).
 
-    `thresholds`: rho, strictly rising, containing 0; `weights`: eta, same length. Raises ValueError otherwise.
+    `thresholds`: rho, strictly increasing, containing 0; `weights`: eta, same length. Raises ValueError otherwise.
     """
 
     thresholds: Sequence[float]
@@ -42,7 +42,7 @@ class DeadZone:
         thresholds = finite_numbers(self.thresholds, "thresholds")
         weights = finite_numbers(self.weights, "weights")
         if any(b <= a for a, b in itertools.pairwise(thresholds)) or 0.0 not in thresholds:
-            raise ValueError("dead-zone thresholds rise strictly and contain 0")
+            raise ValueError("dead-zone thresholds must be strictly increasing and contain 0")
         if len(weights) != len(thresholds):
             raise ValueError(f"{counted(len(thresholds), 'threshold')} but {counted(len(weights), 'weight')}")
         object.__setattr__(self, "thresholds", thresholds)
@@ -50,12 +50,12 @@ class DeadZone:
 
     @property
     def branches_differ(self) -> bool:
-        """One curve for both directions."""
+        """One curve serves both directions."""
         return False
 
     @cached_property
     def breaks(self) -> tuple[float, ...]:
-        """The places where the slope changes: all thresholds but 0."""
+        """Where the slope changes: all thresholds except 0."""
         return tuple(r for r in self.thresholds if r != 0.0)
 
     @cached_property
@@ -78,7 +78,7 @@ class DeadZone:
         return tuple(points)
 
     def _value(self, x: float) -> float:
-        if math.isinf(x):  # the end piece decides, its terms may cancel
+        if math.isinf(x):  # the end piece decides, since its terms may cancel
             slope = self.piece_slopes[-1 if x > 0 else 0]
             return slope * x if slope else self.anchors[-1 if x > 0 else 0][1]
         rho, eta, least, most = self._terms
@@ -130,7 +130,7 @@ class DeadZone:
     def inverse(
         self, y: ArrayLike, ascending: bool = True, low: float = -math.inf, high: float = math.inf
     ) -> Array:
-        """The x in [low, high], where the map has to rise, that has the value y; beyond it the end pieces go on."""
+        """The x in [low, high] with the value y (the map has to rise there); outside, the end pieces continue."""
         ends, anchors, slopes = self._inverses(low, high)
         values = np.asarray(y, dtype=np.float64)
         piece = np.searchsorted(ends, values, side="right")
@@ -138,7 +138,7 @@ class DeadZone:
         return np.asarray(anchor[..., 0] + (values - anchor[..., 1]) / slopes[piece])
 
     def _inverses(self, low: float, high: float) -> tuple[Array, Array, Array]:
-        """Values at the breaks, anchors and slopes of `over` as arrays, made once for each range."""
+        """Values at the breaks, anchors and slopes of `over` as arrays, made once per range."""
         if (low, high) not in self._inverted:
             kept = self.over(low, high)
             self._inverted[low, high] = np.array(kept.values), np.array(kept.anchors), np.array(kept.slopes)
@@ -149,7 +149,7 @@ class DeadZone:
         return {}
 
     def over(self, low: float, high: float) -> Pieces:
-        """The straight pieces that [low, high] touches; the first and the last go on beyond it."""
+        """The straight pieces within [low, high]; the first and the last continue beyond it."""
         first, last = self._pieces(low, high)[0], self._pieces(low, high)[-1]
         breaks = self.breaks[first:last]
         return Pieces(
@@ -165,13 +165,13 @@ class DeadZone:
         return range(first, max(first, last) + 1)
 
     def image(self, low: float, high: float, ascending: bool = True) -> tuple[float, float]:
-        """Least and largest value over [low, high]; they lie at the ends or at breaks."""
+        """Least and largest value over [low, high]; they are at the ends or at breaks."""
         inside = slice(bisect.bisect_right(self.breaks, low), bisect.bisect_left(self.breaks, high))
         values = (self._value(low), self._value(high), *self._values[inside])
         return min(values), max(values)
 
     def slope_range(self, low: float, high: float, ascending: bool = True) -> tuple[float, float]:
-        """Least and largest slope of the pieces that [low, high] touches."""
+        """Least and largest slope of the pieces within [low, high]."""
         slopes = [self.piece_slopes[j] for j in self._pieces(low, high)]
         return min(slopes), max(slopes)
 

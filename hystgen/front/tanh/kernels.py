@@ -2,8 +2,8 @@
 
 The same operations in the same order on numbers of the same format, for float32 and float64 alike: every constant
 comes from a table of the format, because a Python float next to a float32 would widen it once numba compiles the
-function. They run on numpy scalars as they are (`tanh.py_func`) and unchanged when compiled. The method is that of the
-C files' comments, the numbers are those of `c_runtime/front/fit_coefficients.py`.
+function. They run on numpy scalars (`tanh.py_func`), and unchanged when compiled. The method is described in the
+comments of the C files; the numbers are those of `c_runtime/front/fit_coefficients.py`.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ def tanh(x: Real, t: TanhTables) -> Real:
 def atanh(x: Real, t: AtanhTables) -> Real:
     """Inverse hyperbolic tangent of one number, with the bits of `hystgen_atanh`.
 
-    `x`: numpy scalar of the tables' format, |x| < 1, no unit; returns the same format. Anything beyond, NaN too, is
+    `x`: numpy scalar of the tables' format, |x| < 1, no unit; returns the same format. Values outside, and NaN, are
     taken as the last number below 1; raises nothing. Worst error: `ATANH_MAX_ULP`.
     """
     a = -x if x < 0 else x
@@ -113,7 +113,7 @@ def atanh(x: Real, t: AtanhTables) -> Real:
     bits = len(t.power) - 1
     u = t.one[0] - a
     whole = int(u * t.power[bits])
-    m = 2 * whole  # to be brought to 2^bits .. 2^(bits + 1) - 1
+    m = 2 * whole  # to be scaled to 2^bits .. 2^(bits + 1) - 1
     k = 1
     while m < 1 << bits:
         m *= 2

@@ -44,7 +44,7 @@ class TanhEnvelope:
         return self.ascending if ascending or self.descending is None else self.descending
 
     def forward(self, x: ArrayLike, ascending: bool = True) -> Array:
-        """Value of the branch at x. A single float is computed alike on every machine."""
+        """Value of the branch at x. A single float gives the same result on every machine."""
         a0, a1, a2, a3 = self.branch(ascending)
         if isinstance(x, float):
             tables = kernels.TANH_TABLES["float64"]
@@ -54,7 +54,8 @@ class TanhEnvelope:
     def inverse(
         self, y: ArrayLike, ascending: bool = True, low: float = -math.inf, high: float = math.inf
     ) -> Array:
-        """The x at which the branch is y (58); values the branch never reaches are taken as its last reachable ones."""
+        """The x at which the branch is y (58); values that the branch never reaches are replaced by its last reachable
+        ones."""
         a0, a1, a2, a3 = self.branch(ascending)
         edge = float(np.nextafter(1.0, 0.0))
         if isinstance(y, float):
@@ -65,7 +66,7 @@ class TanhEnvelope:
         return np.asarray((np.arctanh(arguments) - a2) / a1)
 
     def image(self, low: float, high: float, ascending: bool) -> tuple[float, float]:
-        """Value at the ends: the branch rises everywhere."""
+        """Values at the ends: the branch rises everywhere."""
         return float(self.forward(float(low), ascending)), float(self.forward(float(high), ascending))
 
     def slope_range(self, low: float, high: float, ascending: bool) -> tuple[float, float]:
