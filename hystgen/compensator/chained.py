@@ -189,8 +189,7 @@ class Heating:
         if isinstance(effect, HysteresisHeating):
             energy, depth, up = lost_on(before, drive, self.first, effect.reach, self.corner, self.depth, self.up)
             return effect.heating * energy / seconds, depth, up
-        way = abs(drive * abs(drive) - before * abs(before))
-        return effect.heating * 0.25 * way / seconds, 0, True
+        return effect.heating * 0.25 * thermal.heat_way(before, drive) / seconds, 0, True
 
     def risen(self, before: float, drive: float, seconds: float) -> float:
         """The rise after the drive has moved from `before`; unchanged at the first sample."""
