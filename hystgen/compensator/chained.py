@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from hystgen.basics import extras
 from hystgen.basics.problems import EffectsError, NotInvertibleError, UnsupportedEffectsError
 from hystgen.chain.chain import Chain, arriving_slack
-from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import noise, preview
 from hystgen.compensator.chain.layout import Read, read
 from hystgen.compensator.chain.parts import Parts
@@ -71,15 +70,13 @@ class Actuator(Block):
     A move back by no more than `slack` is none.
     """
 
-    def __init__(self, static: StaticModel, effects: Sequence[Effect], slack: float) -> None:
-        pi = static.pi
-        self.static, self.bends = static, [effect for effect in effects if effect.bends_plays()]
+    def __init__(self, chain: Chain) -> None:
+        pi = chain.cascade.pi
+        self.chain, self.static, self.slack = chain, chain.cascade, arriving_slack(chain.cascade, chain.effects)
         self.r, self.p = np.array(pi.thresholds), np.array(pi.weights)
         self.c, self.q = np.cumsum(self.p), np.cumsum(self.p * self.r)
-        mover = next((effect for effect in effects if effect.moves_plays()), None)
-        self.movement = None if mover is None else Movement(mover, self.r, self.p)  # type: ignore[arg-type]
+        self.movement = None if chain.mover is None else Movement(chain.mover, self.r, self.p)  # type: ignore[arg-type]
         self.start = np.array(pi.start)
-        self.slack = slack
         self.led_by: lag.UnevenLag | None = None
         self.start_over()
 
@@ -103,10 +100,7 @@ class Actuator(Block):
 
     def total(self, rows: Array) -> float:
         """The weighted sum of the rows, bent where an effect bends them."""
-        bent = rows[:, None]
-        for effect in self.bends:
-            bent = effect.bent(bent, self.r)
-        return float(self.p @ bent[:, 0])
+        return float(self.p @ self.chain.bent(rows[:, None], self.r)[:, 0])
 
     def call(self, verb: str, x: float) -> float:
         """The first move, from the start memory, after which the plays are at rest, is one as any other."""
@@ -150,7 +144,7 @@ class Actuator(Block):
 
     def _input(self, y: float) -> float:
         """Input of the plays at which their sum is `y`."""
-        if self.movement is None and not self.bends:
+        if self.movement is None and not self.chain.bending:
             return self._scan(y)
         w = float(self.plays[0])
         before = self.total(self.moved(w))
@@ -256,12 +250,11 @@ class Compensator:
         if refused:
             raise UnsupportedEffectsError(f"the inverse cannot take in {', '.join(refused)}; remove it from the model")
         self.static, self.effects, self.how = static, effects, how
-        plays = [effect for effect in effects if effect.place is Place.PLAYS]
         drives, outputs = (
-            [block for effect in effects if effect.place is place and (block := filter_block(effect))]
+            [block for effect in chain.at(place) if (block := filter_block(effect))]
             for place in (Place.DRIVE, Place.LINEAR)
         )
-        self.actuator = Actuator(static, plays, arriving_slack(static, effects))
+        self.actuator = Actuator(chain)
         self.blocks: list[Block] = [*drives, self.actuator, *outputs]
         self.slew = self._called("slew_limit")
         self.rest = 0.0  # what rounding takes from a drive at a limited rate: millions of steps would add it up
