@@ -5,10 +5,10 @@
 For each effect the models of these seeds, and of each the largest error of either operator that a search finds: drives
 of sweeps, holds, jumps, noise, and shaking by the fastest step that bounds hold for; then the worst of them with
 another end, again and again. The inverse is asked for where the model has been with such a drive. Exact is what the
-double model answers, forwards `model.simulate`, backwards `hystgen.compensator.chained`, which share no code with the
-tables; where a bound holds for compensators that have seen the same drives, the tables in double precision, to which
-the drives are committed that were sent. A line is printed for each operator: the largest and the median of bound over
-error, and the number of bounds that were exceeded, which has to be 0.
+double model answers, forwards `model.simulate`, backwards `hystgen.compensator.chained`, which share no tables with the
+C, but for the verbs of lag and creep; where a bound holds for compensators that have seen the same drives, the tables
+in double precision, to which the drives are committed that were sent. A line is printed for each operator: the largest
+and the median of bound over error, and the number of bounds that were exceeded, which has to be 0.
 
 A search finds less than there is: a ratio says how slack a bound is at most.
 """

@@ -39,7 +39,8 @@ from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.model import LogarithmicAgeing
 from hystgen.effects.base import Run
 from hystgen.effects.lag import compensator as led
-from hystgen.effects.lag.compensator import LagBlock
+from hystgen.effects.lag.compensator import EARLY, LATE, UnevenLag
+from hystgen.effects.lag.model import Lag
 from hystgen.parameters.files import parse_parameters
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
@@ -69,11 +70,11 @@ def lag() -> None:
     """Both inverses of a lag of 1 s: largest gain from reference to drive, and the error on a sine of 40 steps."""
     print("lag: step / time constant, pole of the exact inverse, its gain and that of the lead, error of the lead, %")
     for step in (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0):
-        block = LagBlock(1.0)
+        block = UnevenLag(Lag(name="lag", time_constant=1.0))
         block.advance(step)
-        pole = -block.early / block.late
+        pole = -float(block.table.block[1, EARLY] / block.table.block[1, LATE])
 
-        def drives(reference: NDArray[np.float64], exact: bool, block: LagBlock = block) -> tuple[Any, Any]:
+        def drives(reference: NDArray[np.float64], exact: bool, block: UnevenLag = block) -> tuple[Any, Any]:
             block.rest(0.0)
             block.exact = exact
             pairs = [(x := block.solve(y), block.absorb(x)) for y in reference.tolist()]

@@ -122,7 +122,7 @@ def reference_signal(one: Compiled, seed: int, n: int, share: float) -> Run:
 
 @pytest.mark.parametrize("name", ["creeping", "lagging", "quick", "worn", "led"])
 def test_floating_point_stays_within_its_bounds(name: str) -> None:
-    """Against the compensator and the chain in double precision, which share no code with it."""
+    """Against the compensator in double precision, which shares the verbs of lag and creep with it, and the chain."""
     one = model({**CHAINS, **LED}[name])
     numbers = built(one, "float32", "corners")
     run = reference_signal(numbers, 3, 250, 0.9)

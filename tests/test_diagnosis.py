@@ -879,7 +879,7 @@ def test_the_extended_file_is_the_model_that_was_found(tmp_path: Path, effect: E
     item = Item("made", run, v, (0.0,), 100.0)
     actuator = Actuator(places, (), (effect,))
     (rows,), _ = actuator.columns(item, weights)
-    predicted = rows + actuator.added(item)
+    predicted = rows + actuator.added(item.run)[item.compared]
     item = dataclasses.replace(item, y=predicted)
     fitted = Fitted(form, np.empty(0), weights, 0.0)
     ready = preparing.Prepared([item], [item], [], [], (0.0, 100.0), places)

@@ -188,7 +188,7 @@ def test_a_start_behind_a_sensor_has_the_same_limits() -> None:
             ys = [replace(STRUCTURE, parts=(CREEP, *more)).actuator(shape) for more in ((), (straight,))]
             assert rms([ys[1].error(record, p)]) == pytest.approx(rms([ys[0].error(record, p)]), rel=1e-6)
         structure = replace(STRUCTURE, parts=(CREEP, bent))
-        curved = [replace(item, y=structure.actuator(shape).mapped(item.y, np.zeros(1), item)) for item in records]
+        curved = [replace(item, y=structure.actuator(shape).mapped(item.y, np.zeros(1), item.run)) for item in records]
         found = fits.linear(structure, curved, shape, without.best)
         judged = Fitted(structure, shape, found.best, found.rms).errors(curved)
     assert found.rms == pytest.approx(rms(judged), rel=0.01)

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,20 +28,11 @@ takes; 25 would by 2e-4. Set by: benchmarks/chosen_numbers.py visits."""
 SESSION_GAP = 10.0
 """Gap between two records of a session, in median steps, above which the drive holds in it; below, it is straight."""
 
-_BEHIND_OFFSET = 6
-"""Rank of the effects that act on the output with its offset, of the order from the drive (0) to the sensor."""
-
-
 def _rank(effect: Effect) -> int:
-    """Position in the chain: gains lie between linear filters of order 0 and others, the offset between outputs."""
-    return {
-        Place.DRIVE: 0,
-        Place.PLAYS: 1,
-        Place.LINEAR: 2 if effect.order == 0 else 4,
-        Place.GAIN: 3,
-        Place.OUTPUT: 5 if effect.order == 0 else _BEHIND_OFFSET,
-        Place.ADDED: 7,
-    }[effect.place]
+    """Position in the chain: gains lie between linear filters of order 0 and others."""
+    places = (Place.DRIVE, Place.PLAYS, Place.LINEAR, Place.GAIN, Place.LINEAR, Place.OUTPUT, Place.ADDED)
+    late = effect.place is Place.LINEAR and effect.order > 0
+    return 4 if late else places.index(effect.place)
 
 
 def in_order(effects: Sequence[Effect]) -> tuple[Effect, ...]:
@@ -122,7 +114,91 @@ def arriving_slack(static: StaticModel, effects: Sequence[Effect]) -> float:
     return NO_MOVE * largest if math.isfinite(largest) else 0.0
 
 
-class Chain:
+class Ordered:
+    """Effects in the order of the chain, and what those at each place make of a signal."""
+
+    effects: tuple[Effect, ...]
+
+    def at(self, place: Place) -> Sequence[Effect]:
+        """The effects at one place of the chain, in its order."""
+        return self._at.get(place, ())
+
+    @cached_property
+    def _at(self) -> dict[Place, list[Effect]]:
+        found: dict[Place, list[Effect]] = {}
+        for effect in sorted(self.effects, key=lambda each: each.order):
+            found.setdefault(effect.place, []).append(effect)
+        return found
+
+    @cached_property
+    def filters(self) -> tuple[Effect, ...]:
+        """The filters right behind the plays; others are behind the gains."""
+        return tuple(effect for effect in self.at(Place.LINEAR) if effect.order == 0)
+
+    @cached_property
+    def bending(self) -> tuple[Effect, ...]:
+        """The effects that bend the plays."""
+        return tuple(effect for effect in self.at(Place.PLAYS) if effect.bends_plays())
+
+    @cached_property
+    def mover(self) -> Effect | None:
+        """The one effect that says how the plays move, if any does."""
+        return next((effect for effect in self.at(Place.PLAYS) if effect.moves_plays()), None)
+
+    def driven(self, run: Run) -> Array:
+        """The drive (N,) behind delay, slew limit and lag."""
+        a = np.ascontiguousarray(run.v, dtype=np.float64)
+        for effect in self.at(Place.DRIVE):
+            a = effect.drive(a, run)
+        return a
+
+    def moved(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+        """Rows (n+1, N) of the plays for their input, before an effect bends them."""
+        if self.mover is None:
+            return operators.plays(w, thresholds, start)
+        return self.mover.plays(w, run, thresholds, start)
+
+    def summed(self, p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
+        """The weighted sum (N,) of the rows of `moved`."""
+        if self.mover is None:
+            return operators.play_sum(w, thresholds, start, p)
+        if type(self.mover).summed is Effect.summed:
+            return operators.weighted_sum(p, self.moved(w, run, thresholds, start))
+        return self.mover.summed(p, w, run, thresholds, start)
+
+    def bent(self, rows: Array, thresholds: Array) -> Array:
+        """The rows as all effects bend them."""
+        for effect in self.bending:
+            rows = effect.bent(rows, thresholds)
+        return rows
+
+    def bent_sum(self, p: Array, rows: Array, thresholds: Array) -> Array:
+        """The weighted sum (N,) of the rows of `bent`, of which there is one effect at least."""
+        *first, last = self.bending
+        for effect in first:
+            rows = effect.bent(rows, thresholds)
+        return last.bent_sum(p, rows, thresholds)
+
+    def mapped(self, h: Array, level: Array | float, run: Run) -> Array:
+        """The output after its maps: a limit before the offset `level`, a sensor after it."""
+        for effect in self.at(Place.OUTPUT):
+            if effect.order == 0:
+                h = effect.mapped(h, run)
+        h = h + level
+        for effect in self.at(Place.OUTPUT):
+            if effect.order > 0:
+                h = effect.mapped(h, run)
+        return h
+
+    def added(self, run: Run) -> Array:
+        """Sum (N,) of the terms added at the end of the chain."""
+        total = np.zeros(len(run.t))
+        for effect in self.at(Place.ADDED):
+            total = total + effect.added(run)
+        return total
+
+
+class Chain(Ordered):
     """Static model and effects as one forward model.
 
     Order: delay, slew limit, lag, memoryless front, plays, creep, ageing and thermal, resonances, saturation behind,
@@ -155,26 +231,17 @@ class Chain:
     def output(self, run: Run) -> Array:
         """Output (N,) of one run, at rest in the start memory at its first sample."""
         y = np.asarray(self.cascade.pi.weights) @ self.plays(self.play_input(run), run)
-        behind = [effect for effect in self.effects if effect.place not in (Place.DRIVE, Place.PLAYS)]
-        offset = self.cascade.output_offset
-        for effect in behind:
-            if _rank(effect) >= _BEHIND_OFFSET:
-                y, offset = y + offset, 0.0
-            if effect.place is Place.LINEAR:
-                y = effect.filtered(y, run)
-            elif effect.place is Place.GAIN:
-                y = effect.gain(run) * y + effect.offset(run)
-            elif effect.place is Place.OUTPUT:
-                y = effect.mapped(y, run)
-            else:
-                y = y + effect.added(run)
-        return y + offset
+        for effect in self.filters:
+            y = effect.filtered(y, run)
+        for effect in self.at(Place.GAIN):
+            y = effect.gain(run) * y + effect.offset(run)
+        for effect in self.at(Place.LINEAR)[len(self.filters) :]:
+            y = effect.filtered(y, run)
+        return self.mapped(y, self.cascade.output_offset, run) + self.added(run)
 
     def play_input(self, run: Run) -> Array:
         """Input `w` (N,) of the plays: the drive behind delay, slew limit, lag and front."""
-        a = np.ascontiguousarray(run.v, dtype=np.float64)
-        for effect in self._of(Place.DRIVE):
-            a = effect.drive(a, run)
+        a = self.driven(run)
         if not self.cascade.branches_differ:
             return through_stages(self.cascade.stages, a, None)
         before = float(self.cascade.front_inverse(self.cascade.pi.start[0])) if self.cascade.start_is_defined else 0.0
@@ -185,56 +252,8 @@ class Chain:
         return through_stages(self.cascade.stages, a, rising)
 
     def plays(self, w: Array, run: Run) -> Array:
-        """Rows (n+1, N) of the plays that the weights sum, beginning at the start memory."""
+        """Rows (n+1, N) that the weights sum, beginning at the start memory: the plays, as one effect may move them and
+        all others bend them."""
         pi = self.cascade.pi
-        return plays(self._of(Place.PLAYS), w, run, np.asarray(pi.thresholds), np.asarray(pi.start))
-
-    def _of(self, place: Place) -> list[Effect]:
-        return [effect for effect in self.effects if effect.place is place]
-
-
-def plays(effects: Sequence[Effect], w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-    """Rows (n+1, N) that the weights sum: the plays, as the one effect that may do so moves them and all others bend
-    them.
-
-    `effects`: those of Place.PLAYS, in order.
-    """
-    return bent(effects, moved(effects, w, run, thresholds, start), thresholds)
-
-
-def moved(effects: Sequence[Effect], w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-    """Rows (n+1, N) of the plays before an effect bends them."""
-    mover = _mover(effects)
-    if mover is None:
-        return operators.plays(w, thresholds, start)
-    return mover.plays(w, run, thresholds, start)
-
-
-def bent(effects: Sequence[Effect], rows: Array, thresholds: Array) -> Array:
-    """The rows as all effects bend them."""
-    for effect in effects:
-        if effect.bends_plays():
-            rows = effect.bent(rows, thresholds)
-    return rows
-
-
-def bent_sum(effects: Sequence[Effect], p: Array, rows: Array, thresholds: Array) -> Array:
-    """The weighted sum (N,) of the rows of `bent`."""
-    *first, last = (effect for effect in effects if effect.bends_plays())
-    if type(last).bent_sum is Effect.bent_sum:
-        return np.asarray(p @ bent(effects, rows, thresholds))
-    return last.bent_sum(p, bent(first, rows, thresholds), thresholds)
-
-
-def summed(effects: Sequence[Effect], p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-    """The weighted sum (N,) of the rows of `moved`."""
-    mover = _mover(effects)
-    if mover is None:
-        return operators.play_sum(w, thresholds, start, p)
-    if type(mover).summed is Effect.summed:
-        return operators.weighted_sum(p, moved(effects, w, run, thresholds, start))
-    return mover.summed(p, w, run, thresholds, start)
-
-
-def _mover(effects: Sequence[Effect]) -> Effect | None:
-    return next((effect for effect in effects if effect.moves_plays()), None)
+        thresholds = np.asarray(pi.thresholds)
+        return self.bent(self.moved(w, run, thresholds, np.asarray(pi.start)), thresholds)

@@ -19,16 +19,16 @@ from numpy.typing import NDArray
 
 from hystgen.basics import extras
 from hystgen.basics.problems import EffectsError, NotInvertibleError, UnsupportedEffectsError
-from hystgen.chain.blocks import Block
 from hystgen.chain.chain import Chain, arriving_slack
-from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import noise, preview
 from hystgen.compensator.chain.layout import Read, read
 from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.step_float import ramp
 from hystgen.effects import own
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.base import Array, Effect, Place, Run
 from hystgen.effects.creep import compensator as creep
+from hystgen.effects.kinds import Block
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag.model import Lag
 from hystgen.effects.rate_dependence.compensator import Movement
@@ -64,22 +64,20 @@ def _brentq() -> Any:
     return brentq
 
 
-class Actuator:
+class Actuator(Block):
     """The memoryless front and the plays as one block: the drive behind a lag in, the weighted sum out.
 
     A move back by no more than `slack` is none.
     """
 
-    def __init__(self, static: StaticModel, effects: Sequence[Effect], slack: float) -> None:
-        pi = static.pi
-        self.static, self.bends = static, [effect for effect in effects if effect.bends_plays()]
+    def __init__(self, chain: Chain) -> None:
+        pi = chain.cascade.pi
+        self.chain, self.static, self.slack = chain, chain.cascade, arriving_slack(chain.cascade, chain.effects)
         self.r, self.p = np.array(pi.thresholds), np.array(pi.weights)
         self.c, self.q = np.cumsum(self.p), np.cumsum(self.p * self.r)
-        mover = next((effect for effect in effects if effect.moves_plays()), None)
-        self.movement = None if mover is None else Movement(mover, self.r, self.p)  # type: ignore[arg-type]
+        self.movement = None if chain.mover is None else Movement(chain.mover, self.r, self.p)  # type: ignore[arg-type]
         self.start = np.array(pi.start)
-        self.slack = slack
-        self.led_by: lag.LagBlock | None = None
+        self.led_by: lag.UnevenLag | None = None
         self.start_over()
 
     def start_over(self) -> None:
@@ -90,7 +88,7 @@ class Actuator:
         self.drive = float(self.static.front_inverse(at)) if self.static.start_is_defined else 0.0
         self.advance(math.inf)
 
-    def advance(self, seconds: float) -> None:
+    def advance(self, seconds: float, later: float | None = None) -> None:  # noqa: ARG002  as of every block
         """The plays move for this long."""
         self.seconds = seconds
 
@@ -102,18 +100,11 @@ class Actuator:
 
     def total(self, rows: Array) -> float:
         """The weighted sum of the rows, bent where an effect bends them."""
-        bent = rows[:, None]
-        for effect in self.bends:
-            bent = effect.bent(bent, self.r)
-        return float(self.p @ bent[:, 0])
+        return float(self.p @ self.chain.bent(rows[:, None], self.r)[:, 0])
 
-    def resting(self, y: float) -> float:
-        """The drive of the first move, from the start memory."""
-        return self.solve(y)
-
-    def rest(self, x: float) -> float:
-        """The first move, after which the plays are at rest."""
-        return self.absorb(x)
+    def call(self, verb: str, x: float) -> float:
+        """The first move, from the start memory, after which the plays are at rest, is one as any other."""
+        return self.solve(x) if verb == "resting" else self.absorb(x)
 
     def solve(self, y: float) -> float:
         """The drive on the branch of its own move: stays on the branch that it is on, moving on or holding, and turns
@@ -133,7 +124,7 @@ class Actuator:
             return v
         other = float(self.static.front_inverse(w, not self.ascending))
         rounding = self.slack + ROUNDING * self.static.slope_ratio * max(abs(v), abs(self.drive))
-        patience = self.led_by.theta if self.led_by and not self.led_by.exact else 0.0
+        patience = self.led_by.patience if self.led_by else 0.0
         if back <= rounding + patience * abs(other - v):
             return self.drive
         if other == self.drive or (other > self.drive) == self.ascending:  # the branches meet here
@@ -153,7 +144,7 @@ class Actuator:
 
     def _input(self, y: float) -> float:
         """Input of the plays at which their sum is `y`."""
-        if self.movement is None and not self.bends:
+        if self.movement is None and not self.chain.bending:
             return self._scan(y)
         w = float(self.plays[0])
         before = self.total(self.moved(w))
@@ -192,8 +183,7 @@ class Heating:
         if isinstance(effect, HysteresisHeating):
             energy, depth, up = lost_on(before, drive, self.first, effect.reach, self.corner, self.depth, self.up)
             return effect.heating * energy / seconds, depth, up
-        way = abs(drive * abs(drive) - before * abs(before))
-        return effect.heating * 0.25 * way / seconds, 0, True
+        return effect.heating * 0.25 * thermal.heat_way(before, drive) / seconds, 0, True
 
     def risen(self, before: float, drive: float, seconds: float) -> float:
         """The rise after the drive has moved from `before`; unchanged at the first sample."""
@@ -235,9 +225,9 @@ def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
 def filter_block(effect: Effect) -> Block | None:
     """The block of an effect that is a filter in front of the plays or behind them; None for any other effect."""
     if isinstance(effect, creep.EFFECTS):
-        return creep.block(effect)
+        return creep.UnevenCreep(effect)
     if isinstance(effect, Lag):
-        return lag.block(effect)
+        return lag.UnevenLag(effect) if effect.time_constant > 0.0 else None
     return own.Instance(effect) if effect.block else None
 
 
@@ -260,20 +250,20 @@ class Compensator:
         if refused:
             raise UnsupportedEffectsError(f"the inverse cannot take in {', '.join(refused)}; remove it from the model")
         self.static, self.effects, self.how = static, effects, how
-        plays = [effect for effect in effects if effect.place is Place.PLAYS]
         drives, outputs = (
-            [block for effect in effects if effect.place is place and (block := filter_block(effect))]
+            [block for effect in chain.at(place) if (block := filter_block(effect))]
             for place in (Place.DRIVE, Place.LINEAR)
         )
-        self.actuator = Actuator(static, plays, arriving_slack(static, effects))
+        self.actuator = Actuator(chain)
         self.blocks: list[Block] = [*drives, self.actuator, *outputs]
         self.slew = self._called("slew_limit")
-        self.rest = 0.0
-        lags = [block for block in drives if isinstance(block, lag.LagBlock)]
+        self.rest = 0.0  # what rounding takes from a drive at a limited rate: millions of steps would add it up
+        self.ends: Sequence[tuple[float, float]] = ()
+        lags = [block for block in drives if isinstance(block, lag.UnevenLag)]
         self.braked = lags[0] if self.slew and len(lags) == 1 else None
         self.parts = Parts.of(effects)
         if self.parts.turning(static.branches_differ):
-            lags[0].turn_with(self.actuator, as_emitted)
+            lags[0].rises, lags[0].always_led = lambda: self.actuator.rises, as_emitted
             self.actuator.led_by = lags[0]
 
     def _called(self, name: str) -> list[Any]:
@@ -308,11 +298,12 @@ class Compensator:
         heating = [Heating(effect, n) for effect in self.effects if isinstance(effect, OwnHeat)]
         v, beyond = np.empty(n), np.zeros(n)
         travelled = self.rest = 0.0
+        steps = np.diff(t).tolist() or [1.0]
         for k in range(n):
-            seconds = float(t[k] - t[k - 1]) if k else 0.0
-            if k:
-                for block in self.blocks:
-                    block.advance(seconds)
+            seconds = steps[k - 1] if k else 0.0
+            for block in self.blocks:
+                if k or block is not self.actuator:  # which starts over without time
+                    block.advance(steps[max(k - 1, 0)], steps[min(k, len(steps) - 1)])
             before = float(v[k - 1]) if k else math.nan
             drive = before
             for _ in range(TURNS):
@@ -328,7 +319,7 @@ class Compensator:
                 for each in heating:
                     y = each.solve(y, each.risen(before, drive, seconds))
                 drive = self._solve(y, gains, k, [ageing.gain(e, way) for e in ageing_effects])
-                wanted = self._slewed(drive, before, seconds)
+                wanted = self._slewed(drive, before, seconds) if self.slew and k else drive
                 drive = min(max(wanted, ends[0]), ends[1])
                 beyond[k] = abs(wanted - drive)
                 if drive == last or not (ageing_effects or heating):
@@ -339,7 +330,7 @@ class Compensator:
             travelled += abs(drive - before) if k else 0.0
             for each in heating:
                 each.move(before, drive, seconds)
-            self.rest = self._rest(drive, before, seconds) if self.slew and seconds > 0.0 else 0.0
+            self.rest = next((rest for end, rest in self.ends if drive == end), 0.0)
             v[k] = drive
         return v, beyond
 
@@ -353,22 +344,13 @@ class Compensator:
 
     def _slewed(self, drive: float, before: float, seconds: float) -> float:
         """The nearest drive that the amplifier can reach in this time, or one from which a lag does not overshoot."""
-        if not self.slew or seconds <= 0.0:
-            return drive
         falling: float = min(effect.falling_rate for effect in self.slew) * seconds
         rising: float = min(effect.rate for effect in self.slew) * seconds
-        lowest, highest = (math.fsum((before, self.rest, move)) for move in (-falling, rising))
-        near = min(max(drive, lowest), highest)
+        low, high = self.ends = [ramp(before, self.rest, move, 0.0) for move in (-falling, rising)]
+        near = min(max(drive, low[0]), high[0])
         if self.braked is not None and not self.braked.exact:
-            near = self.braked.steady(self.braked.braked(near, abs(drive - near), falling, rising))
-        return min(max(near, lowest), highest)
-
-    def _rest(self, drive: float, before: float, seconds: float) -> float:
-        """What rounding takes from a drive that the amplifier's rate has limited: millions of steps would add it up."""
-        for rate in (min(effect.rate for effect in self.slew), -min(effect.falling_rate for effect in self.slew)):
-            if drive == math.fsum((before, self.rest, rate * seconds)):
-                return math.fsum((before, self.rest, rate * seconds, -drive))
-        return 0.0
+            near = self.braked.braked(near, abs(drive - near), falling, rising)
+        return min(max(near, low[0]), high[0])
 
     def _gains(self, reference: Run) -> list[tuple[Array, Array]]:
         """Gain and offset (N,) by each logged temperature, at the time when the drive of a sample takes effect."""

@@ -370,5 +370,5 @@ def _extended(
 def _offset(fitted: Fitted, item: Item) -> float:
     actuator = fitted.actuator
     rows, constant = actuator.columns(item, fitted.weights)
-    predicted = actuator.compared(rows[0] + constant, item) + actuator.added(item)
+    predicted = actuator.compared(rows[0] + constant, item) + actuator.added(item.run)[item.compared]
     return float(np.mean(item.y[item.compared] - predicted))

@@ -27,7 +27,7 @@ import numpy as np
 from hystgen.basics.names import KEYWORDS
 from hystgen.basics.problems import EffectsError
 from hystgen.effects.base import USER, Array, Effect, Place
-from hystgen.effects.kinds import Kind, OwnBlock, product
+from hystgen.effects.kinds import Block, Kind, OwnBlock, product
 
 ARGUMENTS = {"rest": 3, "resting": 2, "solve": 3, "absorb": 3}
 """How many arguments each function takes."""
@@ -86,43 +86,27 @@ def _failed(effect: Effect, function: str, error: Exception) -> EffectsError:
     return EffectsError(f"the effect {effect.name} failed in {function}: {type(error).__name__}: {error}")
 
 
-class Instance:
-    """One block in double precision, as `hystgen.chain.blocks.Block`; the numbers of a step length are kept."""
+class Instance(Block):
+    """The block of a user's own effect in double precision; the numbers of a step length are kept."""
 
     def __init__(self, effect: Effect) -> None:
         assert effect.block is not None
         self.effect, self.block = effect, effect.block
         self.state = np.zeros(len(effect.block.state))
         self._numbers = functools.lru_cache(maxsize=64)(functools.partial(numbers, effect))
-        self.table = np.empty(0)
+        self.advance(1.0)  # at rest the length of a step does not matter
 
-    def _call(self, verb: str, *given: Any) -> float:
-        if not len(self.table) and self.block.table:
-            self.advance(1.0)  # at rest the length of a step does not matter
-        try:
-            return float(getattr(self.block, verb)(self.table, *given))
-        except Exception as error:
-            raise _failed(self.effect, verb, error) from error
-
-    def resting(self, y: float) -> float:
-        """The input of the settled output."""
-        return self._call("resting", y)
-
-    def rest(self, x: float) -> float:
-        """Settle."""
-        return self._call("rest", self.state, x)
-
-    def advance(self, seconds: float) -> None:
+    def advance(self, seconds: float, later: float | None = None) -> None:
         """The numbers of this step."""
         self.table = self._numbers(seconds)
 
-    def solve(self, y: float) -> float:
-        """The input that gives `y`."""
-        return self._call("solve", self.state, y)
-
-    def absorb(self, x: float) -> float:
-        """The memory follows."""
-        return self._call("absorb", self.state, x)
+    def call(self, verb: str, x: float) -> float:
+        """What a function makes of x."""
+        memory = () if verb == "resting" else (self.state,)
+        try:
+            return float(getattr(self.block, verb)(self.table, *memory, x))
+        except Exception as error:
+            raise _failed(self.effect, verb, error) from error
 
 
 # ---------------------------------------------------------------- what is wrong with one

@@ -38,12 +38,10 @@ from hystgen.compensator.float_tables import build_float, inward
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import AgeingTables
 from hystgen.effects.creep import compensator as creep
-from hystgen.effects.creep.compensator import CreepTables
 from hystgen.effects.delay import compensator as delay
 from hystgen.effects.delay.compensator import DelayTables
 from hystgen.effects.drift import compensator as drift
 from hystgen.effects.lag import compensator as lag
-from hystgen.effects.lag.compensator import LagTables
 from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.effects.thermal import compensator as thermal
@@ -162,7 +160,6 @@ def build(
     plays.limits[slots.OUTPUT_MIN], plays.limits[slots.OUTPUT_MAX] = low, high
 
     creeps = [creep.numbers(each, seconds) for each in parts.creeps]
-    rows = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in creeps]
     turning = parts.turning(static.branches_differ)
     lags = [lag.numbers(each, seconds, turning) for each in parts.lags]
     span, drive_span = float(high) - float(low), static.input_range[1] - static.input_range[0]
@@ -179,7 +176,6 @@ def build(
     lead_room *= math.prod(max(one.backward.largest, 1.0) for one in (*drives, *outputs))
     most = max(map(abs, static.input_range)) * lead_room + span * weights * lead_room * steepest
     reals([most], "intermediate results")
-    first = np.cumsum([0, *(len(one.terms) for one in creeps)])
     waited, waiting = delay.numbers(parts.delay, seconds)
     max_rate = fastest(static, parts, seconds, how)
     rounded = ROUNDINGS * float(np.finfo(dtype).eps) / 2 * max(map(abs, static.input_range))
@@ -190,15 +186,8 @@ def build(
         plays,
         plays.limits,
         moving.build(static, parts.plays, seconds, min(max_rate * seconds, drive_span), dtype),
-        LagTables(
-            np.array([int(exact) for exact, _ in lags], dtype=np.int64),
-            reals([row for _, row in lags], "constants of the lag").reshape(len(lags), 4),
-        ),
-        CreepTables(
-            reals(rows, "constants of the creep").reshape(len(rows), 4),
-            first.astype(np.int64),
-            reals(np.concatenate([np.empty((0, 2)), *(creep.shares(one.terms) for one in creeps)]), "creep"),
-        ),
+        lag.tables(lags, reals),
+        creep.tables(creeps, reals),
         DelayTables(reals([waited] * (waiting > 0), "the delay"), waiting),
         reals([resonance.numbers(each, seconds).table for each in parts.modes], "the modes").reshape(-1, 5),
         _ageing(parts, drive_span, reals, float(np.finfo(dtype).eps) / 2),

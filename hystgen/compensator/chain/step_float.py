@@ -16,6 +16,7 @@ from hystgen.effects.creep import compensator as creep
 from hystgen.effects.delay.compensator import delayed
 from hystgen.effects.drift import compensator as drift
 from hystgen.effects.lag import compensator as lag
+from hystgen.effects.lag.compensator import HALVES
 from hystgen.effects.lag.compensator import braked as lag_braked
 from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.thermal import compensator as thermal
@@ -67,7 +68,7 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:  # noqa: ARG001  as in fi
 def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
     """The drive from which the lag does not overshoot, where the one in reach is near instead of v."""
     beyond = v - near if v > near else near - v
-    return lag_braked(t.lag, s.lag, near, beyond, t.number[FALLING], t.number[RISING])
+    return lag_braked(t.lag, s.lag, near, beyond, t.number[FALLING], t.number[RISING], HALVES)
 
 
 # ---------------------------------------------------------------- slew_float.c

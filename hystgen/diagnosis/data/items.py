@@ -7,7 +7,7 @@ filters are exact on straight lines.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Protocol
@@ -52,13 +52,17 @@ class Recent:
         self._arrays[by] = found = self._arrays.pop(by)  # moved to the end as the one used last
         return found
 
-    def remember(self, by: object, found: Array) -> None:
-        """Remember an array; those unused for the longest time give way."""
-        arrays = self._arrays
+    def kept(self, by: object, make: Callable[[], Array]) -> Array:
+        """The array under a key, made if there is none; those unused for the longest time give way."""
+        found = self.recalled(by)
+        if found is not None:
+            return found
+        found, arrays = make(), self._arrays
         while arrays and (len(arrays) >= self._most or found.nbytes * (len(arrays) + 1) > self._most_bytes):
             del arrays[next(iter(arrays))]
         if found.nbytes <= self._most_bytes:
             arrays[by] = found
+        return found
 
 
 @dataclass(frozen=True)

@@ -67,15 +67,15 @@ class _Block:
         if here.bends:
             self._level, moved, begun = here.level(h, item, p)
             self._offset = here.compared(moved, item)
-            bent = here.mapped(h, self._level, item)
+            bent = here.mapped(h, self._level, item.run)
             step = item.step(h)
-            slope = (here.mapped(h + step, self._level, item) - bent) / step
+            slope = (here.mapped(h + step, self._level, item.run) - bent) / step
             rows = here.compared(rows * slope, item)
             h = here.compared(bent, item)
             target = measured - h + p @ rows + begun
         else:
             target = measured - constant
-        added = here.added(item)
+        added = here.added(item.run)[item.compared]
         self._sum = h + added
         self.samples = len(h)
         free = (like or here).nuisances(item, self._offset)
@@ -120,8 +120,8 @@ class _Block:
         rows, constant = other.columns(self._item, self._p, sums)
         moved = rows[0] + constant
         if other.bends:
-            moved = other.compared(other.mapped(moved, self._level, self._item), self._item)
-        return np.asarray(moved + other.added(self._item))
+            moved = other.compared(other.mapped(moved, self._level, self._item.run), self._item)
+        return np.asarray(moved + other.added(self._item.run)[self._item.compared])
 
     def _begun(self, other: Actuator) -> Array:
         """The response to the start state with other numbers: a factor at its limit follows it, the others stay."""

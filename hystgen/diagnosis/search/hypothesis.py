@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.cascade import Cascade
-from hystgen.chain import chain
+from hystgen.chain.chain import Ordered
 from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.search import acceptance
@@ -58,8 +58,8 @@ class NotFiniteError(ArithmeticError):
 
 
 @dataclass(frozen=True)
-class Actuator:
-    """Plays with given thresholds between a front and effects; the weights are separate arguments."""
+class Actuator(Ordered):
+    """The chain of a hypothesis, over records whose start state may be unknown; the weights are separate arguments."""
 
     thresholds: Array
     stages: tuple[Stage, ...]
@@ -70,17 +70,6 @@ class Actuator:
     """Gain and offset over a run, kept with the effect and the run, since the `id` of a deleted one may be reused."""
     starts: Starts = ()
     """Start memories found beside the effects: the turns of an item, and those that replace them."""
-
-    def at(self, place: Place) -> Sequence[Effect]:
-        """The effects at one place of the chain, in its order."""
-        return self._at.get(place, ())
-
-    @cached_property
-    def _at(self) -> dict[Place, list[Effect]]:
-        found: dict[Place, list[Effect]] = {}
-        for effect in sorted(self.effects, key=lambda each: each.order):
-            found.setdefault(effect.place, []).append(effect)
-        return found
 
     def columns(self, item: Item, p: Array | None = None, sums: Sums | None = None) -> tuple[Array, Array]:
         """Rows that the weights multiply, up to the output map, and the constant that is added to them.
@@ -100,11 +89,10 @@ class Actuator:
                 self.gains[key] = effect, whole, effect.gain(whole), effect.offset(whole)
             gain, offset = (values[item.part][now] for values in self.gains[key][2:])
             rows, constant = rows * gain, constant * gain + offset
-        for effect in self.at(Place.LINEAR):
-            if effect.order > 0:
-                rows = effect.filtered(rows, run)
-                if self.at(Place.GAIN):  # without one the constant is zero
-                    constant = effect.filtered(constant, run)
+        for effect in self.at(Place.LINEAR)[len(self.filters) :]:
+            rows = effect.filtered(rows, run)
+            if self.at(Place.GAIN):  # without one the constant is zero
+                constant = effect.filtered(constant, run)
         if self._needed == _RINGING:
             rows, constant = item.picked(rows), constant[item.compared]
         return rows, constant
@@ -118,94 +106,73 @@ class Actuator:
         """The last part of the chain that needs every sample; after it the compared ones are enough."""
         if not all(effect.pointwise for effect in self.at(Place.OUTPUT)):
             return _MAPPED
-        if len(self._filters) < len(self.at(Place.LINEAR)):
+        if len(self.filters) < len(self.at(Place.LINEAR)):
             return _RINGING
-        return _FILTERED if self._filters or not all(effect.pointwise for effect in self._bending) else _MOVED
+        return _FILTERED if self.filters or not all(effect.pointwise for effect in self.bending) else _MOVED
 
     def _slow(self, item: Item) -> Array:
         """(n + 1, N) plays after the filters that follow them, cached like the plays."""
         if self._needed == _MOVED:
             return self._plays(item)
-        by = (self._moving, self._bending, self._filters, self._needed == _FILTERED)
-        rows = item.moved.recalled(by)
-        if rows is None:
+
+        def make() -> Array:
             rows = self._plays(item)
-            for effect in self._filters:
+            for effect in self.filters:
                 rows = effect.filtered(rows, item.run)
-            if self._needed == _FILTERED:
-                rows = item.picked(rows)
-            item.moved.remember(by, rows)
-        return rows
+            return item.picked(rows) if self._needed == _FILTERED else rows
+
+        return item.moved.kept((self._moving, self.bending, self.filters, self._needed == _FILTERED), make)
 
     def _slow_sum(self, item: Item, p: Array, sums: Sums) -> Array:
         """(N,) weighted sum of `_slow`; actuators that differ in one number share the part of the chain before it."""
-        by: object = (self._moving, self._bending)
+        by: object = (self._moving, self.bending)
         if by not in sums:
             sums[by] = self._summed(item, p)
         total = sums[by]
-        for effect in self._filters:
+        for effect in self.filters:
             by = (by, effect)
             if by not in sums:
                 sums[by] = effect.filtered(total, item.run)
             total = sums[by]
         return total[item.compared] if self._needed == _FILTERED else total
 
-    @cached_property
-    def _filters(self) -> tuple[Effect, ...]:
-        """The filters right behind the plays."""
-        return tuple(effect for effect in self.at(Place.LINEAR) if effect.order == 0)
-
     def _plays(self, item: Item) -> Array:
         """(n + 1, N) plays after the effects that bend them; those of the last few hypotheses are cached."""
-        if not self._bending:
+        if not self.bending:
             return self._moved(item)
-        by = (self._moving, self._bending, self._needed == _MOVED)
-        rows = item.moved.recalled(by)
-        if rows is None:
-            rows = chain.bent(self._bending, self._moved(item), self.thresholds)
-            item.moved.remember(by, rows)
-        return rows
+        by = (self._moving, self.bending, self._needed == _MOVED)
+        return item.moved.kept(by, lambda: self.bent(self._moved(item), self.thresholds))
 
     def _moved(self, item: Item) -> Array:
         """(n + 1, N) plays before they are bent, also cached."""
-        by = (self._moving, (), self._needed == _MOVED)
-        rows = item.moved.recalled(by)
-        if rows is None:
-            rows = chain.moved(self.at(Place.PLAYS), *self._input(item))
-            if self._needed == _MOVED:
-                rows = item.picked(rows)
-            item.moved.remember(by, rows)
-        return rows
+
+        def make() -> Array:
+            rows = self.moved(*self._input(item))
+            return item.picked(rows) if self._needed == _MOVED else rows
+
+        return item.moved.kept((self._moving, (), self._needed == _MOVED), make)
 
     def _summed(self, item: Item, p: Array) -> Array:
         """(N,) weighted sum of the plays; those without a weight need not be computed.
 
         The sum has the same bits with and without cached plays, since the cache depends on what a process did before.
         """
-        if self._bending:
-            return chain.bent_sum(self._bending, p, self._moved(item), self.thresholds)
+        if self.bending:
+            return self.bent_sum(p, self._moved(item), self.thresholds)
         rows = item.moved.recalled((self._moving, (), self._needed == _MOVED))
         if rows is not None:
             return operators.weighted_sum(p, rows)
-        total = chain.summed(self.at(Place.PLAYS), p, *self._input(item))
+        total = self.summed(p, *self._input(item))
         return total[item.compared] if self._needed == _MOVED else total
-
-    @cached_property
-    def _bending(self) -> tuple[Effect, ...]:
-        """The effects that bend the plays."""
-        return tuple(effect for effect in self.at(Place.PLAYS) if effect.bends_plays())
 
     @cached_property
     def _moving(self) -> object:
         """A key of everything, except the record, that the movement of the plays depends on."""
-        movers = tuple(effect for effect in self.at(Place.PLAYS) if effect.moves_plays())
-        return self.thresholds.tobytes(), tuple(self.at(Place.DRIVE)), self.stages, movers, self.starts
+        return self.thresholds.tobytes(), tuple(self.at(Place.DRIVE)), self.stages, self.mover, self.starts
 
     def course(self, item: Item, y: Array) -> reduction.Course:
         """The record as the plays see it, with another output (N,)."""
-        a = item.run.v
-        for effect in self.at(Place.DRIVE):
-            a = effect.drive(a, item.run)
+        a = self.driven(item.run)
         course = reduction.Course(item.name, a, y, self._visited(item), 0, len(a))
         return joint.through_front(course, self.stages)
 
@@ -221,18 +188,6 @@ class Actuator:
         start = reduction.start_states(course.v, course.history, self.thresholds)
         return course.v, item.run, self.thresholds, start
 
-    def mapped(self, h: Array, level: Array, item: Item) -> Array:
-        """The output after its maps: a limit before the offset `level`, a sensor after it."""
-        maps = self.at(Place.OUTPUT)
-        for effect in maps:
-            if effect.order == 0:
-                h = effect.mapped(h, item.run)
-        h = h + level
-        for effect in maps:
-            if effect.order > 0:
-                h = effect.mapped(h, item.run)
-        return h
-
     def level(self, h: Array, item: Item, p: Array) -> tuple[Array, Array, Array]:
         """The best offset (N,) in front of a sensor and behind a limit, and the change of the output with it (N,).
 
@@ -240,17 +195,17 @@ class Actuator:
         sensor: about the wrong offset its curve would be a different one. Also returns the responses' part of the
         output (at the compared samples), to first order; their factors are within the limits of `largest`.
         """
-        y = item.y[item.compared] - self.added(item)
+        y = item.y[item.compared] - self.added(item.run)[item.compared]
         free = self._free(item) if self._needed == _MAPPED else self.nuisances(item)
         limits = self.largest(item, p)
         factors = np.zeros(len(free))
         level = np.full(len(h), float(np.mean(y - self.compared(h, item))))
         step = item.step(h)
         for _ in range(LEVEL_STEPS):
-            bent = self.mapped(h, level, item)
+            bent = self.mapped(h, level, item.run)
             if not np.isfinite(bent).all():
                 raise NotFiniteError
-            moved = (self.mapped(h, level + step, item) - bent) / step
+            moved = (self.mapped(h, level + step, item.run) - bent) / step
             residuals, slopes = y - self.compared(bent, item), self.compared(free * moved, item)
             if not np.any(slopes[0]):
                 break
@@ -263,13 +218,6 @@ class Actuator:
             if np.max(np.abs(shift)) < step:
                 break
         return level, moved, factors[1:] @ self.nuisances(item, self.compared(moved, item))[1:]
-
-    def added(self, item: Item) -> Array:
-        """Sum of the terms added at the end of the chain, at the compared samples."""
-        total = np.zeros(len(item.run.t))
-        for effect in self.at(Place.ADDED):
-            total = total + effect.added(item.run)
-        return total[item.compared]
 
     @cached_property
     def bends(self) -> bool:
@@ -308,9 +256,8 @@ class Actuator:
         `like`: another actuator and its weights, whose `nuisances` are free in place of its own, to compare the two on
         equal terms.
         """
-        by = self._mark(p), None if like is None else like[0]._mark(like[1])
-        whole = item.errors.recalled(by)
-        if whole is None:
+
+        def make() -> Array:
             residuals, offset = self._residual(item, p)
             known = np.isfinite(residuals)
             free = (self.nuisances(item, offset) if like is None else like[0].nuisances(item))[:, known]
@@ -320,8 +267,9 @@ class Actuator:
             whole = np.full(len(item.y), np.nan)
             whole[item.compared] = e
             whole.setflags(write=False)
-            item.errors.remember(by, whole)
-        return whole
+            return whole
+
+        return item.errors.kept((self._mark(p), None if like is None else like[0]._mark(like[1])), make)
 
     def _mark(self, p: Array) -> object:
         """A key of everything, except the record, that a prediction depends on."""
@@ -334,19 +282,19 @@ class Actuator:
 
     def _residual(self, item: Item, p: Array) -> Array:
         """(2, N) at the compared samples: the error before a fit of free components, and its change with the offset."""
-        by = self._mark(p)
-        found = item.residuals.recalled(by)
-        if found is None:
+
+        def make() -> Array:
             rows, constant = self.columns(item, p)
             h, moved = rows[0] + constant, np.ones(rows.shape[1])
             begun: Array | float = 0.0
             if self.bends:
                 level, moved, begun = self.level(h, item, p)
-                h = self.mapped(h, level, item)
-            residuals = item.y[item.compared] - self.compared(h, item) - self.added(item) + begun
-            found = np.stack([residuals, self.compared(moved, item)])
-            item.residuals.remember(by, found)
-        return found
+                h = self.mapped(h, level, item.run)
+            added = self.added(item.run)[item.compared]
+            residuals = item.y[item.compared] - self.compared(h, item) - added + begun
+            return np.stack([residuals, self.compared(moved, item)])
+
+        return item.residuals.kept(self._mark(p), make)
 
 
 def _within(columns: Array, y: Array, low: Array, high: Array) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,62 +11,10 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
-from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.kinds import Block, Constants, Kind, Rows
 from hystgen.plays.slots import Counts, Reals, zero
 
 EFFECTS = (ExponentialCreep, LogarithmicCreep)
-
-
-class CreepBlock:
-    """`y_k = d h_k + sum X_i`, `X_i <- E_i X_i + c_i (b0_i h_(k-1) + b1_i h_k)`, the weights folded into the states.
-
-    `direct`: d, the share of a step that arrives at once; `weights`: c_i >= 0. Solved, `h_k = (y_k - sum (E_i X_i +
-    c_i b0_i h_(k-1)))/(d + sum c_i b1_i)`: for d > 0 the inverse is stable whatever the time constants are, since the
-    response is strictly positive real.
-    """
-
-    def __init__(self, direct: float, time_constants: Array, weights: Array) -> None:
-        self.direct, self.time_constants, self.weights = direct, time_constants, weights
-        self.states, self.before = np.zeros(len(weights)), 0.0
-        self._factors = functools.lru_cache(maxsize=64)(self._of_step)
-        self.advance(0.0)
-
-    def _of_step(self, seconds: float) -> tuple[Array, Array, Array, float]:
-        step = np.array([seconds])
-        decay, early, late = np.array([np.concatenate(decays(step, tau)) for tau in self.time_constants]).T
-        late = self.weights * late
-        return decay, self.weights * early, late, self.direct + float(np.sum(late))
-
-    def resting(self, y: float) -> float:
-        """`y/(d + sum c_i)`."""
-        return y / (self.direct + float(np.sum(self.weights)))
-
-    def rest(self, x: float) -> float:
-        """Every state holds its share of `x`."""
-        self.states, self.before = self.weights * x, x
-        return self.direct * x + float(np.sum(self.states))
-
-    def advance(self, seconds: float) -> None:
-        """The factors of this step."""
-        self.decay, self.early, self.late, self.slope = self._factors(seconds)
-
-    def solve(self, y: float) -> float:
-        """The play sum that gives `y` with what creeps anyway."""
-        return (y - float(np.sum(self.decay * self.states + self.early * self.before))) / self.slope
-
-    def absorb(self, x: float) -> float:
-        """The states follow."""
-        self.states = self.decay * self.states + self.early * self.before + self.late * x
-        self.before = x
-        return self.direct * x + float(np.sum(self.states))
-
-
-def block(effect: ExponentialCreep | LogarithmicCreep) -> CreepBlock:
-    """The block of an effect without `problems`."""
-    if isinstance(effect, ExponentialCreep):
-        return CreepBlock(1.0, np.array(effect.time_constants), np.array(effect.weights))
-    tau, weight = effect.spectrum()
-    return CreepBlock(effect.at_once, tau, np.full(len(tau), weight))
 
 
 def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:
@@ -79,8 +27,17 @@ def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:
         )
 
 
+RATE, EARLY, LATE, WEIGHT = 0, 1, 2, 3
+
+
 class CreepNumbers(NamedTuple):
-    """Constants of a block at even steps, in double precision. `terms` (m, 4): of each state 1 - E, c b0, c b1, c."""
+    """Constants of a block `y_k = d h_k + sum X_i`, `X_i <- E_i X_i + c_i (b0_i h_(k-1) + b1_i h_k)` at even steps, in
+    double precision: d is the share of a step that arrives at once, c_i >= 0 the weights. `terms` (m, 4): of each state
+    1 - E, c b0, c b1, c.
+
+    Solved, `h_k = (y_k - sum (E_i X_i + c_i b0_i h_(k-1)))/(d + sum c_i b1_i)`: for d > 0 the inverse is stable
+    whatever the time constants are, since the response is strictly positive real.
+    """
 
     slope: float  # d + sum c_i b1_i
     rest: float  # d + sum c_i
@@ -89,14 +46,15 @@ class CreepNumbers(NamedTuple):
 
 def numbers(effect: ExponentialCreep | LogarithmicCreep, seconds: float) -> CreepNumbers:
     """The constants of an effect without `problems` at steps of `seconds`."""
-    one = block(effect)
-    one.advance(seconds)
-    rate = -np.expm1(-seconds / one.time_constants)
-    terms = np.column_stack([rate, one.early, one.late, one.weights])
-    return CreepNumbers(one.slope, one.direct + float(np.sum(one.weights)), terms)
-
-
-RATE, EARLY, LATE, WEIGHT = 0, 1, 2, 3
+    if isinstance(effect, ExponentialCreep):
+        direct, tau, weights = 1.0, np.array(effect.time_constants), np.array(effect.weights)
+    else:
+        tau, weight = effect.spectrum()
+        direct, weights = effect.at_once, np.full(len(tau), weight)
+    step = np.array([seconds])
+    _, early, late = np.array([np.concatenate(decays(step, each)) for each in tau]).T
+    terms = np.column_stack([-np.expm1(-seconds / tau), weights * early, weights * late, weights])
+    return CreepNumbers(direct + float(np.sum(terms[:, LATE])), direct + float(np.sum(weights)), terms)
 
 
 def shares(terms: Array) -> Array:
@@ -129,6 +87,16 @@ class CreepTables(NamedTuple):
     block: Reals
     first: Counts
     term: Reals
+
+
+def tables(blocks: Sequence[CreepNumbers], reals: Callable[[Any, str], Any]) -> CreepTables:
+    """The tables of several blocks in floating point; `reals`: numbers, with a name, as those of the arithmetic."""
+    rows = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in blocks]
+    return CreepTables(
+        reals(rows, "constants of the creep").reshape(len(rows), 4),
+        np.cumsum([0, *(len(one.terms) for one in blocks)]).astype(np.int64),
+        reals(np.concatenate([np.empty((0, 2)), *(shares(one.terms) for one in blocks)]), "creep"),
+    )
 
 
 def constants(t: CreepTables) -> Iterator[Constants]:
@@ -185,3 +153,37 @@ def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
         ahead = ahead + following
     s.block[j, AHEAD] = ahead
     return y
+
+
+# ---------------------------------------------------------------- at steps of any length
+
+
+class UnevenCreep(Block):
+    """Creep in double precision at steps of any length, by these functions."""
+
+    def __init__(self, effect: ExponentialCreep | LogarithmicCreep) -> None:
+        self._numbers = functools.lru_cache(maxsize=64)(functools.partial(numbers, effect))
+        self._tables = functools.lru_cache(maxsize=256)(self._of_steps)
+        self.advance(1.0)
+        self.state = CreepState(np.zeros((1, 2)), np.zeros((len(self.table.term), 2)))
+
+    def _of_steps(self, seconds: float, later: float) -> CreepTables:
+        """As `tables`, with the states on their way to the next output, by the E and b0 of the next step; an input has
+        the share `(E b1 + b0)/(1 - E)` in it, with the b1 of this one."""
+        now, following = self._numbers(seconds), self._numbers(later)
+        rate, late = following.terms[:, RATE], now.terms[:, LATE] - following.terms[:, LATE]
+        found = tables([now], lambda values, _: np.array(values))
+        found.term[:] = shares(following.terms)
+        found.term[:, SHARE] += late * (1.0 - rate) / rate
+        return found
+
+    def advance(self, seconds: float, later: float | None = None) -> None:
+        """The numbers of this step and the next."""
+        self.table = self._tables(seconds, later or seconds)
+
+    def call(self, verb: str, x: float) -> float:
+        """What a function makes of x."""
+        return float(FUNCTIONS[verb](self.table, self.state, 0, x))
+
+
+FUNCTIONS: dict[str, Any] = {"rest": creep_rest, "resting": creep_resting, "solve": creep_solve, "absorb": creep_absorb}

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-from typing import Any, NamedTuple, Protocol
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hystgen.basics.jit import jit
 from hystgen.effects.base import decays
-from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.kinds import Block, Constants, Kind
 from hystgen.effects.lag.model import Lag
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -28,134 +28,24 @@ its end, without a limit 0.1. A sine of 100 samples from rest is missed by 0.003
 0.0045 with 1. Set by: benchmarks/chosen_numbers.py branches."""
 
 
-class Branched(Protocol):
-    """What is behind a lag, and differs with the direction in which it arrives: `ascending` as it moved last, `rises`
-    as it is to move now."""
-
-    ascending: bool
-    rises: bool
-
-
-class LagBlock:
-    """`a_k = E a_(k-1) + b0 v_(k-1) + b1 v_k`, led by way of the state of a lag on held drives.
-
-    For steps T well below tau the inverse of this is a pole near -1, which rings. With `theta = b0/(1 - E)` and
-    `x_k = E x_(k-1) + (1 - E) v_k`, which is exactly invertible, `a_k = (1 - theta) x_k + theta x_(k-1)` for even
-    steps: x is led to `a + theta (a - a_before)`. What remains is `theta^2` times the second difference of the wanted
-    a. For T >= 2 tau the pole fades within a few samples, and the inverse is the exact one.
-    """
-
-    def __init__(self, time_constant: float) -> None:
-        self.time_constant = time_constant
-        self.branched: Branched | None = None
-        self.always_led = False
-        self.rest(0.0)
-        self.advance(0.0)
-
-    def advance(self, seconds: float) -> None:
-        """The factors of this step."""
-        self.decay, self.early, self.late = (float(x[0]) for x in decays(np.array([seconds]), self.time_constant))
-        self.exact = seconds >= LONG_STEP * self.time_constant and not self.always_led
-        self.theta = self.early / (1.0 - self.decay) if self.decay < 1.0 else 0.5
-
-    def turn_with(self, branched: Branched, always_led: bool) -> None:
-        """Arrive from one side at what follows, which differs with the direction, unless the inverse is exact.
-
-        `always_led`: it never is, since a drive that is rounded does not arrive exactly.
-        """
-        self.branched, self.always_led = branched, always_led
-
-    def resting(self, y: float) -> float:
-        """The drive itself."""
-        return y
-
-    def rest(self, x: float) -> float:
-        """Settle."""
-        self.state = self.reached = self.before = self.wanted = self._asked = self._earlier = self.answer = x
-        self._target, self._moved, self._missed = x, 0.0, 0.0
-        return x
-
-    def solve(self, y: float) -> float:
-        """The drive that leads to `y`."""
-        if self.branched is None or self.exact:
-            return self._led(y)
-        way = y - self._target
-        if way * self._moved <= 0.0:
-            way = 0.0
-        elif abs(way) > MOST_LED * abs(self._moved):
-            way = MOST_LED * self._moved
-        self.wanted = self._earlier = y - way
-        v = self._led(y)
-        self.wanted -= self._missed
-        self.answer = self.steady(v)
-        return self.answer
-
-    def steady(self, v: float) -> float:
-        """The drive nearest to v that does not take the lag back from the direction in which it is to arrive."""
-        if self.branched is None or self.exact:
-            return v
-        return max(v, self.state) if self.branched.rises else min(v, self.state)
-
-    def _led(self, y: float) -> float:
-        if self.exact:
-            self.answer = (y - self.decay * self.reached - self.early * self.before) / self.late
-        else:
-            goal = y + self.theta * (y - self.wanted)
-            self.answer = self.state + (goal - self.state) / (1.0 - self.decay)
-        self._asked = y
-        return self.answer
-
-    def braked(self, near: float, short: float, falling: float, rising: float) -> float:
-        """The drive from which the lag does not overshoot, though its drive comes back by `falling` or `rising` a step.
-
-        `near`: the drive in reach that is nearest to the answer, `short` of it. A target that moves on by `way` a step
-        takes a lead of `way/(1 - E)`. With m beyond that, which shrinks by `back` a step, the lag gains at most
-        `(1 - E)(m + back/2)^2/(2 back)` on the target, and is to gain `left`. Up to `left = (1 - E) back/2` it arrives
-        in one step; and a drive no farther than where the lag is to arrive never overshoots. Where nothing limits the
-        drive its lead is right as it is, so that it gives way by what it is short of the answer and was before at most.
-        """
-        rate = 1.0 - self.decay
-        way = min(max(self._asked - self._earlier, -falling), rising)
-        left = self._asked + self.theta * way - self.state - way
-        back = falling + way if left > 0.0 else rising - way
-        room = short + abs(self._earlier - self.wanted) / rate
-        lead = math.copysign(1.0, left) * (near - self.state - way / rate)
-        most = abs(left) / rate
-        if most <= 0.5 * back:
-            room = min(max(lead - most, -room), room)
-        else:
-            most = max(abs(left), math.sqrt(2.0 * back * most) - 0.5 * back)
-            room = min(max(lead - most, 0.0), room)
-        return near - math.copysign(1.0, left) * room
-
-    def absorb(self, x: float) -> float:
-        """The lag follows. Behind another drive than the one asked for, the next lead starts from where that leads."""
-        self.reached = self.decay * self.reached + self.early * self.before + self.late * x
-        self.state = self.state + (1.0 - self.decay) * (x - self.state)
-        self.wanted = self._asked + self.late * (x - self.answer)
-        self.before = x
-        self._target, self._moved = self._asked, self._asked - self._target
-        self._earlier = self._asked
-        self._missed = self._earlier - self.wanted
-        return self.reached
-
-
-def block(effect: Lag) -> LagBlock | None:
-    """The block of an effect; None if its time constant is 0."""
-    return LagBlock(effect.time_constant) if effect.time_constant > 0.0 else None
-
-
-def numbers(effect: Lag, seconds: float, turning: bool = False) -> tuple[bool, tuple[float, float, float, float]]:
+def numbers(
+    effect: Lag, seconds: float, turning: bool = False, exact: bool | None = None
+) -> tuple[bool, tuple[float, float, float, float]]:
     """Whether the inverse is exact, and its constants: `1 - E`, then b0, b1, `1/b1`, or else theta, b1, `1/(1 - E)`.
 
-    `turning`: what follows differs with the direction in which the lag arrives, so that it is led in any case.
+    `turning`: what follows differs with the direction in which the lag arrives, so that it is led in any case; `exact`:
+    as asked for.
+
+    Of `a_k = E a_(k-1) + b0 v_(k-1) + b1 v_k`, for steps T well below tau, the inverse is a pole near -1, which rings.
+    With `theta = b0/(1 - E)` and `x_k = E x_(k-1) + (1 - E) v_k`, which is exactly invertible, `a_k = (1 - theta) x_k +
+    theta x_(k-1)` for even steps: x is led to `a + theta (a - a_before)`. What remains is `theta^2` times the second
+    difference of the wanted a. For T >= 2 tau the pole fades within a few samples, and the inverse is the exact one.
     """
-    one = LagBlock(effect.time_constant)
-    one.advance(seconds)
+    if exact is None:
+        exact = seconds >= LONG_STEP * effect.time_constant and not turning
+    _, early, late = (float(x[0]) for x in decays(np.array([seconds]), effect.time_constant))
     rate = -float(np.expm1(-seconds / effect.time_constant))
-    if one.exact and not turning:
-        return True, (rate, one.early, one.late, 1.0 / one.late)
-    return False, (rate, one.early / rate, one.late, 1.0 / rate)
+    return exact, (rate, early, late, 1.0 / late) if exact else (rate, early / rate, late, 1.0 / rate)
 
 
 def shifted(theta: float, turning: bool = False) -> float:
@@ -199,6 +89,16 @@ class LagTables(NamedTuple):
 
     exact: Counts
     block: Reals
+
+
+def tables(
+    lags: Sequence[tuple[bool, tuple[float, float, float, float]]], reals: Callable[[Any, str], Any]
+) -> LagTables:
+    """The tables of several lags in floating point; `reals`: numbers, with a name, as those of the arithmetic."""
+    return LagTables(
+        np.array([int(exact) for exact, _ in lags], dtype=np.int64),
+        reals([row for _, row in lags], "constants of the lag").reshape(len(lags), 4),
+    )
 
 
 def constants(t: LagTables, braked: bool) -> Iterator[Constants]:
@@ -314,8 +214,17 @@ def steady_absorb(s: Reals, before: Any) -> None:
 
 
 @jit
-def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: Any) -> Any:
-    """As `LagBlock.braked`, of the only lag of a model."""
+def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: Any, halves: int) -> Any:
+    """The drive from which the only lag of a model does not overshoot, though its drive comes back by `falling` or
+    `rising` a step.
+
+    `near`: the drive in reach that is nearest to the answer, `short` of it. A target that moves on by `way` a step
+    takes a lead of `way/(1 - E)`. With m beyond that, which shrinks by `back` a step, the lag gains at most
+    `(1 - E)(m + back/2)^2/(2 back)` on the target, and is to gain `left`. Up to `left = (1 - E) back/2` it arrives
+    in one step; and a drive no farther than where the lag is to arrive never overshoots. Where nothing limits the
+    drive its lead is right as it is, so that it gives way by what it is short of the answer and was before at most.
+    `halves`: of the search for m.
+    """
     n = t.block[0]
     missed = s[0, EARLIER] - s[0, WANTED]
     room = short + (-missed if missed < 0 else missed) * n[INVERSE]
@@ -332,12 +241,12 @@ def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: 
     down = left < 0
     back = rising - way if down else falling + way
     size = -left if down else left
-    over = braked_over(size, size * n[INVERSE], -ahead if down else ahead, back, room, n.dtype.type(0.5))
+    over = braked_over(size, size * n[INVERSE], -ahead if down else ahead, back, room, n.dtype.type(0.5), halves)
     return near + over if down else near - over
 
 
 @jit
-def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any) -> Any:
+def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any, halves: int) -> Any:
     """By how much a lead exceeds the largest that comes back in time, within `room`; `most` gains `size` at once."""
     margin = back * half
     over = lead - most
@@ -346,7 +255,7 @@ def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any
         if lead <= size or (lead + margin) * (lead + margin) <= limit:
             return lead - lead
         low, high = size, lead
-        for _ in range(HALVES):
+        for _ in range(halves):
             middle = low + (high - low) * half
             if (middle + margin) * (middle + margin) <= limit:
                 low = middle
@@ -356,3 +265,78 @@ def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any
     if over > room:
         return room
     return -room if over < -room else over
+
+
+# ---------------------------------------------------------------- at steps of any length
+
+
+ALL_HALVES = 64
+"""[steps] Halvings after which nothing is left in double precision, which has 53 bits."""
+
+
+class UnevenLag(Block):
+    """A lag in double precision at steps of any length: led by the first of two rows, inverted exactly by the second,
+    which also says what arrives.
+
+    `rises`: the direction in which it is to arrive, where what follows has two branches; then it is led however short
+    it is if `always_led`, since a drive that is rounded does not arrive exactly.
+    """
+
+    def __init__(self, effect: Lag) -> None:
+        self.rises: Callable[[], bool] | None = None
+        self.always_led = False
+        self.moved = 0.0
+        self.state = np.zeros((2, 6))
+        self.begun = self.state[0].copy()
+        self._of_step = functools.lru_cache(maxsize=64)(functools.partial(_uneven, effect))
+        self.advance(1.0)
+
+    def advance(self, seconds: float, later: float | None = None) -> None:
+        """The numbers of this step."""
+        long, self.table = self._of_step(seconds)
+        self.exact = long and not self.always_led
+
+    @property
+    def patience(self) -> float:
+        """The share of the way to another branch that it misses in the first sample of a turn."""
+        return 0.0 if self.exact else float(self.table.block[0, THETA])
+
+    def call(self, verb: str, x: float) -> float:
+        """What a function makes of x; for `solve` it may be asked several times."""
+        t, s = self.table, self.state
+        if verb == "rest":
+            self.moved = 0.0
+            lag_rest(t, s, 0, x)
+            lag_rest(t, s, 1, x)
+        elif verb == "absorb":
+            self.moved = float(s[0, ASKED] - self.begun[ASKED])
+            lag_absorb(t, s, 0, x)
+            x = lag_absorb(t, s, 1, x)
+        elif verb == "solve":
+            s[0] = self.begun
+            if self.exact:
+                answer = lag_solve(t, s, 1, x)
+                s[0, ASKED], s[0, ANSWER] = x, answer
+                return float(answer)
+            if self.rises is None:
+                return float(lag_solve(t, s, 0, x))
+            return float(steady_solve(t, s, x, self.moved, int(self.rises()), s[0, HIGH], 0.0)[0])
+        if verb != "resting":
+            self.begun = s[0].copy()
+        return float(x)
+
+    def steady(self, v: float) -> float:
+        """The drive nearest to v that does not take the lag back from the direction in which it is to arrive."""
+        if self.rises is None or self.exact:
+            return v
+        return float(steady_kept(self.table, self.state, v, int(self.rises()), self.state[0, HIGH], 0.0))
+
+    def braked(self, near: float, short: float, falling: float, rising: float) -> float:
+        """The drive from which it does not overshoot, as `braked`."""
+        return self.steady(float(braked(self.table, self.state, near, short, falling, rising, ALL_HALVES)))
+
+
+def _uneven(effect: Lag, seconds: float) -> tuple[bool, LagTables]:
+    """Whether a step is long enough for the exact inverse, and the numbers of both."""
+    long, _ = numbers(effect, seconds)
+    return long, tables([numbers(effect, seconds, exact=exact) for exact in (False, True)], lambda x, _: np.array(x))

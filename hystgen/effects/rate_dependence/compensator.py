@@ -8,7 +8,7 @@ from typing import TypeGuard
 import numpy as np
 
 from hystgen.effects.base import Array, Effect
-from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate, relaxed
+from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate, dilated_plays, relaxed
 
 
 class Movement:
@@ -43,8 +43,8 @@ class Movement:
         out = np.empty_like(plays)
         out[0] = w
         if self.by_threshold(seconds):
-            r = self.r[1:] + np.asarray(self.betas) * abs(w - x) / seconds
-            out[1:] = np.clip(plays[1:], w - r, w + r)
+            rate = np.array([abs(w - x) / seconds])
+            dilated_plays(np.array([w]), rate, self.r[1:], np.asarray(self.betas), plays[1:], out[1:, None])
             return out
         for i, tau in enumerate(self.taus, 1):
             if tau > 0.0:
