@@ -19,6 +19,7 @@ import units
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.compensator import reference, step, step_fixed, step_float
 from hystgen.emission import runtime
+from hystgen.emission.calls import emitted_files
 from hystgen.plays import fixed, loop, slots
 from hystgen.verification import signals
 from hystgen.verification.compilers import C_WARNINGS, WARNINGS
@@ -198,7 +199,7 @@ def test_every_line_is_in_a_unit() -> None:
     found = set().union(*(units.lines(*unit) for unit in units.UNITS))
     whole = {units.RUNTIME / "hystgen_runtime.c", units.EFFECTS / "resonance" / "part.c"}
     memory = {units.RUNTIME / "plays" / f"state_{kind}.h" for kind in ("float", "fixed")}  # of kernels, in all units
-    files = [path for path in units.standing() if path.suffix == ".c" or path.stem.startswith("state") or path.stem.endswith("_state")]
+    files = [path for path in units.standing() if path.suffix == ".c" or "state" in path.stem.split("_")]
     expected = {
         (units.relative(path), number)
         for path in {*files} - whole - memory
@@ -241,6 +242,47 @@ def test_a_file_opens_with_a_paragraph(path: Path) -> None:
     """What it does stands in front of its first line of code."""
     text = path.read_text(encoding="ascii")
     assert re.match(r"/\*(?:[^*]|\*(?!/)){20,}\*/\n", text) or path.name == "part.c"
+
+
+FORMS = """#ifndef HYSTGEN_A_C
+#ifdef HYSTGEN_FIXED
+fixed
+#ifdef HYSTGEN_SOFT_FLOAT
+soft
+#else
+hard
+#endif
+#elif defined(HYSTGEN_HAS_DELAY) && !defined(HYSTGEN_CHAIN)
+delayed
+#else
+plain
+#ifndef HYSTGEN_HAS_DELAY
+at once
+#endif
+#endif
+#endif
+"""
+
+
+@pytest.mark.parametrize(("facts", "kept"), [
+    (["FIXED"], ["fixed", "#ifdef HYSTGEN_SOFT_FLOAT", "soft", "#else", "hard", "#endif"]),
+    (["FIXED", "HAS_DELAY"], ["fixed", "#ifdef HYSTGEN_SOFT_FLOAT", "soft", "#else", "hard", "#endif"]),
+    (["HAS_DELAY"], ["delayed"]),
+    (["HAS_DELAY", "CHAIN"], ["plain"]),
+    ([], ["plain", "at once"]),
+])  # fmt: skip
+def test_conditions_on_facts_choose_and_others_stay(facts: list[str], kept: list[str]) -> None:
+    found = runtime.chosen(FORMS, {f"HYSTGEN_{fact}" for fact in facts})
+    assert found.splitlines() == ["#ifndef HYSTGEN_A_C", *kept, "#endif"]
+
+
+@pytest.mark.parametrize(("name", "arithmetic"), [("everything", "q31"), ("plain", "float64")])
+def test_neither_facts_nor_the_default_model_are_emitted(name: str, arithmetic: str) -> None:
+    for layout in ("self-contained", "shared-runtime"):
+        files = emitted_files(units.model(name), operator="both", arithmetic=arithmetic, layout=layout)
+        macros = {macro for text in files.values() for macro in re.findall(r"\bHYSTGEN_\w+", text)}
+        assert macros
+        assert not {macro for macro in macros if runtime.FACTS.fullmatch(macro) or macro == "HYSTGEN_CONFIGURED"}
 
 
 def test_functions_of_engine_loop_have_one_name_in_c_and_python() -> None:
