@@ -26,9 +26,8 @@ from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.chain.step_float import ramp
 from hystgen.effects import own
 from hystgen.effects.ageing import compensator as ageing
-from hystgen.effects.base import Array, Effect, Place, Run
+from hystgen.effects.base import Array, Block, Effect, Place, Run
 from hystgen.effects.creep import compensator as creep
-from hystgen.effects.kinds import Block
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag.model import Lag
 from hystgen.effects.rate_dependence.compensator import Movement

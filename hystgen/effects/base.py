@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import enum
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -340,6 +341,39 @@ class Effect(BaseModel):
     def candidates(cls, about: About) -> list[Candidate]:
         """Shapes to try in a fit, simplest first."""
         return []
+
+
+class Block(ABC):
+    """One block of a compensator in double precision, one sample at a time, at steps of any length in s.
+
+    A compensator solves backwards from the output, which moves nothing, and absorbs the applied drive forwards, so that
+    its memory holds only what the actuator has seen.
+    """
+
+    @abstractmethod
+    def advance(self, seconds: float, later: float | None = None) -> None:
+        """The next sample comes this long after the last one, and the one behind it `later` after that; None: as long
+        again. For the first sample, at which everything rests, both are what comes behind it."""
+
+    @abstractmethod
+    def call(self, verb: str, x: float) -> float:
+        """What one of the verbs below makes of x."""
+
+    def resting(self, y: float) -> float:
+        """The input that gives the output `y` once everything has settled."""
+        return self.call("resting", y)
+
+    def rest(self, x: float) -> float:
+        """Settle at the input `x`; returns the output."""
+        return self.call("rest", x)
+
+    def solve(self, y: float) -> float:
+        """The input that gives the output `y` at this sample."""
+        return self.call("solve", y)
+
+    def absorb(self, x: float) -> float:
+        """The input is `x` at this sample; returns the output."""
+        return self.call("absorb", x)
 
 
 def span(low: float, high: float) -> tuple[float, float]:

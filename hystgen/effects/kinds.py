@@ -7,7 +7,6 @@ import functools
 import inspect
 import textwrap
 import types
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -16,39 +15,6 @@ from hystgen.basics.jit import Jit, jit
 
 VERBS = ("rest", "resting", "solve", "absorb")
 """The verbs of every block: settle at an input, give the input of a settled output, solve for an input, absorb one."""
-
-
-class Block(ABC):
-    """One block of a compensator in double precision, one sample at a time, at steps of any length in s.
-
-    A compensator solves backwards from the output, which moves nothing, and absorbs the applied drive forwards, so that
-    its memory holds only what the actuator has seen.
-    """
-
-    @abstractmethod
-    def advance(self, seconds: float, later: float | None = None) -> None:
-        """The next sample comes this long after the last one, and the one behind it `later` after that; None: as long
-        again. For the first sample, at which everything rests, both are what comes behind it."""
-
-    @abstractmethod
-    def call(self, verb: str, x: float) -> float:
-        """What one of the `VERBS` makes of x."""
-
-    def resting(self, y: float) -> float:
-        """The input that gives the output `y` once everything has settled."""
-        return self.call("resting", y)
-
-    def rest(self, x: float) -> float:
-        """Settle at the input `x`; returns the output."""
-        return self.call("rest", x)
-
-    def solve(self, y: float) -> float:
-        """The input that gives the output `y` at this sample."""
-        return self.call("solve", y)
-
-    def absorb(self, x: float) -> float:
-        """The input is `x` at this sample; returns the output."""
-        return self.call("absorb", x)
 
 
 @dataclass(frozen=True)

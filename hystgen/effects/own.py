@@ -26,8 +26,8 @@ import numpy as np
 
 from hystgen.basics.names import KEYWORDS
 from hystgen.basics.problems import EffectsError
-from hystgen.effects.base import USER, Array, Effect, Place
-from hystgen.effects.kinds import Block, Kind, OwnBlock, product
+from hystgen.effects.base import USER, Array, Block, Effect, Place
+from hystgen.effects.kinds import Kind, OwnBlock, product
 
 ARGUMENTS = {"rest": 3, "resting": 2, "solve": 3, "absorb": 3}
 """How many arguments each function takes."""

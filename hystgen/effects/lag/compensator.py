@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.effects.base import decays
-from hystgen.effects.kinds import Block, Constants, Kind
+from hystgen.effects.base import Block, decays
+from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag.model import Lag
 from hystgen.plays.slots import Counts, Reals, zero
 
