@@ -108,6 +108,7 @@ def arrived(v: Array, step: float, lag: float) -> tuple[float, int]:
     return float(np.max(y)) / step - 1.0, int(left[-1]) + 1
 
 
+@pytest.mark.thorough(but_one_in=5)
 @pytest.mark.parametrize(
     ("lag", "moves", "back"),
     [(20.0, 25.0, 1.0), (20.0, 5.0, 1.0), (2.0, 8.0, 2.0), (100.0, 12.0, 0.5), (60.0, 4.0, 1.0)],

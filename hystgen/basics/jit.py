@@ -76,7 +76,7 @@ def plain() -> Iterator[None]:
         _plain.reset(before)
 
 
-def for_samples(function: Jit[..., Any], samples: NDArray[Any]) -> contextlib.AbstractContextManager[None]:
+def for_samples(function: Callable[..., Any], samples: NDArray[Any]) -> contextlib.AbstractContextManager[None]:
     """As `plain` while `function` has been given few samples of their type in this process, and otherwise nothing."""
     key = function, samples.dtype
     if _samples[key] + len(samples) > SHORT:
