@@ -24,7 +24,7 @@ REC = Path(__file__).resolve().parents[1] / "examples" / "stage_recording.csv"
 MODEL = Model(parse_parameters(FILES["plain"], "plain.yaml"))
 INVERSE = MODEL.inverse()
 NO_RECORD = r"a data frame, a dict of arrays .*, a tuple of arrays \(t, v, y\), or a list of these, not "
-OF_FILES = "made of files, not of records in memory"
+OF_FILES = "consists of files, not of records in memory"
 
 
 class Frame:
@@ -121,7 +121,7 @@ OPTIONS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
     "name of an option": ({"threshold": 3}, TypeError, r"\(\) has no option threshold; did you mean thresholds\?"),
     "history of one": ({"history": 5}, TypeError, r"history is a list .* not 5; give a list .* \[100, -100\]"),
     "history as text": ({"history": "100,-100"}, TypeError, "not '100,-100'; give a list"),
-    "history of texts": ({"history": ["a"]}, TypeError, "history .* an entry is none"),
+    "history of texts": ({"history": ["a"]}, TypeError, "history .* an entry is not a number"),
     "rest": ({"rest": "1"}, TypeError, "rest is a number of seconds, not '1'"),
     "skip": ({"skip": -2.5}, ValueError, "skip is a number of seconds, not negative, not -2.5"),
     "columns as text": ({"columns": "t=Time"}, TypeError, "columns is a mapping .* not 't=Time'; give {'t': 'Time'"),
@@ -170,7 +170,7 @@ def test_wrong_options_of_a_diagnosis_and_a_batch(tmp_path: Path) -> None:
     ):  # fmt: skip
         refused(lambda options=options: hystgen.diagnose(MODEL, REC, **options), error, words)
     for options, error, words in (
-        ({"jobs": "2"}, TypeError, "jobs is a whole number"), ({"jobs": 0}, ValueError, "from 1 on"),
+        ({"jobs": "2"}, TypeError, "jobs is a whole number"), ({"jobs": 0}, ValueError, "at least 1"),
         ({"emission": {"arithmetics": "q15"}}, TypeError, "did you mean arithmetic"),
     ):  # fmt: skip
         refused(lambda options=options: hystgen.identify_batch(REC, tmp_path / "o", **options), error, words)

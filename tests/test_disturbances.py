@@ -561,7 +561,7 @@ def test_a_diagnosis_of_faulty_records(tmp_path: Path) -> None:
     assert (drop["kind"], drop["count"], drop["level"]) == ("drop_outs", 2, -2.0)
     found.write(tmp_path / "out")
     page = (tmp_path / "out" / "report.html").read_text()
-    for words in ("a line at 50 Hz (mains hum)", "drop-outs", "No effect of the catalogue", "Faults of the data"):
+    for words in ("a line at 50 Hz (mains hum)", "drop-outs", "No effect in the catalogue", "Faults of the data"):
         assert words in page
     assert json.loads((tmp_path / "out" / "diagnosis.json").read_text()) == found.content
 

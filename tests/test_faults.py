@@ -418,7 +418,7 @@ class TestSizes:
                         wrong[channel][k] = value
                         fit = hystgen.identify(record(wrong["v"], wrong["y"]), history=[0.0])
                         assert apart(fit, clean) < 0.005
-            with pytest.raises(IdentificationError, match=r"2000 of 2000 samples of y stand for no value.*convert y"):
+            with pytest.raises(IdentificationError, match=r"2000 of 2000 samples of y stand for a missing value.*convert y"):
                 hystgen.identify(record(v, (y + 10.0) * 1e300))
 
 
@@ -432,7 +432,7 @@ class TestConverterAtItsEnd:
         at = np.flatnonzero(y >= level)
         (used,) = fit.used
         assert used.stretches.tolist() == at.tolist()
-        assert any(f"{len(at)} samples of y at the converter's end" in text for text in fit.warnings)
+        assert any(f"{len(at)} samples of y at the limit of the converter" in text for text in fit.warnings)
         assert fit.parameters.model.pi.weights[:2] == pytest.approx(WEIGHTS[:2], abs=0.003)
         assert fit.parameters.input_range[1] == np.max(v[y < level])
 

@@ -199,7 +199,7 @@ def test_inputs_that_are_none_are_refused(name: str) -> None:
         (lambda: plants.Preisach(lambda a, b: (a - b) * (1.5 - (a - b)), 0.0, 1.0), "increases in alpha"),
         (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0]]), "2 edges but 1 rows"),
         (lambda: EverettTable([0.0, 1.0], 3.0), "2 edges but 0 rows"),  # type: ignore[arg-type]
-        (lambda: EverettTable([0.0, 0.0], [[0.0, 0.0]] * 2), "rise strictly"),
+        (lambda: EverettTable([0.0, 0.0], [[0.0, 0.0]] * 2), "strictly increasing"),
         (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0], [0.0]]), "every row has 2 values"),
         (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0], [1.0, 0.5]]), "0 on the diagonal"),
         (lambda: EverettTable([0.0, 1.0], [[0.0, 0.0], [math.nan, 0.0]]), "values up to the diagonal as finite"),
@@ -207,7 +207,7 @@ def test_inputs_that_are_none_are_refused(name: str) -> None:
         (lambda: plants.Preisach(SURFACE, -5.1, 5.0), "from -5 to 5 has no values outside"),
         (lambda: SURFACE(np.array([0.0]), np.array([0.1])), "nor for alpha < beta"),
         (lambda: plants.KrasnoselskiiPokrovskii([0.0], [1.0], [1.0], 0.0), "ramp has to be positive"),
-        (lambda: plants.KrasnoselskiiPokrovskii([2.0], [1.0], [1.0], 1.0), "not above its upper one"),
+        (lambda: plants.KrasnoselskiiPokrovskii([2.0], [1.0], [1.0], 1.0), "not be above its upper one"),
         (lambda: plants.KrasnoselskiiPokrovskii([0.0], [1.0], [1.0, 2.0], 1.0), "but 2 weights"),
         (lambda: plants.KrasnoselskiiPokrovskii([0.0], [1.0], [1.0], 1.0, 2.0), "between -1 and 1"),
         (lambda: plants.KrasnoselskiiPokrovskii.on_grid(1.0, 0.0, 5, np.minimum), "low = 1.0 has to be below high"),

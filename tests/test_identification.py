@@ -293,7 +293,7 @@ class TestWeights:
         fit = hystgen.identify(record(v, y), thresholds=THRESHOLDS, history=())
         assert fitted(fit)[1][0] == 0.0
         (warned,) = fit.warnings
-        assert warned.startswith("p_0 is 0: after each reversal the output stands still")
+        assert warned.startswith("p_0 is 0: after each reversal the output does not move")
         fit.write(tmp_path / "a.yaml")
         with pytest.raises(NotInvertibleError):
             hystgen.load(tmp_path / "a.yaml").inverse()

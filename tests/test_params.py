@@ -369,10 +369,10 @@ REFUSED = [
         '4:23515: model.pi.weights: has 4098 values, more than 4097; shorten the list',
     ]),
     case('state_length', pi("thresholds: [0, 1], weights: [1, 1], initial_state: [0, 0, 0]"), [
-        '4:66: model.pi.initial_state: has 3 values for 2 thresholds (r_0 included); write one number, or one a threshold',
+        '4:66: model.pi.initial_state: has 3 values for 2 thresholds (r_0 included); write one number, or one per threshold',
     ]),
     case('state_one', pi("thresholds: [0, 1], weights: [1, 1], initial_state: [0]"), [
-        '4:66: model.pi.initial_state: has 1 value for 2 thresholds (r_0 included); write one number, or one a threshold',
+        '4:66: model.pi.initial_state: has 1 value for 2 thresholds (r_0 included); write one number, or one per threshold',
     ]),
     case('state_none', pi("thresholds: [0, 1], weights: [1, 1], initial_state: []"), [
         '4:66: model.pi.initial_state: has 0 values, at least 1 needed; add to the list',
@@ -453,7 +453,7 @@ REFUSED = [
         '4:23: model.pi.density: makes weights up to 3.33e+31, more than 1e+30; choose other units',
     ]),
     case('density_state', den("formula: r, r_max: 1, p0: 1, n: 2}, initial_state: [0, 1], x: {"), [
-        '4:75: model.pi.initial_state: has 2 values for 3 thresholds (r_0 included); write one number, or one a threshold',
+        '4:75: model.pi.initial_state: has 2 values for 3 thresholds (r_0 included); write one number, or one per threshold',
         '4:83: model.pi.x: unknown key; known here are thresholds, weights, initial_state, density',
     ]),
     case('table_order', den("table: {r: [0, 1, 1], p: [1, 1, 1]}, p0: 1, n: 1"), [
@@ -476,7 +476,7 @@ REFUSED = [
         '4:32: model.pi.density.table.q: unknown key; known here are r, p',
     ]),
     case('density_state_length', H + "model: {pi: {density: {formula: r, r_max: 1, p0: 1, n: 2}, initial_state: [0, 1]}}\n", [
-        '4:75: model.pi.initial_state: has 2 values for 3 thresholds (r_0 included); write one number, or one a threshold',
+        '4:75: model.pi.initial_state: has 2 values for 3 thresholds (r_0 included); write one number, or one per threshold',
     ]),
     case('stage_number', front("5"), [
         '4:64: model.memoryless: must be a stage or a list of stages, not 5; write a mapping with kind: dead_zone or kind: tanh',
@@ -760,7 +760,7 @@ emit: {operator: revers}
         "f.yaml:7:14: error: input_range: 5 is not below 1; write [lowest, highest]",
         "f.yaml:10:26: error: model.pi.thresholds[2]: 0.45 is not above the 0.9 before it; sort the list and remove repeated values",
         "f.yaml:11:14: error: model.pi.weights: has 2 values for 3 in thresholds; give as many as thresholds",
-        "f.yaml:12:20: error: model.pi.initial_state: has 2 values for 3 thresholds (r_0 included); write one number, or one a threshold",
+        "f.yaml:12:20: error: model.pi.initial_state: has 2 values for 3 thresholds (r_0 included); write one number, or one per threshold",
         "f.yaml:14:37: error: model.memoryless[0].thresholds: do not contain 0; add 0 and the weight of the linear part",
         "f.yaml:14:54: error: model.memoryless[0].weights: has 1 value for 2 in thresholds; give as many as thresholds",
         "f.yaml:15:31: error: model.memoryless[1].ascending: a0 = 1 and a1 = -1 make a falling branch; give both the same sign",

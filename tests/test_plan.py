@@ -234,14 +234,14 @@ class TestCommand:
             path.touch()
         assert hystgen.plan(tmp_path / "stage.yaml", rate=50.0).left_over(left[0].parent) == []
         _, _, err = run("diagnose", "--plan", tmp_path / "stage.yaml", "-o", left[0].parent)
-        assert f"of an earlier plan, with other drives: {left[0]}, {left[1]}; remove" in err
+        assert f"from an earlier plan, with other drives: {left[0]}, {left[1]}; remove" in err
 
     @pytest.mark.parametrize(
         ("dac", "problems"),
         [
-            ({"dac_bits": 4, "dac_range": (150.0, 0.0)}, ["for one rate", "a DAC of 4 bits", "150 to 0 does not rise"]),
-            ({"dac_bits": 40}, ["for one rate", "its bits and its range", "a DAC of 40 bits"]),
-            ({"dac_range": (9.0, 1.0), "rate": 50.0}, ["its bits and its range", "9 to 1 does not rise"]),
+            ({"dac_bits": 4, "dac_range": (150.0, 0.0)}, ["need a rate", "a DAC of 4 bits", "150 to 0 is not incr"]),
+            ({"dac_bits": 40}, ["need a rate", "its bits and its range", "a DAC of 40 bits"]),
+            ({"dac_range": (9.0, 1.0), "rate": 50.0}, ["its bits and its range", "9 to 1 is not increasing"]),
             ({"dac_bits": 4, "dac_range": (1, 2, 3), "rate": 0.0}, ["the rate 0.0", "has 3 numbers", "a DAC of 4"]),
         ],
     )
