@@ -2,12 +2,6 @@
 
 /* Operators of a model with effects: signals in fixed point, with bits below those of codes. */
 
-/* Every code is a finite number. */
-static inline bool hystgen_finite(hystgen_signal_t x) {
-    (void)x;
-    return true;
-}
-
 /* A signal in front of the plays, in units of their input. */
 static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a) {
     return (hystgen_fine_t)hystgen_nearest(a, HYSTGEN_ARRIVING_BITS);
@@ -27,19 +21,6 @@ static hystgen_reach_t hystgen_drive_code(hystgen_signal_t v) {
         return (hystgen_reach_t)HYSTGEN_LEAST_CODE;
     }
     return (hystgen_reach_t)code;
-}
-
-static inline bool hystgen_is_drive(hystgen_real_t v) {
-    return hystgen_clamp_drive(v) == v;
-}
-
-static inline bool hystgen_is_reference(hystgen_real_t u) {
-    return hystgen_inverse_clamp(u) == u;
-}
-
-/* An applied drive, limited to its range. */
-static inline hystgen_real_t hystgen_applied_drive(hystgen_real_t v) {
-    return hystgen_clamp_drive(v);
 }
 
 /* Output code of a signal, limited to the type. */

@@ -16,3 +16,10 @@ static hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self, hystgen_r
 static hystgen_real_t hystgen_inverse_held(const hystgen_inverse_t *self) {
     return self->stepped ? self->answer : self->applied;
 }
+
+/* Every reference is answered anew: time has passed for the effects. */
+static bool hystgen_inverse_stands(const hystgen_inverse_t *self, hystgen_real_t u) {
+    (void)self;
+    (void)u;
+    return false;
+}

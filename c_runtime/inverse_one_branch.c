@@ -2,7 +2,7 @@
 
 /* The drive that gives w; sets `limited` if there is none. */
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
-                                                                      hystgen_signal_t level,
+                                                                      hystgen_real_t level,
                                                                       hystgen_reach_t w,
                                                                       bool *limited) {
     (void)self;

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 from modelfiles import BRAKED, CALM, CHAINS, FILES, LED, PLAYS, STEADY, head
 
-STEP = "c_runtime/loop_float.c"
-LOOP = "c_runtime/loop.c"
+ALONE = "c_runtime/chain_alone.c"
 CODES = "c_runtime/code_saturating.c"
 FINER = "c_runtime/front_finer.c"
 CORNERS = "c_runtime/corners_fixed.c"
@@ -204,20 +203,20 @@ KILLED = (
         "return (hystgen_real_t)code;", "far_low", "q15",
     ),
     Mutant(
-        "no number before the first step", STEP, "self->stepped ? self->answer : self->drive", "self->answer",
+        "no number before the first step", ALONE, "self->stepped ? self->answer : self->drive", "self->answer",
         "plain", "float32", "loop",
     ),
     Mutant(
-        "a committed drive answers the same reference, loop", LOOP, "    self->repeat = false;\n    self->pending = v;",
-        "    self->pending = v;", "plain", "q31", "loop",
+        "a committed drive answers the same reference, loop", "c_runtime/chain_calls.c",
+        "    self->repeat = false;\n    self->pending = inside;", "    self->pending = inside;", "plain", "q31", "loop",
     ),
     Mutant(
-        "what is pending stays out of the memory", LOOP, "hystgen_inverse_absorb(self, self->pending);",
+        "what is pending stays out of the memory", "c_runtime/chain.c", "hystgen_inverse_absorb(self, self->pending);",
         "self->drive = self->pending;", "plain", "float32", "loop",
     ),
     Mutant(
-        "the limit of a reference counts as the reference", LOOP, "self->reference = u;", "self->reference = level;",
-        "plain", "float32", "loop",
+        "the limit of a reference counts as the reference", ALONE, "self->reference = u;",
+        "self->reference = hystgen_inverse_clamp(u);", "plain", "float32", "loop",
     ),
     Mutant(
         "an envelope limits nothing above", CURVE, "*limited = w > e->most && w > e->envelope_most;",
@@ -264,8 +263,8 @@ KILLED = (
     ),
     Mutant(
         "with effects, a kink counts as sought for good", CHAIN,
-        "    self->sought = false;\n    return hystgen_inverse_started(self);",
-        "    return hystgen_inverse_started(self);",
+        "    self->sought = false;\n    self->level = hystgen_inverse_started(self);",
+        "    self->level = hystgen_inverse_started(self);",
         "led", "q31",
     ),
     Mutant(
@@ -317,7 +316,7 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
      "= -HYSTGEN_FARTHEST_OFFSET;\n        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;\n",
      "= -HYSTGEN_FARTHEST_OFFSET;\n", "creeping", "float32", 2),
     ("a settled actuator keeps moving", "chain_calls.c", "    self->moving = false;\n", "", "creeping", "q31", 2),
-    ("a reference that is no number is forgotten", "chain_calls.c", "            hystgen_inverse_repeat(self);\n",
+    ("a reference that is no number is forgotten", "chain_calls.c", "    hystgen_inverse_repeat(self);\n",
      "", "late", "float32"),
     ("a set offset leaves the clock running", "chain_calls.c", "        hystgen_inverse_clock_start(self);\n",
      "", "drifting", "float32"),

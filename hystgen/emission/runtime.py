@@ -47,7 +47,8 @@ FIXED_CHAIN_BLOCKS = (
 SIGNALS = {
     "hystgen_signal_t": "hystgen_sum_t", "hystgen_fine_t": "hystgen_play_t", "hystgen_travel_t": "hystgen_sum_t",
 }  # fmt: skip
-"""Types between the blocks of a model with effects in fixed point; elsewhere they are those of codes."""
+"""Types between the blocks of a model with effects in fixed point; elsewhere they are those of codes, but in engine
+loop without effects signals are as wide as sums of the plays."""
 
 FINE = {
     "HYSTGEN_FINE_MIN": "HYSTGEN_DRIVE_MIN", "HYSTGEN_FINE_MAX": "HYSTGEN_DRIVE_MAX",
@@ -69,11 +70,12 @@ FIXED_KERNELS = (
 
 @dataclass(frozen=True)
 class Family:
-    """An arithmetic in C: its files of the run time and its types; `chain`: in a model with
-    effects."""
+    """An arithmetic in C: its files of the run time and its types; `chain`: in a model with effects, `loop`: in one
+    without, in engine loop."""
 
     arithmetic: Arithmetic
     chain: bool = False
+    loop: bool = False
 
     @property
     def bits(self) -> str:
@@ -108,7 +110,8 @@ class Family:
         """Names in code that models with and without effects share, and their meaning here."""
         if self.chain and self.fixed:
             return SIGNALS
-        return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE
+        sums = {"hystgen_signal_t": "hystgen_sum_t"} if self.loop and self.fixed else {}
+        return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE | sums
 
     @property
     def chain_types(self) -> tuple[str, ...]:
@@ -208,13 +211,12 @@ class Variant:
         """How functions begin that the compiler keeps apart here, as `render_operators` has it."""
         corners = self.engine == "corners"
         found = ["HYSTGEN_APART ", "HYSTGEN_APART_IN_FIXED " if self.fixed else "HYSTGEN_APART_IN_FLOAT "]
+        found += ["HYSTGEN_APART_IN_CHAIN ", *["HYSTGEN_APART_IN_FIXED_CHAIN "] * self.fixed] * self.chain
         found += ["HYSTGEN_APART_IN_FLOAT_CORNERS "] * (corners and not self.fixed)
         return (*found, *["HYSTGEN_APART_BUT_IN_FLOAT_LOOP "] * (corners or self.fixed))
 
     def state(self, operator: str) -> str:
-        """The header with the type of an instance."""
-        if self.engine == "loop":
-            return f"hystgen_loop_{operator}{'_branches' * self.branches}_state.h"
+        """The header with the type of an instance in engine corners without effects."""
         return f"hystgen_{operator}{'_front' * self.fronts}{'_fixed' * self.fixed}_state.h"
 
     def sources(self) -> tuple[str, ...]:
@@ -232,7 +234,7 @@ class Variant:
             files += two if self.branches else ("inverse_one_branch.c",)
         elif self.fixed or self.chain or self.engine == "loop":
             files.append("front_finer.c" if self.finer and not self.chain else "front_none.c")
-        own = self._chain() if self.chain else self._loop() if self.engine == "loop" else self._corners()
+        own = self._chain() if self.chain or self.engine == "loop" else self._corners()
         return (*files, *own, "status.c")
 
     @property
@@ -241,15 +243,15 @@ class Variant:
         return "loop_start_list.c" if self.start_list else "loop_start.c"
 
     def _chain(self) -> tuple[str, ...]:
-        """The files of a model with effects, apart from its blocks."""
+        """The files of a chain, apart from its blocks: of a model with effects, or of engine loop."""
         front = "branches" if self.branches else "front" if self.fronts else "plain"
         kind, loops = "fixed" if self.fixed else "float", self.engine == "loop"
         slew = (f"slew_{kind}.c", "chain_slew.c", *(() if self.braked else ("chain_unbraked.c",)))
-        slew = slew if self.slew else ("chain_free.c",)
+        slew = slew if self.slew else ("chain_free.c",) if self.chain else ("chain_alone.c",)
         braked = f"chain_braked{'_quiet' * self.quiet}{'_steady' * self.turning}.c"
         brake = ("chain_brake.c", braked) if self.braked else ()
         delay, more = "chain_delay.c" if self.waits else "chain_prompt.c", ("chain_ageing.c",) if self.ages else ()
-        solve = f"chain_solve_{kind}.c"
+        solve = "chain_solve.c" if self.fixed or not self.chain else "chain_solve_float.c"
         if not self.moves:
             plays: tuple[str, ...] = (solve, "chain_plays.c") if loops else (f"chain_corners_{kind}.c",)
         elif not self.bends:
@@ -264,24 +266,20 @@ class Variant:
             value = "value_apart.c" if self.bends == "centre" and not self.fixed else "value.c"
             moved = (*before, bent, f"moved_{self.moves}.c", reached, "moved_rest.c", *kept, known, value)
             plays = (*moved, "chain_moving.c", f"search_{kind}.c")
-        finer = ("chain_finer.c" if loops else "chain_corners_finer.c") if self.finer else "chain_whole.c"
+        finer = "chain_whole.c"
+        if self.finer and self.chain:
+            finer = "chain_finer.c" if loops else "chain_corners_finer.c"
         plays = (*plays, finer) if loops else (finer, *plays)
         chain = ("chain.c", "chain_loop.c" if loops else "chain_corners.c", "chain_calls.c")
         start = (self._start,) if loops else ()
-        return (*start, f"loop_{front}.c", delay, *slew, f"chain_{kind}.c", *brake, *plays, *chain, *more)
-
-    def _loop(self) -> tuple[str, ...]:
-        front = "branches" if self.branches else "front" if self.fronts else "plain"
-        kind = "fixed" if self.fixed else "float"
+        drive = ("loop_branches_drive.c",) if self.branches and not self.chain else ()
+        entered = () if self.fixed or self.chain else ("entered_float.c",)
+        codes = ("chain_float.c",)
+        if self.fixed:
+            codes = ("limits_fixed.c", "chain_fixed.c" if self.chain else "chain_codes.c")
         return (
-            self._start,
-            f"loop_{front}.c",
-            *(["loop_branches_drive.c"] if self.branches else []),
-            f"loop_output_{kind}.c",
-            "loop.c",
-            f"loop_{kind}.c",
-            "loop_two_branches.c" if self.branches else "loop_one_branch.c",
-        )
+            *start, f"loop_{front}.c", *drive, delay, *slew, *entered, *codes, *brake, *plays, *chain, *more,
+        )  # fmt: skip
 
     def _corners(self) -> tuple[str, ...]:
         kind = "_front" * self.fronts + "_fixed" * self.fixed
@@ -410,7 +408,7 @@ def operator_pieces(
 
     functions = folding.folded(
         [each for _, each in parsed if each], kernels, lambda functions: {each.name for each in put(functions)},
-        family.fixed, variant.apart,
+        family.fixed, variant.apart, family.signals,
     )  # fmt: skip
     return put(functions)
 
@@ -502,6 +500,10 @@ def render_operators(
     text = _joined(pieces)
     apart = corners > 0 and not family.fixed
     text = text.replace("HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART " if apart else "static ")
+    chained = "HYSTGEN_APART " if family.fixed and family.chain else "static inline "
+    text = text.replace("HYSTGEN_APART_IN_FIXED_CHAIN ", chained)
+    text = text.replace("HYSTGEN_APART_IN_CHAIN ", "HYSTGEN_APART " if family.chain else "static ")
+    text = text if family.chain else text.replace("HYSTGEN_ALONE ", "")
     text = text.replace("HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART " if family.fixed else "static inline ")
     text = text.replace("HYSTGEN_APART_IN_FLOAT ", "static " if family.fixed else "HYSTGEN_APART ")
     loop = corners == 0 and not family.fixed
@@ -545,7 +547,7 @@ def _named(
     """The text with the names of a model and of its run time; `carried`: those that the model has in its place."""
     for shared, here in family.signals.items():
         cast = f"({shared})"
-        if here == "hystgen_real_t":
+        if here == "hystgen_real_t" and not (family.loop and family.fixed):
             text = text.replace(cast, "")
         text = re.sub(rf"\b{shared}\b", here, text)
     if not family.fixed:  # one type for everything
