@@ -203,9 +203,7 @@ class _Folding:
             self._calls(function.name, functools.partial(_argument, place=place, same=same))
         elif (found := re.fullmatch(r"return \((\w+)\)(\w+);", does)) and found[2] in function.names:
             self._converted(function.name, found[1])
-        elif found := re.fullmatch(r"return (self->\w+);", does):
-            self._calls(function.name, lambda body, start, end, _: body[:start] + found[1] + body[end:])
-        elif does in ("return true;", "return false;"):
+        elif re.fullmatch(r"return self->\w+;", does) or does in ("return true;", "return false;"):
             self._calls(function.name, lambda body, start, end, _: body[:start] + does[7:-1] + body[end:])
         elif found := re.fullmatch(r"(return )?(hystgen_\w+)\((.*)\);", does):
             self._forward(function, found[2], f"{found[3]})", bool(found[1]))
@@ -213,14 +211,10 @@ class _Folding:
     def _converted(self, name: str, kind: str) -> None:
         """Leaves out calls that convert to the type that the argument has."""
         for caller, function in self.functions.items():
-            types = _declared(function)
-            body = re.sub(
-                rf"\b{name}\((\w+)\)",
-                lambda found, types=types: found[1] if self._same(types.get(found[1], ""), kind) else found[0],
-                function.body,
-            )  # fmt: skip
-            if body != function.body:
-                self._change(caller, body)
+            same = {each for each, own in _declared(function).items() if self._same(own, kind)}
+            for each in same:
+                function = replace(function, body=function.body.replace(f"{name}({each})", each))
+            self.functions[caller] = function
 
     def _forward(self, function: Function, name: str, rest: str, answers: bool) -> None:
         """A function that is a call of another one, which the callers may call themselves."""

@@ -274,9 +274,8 @@ class Variant:
         start = (self._start,) if loops else ()
         drive = ("loop_branches_drive.c",) if self.branches and not self.chain else ()
         entered = () if self.fixed or self.chain else ("entered_float.c",)
-        codes = ("chain_float.c",)
-        if self.fixed:
-            codes = ("limits_fixed.c", "chain_fixed.c" if self.chain else "chain_codes.c")
+        fixed = ("limits_fixed.c", "chain_fixed.c" if self.chain else "chain_codes.c")
+        codes = fixed if self.fixed else ("chain_float.c",)
         return (
             *start, f"loop_{front}.c", *drive, delay, *slew, *entered, *codes, *brake, *plays, *chain, *more,
         )  # fmt: skip
