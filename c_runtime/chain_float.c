@@ -1,6 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects: signals in floating point, of the type of drives. */
+/* Operators of engine loop and of every model with effects: signals in floating point, of the type
+   of drives. */
 
 static bool hystgen_finite(hystgen_signal_t x) {
     return x >= -HYSTGEN_REAL_MAX && x <= HYSTGEN_REAL_MAX; /* false for NaN */

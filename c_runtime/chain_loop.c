@@ -1,6 +1,6 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects: start memory of engine loop. */
+/* Operators of engine loop, with effects or without: start memory. */
 
 void hystgen_forward_init(hystgen_forward_t *self) {
     hystgen_forward_settings_init(self);

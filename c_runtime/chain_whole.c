@@ -1,6 +1,7 @@
 #include "hystgen_runtime.h"
 
-/* Operators of a model with effects: the input of the plays is fine enough as it is. */
+/* Operators of engine loop and of every model with effects: the input of the plays is fine enough as
+   it is. */
 
 static inline hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *self,
                                                      hystgen_signal_t h, hystgen_reach_t w,

@@ -1,7 +1,8 @@
-"""One step of engine loop, and the operations around it: commit, reset, init.
+"""One step, and the operations around it: commit, reset, init. `operations_of` has what every chain shares, `made_of`
+the chain without blocks, engine loop of a model without effects; `hystgen.compensator.chain` has those with blocks.
 
 Every function has a counterpart of the same name in `c_runtime/`. Functions that both operators share exist twice in C
-(`forward_begin`, `inverse_begin`) and once here (`begin`). Engine corners has its own functions in
+(`forward_begin`, `inverse_begin`) and once here (`begin`). Engine corners without effects has its own functions in
 `hystgen.compensator.corners` and shares the memoryless part and the tables.
 """
 
