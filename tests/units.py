@@ -100,8 +100,8 @@ def _values(name: str, arithmetic: str, engine: str) -> SimpleNamespace:
 
 def _states(values: SimpleNamespace) -> list[str]:
     """The headers with the memory of an instance, or of the blocks that it is made of."""
-    if values.variant.chain:
-        return [values.family.chain_types[1]]
+    if values.instances:
+        return [values.family.chain_types[1]] * values.variant.chain
     return [values.variant.state(op) for op in ("forward", "inverse")]
 
 
@@ -123,14 +123,17 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     values = _values(name, arithmetic, engine)
     operators = ("forward", "inverse")
     apis = [f"hystgen_{op}_api.h" for op in operators]
-    headers = [*_states(values), *([] if values.variant.chain else apis)]
-    types = [] if not values.variant.chain else [
-        f'#include "{values.family.chain_types[0]}"', *values.instances.values(),
-        *(f'#include "{header}"' for header in (*apis, *(f"hystgen_chain_{op}_api.h" for op in operators))),
+    chain, loop = values.variant.chain, values.family.loop
+    headers = [*_states(values), *([] if values.instances else apis)]
+    more = [f"hystgen_chain_{op}_api.h" for op in operators] * chain
+    types = [] if not values.instances else [
+        *([f'#include "{values.family.chain_types[0]}"'] * chain), *values.instances.values(),
+        *(f'#include "{header}"' for header in (*apis, *more)),
     ]  # fmt: skip
     text = "\n".join(
         [
-            *(["#define HYSTGEN_CHAIN"] if values.variant.chain else []),
+            *["#define HYSTGEN_CHAIN"] * chain,
+            *["#define HYSTGEN_LOOP", "#define HYSTGEN_STATUS_SLEW_LIMITED 16u /* never set */"] * loop,
             '#include "hystgen_runtime.h"',
             f"#define HYSTGEN_CORNERS {values.corners}",
             *values.limits,

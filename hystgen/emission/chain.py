@@ -576,7 +576,7 @@ def _functions(
 
     yield _function(
         "Sum of the plays.", f"static hystgen_signal_t hystgen_{op}_level(const {self_t})",
-        ["return self->level;" if t.effects else f"return hystgen_{op}_started(self);"],
+        ["return self->level;" if t.effects else "return hystgen_loop_output(&hystgen_model_tables, self->play);"],
     )  # fmt: skip
     yield _function(
         "What the output side has given last.", f"static hystgen_signal_t hystgen_{op}_output(const {self_t})",

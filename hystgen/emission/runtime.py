@@ -271,6 +271,7 @@ class Variant:
             finer = "chain_finer.c" if loops else "chain_corners_finer.c"
         plays = (*plays, finer) if loops else (finer, *plays)
         chain = ("chain.c", "chain_loop.c" if loops else "chain_corners.c", "chain_calls.c")
+        chain += ("chain_settings.c",) * self.chain
         start = (self._start,) if loops else ()
         drive = ("loop_branches_drive.c",) if self.branches and not self.chain else ()
         entered = () if self.fixed or self.chain else ("entered_float.c",)
