@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 from modelfiles import BRAKED, CALM, CHAINS, FILES, LED, PLAYS, STEADY, head
 
-STEP = "c_runtime/compensator/loop_float.c"
-LOOP = "c_runtime/compensator/loop.c"
+ALONE = "hystgen/effects/slew_limit/slewed.c"
 CODES = "c_runtime/compensator/code.c"
 FINER = "c_runtime/front/front.c"
 CORNERS = "c_runtime/plays/corners_fixed.c"
@@ -204,20 +203,20 @@ KILLED = (
         "return (hystgen_real_t)code;", "far_low", "q15",
     ),
     Mutant(
-        "no number before the first step", STEP, "self->stepped ? self->answer : self->drive", "self->answer",
+        "no number before the first step", ALONE, "self->stepped ? self->answer : self->drive", "self->answer",
         "plain", "float32", "loop",
     ),
     Mutant(
-        "a committed drive answers the same reference, loop", LOOP, "    self->repeat = false;\n    self->pending = v;",
-        "    self->pending = v;", "plain", "q31", "loop",
+        "a committed drive answers the same reference, loop", "c_runtime/compensator/chain/chain_calls.c",
+        "    self->repeat = false;\n    self->pending = inside;", "    self->pending = inside;", "plain", "q31", "loop",
     ),
     Mutant(
-        "what is pending stays out of the memory", LOOP, "hystgen_inverse_absorb(self, self->pending);",
-        "self->drive = self->pending;", "plain", "float32", "loop",
+        "what is pending stays out of the memory", "c_runtime/compensator/chain/chain.c",
+        "hystgen_inverse_absorb(self, self->pending);", "self->drive = self->pending;", "plain", "float32", "loop",
     ),
     Mutant(
-        "the limit of a reference counts as the reference", LOOP, "self->reference = u;", "self->reference = level;",
-        "plain", "float32", "loop",
+        "the limit of a reference counts as the reference", ALONE, "self->reference = u;",
+        "self->reference = hystgen_inverse_clamp(u);", "plain", "float32", "loop",
     ),
     Mutant(
         "an envelope limits nothing above", CURVE, "*limited = w > e->most && w > e->envelope_most;",
@@ -264,8 +263,8 @@ KILLED = (
     ),
     Mutant(
         "with effects, a kink counts as sought for good", CHAIN,
-        "    self->sought = false;\n    return hystgen_inverse_started(self);",
-        "    return hystgen_inverse_started(self);",
+        "    self->sought = false;\n    self->level = hystgen_inverse_started(self);",
+        "    self->level = hystgen_inverse_started(self);",
         "led", "q31",
     ),
     Mutant(
@@ -318,14 +317,14 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
      "                high = middle;\n", "braked", "float32"),
     ("the brake finds no lead, fixed", "effects/lag/braked_fixed.c",
      "low = middle;", "high = middle;", "braked", "q31"),
-    ("a limited offset is not told", "compensator/chain/chain_calls.c",
+    ("a limited offset is not told", "compensator/chain/settings.c",
      "= -HYSTGEN_FARTHEST_OFFSET;\n        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;\n",
      "= -HYSTGEN_FARTHEST_OFFSET;\n", "creeping", "float32", 2),
-    ("a settled actuator keeps moving", "compensator/chain/chain_calls.c",
+    ("a settled actuator keeps moving", "compensator/chain/settings.c",
      "    self->moving = false;\n", "", "creeping", "q31", 2),
     ("a reference that is no number is forgotten", "compensator/chain/chain_calls.c",
-     "            hystgen_inverse_repeat(self);\n", "", "late", "float32"),
-    ("a set offset leaves the clock running", "compensator/chain/chain_calls.c",
+     "    hystgen_inverse_repeat(self);\n", "", "late", "float32"),
+    ("a set offset leaves the clock running", "compensator/chain/settings.c",
      "        hystgen_inverse_clock_start(self);\n", "", "drifting", "float32"),
     ("a rising drive is not slewed", "effects/slew_limit/slewed.c", "beyond = v > ramp->drive ||", "beyond = v > v ||",
      "quick", "float32"),

@@ -1491,8 +1491,8 @@ for test, *numbers in (
 
 @pytest.mark.parametrize(
     ("row", "given", "expected"),
-    [pytest.param(row, given, expected, id=f"{row.name}{list(given) if given else ''}")
-     for row in ROWS for given, expected in row.cases],
+    [pytest.param(row, given, expected, id=f"{row.name}-{number}")
+     for row in ROWS for number, (given, expected) in enumerate(row.cases)],
 )  # fmt: skip
 def test_a_case_on_one_side(row: thresholds.Row, given: tuple[Any, ...], expected: Any) -> None:
     assert row.answer(given) == expected

@@ -122,9 +122,9 @@ def _values(name: str, arithmetic: str, engine: str) -> SimpleNamespace:
 
 def _states(values: SimpleNamespace) -> list[str]:
     """The headers with the memory of an instance, or of the blocks that it is made of."""
-    if values.variant.chain:
-        return [values.family.chain_types[1]]
-    return [values.variant.state(op) for op in ("forward", "inverse")]
+    if values.instances:
+        return [values.family.chain_types[1]] * values.variant.chain
+    return [values.variant.state]
 
 
 def _blocks(values: SimpleNamespace) -> list[str]:
@@ -144,15 +144,17 @@ def _blocks(values: SimpleNamespace) -> list[str]:
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     """The unit of both operators of a model, with its kernels."""
     values = _values(name, arithmetic, engine)
-    headers = [*dict.fromkeys(_states(values)), *([] if values.variant.chain else ["compensator/api.h"])]
-    types = [] if not values.variant.chain else [
-        f'#include "{values.family.chain_types[0]}"', *values.instances.values(),
-        '#include "compensator/api.h"', '#include "compensator/chain/api.h"',
+    chain, loop = values.variant.chain, values.family.loop
+    headers = [*_states(values), *([] if values.instances else ["compensator/api.h"])]
+    types = [] if not values.instances else [
+        *([f'#include "{values.family.chain_types[0]}"'] * chain), *values.instances.values(),
+        '#include "compensator/api.h"', *['#include "compensator/chain/api.h"'] * chain,
     ]  # fmt: skip
     text = "\n".join(
         [
             "#define HYSTGEN_CONFIGURED",
-            *(["#define HYSTGEN_CHAIN"] if values.variant.chain else []),
+            *["#define HYSTGEN_CHAIN"] * chain,
+            *["#define HYSTGEN_LOOP", "#define HYSTGEN_STATUS_SLEW_LIMITED 16u /* never set */"] * loop,
             *(f"#define {fact}" for fact in sorted(values.variant.facts)),
             '#include "hystgen_runtime.h"',
             f"#define HYSTGEN_CORNERS {values.corners}",

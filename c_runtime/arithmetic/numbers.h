@@ -42,13 +42,18 @@ typedef hystgen_real_t hystgen_sum_t;
 
 /* In a model with effects, signal: between its blocks, in fixed point wider than codes; fine: a
    drive in front of its plays, in fixed point with bits below a code; travel: the distance that the
-   drive has covered. Without effects, and in floating point, all of them have the caller's type. */
+   drive has covered. Without effects, and in floating point, all of them have the caller's type, but
+   signals of engine loop are sums of its plays. */
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
 typedef hystgen_sum_t hystgen_signal_t;
 typedef hystgen_play_t hystgen_fine_t;
 typedef hystgen_sum_t hystgen_travel_t;
 #else
+#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_LOOP)
+typedef hystgen_sum_t hystgen_signal_t;
+#else
 typedef hystgen_real_t hystgen_signal_t;
+#endif
 typedef hystgen_real_t hystgen_fine_t;
 typedef hystgen_real_t hystgen_travel_t;
 typedef hystgen_real_t hystgen_number_t;
@@ -65,6 +70,8 @@ typedef hystgen_real_t hystgen_number_t;
 #define HYSTGEN_FIXED_KERNEL
 #define HYSTGEN_APART_IN_FLOAT_CORNERS HYSTGEN_APART
 #define HYSTGEN_APART_IN_FIXED HYSTGEN_APART
+#define HYSTGEN_APART_IN_FIXED_CHAIN HYSTGEN_APART
+#define HYSTGEN_APART_IN_CHAIN HYSTGEN_APART
 #define HYSTGEN_APART_IN_FLOAT HYSTGEN_APART
 #define HYSTGEN_APART_BUT_IN_FLOAT_LOOP HYSTGEN_APART
 

@@ -25,13 +25,13 @@ static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t 
 /* The drive that gives w on the branch of its own move. Tries the branch of the reference's move,
    then the other one; if neither fits, the drive holds. Sets `limited` if no drive gives w. */
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
-                                                                      hystgen_signal_t level,
+                                                                      hystgen_real_t level,
                                                                       hystgen_reach_t w,
                                                                       bool *limited) {
     bool up = self->ascending;
-    if (level > self->level) {
+    if (level > self->last) {
         up = true;
-    } else if (level < self->level) {
+    } else if (level < self->last) {
         up = false;
     }
     hystgen_reach_t v = hystgen_front_inverse(w, up, limited);
@@ -50,7 +50,7 @@ HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hyst
 #else
 /* The drive that gives w; sets `limited` if there is none. */
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
-                                                                      hystgen_signal_t level,
+                                                                      hystgen_real_t level,
                                                                       hystgen_reach_t w,
                                                                       bool *limited) {
     (void)self;

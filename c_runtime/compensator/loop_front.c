@@ -19,7 +19,7 @@ static hystgen_play_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_fi
 }
 
 /* The drive that gives w. */
-static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_signal_t level,
+static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_real_t level,
                                              hystgen_reach_t w) {
     bool limited;
     const hystgen_reach_t v = hystgen_inverse_choose(self, level, w, &limited);

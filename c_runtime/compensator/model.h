@@ -3,6 +3,9 @@
    compiles as it is opened in an editor. With HYSTGEN_CONFIGURED a real model comes instead. */
 #ifndef HYSTGEN_MODEL_H
 #define HYSTGEN_MODEL_H
+#if !defined(HYSTGEN_CONFIGURED) && !defined(HYSTGEN_HAS_CORNERS) && !defined(HYSTGEN_CHAIN)
+#define HYSTGEN_CHAIN /* engine loop is a chain */
+#endif
 #include "hystgen_runtime.h"
 #ifndef HYSTGEN_CONFIGURED
 
@@ -93,8 +96,9 @@ extern const hystgen_drive_t hystgen_inverse_drive[2];
 #endif
 #endif
 
-#ifndef HYSTGEN_CHAIN
-#ifdef HYSTGEN_HAS_CORNERS
+#ifdef HYSTGEN_CHAIN
+#include "compensator/chain/model.h"
+#else
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_HAS_FRONT)
 #include "compensator/corners/state_front_fixed.h"
 #elif defined(HYSTGEN_FIXED)
@@ -103,13 +107,6 @@ extern const hystgen_drive_t hystgen_inverse_drive[2];
 #include "compensator/corners/state_front.h"
 #else
 #include "compensator/corners/state.h"
-#endif
-#elif defined(HYSTGEN_HAS_TWO_BRANCHES)
-#include "compensator/loop_forward_branches_state.h"
-#include "compensator/loop_inverse_branches_state.h"
-#else
-#include "compensator/loop_forward_state.h"
-#include "compensator/loop_inverse_state.h"
 #endif
 #include "compensator/api.h"
 #endif

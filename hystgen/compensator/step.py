@@ -1,7 +1,8 @@
-"""One step of engine loop, and the operations around it: commit, reset, init.
+"""One step, and the operations around it: commit, reset, init. `operations_of` has what every chain shares, `made_of`
+the chain without blocks, engine loop of a model without effects; `hystgen.compensator.chain` has those with blocks.
 
 Every function has a counterpart of the same name in `c_runtime/`. Functions that both operators share exist twice in C
-(`forward_begin`, `inverse_begin`) and once here (`begin`). Engine corners has its own functions in
+(`forward_begin`, `inverse_begin`) and once here (`begin`). Engine corners without effects has its own functions in
 `hystgen.compensator.corners` and shares the memoryless part and the tables.
 """
 
@@ -76,16 +77,6 @@ def inverse_fits(t: Tables | FixedTables, s: State, v: Any, ascending: int) -> b
     if inside == s.real[DRIVE]:
         return bool(s.counts[ASCENDING] == ascending)
     return bool((inside > s.real[DRIVE]) == (ascending != 0))
-
-
-@jit
-def inverse_replace(s: State, applied: Any, v: Any) -> None:
-    """Drive v, which is `applied` after limiting, is pending in place of the last answer."""
-    if v != applied:
-        s.counts[STATUS] |= INPUT_CLAMPED
-    s.counts[REPEAT] = 0
-    s.real[PENDING] = v
-    s.counts[HAS_PENDING] = 1
 
 
 class PlayOperations(NamedTuple):
@@ -180,6 +171,118 @@ def plays_of(
     return PlayOperations(init, reset, arrive, inverse_drive)
 
 
+class Hooks(NamedTuple):
+    """What a step leaves to the chain that it runs on, as functions of tables and memory."""
+
+    plays: Callable[..., Any]  # the memory of the step itself
+    finite: Callable[..., Any]
+    forward_absorb: Callable[..., Any]
+    inverse_absorb: Callable[..., Any]
+    shown: Callable[..., Any]  # the output now, and status bits
+    unread: Callable[..., Any]  # a reference is not finite
+    held: Callable[..., Any]  # the drive then
+    stands: Callable[..., Any]  # whether the last answer is that for a reference
+    sought: Callable[..., Any]  # the drive for a limited reference, which may lie beyond its range; sets BITS
+    other: Callable[..., Any]  # a call that models without effects do not have
+
+
+def operations_of(
+    init: Callable[..., Any],
+    reset: Callable[..., Any],
+    visit: Callable[..., Any],
+    front: tuple[Callable[..., Any], Callable[..., Any]],
+    hooks: Hooks,
+) -> Operations:
+    """The operations on a chain: step, commit, hold, clamp and status are the same for every one."""
+    plays, finite, forward_absorb, inverse_absorb, shown, unread, held, stands, sought, other = hooks
+
+    @jit(inline=True)
+    def forward_step(t: Any, s: Any, v: Any) -> Any:
+        """One sample of the forward operator."""
+        m = plays(s)
+        if not finite(t, v):
+            m.counts[STATUS] |= HELD
+            return m.real[ANSWER]
+        inside = clamp_drive(t, v)
+        if inside != v:
+            m.counts[STATUS] |= INPUT_CLAMPED
+        forward_absorb(t, s, inside)
+        m.real[ANSWER], bits = shown(t, s)
+        m.counts[STATUS] |= bits
+        return m.real[ANSWER]
+
+    @jit
+    def inverse_take(t: Any, s: Any) -> None:
+        """The actuator has seen the pending drive."""
+        m = plays(s)
+        if m.counts[HAS_PENDING]:
+            inverse_absorb(t, s, m.real[PENDING])
+            m.counts[HAS_PENDING] = 0
+
+    @jit
+    def inverse_step(t: Any, s: Any, u: Any) -> Any:
+        """One sample of the inverse operator."""
+        m = plays(s)
+        inverse_take(t, s)
+        if not finite(t, u):
+            m.counts[STATUS] |= HELD
+            unread(t, s)
+            return inverse_answer(m, held(t, s))
+        level = inverse_clamp(t, u)
+        if level != u:
+            m.counts[STATUS] |= INPUT_CLAMPED
+        if stands(t, s, u):
+            m.counts[STATUS] |= m.counts[BITS]
+            return inverse_answer(m, m.real[ANSWER])
+        v = sought(t, s, level)
+        inside = clamp_drive(t, v)
+        if inside != v:
+            m.counts[BITS] |= OUTPUT_CLAMPED
+        m.counts[STATUS] |= m.counts[BITS]
+        return inverse_answer(m, inside)
+
+    @jit
+    def inverse_commit(t: Any, s: Any, applied: Any) -> None:
+        """`applied` is the drive that was really applied in place of the last answer."""
+        m = plays(s)
+        if not finite(t, applied):
+            m.counts[STATUS] |= HELD
+            return
+        v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
+        if v != applied:
+            m.counts[STATUS] |= INPUT_CLAMPED
+        m.counts[REPEAT] = 0
+        m.real[PENDING] = v
+        m.counts[HAS_PENDING] = 1
+
+    @jit
+    def run(t: Any, s: Any, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
+        """Run op[i] with argument x[i]. answers[i] is the answer of a call that has one, else 0, and that of a reset is
+        left out; status[i] is read and cleared, or left for a later call."""
+        m = plays(s)
+        for i in range(len(op)):
+            call = op[i] & OP_CALL
+            answers[i] = t.limits[ZERO]
+            if call == OP_INIT:
+                init(t, s, inverse)
+            elif call == OP_COMMIT:
+                inverse_commit(t, s, x[i])
+            elif call in (OP_STEP, OP_RESET):
+                if call == OP_RESET:
+                    reset(t, s, inverse)
+                if inverse:
+                    inverse_step(t, s, x[i])
+                else:
+                    forward_step(t, s, x[i])
+                if call == OP_STEP:
+                    answers[i] = m.real[ANSWER]
+            else:
+                answers[i] = other(t, s, inverse, call, x[i])
+            status[i] = read(m.counts, STATUS, op[i])
+
+    return Operations(init, visit, run, forward_step, inverse_step, *front)
+
+
 def made_of(
     front_forward: Callable[..., Any],
     front_inverse: Callable[..., Any],
@@ -187,9 +290,21 @@ def made_of(
     inverse_solve: Callable[..., Any],
     finite: Callable[..., Any],
 ) -> Operations:
-    """The operations, from the parts in which arithmetics differ: the memoryless part, the output for the present
-    memory, the input of the plays that gives an output, and whether an argument is finite."""
-    init, reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, output)
+    """The operations of a chain without blocks, from the parts in which arithmetics differ: the memoryless part, the
+    output for the present memory with its status bits, the input of the plays that gives an output, and whether an
+    argument is finite."""
+
+    @jit(inline=True)
+    def level_of(t: Tables | FixedTables, s: State) -> Any:
+        """The output for the present memory; its status is not reported, since this is no step."""
+        return output(t, s)[0]
+
+    init, reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, level_of)
+
+    @jit(inline=True)
+    def itself(s: State) -> State:
+        """The memory of the plays is all there is."""
+        return s
 
     @jit(inline=True)
     def absorb(t: Tables | FixedTables, s: State, v: Any) -> None:
@@ -200,82 +315,37 @@ def made_of(
     def visit(t: Tables | FixedTables, s: State, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
         """Let the actuator be at drive v before the next sample."""
         absorb(t, s, v)
-        s.real[LEVEL] = output(t, s)
+        s.real[LEVEL], bits = output(t, s)
+        s.counts[STATUS] |= bits
 
     @jit(inline=True)
-    def forward_step(t: Tables | FixedTables, s: State, v: Any) -> Any:
-        """One sample of the forward operator."""
-        if not finite(t, v):
-            s.counts[STATUS] |= HELD
-            return s.real[ANSWER]
-        inside = clamp_drive(t, v)
-        if inside != v:
-            s.counts[STATUS] |= INPUT_CLAMPED
-        absorb(t, s, inside)
-        s.real[ANSWER] = output(t, s)
-        return s.real[ANSWER]
-
-    @jit
-    def inverse_take(t: Tables | FixedTables, s: State) -> None:
-        """The actuator has seen the pending drive."""
-        if s.counts[HAS_PENDING]:
-            absorb(t, s, s.real[PENDING])
-            s.counts[HAS_PENDING] = 0
+    def unread(t: Tables | FixedTables, s: State) -> None:
+        """No line of references has to go on."""
 
     @jit(inline=True)
-    def inverse_search(t: Tables | FixedTables, s: State, u: Any, level: Any, bits: int) -> Any:
-        """Answer reference u, which is `level` after limiting; `bits` is its status so far."""
+    def held(t: Tables | FixedTables, s: State) -> Any:  # noqa: ARG001  the same call for every chain
+        """The last answer once more."""
+        return s.real[ANSWER] if s.counts[STEPPED] else s.real[DRIVE]
+
+    @jit(inline=True)
+    def stands(t: Tables | FixedTables, s: State, u: Any) -> bool:  # noqa: ARG001
+        """Whether the last answer still stands for reference u; u is the last reference from now on."""
         if s.counts[REPEAT] and u == s.real[REFERENCE]:
-            s.counts[STATUS] |= s.counts[BITS]
-            return inverse_answer(s, s.real[ANSWER])
+            return True
         s.real[REFERENCE] = u
         s.counts[REPEAT] = 1
-        s.counts[BITS] = bits
-        v = inverse_drive(t, s, level, inverse_solve(t, s, level))
-        inside = clamp_drive(t, v)
-        if inside != v:
-            s.counts[BITS] |= OUTPUT_CLAMPED
-        s.counts[STATUS] |= s.counts[BITS]
-        return inverse_answer(s, inside)
+        return False
 
-    @jit
-    def inverse_step(t: Tables | FixedTables, s: State, u: Any) -> Any:
-        """One sample of the inverse operator."""
-        inverse_take(t, s)
-        if not finite(t, u):
-            s.counts[STATUS] |= HELD
-            return inverse_answer(s, s.real[ANSWER] if s.counts[STEPPED] else s.real[DRIVE])
-        level = inverse_clamp(t, u)
-        return inverse_search(t, s, u, level, 0 if level == u else INPUT_CLAMPED)
+    @jit(inline=True)
+    def sought(t: Tables | FixedTables, s: State, level: Any) -> Any:
+        """The drive for the limited reference `level`."""
+        s.counts[BITS] = 0
+        return inverse_drive(t, s, level, inverse_solve(t, s, level))
 
-    @jit
-    def inverse_commit(t: Tables | FixedTables, s: State, applied: Any) -> None:
-        """`applied` is the drive that was really applied in place of the last answer."""
-        if not finite(t, applied):
-            s.counts[STATUS] |= HELD
-            return
-        inverse_replace(s, applied, clamp_drive(t, applied) + t.limits[ZERO])  # no drive is -0
+    @jit(inline=True)
+    def other(t: Tables | FixedTables, s: State, inverse: int, call: int, x: Any) -> Any:  # noqa: ARG001
+        """There are no other calls."""
+        return t.limits[ZERO]
 
-    @jit
-    def run(
-        t: Tables | FixedTables, s: State, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes
-    ) -> None:
-        """Run op[i] with argument x[i]. answers[i] is the answer of a step, else 0; status[i] is read and cleared, or
-        left for a later call."""
-        for i in range(len(op)):
-            call = op[i] & OP_CALL
-            if call == OP_INIT:
-                init(t, s, inverse)
-            elif call == OP_COMMIT:
-                inverse_commit(t, s, x[i])
-            else:
-                if call == OP_RESET:
-                    reset(t, s, inverse)
-                if inverse:
-                    inverse_step(t, s, x[i])
-                else:
-                    forward_step(t, s, x[i])
-            answers[i] = s.real[ANSWER] if call == OP_STEP else t.limits[ZERO]
-            status[i] = read(s.counts, STATUS, op[i])
-
-    return Operations(init, visit, run, forward_step, inverse_step, front_forward, front_inverse)
+    hooks = Hooks(itself, finite, absorb, absorb, output, unread, held, stands, sought, other)
+    return operations_of(init, reset, visit, (front_forward, front_inverse), hooks)

@@ -7,16 +7,14 @@ from typing import Any
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import FixedTables
 from hystgen.plays.fixed import code, loop_solve
-from hystgen.plays.loop import STATUS, State, loop_output
+from hystgen.plays.loop import State, loop_output
 from hystgen.plays.slots import FRACTION, OFFSET
 
 
 @jit
-def output(t: FixedTables, s: State) -> Any:
-    """Output code for the present memory, limited to the type."""
-    found, bits = code(t, loop_output(t, s) + t.limits[OFFSET])
-    s.counts[STATUS] |= bits
-    return found
+def output(t: FixedTables, s: State) -> tuple[Any, int]:
+    """Output code for the present memory, limited to the type, and its status."""
+    return code(t, loop_output(t, s) + t.limits[OFFSET])
 
 
 @jit

@@ -11,9 +11,9 @@ from hystgen.plays.slots import OFFSET, REAL_MAX
 
 
 @jit(inline=True)
-def output(t: Tables, s: State) -> Any:
-    """Output for the present memory, offset included."""
-    return loop_output(t, s) + t.limits[OFFSET]
+def output(t: Tables, s: State) -> tuple[Any, int]:
+    """Output for the present memory, offset included, and its status."""
+    return loop_output(t, s) + t.limits[OFFSET], 0
 
 
 @jit(inline=True)

@@ -286,6 +286,31 @@ def _fixed_moving(t: FixedMovingTables, prefix: str, inverse: bool) -> tuple[lis
 
 
 @dataclass(frozen=True)
+class Shape:
+    """What decides on functions and memory of a chain beside its blocks: `effects`: it has any; `corners`: engine
+    corners, `taps`: samples of the reference that are summed, `waiting`: drives that wait; the others as in `Variant`.
+    """
+
+    fixed: bool
+    effects: bool = False
+    corners: bool = False
+    slew: bool = False
+    braked: bool = False
+    quiet: bool = False
+    turning: bool = False
+    taps: int = 0
+    waiting: int = 0
+
+    @classmethod
+    def of(cls, t: ChainTables) -> Shape:
+        """That of a model with effects."""
+        return cls(
+            t.fixed, True, t.plays.engine == slots.CORNERS, bool(t.slew), bool(t.braked), bool(t.quiet),
+            bool(t.turning), len(t.tap), t.delay.samples,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
 class Glue:
     """The operators of a model with effects: the memory of an instance and the text of its type by operator, functions,
     tables, which functions of the interface it has beside those of every model, and the numbers that functions name."""
@@ -302,6 +327,7 @@ class Glue:
 def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, Any]]) -> Glue:
     """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
     t = compiled.tables
+    shape = Shape.of(t)
     named = {op: sides(t, op) for op in operators}
     clocks = [Block(constants, "clock") for constants in blocks.clocks(t)]
     rubbing = [
@@ -309,7 +335,7 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         for i, constants in enumerate(blocks.rubbing(t), 1)
     ]
     functions = [
-        line for op in operators for line in _functions(op, t, *named[op], behind, clocks, rubbing)
+        line for op in operators for line in _functions(op, shape, *named[op], behind, clocks, rubbing)
     ]
     heated = ["set_temperature"] * (len(t.gain) > 0)
     aged = ["set_gain", "travel", "set_travel"] * (len(t.ageing.turns) > 0)
@@ -358,12 +384,20 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     searched = t.moving.used and not t.moving.scanned
     n = len(t.threshold) - 1
     kept = n * (t.moving.moves == moving.DASHPOT)
-    fields = {op: instance(op, t, own[op], n, kept, searched) for op in operators}
+    fields = {op: instance(op, shape, own[op], n, kept, searched) for op in operators}
     return Glue(
         fields,
         {op: _state(op, fields[op]) for op in operators},
         "\n".join(functions), arrays, [text for stage in behind for text in stage["arrays"]], calls, constants,
     )  # fmt: skip
+
+
+def alone(operators: Sequence[str], plays: int, fixed: bool) -> Glue:
+    """The glue of a model without effects in engine loop: a chain without blocks."""
+    shape = Shape(fixed)
+    functions = [line for op in operators for line in _functions(op, shape, (), (), (), (), ())]
+    fields = {op: instance(op, shape, (), plays, 0, False) for op in operators}
+    return Glue(fields, {op: _state(op, fields[op]) for op in operators}, "\n".join(functions), [], [], {}, [])
 
 
 def with_fields(made: Glue, named: Mapping[str, Collection[str]]) -> Glue:
@@ -392,20 +426,23 @@ def _fixed_constants(t: ChainTables) -> list[tuple[str, str, str]]:
 
 _PLAYS = "play 0 is the input of the plays"
 _KEPT = "; behind them what each has lost"
+_LAST = "the same, limited: the next reference moves up or down from here"
 
 
-def instance(op: str, t: ChainTables, blocks: Sequence[Block], plays: int, kept: int, moving: bool) -> list[Field]:
+def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, moving: bool) -> list[Field]:
     """The memory of one operator, field by field."""
-    inverse, taps = op == "inverse", len(t.tap)
-    waiting = 0 if inverse else t.delay.samples
+    inverse, taps = op == "inverse", t.taps
+    waiting = 0 if inverse else t.waiting
+    arrived = Field("fine", "drive", "what arrived of it in front of the plays")
     return [
         *([Field("real", "pending", "drive sent but not yet part of the memory")] if inverse else []),
         Field("real", "applied", "drive seen last"),
         *([Field("ramp", "reached", "drive at a limited rate")] if t.slew else []),
-        Field("fine", "drive", "what arrived of it in front of the plays"),
+        arrived if t.effects else Field("real", "drive", "seen last"),
+        *([Field("real", "reference", "of the last step"), Field("real", "last", _LAST)] if inverse else []),
         Field("signal", "level", "sum of the plays"),
         Field("signal", "output", "what the output side made of it"),
-        Field("real", "answer", f"{'drive' if inverse else 'displacement'} returned last"),
+        Field("real", "answer", f"{'drive' if inverse else 'displacement' if t.effects else 'output'} returned last"),
         Field("signal", "offset", "set beside that of the model"),
         *(field for block in blocks for field in block.fields),
         *([Field("quiet", "quiet", members="wwi" if t.fixed else "rri")] if inverse and t.quiet else []),
@@ -414,17 +451,18 @@ def instance(op: str, t: ChainTables, blocks: Sequence[Block], plays: int, kept:
         *([Field("real", "waiting", "drives", waiting), Field("status", "oldest", "of them")] if waiting else []),
         Field("flag", "ascending", "direction of the drive's last move"),
         Field("flag", "moving", "a drive was applied"),
-        *([Field("flag", "has_pending"), Field("flag", "stepped", "a step has answered")] if inverse else []),
+        *([Field("flag", "has_pending"), Field("flag", "repeat", "the last answer still stands for `reference`"),
+           Field("flag", "stepped", "a step has answered")] if inverse else []),
         *([Field("flag", "filled", "there are references"), Field("status", "bits", "of the last step")] if inverse
           else []),
         Field("status", "status"),
-        *(_corners(t, inverse, plays) if t.plays.engine == slots.CORNERS
+        *(_corners(t, inverse, plays) if t.corners
           else [Field("play", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept)]),
         *([Field("signal", "bent", "what each contributes", plays + 1)] if moving else []),
     ]  # fmt: skip
 
 
-def _corners(t: ChainTables, inverse: bool, plays: int) -> list[Field]:
+def _corners(t: Shape, inverse: bool, plays: int) -> list[Field]:
     """The memory of the plays of engine corners."""
     sought = [Field("flag", "sought", "a solution has been found since the plays followed")] * inverse
     if not t.fixed:
@@ -454,7 +492,7 @@ def _function(comment: str, head: str, lines: Sequence[str]) -> str:
 
 def _functions(
     op: str,
-    t: ChainTables,
+    t: Shape,
     before: Sequence[Block],
     after: Sequence[Block],
     behind: Sequence[dict[str, Any]],
@@ -462,7 +500,7 @@ def _functions(
     rubbing: Sequence[Block | None],
 ) -> Iterator[str]:
     """The functions of one operator that name the blocks."""
-    inverse, ahead = op == "inverse", len(t.tap) > 0
+    inverse, ahead = op == "inverse", t.taps > 0
     self_t = f"hystgen_{op}_t *self"
     apart = "HYSTGEN_APART" if t.fixed else "static"  # its products of 64 bits stay off the stack of what calls it
 
@@ -528,22 +566,33 @@ def _functions(
     lines = ["hystgen_signal_t x = y;"] if behind else []
     x = "x" if behind else "y"
     lines += [f"x = hystgen_{stage['kind']}_forward({stage['table']}, x);" for stage in behind]
-    offsets = "HYSTGEN_OUTPUT_OFFSET + self->offset"
+    offsets = "HYSTGEN_OUTPUT_OFFSET + self->offset" if t.effects else "HYSTGEN_OFFSET"
 
     def drifts(lead: str) -> str:
         return "".join(f" + hystgen_clock_drift({each.table}, &self->{each.name}, {lead})" for each in clocks)
 
+    def total(more: str) -> str:
+        return f"({offsets}{more})" if t.effects else offsets
+
+    yield _function(
+        "Sum of the plays.", f"static hystgen_signal_t hystgen_{op}_level(const {self_t})",
+        ["return self->level;" if t.effects else "return hystgen_loop_output(&hystgen_model_tables, self->play);"],
+    )  # fmt: skip
+    yield _function(
+        "What the output side has given last.", f"static hystgen_signal_t hystgen_{op}_output(const {self_t})",
+        ["return self->output;" if after else f"return hystgen_{op}_level(self);"],
+    )  # fmt: skip
     own = apart if behind or clocks else "static"
     yield _function(
         "The displacement for an output y of the chain.",
         f"{own} hystgen_signal_t hystgen_{op}_displaced(const {self_t}, hystgen_signal_t y)",
-        [*lines, f"return {x} + ({offsets}{drifts('0')});"],
+        [*lines, f"return {x} + {total(drifts('0'))};"],
     )
     if inverse:
         lead = f"self->filled ? self->{clocks[0].name}.lead : 0" if clocks and ahead else "0"
         lines = [f"const hystgen_signal_t lead = {lead};"] * len(clocks)
         counted = ["hystgen_quiet_count(&self->quiet, u);"] * quiet
-        y = f"u - ({offsets}{drifts('self->moving ? lead + 1 : lead')})"
+        y = f"u - {total(drifts('self->moving ? lead + 1 : lead'))}"
         lines += counted
         if behind:
             lines.append(f"hystgen_signal_t y = {y};")
@@ -584,9 +633,9 @@ def _functions(
         "Offset and gains of the parameter file.",
         f"static void hystgen_{op}_settings_init({self_t})",
         [
-            "self->offset = 0;",
+            *(["self->offset = 0;"] if t.effects else []),
             *(["self->reached.drive = 0;", "self->reached.rest = 0;"] if t.slew else []),
-            *(["hystgen_delay_rest(self->waiting, &self->oldest, 0);"] if t.delay.samples and not inverse else []),
+            *(["hystgen_delay_rest(self->waiting, &self->oldest, 0);"] if t.waiting and not inverse else []),
             *(f"hystgen_clock_start(&self->{each.name});" for each in clocks),
             *(f"self->{each.name}.lead = 0;" for each in clocks),
             *(f"hystgen_heat_init(&self->{each.name});" for each in heat),

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _HEAD = re.compile(r"(?P<before>(?:[\w*]+\s+\**)+?)(?P<name>hystgen_\w+)\((?P<parameters>[^(){};]*)\)\s*\{\n")
 _OWN = ("static ", "HYSTGEN_APART_IN_FLOAT ", "HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ",
-        "HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART ")  # fmt: skip
+        "HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART_IN_FIXED_CHAIN ", "HYSTGEN_APART_IN_CHAIN ",
+        "HYSTGEN_APART ")  # fmt: skip
 """How functions begin that only the model itself calls."""
 _DELIMITED = (re.compile(r"(?:[(,?:]|(?<![=!<>])=|\breturn)\s*$"), re.compile(r"\s*[),;:]"))
 """What stands before and behind a whole argument, initializer or answer."""
@@ -90,6 +92,7 @@ def folded(
     wanted: Callable[[dict[str, Function]], Collection[str]],
     fixed: bool,
     apart: Sequence[str],
+    types: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, Function]:
     """The functions of a model without what does nothing. `wanted` names those that are called; otherwise as `Folding`.
     """
@@ -100,7 +103,7 @@ def folded(
         return f"/*{len(comments) - 1}*/"
 
     masked = [replace(each, body=_COMMENT.sub(mask, each.body)) for each in functions]
-    folding = _Folding(masked, list(kernels), fixed, apart)
+    folding = _Folding(masked, list(kernels), fixed, apart, types)
     while folding.once():
         kept = wanted(folding.functions)
         folding.functions = {name: each for name, each in folding.functions.items() if name in kept}
@@ -115,14 +118,16 @@ def folded(
 
 class _Folding:
     """The functions of a model's operators. `kernels`: others that they call, which stay as they are; `fixed`: numbers
-    of several types; `apart`: how functions begin that the compiler keeps apart here, for the sake of the stack."""
+    of several types; `apart`: how functions begin that the compiler keeps apart here, for the sake of the stack;
+    `types`: names of types that stand for others here."""
 
     def __init__(
-        self, functions: Sequence[Function], kernels: Sequence[Function], fixed: bool, apart: Sequence[str]
-    ) -> None:
+        self, functions: Sequence[Function], kernels: Sequence[Function], fixed: bool, apart: Sequence[str],
+        types: Mapping[str, str],
+    ) -> None:  # fmt: skip
         self.functions = {each.name: each for each in functions}
         self._known = {each.name: each for each in kernels}
-        self._fixed, self._apart = fixed, tuple(apart)
+        self._fixed, self._apart, self._types = fixed, tuple(apart), types
 
     def once(self) -> bool:
         """One round. Returns whether anything has changed."""
@@ -150,6 +155,12 @@ class _Folding:
                     body, at = new, found.start()
             if body != function.body:
                 self._change(caller, body)
+
+    def _looks(self, expression: str) -> bool:
+        """Whether an expression only looks: it calls nothing that may change what it is given."""
+        called = [self.functions.get(each) or self._known.get(each) for each in re.findall(r"(\w+)\(", expression)]
+        given = [kind for each in called if each for kind in each.parameters]
+        return None not in called and all("*" not in kind or kind.startswith("const ") for kind in given)
 
     def _unused_parameters(self) -> None:
         for name in list(self.functions):
@@ -190,10 +201,20 @@ class _Folding:
             place = function.names.index(found[1])
             same = self._same(function.types[place], function.answer)
             self._calls(function.name, functools.partial(_argument, place=place, same=same))
-        elif does in ("return true;", "return false;"):
+        elif (found := re.fullmatch(r"return \((\w+)\)(\w+);", does)) and found[2] in function.names:
+            self._converted(function.name, found[1])
+        elif re.fullmatch(r"return self->\w+;", does) or does in ("return true;", "return false;"):
             self._calls(function.name, lambda body, start, end, _: body[:start] + does[7:-1] + body[end:])
         elif found := re.fullmatch(r"(return )?(hystgen_\w+)\((.*)\);", does):
             self._forward(function, found[2], f"{found[3]})", bool(found[1]))
+
+    def _converted(self, name: str, kind: str) -> None:
+        """Leaves out calls that convert to the type that the argument has."""
+        for caller, function in self.functions.items():
+            same = {each for each, own in _declared(function).items() if self._same(own, kind)}
+            for each in same:
+                function = replace(function, body=function.body.replace(f"{name}({each})", each))
+            self.functions[caller] = function
 
     def _forward(self, function: Function, name: str, rest: str, answers: bool) -> None:
         """A function that is a call of another one, which the callers may call themselves."""
@@ -226,6 +247,7 @@ class _Folding:
         """Whether two types are one."""
         def plain(kind: str) -> str:
             kind = " ".join(re.sub(r"\b(const|inline)\b", "", kind).split()).replace(" *", "*")
+            kind = re.sub(r"\w+", lambda name: self._types.get(name[0], name[0]), kind)
             return kind if self._fixed else re.sub(rf"\bhystgen_({'|'.join(_NUMBERS)})_t\b", "real", kind)
 
         return plain(one) == plain(other)
@@ -255,8 +277,7 @@ class _Folding:
 
     def _copies(self, function: Function, body: str) -> str:
         """The body without constants that are another one, or a parameter, once more."""
-        types = dict(zip(function.names, function.types, strict=True))
-        types |= {each[2]: each[1] for each in re.finditer(r"^ *const (\w+) (\w+) =", body, re.MULTILINE)}
+        types = _declared(replace(function, body=body))
         for found in re.finditer(r"^ *const (\w+) (\w+) = (\w+);\n", body, re.MULTILINE):
             kind, copy, of = found.groups()
             declared = re.sub(rf"^ *const \w+ {of} = ", "", body, flags=re.MULTILINE)
@@ -288,13 +309,19 @@ class _Folding:
         for name, function in mine.items():
             body = function.body
             for found in _STORE.finditer(function.body):
-                if (found[1] not in read or found[1] in false) and _pure(found[2]):
+                if (found[1] not in read or found[1] in false) and self._looks(found[2]):
                     body = body.replace(found[0], "", 1)
             for field in false:
                 body = re.sub(rf"^ *[\w>-]+ \|= self->{field} \? \w+ : 0u;\n", "", body, flags=re.MULTILINE)
                 body = body.replace(f"if (self->{field})", "if (false)")
             if body != function.body:
                 self._change(name, body)
+
+
+def _declared(function: Function) -> dict[str, str]:
+    """The types of parameters and of constants of a function."""
+    constants = re.finditer(r"^ *const (\w+) (\w+) =", function.body, re.MULTILINE)
+    return dict(zip(function.names, function.types, strict=True)) | {each[2]: each[1] for each in constants}
 
 
 _ASKED = r"(?:\bif \(|\|= )self->(\w+)(?:\)| \? \w+ : 0u;)"

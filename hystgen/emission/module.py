@@ -214,8 +214,9 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     corners = options.engine == "corners"
     n = cascade.pi.n
     compiled = compiled_of(parameters, cascade, options)
-    if compiled:
-        about["family"] = dataclasses.replace(about["family"], chain=True)
+    about["family"] = dataclasses.replace(
+        about["family"], chain=compiled is not None, loop=compiled is None and options.engine == "loop"
+    )
     values = SimpleNamespace(
         **about,
         **(numbers.chain_fields(parameters, compiled, options, prefix) if compiled

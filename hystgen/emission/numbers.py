@@ -30,9 +30,12 @@ from hystgen.plays.corners.corners_float import Curve, Start
 
 def fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
     """Values for the templates; `prefix`: of the types of the run time."""
-    if not ARITHMETICS[options.arithmetic].fixed:
-        return _float_fields(parameters, cascade, options, prefix)
-    return _fixed_fields(parameters, cascade, options, prefix)
+    fixed = ARITHMETICS[options.arithmetic].fixed
+    found = (_fixed_fields if fixed else _float_fields)(parameters, cascade, options, prefix)
+    if options.engine == "loop":
+        operators = [op for op in ("forward", "inverse") if getattr(options, op)]
+        found["glue"] = chain.alone(operators, cascade.pi.n, fixed)
+    return found
 
 
 def _limits(numbers: Tables | FixedTables, more: Sequence[tuple[str, str, str]] = ()) -> dict[str, Any]:

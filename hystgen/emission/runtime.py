@@ -78,7 +78,8 @@ FIXED_CHAIN_BLOCKS = (
 SIGNALS = {
     "hystgen_signal_t": "hystgen_sum_t", "hystgen_fine_t": "hystgen_play_t", "hystgen_travel_t": "hystgen_sum_t",
 }  # fmt: skip
-"""Types between the blocks of a model with effects in fixed point; elsewhere they are those of codes."""
+"""Types between the blocks of a model with effects in fixed point; elsewhere they are those of codes, but in engine
+loop without effects signals are as wide as sums of the plays."""
 
 FINE = {
     "HYSTGEN_FINE_MIN": "HYSTGEN_DRIVE_MIN", "HYSTGEN_FINE_MAX": "HYSTGEN_DRIVE_MAX",
@@ -100,11 +101,12 @@ FIXED_KERNELS = (
 
 @dataclass(frozen=True)
 class Family:
-    """An arithmetic in C: its files of the run time and its types; `chain`: in a model with
-    effects."""
+    """An arithmetic in C: its files of the run time and its types; `chain`: in a model with effects, `loop`: in one
+    without, in engine loop."""
 
     arithmetic: Arithmetic
     chain: bool = False
+    loop: bool = False
 
     @property
     def bits(self) -> str:
@@ -146,7 +148,8 @@ class Family:
         """Names in code that models with and without effects share, and their meaning here."""
         if self.chain and self.fixed:
             return SIGNALS
-        return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE
+        sums = {"hystgen_signal_t": "hystgen_sum_t"} if self.loop and self.fixed else {}
+        return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE | sums
 
     @property
     def chain_types(self) -> tuple[str, ...]:
@@ -246,6 +249,7 @@ class Variant:
         """How functions begin that the compiler keeps apart here, as `render_operators` has it."""
         corners = self.engine == "corners"
         found = ["HYSTGEN_APART ", "HYSTGEN_APART_IN_FIXED " if self.fixed else "HYSTGEN_APART_IN_FLOAT "]
+        found += ["HYSTGEN_APART_IN_CHAIN ", *["HYSTGEN_APART_IN_FIXED_CHAIN "] * self.fixed] * self.chain
         found += ["HYSTGEN_APART_IN_FLOAT_CORNERS "] * (corners and not self.fixed)
         return (*found, *["HYSTGEN_APART_BUT_IN_FLOAT_LOOP "] * (corners or self.fixed))
 
@@ -264,10 +268,9 @@ class Variant:
         }  # fmt: skip
         return frozenset(f"HYSTGEN_HAS_{fact}" for fact, holds in found.items() if holds)
 
-    def state(self, operator: str) -> str:
-        """The header with the type of an instance."""
-        if self.engine == "loop":
-            return f"compensator/loop_{operator}{'_branches' * self.branches}_state.h"
+    @property
+    def state(self) -> str:
+        """The header with the types of both instances in engine corners without effects."""
         return f"compensator/corners/state{'_front' * self.fronts}{'_fixed' * self.fixed}.h"
 
     def sources(self) -> tuple[str, ...]:
@@ -279,7 +282,7 @@ class Variant:
             files.append("front/front.c")
         if self.fronts:
             files.append(f"compensator/{'chain/' * (self.chain and self.branches)}branches.c")
-        own = self._chain() if self.chain else self._loop() if self.engine == "loop" else self._corners()
+        own = self._chain() if self.chain or self.engine == "loop" else self._corners()
         return (*files, *own, "compensator/status.c")
 
     @property
@@ -290,7 +293,7 @@ class Variant:
         return (*start, f"compensator/loop_{front}.c")
 
     def _chain(self) -> tuple[str, ...]:
-        """The files of a model with effects, apart from its blocks."""
+        """The files of a chain, apart from its blocks: of a model with effects, or of engine loop."""
         chain, moving = "compensator/chain/", "effects/rate_dependence/"
         loops, solve, refined = self.engine == "loop", f"{chain}plays_solve.c", f"{chain}refined_input.c"
         if not loops:
@@ -305,21 +308,15 @@ class Variant:
             plays = (*before, "effects/noncongruent/bent.c", moved, f"{chain}moving_plays.c", f"{chain}moving_search.c",
                      refined)  # fmt: skip
         brake = ("effects/slew_limit/brake.c",) if self.braked else ()
-        signals = ("effects/delay/forward.c", "effects/slew_limit/slewed.c", f"{chain}signals.c", *brake)
+        drive = ("compensator/loop_branches_drive.c",) if self.branches and not self.chain else ()
+        entered = () if self.chain else (f"{chain}drive_signal.c",)
+        limits = ("effects/delay/forward.c", "effects/slew_limit/slewed.c")
+        signals = (*drive, *limits, *entered, f"{chain}signals.c", *brake)
         start = f"{chain}{'chain_loop' if loops else 'corners_start'}.c"
         ageing = ("effects/ageing/calls.c",) if self.ages else ()
-        return (*self._front, *signals, *plays, f"{chain}chain.c", start, f"{chain}chain_calls.c", *ageing)
-
-    def _loop(self) -> tuple[str, ...]:
-        kind = "fixed" if self.fixed else "float"
-        return (
-            *self._front,
-            *(["compensator/loop_branches_drive.c"] if self.branches else []),
-            f"compensator/loop_output_{kind}.c",
-            "compensator/loop.c",
-            f"compensator/loop_{kind}.c",
-            "compensator/loop_two_branches.c" if self.branches else "compensator/loop_one_branch.c",
-        )
+        settings = (f"{chain}settings.c",) if self.chain else ()
+        calls = (f"{chain}chain.c", start, f"{chain}chain_calls.c", *settings, *ageing)
+        return (*self._front, *signals, *plays, *calls)
 
     def _corners(self) -> tuple[str, ...]:
         kind = "_front" * self.fronts + "_fixed" * self.fixed
@@ -490,7 +487,7 @@ def operator_pieces(
 
     functions = folding.folded(
         [each for _, each in parsed if each], kernels, lambda functions: {each.name for each in put(functions)},
-        family.fixed, variant.apart,
+        family.fixed, variant.apart, family.signals,
     )  # fmt: skip
     return put(functions)
 
@@ -523,7 +520,7 @@ def state_pieces(variant: Variant, operators: Iterable[str], functions: Sequence
     made = []
     for op in operators:
         named = fields(functions, op)
-        for piece in needed(_pieces([variant.state(op)], variant.facts), [f"hystgen_{op}_t"]):
+        for piece in needed(_pieces([variant.state], variant.facts), [f"hystgen_{op}_t"]):
             lines = piece.text.split("\n")
             member = re.compile(r"^    [\w ]+?(\w+)(?:\[.*\])?;")
             kept = [line for line in lines if not (found := member.match(line)) or found[1] in named]
@@ -583,6 +580,10 @@ def render_operators(
     text = _joined(pieces)
     apart = corners > 0 and not family.fixed
     text = text.replace("HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART " if apart else "static ")
+    chained = "HYSTGEN_APART " if family.fixed and family.chain else "static inline "
+    text = text.replace("HYSTGEN_APART_IN_FIXED_CHAIN ", chained)
+    text = text.replace("HYSTGEN_APART_IN_CHAIN ", "HYSTGEN_APART " if family.chain else "static ")
+    text = text if family.chain else text.replace("HYSTGEN_ALONE ", "")
     text = text.replace("HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART " if family.fixed else "static inline ")
     text = text.replace("HYSTGEN_APART_IN_FLOAT ", "static " if family.fixed else "HYSTGEN_APART ")
     loop = corners == 0 and not family.fixed
@@ -627,7 +628,7 @@ def _named(
     """The text with the names of a model and of its run time; `carried`: those that the model has in its place."""
     for shared, here in family.signals.items():
         cast = f"({shared})"
-        if here == "hystgen_real_t":
+        if here == "hystgen_real_t" and not (family.loop and family.fixed):
             text = text.replace(cast, "")
         text = re.sub(rf"\b{shared}\b", here, text)
     if not family.fixed:  # one type for everything

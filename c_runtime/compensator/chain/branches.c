@@ -26,7 +26,7 @@ static inline bool hystgen_turns(hystgen_signal_t back, hystgen_signal_t way) {
    moves on or holds, and turns only for more than that is worth. Sets a status bit if no drive
    gives w. */
 HYSTGEN_APART_BUT_IN_FLOAT_LOOP hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self,
-                                                                      hystgen_signal_t level,
+                                                                      hystgen_real_t level,
                                                                       hystgen_reach_t w) {
     bool limited;
     const bool up = self->ascending;

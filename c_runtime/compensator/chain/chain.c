@@ -1,6 +1,7 @@
-/* Operators of a model with effects: a chain of blocks from drive to displacement. An applied drive
-   passes forwards through all of them, a reference backwards, so that the memory holds only what
-   the actuator has seen. The model's own functions call its blocks:
+/* Operators of engine loop and of every model with effects: a chain of blocks from drive to
+   displacement, which has the plays alone in a model without effects. An applied drive passes
+   forwards through all of them, a reference backwards, so that the memory holds only what the
+   actuator has seen. The model's own functions call its blocks:
 
    waited, slewed   delay and slew limit; only the forward operator has the delay, since references
                     of the inverse come ahead of time
@@ -46,18 +47,18 @@ static inline void hystgen_forward_played(hystgen_forward_t *self, hystgen_real_
     const hystgen_signal_t x = hystgen_entered_drive(reached);
     const hystgen_signal_t a = self->moving ? hystgen_forward_drive_side_absorb(self, x)
                                             : hystgen_forward_drive_side_rest(self, x);
-    self->level = hystgen_forward_follow(self, hystgen_forward_arrive(self, hystgen_arriving(a)));
+    hystgen_forward_follow(self, hystgen_forward_arrive(self, hystgen_arriving(a)));
 }
 
 /* The plays have moved: their sum passes through the output side. */
-HYSTGEN_APART_IN_FIXED void hystgen_forward_passed_on(hystgen_forward_t *self) {
+HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_forward_passed_on(hystgen_forward_t *self) {
     self->output = self->moving ? hystgen_forward_output_side_absorb(self, self->level)
                                 : hystgen_forward_output_side_rest(self, self->level);
     self->moving = true;
 }
 
 /* The actuator has seen drive v. */
-HYSTGEN_APART_IN_FIXED void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v) {
+HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v) {
     if (self->moving) {
         hystgen_forward_travelled(self, v);
     }
@@ -71,18 +72,18 @@ static inline void hystgen_inverse_played(hystgen_inverse_t *self, hystgen_real_
     const hystgen_signal_t x = hystgen_entered_drive(v);
     const hystgen_signal_t a = self->moving ? hystgen_inverse_drive_side_absorb(self, x)
                                             : hystgen_inverse_drive_side_rest(self, x);
-    self->level = hystgen_inverse_follow(self, hystgen_inverse_arrive(self, hystgen_arriving(a)));
+    hystgen_inverse_follow(self, hystgen_inverse_arrive(self, hystgen_arriving(a)));
 }
 
 /* The plays have moved: their sum passes through the output side. */
-HYSTGEN_APART_IN_FIXED void hystgen_inverse_passed_on(hystgen_inverse_t *self) {
+HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_inverse_passed_on(hystgen_inverse_t *self) {
     self->output = self->moving ? hystgen_inverse_output_side_absorb(self, self->level)
                                 : hystgen_inverse_output_side_rest(self, self->level);
     self->moving = true;
 }
 
 /* The actuator has seen drive v. */
-HYSTGEN_APART_IN_FIXED void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v) {
+HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v) {
     if (self->moving) {
         hystgen_inverse_travelled(self, v);
     }
@@ -108,39 +109,56 @@ static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_re
     return v;
 }
 
+/* The displacement now. */
+static hystgen_real_t hystgen_forward_shown(const hystgen_forward_t *self) {
+    unsigned int status = 0; /* not reported: this is no step */
+    return hystgen_output_code(hystgen_forward_displaced(self, hystgen_forward_output(self)),
+                               &status);
+}
+
+/* The displacement now. */
+static hystgen_real_t hystgen_inverse_shown(const hystgen_inverse_t *self) {
+    unsigned int status = 0; /* not reported: this is no step */
+    return hystgen_output_code(hystgen_inverse_displaced(self, hystgen_inverse_output(self)),
+                               &status);
+}
+
 /* The part common to init and reset, once the plays are set: they rest at this drive. */
-HYSTGEN_APART void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive,
-                                         bool ascending) {
+HYSTGEN_APART_IN_CHAIN void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive,
+                                                  bool ascending) {
+    const hystgen_signal_t x = hystgen_entered_drive(drive);
     self->applied = drive;
-    self->drive = hystgen_arriving(hystgen_entered_drive(drive));
+    self->drive = hystgen_arriving(x);
     self->ascending = ascending;
     self->moving = false;
     self->status = 0;
     self->level = hystgen_forward_started(self);
-    (void)hystgen_forward_drive_side_rest(self, hystgen_entered_drive(drive));
+    (void)hystgen_forward_drive_side_rest(self, x);
     self->output = hystgen_forward_output_side_rest(self, self->level);
-    self->answer =
-        hystgen_output_code(hystgen_forward_displaced(self, self->output), &self->status);
-    self->status = 0;
+    self->answer = hystgen_forward_shown(self);
 }
 
 /* The part common to init and reset, once the plays are set: they rest at this drive. */
-HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive,
-                                         bool ascending) {
+HYSTGEN_APART_IN_CHAIN void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive,
+                                                  bool ascending) {
+    const hystgen_signal_t x = hystgen_entered_drive(drive);
     self->pending = drive;
     self->answer = drive;
+    self->reference = 0;
     self->has_pending = false;
+    self->repeat = false;
     self->stepped = false;
     self->filled = false;
     self->bits = 0;
     self->applied = drive;
-    self->drive = hystgen_arriving(hystgen_entered_drive(drive));
+    self->drive = hystgen_arriving(x);
     self->ascending = ascending;
     self->moving = false;
     self->status = 0;
     self->level = hystgen_inverse_started(self);
-    (void)hystgen_inverse_drive_side_rest(self, hystgen_entered_drive(drive));
+    (void)hystgen_inverse_drive_side_rest(self, x);
     self->output = hystgen_inverse_output_side_rest(self, self->level);
+    self->last = hystgen_inverse_shown(self);
 }
 
 #endif

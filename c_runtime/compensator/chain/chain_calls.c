@@ -1,106 +1,7 @@
-/* Operators of a model with effects: the other functions that users call. */
+/* Operators of engine loop and of every model with effects: step and commit. Called by users. */
 #include "compensator/chain/model.h"
 #include "compensator/chain/chain.c"
 #include "compensator/chain/refined_input.c"
-
-void hystgen_forward_settle(hystgen_forward_t *self, hystgen_real_t v) {
-    if (!hystgen_finite(v)) {
-        self->status |= HYSTGEN_STATUS_HELD;
-        return;
-    }
-    const hystgen_real_t inside = hystgen_applied_drive(v);
-    if (inside < v || inside > v) {
-        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
-    }
-    if (self->moving) {
-        hystgen_forward_travelled(self, inside);
-    }
-    self->moving = false;
-    hystgen_forward_absorb(self, inside);
-}
-
-void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v) {
-    hystgen_inverse_take(self);
-    if (!hystgen_finite(v)) {
-        self->status |= HYSTGEN_STATUS_HELD;
-        return;
-    }
-    const hystgen_real_t inside = hystgen_applied_drive(v);
-    if (inside < v || inside > v) {
-        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
-    }
-    if (self->moving) {
-        hystgen_inverse_travelled(self, inside);
-    }
-    self->moving = false;
-    hystgen_inverse_absorb(self, inside);
-}
-
-/* Sets the offset, limited to the span of the displacement. */
-static void hystgen_forward_put_offset(hystgen_forward_t *self, hystgen_signal_t d) {
-    if (!hystgen_finite(d)) {
-        self->status |= HYSTGEN_STATUS_HELD;
-        return;
-    }
-    if (d > HYSTGEN_FARTHEST_OFFSET) {
-        self->offset = HYSTGEN_FARTHEST_OFFSET;
-        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
-    } else if (d < -HYSTGEN_FARTHEST_OFFSET) {
-        self->offset = -HYSTGEN_FARTHEST_OFFSET;
-        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
-    } else {
-        self->offset = d;
-    }
-}
-
-void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d) {
-    const hystgen_signal_t level = hystgen_entered_level(d);
-    hystgen_forward_put_offset(self, level);
-    if (hystgen_finite(level)) {
-        hystgen_forward_clock_start(self);
-    }
-}
-
-/* Sets the offset, limited to the span of the displacement. */
-static void hystgen_inverse_put_offset(hystgen_inverse_t *self, hystgen_signal_t d) {
-    if (!hystgen_finite(d)) {
-        self->status |= HYSTGEN_STATUS_HELD;
-        return;
-    }
-    if (d > HYSTGEN_FARTHEST_OFFSET) {
-        self->offset = HYSTGEN_FARTHEST_OFFSET;
-        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
-    } else if (d < -HYSTGEN_FARTHEST_OFFSET) {
-        self->offset = -HYSTGEN_FARTHEST_OFFSET;
-        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
-    } else {
-        self->offset = d;
-    }
-}
-
-void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d) {
-    const hystgen_signal_t level = hystgen_entered_level(d);
-    hystgen_inverse_put_offset(self, level);
-    if (hystgen_finite(level)) {
-        hystgen_inverse_clock_start(self);
-    }
-}
-
-void hystgen_forward_set_temperature(hystgen_forward_t *self, hystgen_real_t temperature) {
-    if (!hystgen_finite(temperature)) {
-        self->status |= HYSTGEN_STATUS_HELD;
-    } else if (hystgen_forward_heat(self, temperature)) {
-        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
-    }
-}
-
-void hystgen_inverse_set_temperature(hystgen_inverse_t *self, hystgen_real_t temperature) {
-    if (!hystgen_finite(temperature)) {
-        self->status |= HYSTGEN_STATUS_HELD;
-    } else if (hystgen_inverse_heat(self, temperature)) {
-        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
-    }
-}
 
 HYSTGEN_ALONE hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
     hystgen_real_t inside = v;
@@ -113,36 +14,27 @@ HYSTGEN_ALONE hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystg
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
     hystgen_forward_absorb(self, inside);
-    self->answer =
-        hystgen_output_code(hystgen_forward_displaced(self, self->output), &self->status);
-    return self->answer;
+    const hystgen_real_t answer = hystgen_output_code(
+        hystgen_forward_displaced(self, hystgen_forward_output(self)), &self->status);
+    self->answer = answer;
+    return answer;
 }
 
 /* Limits a reference that is out of its range. */
-HYSTGEN_APART hystgen_real_t hystgen_inverse_outside(hystgen_inverse_t *self, hystgen_real_t u) {
+HYSTGEN_APART_IN_CHAIN hystgen_real_t hystgen_inverse_outside(hystgen_inverse_t *self, hystgen_real_t u) {
     self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     return hystgen_inverse_clamp(u);
 }
 
-/* Limits reference u to its range. Returns false where it is no number: the newest one stands once
-   more. */
-static bool hystgen_inverse_entered(hystgen_inverse_t *self, hystgen_real_t u,
-                                    hystgen_real_t *level) {
-    *level = u;
-    if (!hystgen_is_reference(u)) {
-        if (!hystgen_finite(u)) {
-            self->status |= HYSTGEN_STATUS_HELD;
-            hystgen_inverse_repeat(self);
-            return false;
-        }
-        *level = hystgen_inverse_outside(self, u);
-    }
-    return true;
+/* A reference that is no number: the newest one stands once more. */
+static void hystgen_inverse_unread(hystgen_inverse_t *self) {
+    self->status |= HYSTGEN_STATUS_HELD;
+    hystgen_inverse_repeat(self);
 }
 
 /* Takes the next reference, which lies within its range. Returns the output that the output side
    has to reach at this sample. */
-HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self,
+HYSTGEN_APART_IN_FIXED_CHAIN hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self,
                                                             hystgen_real_t level) {
     bool limited = false;
     const hystgen_signal_t wanted =
@@ -153,26 +45,22 @@ HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *s
     return hystgen_inverse_ahead(self, wanted);
 }
 
-void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u) {
-    hystgen_real_t level = u;
-    if (hystgen_inverse_entered(self, u, &level)) {
-        (void)hystgen_inverse_put(self, level);
-    }
-}
-
 /* The sum of the plays with which the output side gives y; the memory is up to date. */
-HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_wanted(hystgen_inverse_t *self,
+HYSTGEN_APART_IN_FIXED_CHAIN hystgen_signal_t hystgen_inverse_wanted(hystgen_inverse_t *self,
                                                                hystgen_signal_t y) {
     return self->moving ? hystgen_inverse_output_side_solve(self, y)
                         : hystgen_inverse_output_side_resting(self, y);
 }
 
-/* The drive that leads to an input w of the plays, at which their sum is h. */
-HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_sought(hystgen_inverse_t *self,
-                                                              hystgen_signal_t h,
-                                                              hystgen_reach_t w) {
+/* The drive that leads to an input w of the plays, at which their sum is h, for the limited
+   reference `level`. */
+HYSTGEN_APART_IN_FIXED_CHAIN hystgen_reach_t hystgen_inverse_sought(hystgen_inverse_t *self,
+                                                                    hystgen_real_t level,
+                                                                    hystgen_signal_t h,
+                                                                    hystgen_reach_t w) {
     self->bits = 0;
-    const hystgen_signal_t a = hystgen_inverse_finer(self, h, w, hystgen_inverse_drive(self, h, w));
+    const hystgen_signal_t a =
+        hystgen_inverse_finer(self, h, w, hystgen_inverse_drive(self, level, w));
     return hystgen_drive_code(self->moving ? hystgen_inverse_drive_side_solve(self, a) : a);
 }
 
@@ -194,12 +82,19 @@ static hystgen_real_t hystgen_inverse_limited(hystgen_inverse_t *self, hystgen_r
 HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_next(hystgen_inverse_t *self,
                                                            hystgen_real_t u) {
     hystgen_real_t level = u;
-    if (!hystgen_inverse_entered(self, u, &level)) {
-        return hystgen_inverse_answer(self, hystgen_inverse_held(self));
+    if (!hystgen_is_reference(u)) {
+        if (!hystgen_finite(u)) {
+            hystgen_inverse_unread(self);
+            return hystgen_inverse_answer(self, hystgen_inverse_held(self));
+        }
+        level = hystgen_inverse_outside(self, u);
+    }
+    if (hystgen_inverse_stands(self, u)) {
+        return hystgen_inverse_answer(self, self->answer);
     }
     const hystgen_signal_t h = hystgen_inverse_wanted(self, hystgen_inverse_put(self, level));
     const hystgen_reach_t w = hystgen_inverse_input(self, h);
-    const hystgen_reach_t v = hystgen_inverse_sought(self, h, w);
+    const hystgen_reach_t v = hystgen_inverse_sought(self, level, h, w);
     return hystgen_inverse_answer(self, hystgen_inverse_limited(self, v));
 }
 
@@ -217,18 +112,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     if (inside < applied || inside > applied) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
+    self->repeat = false;
     self->pending = inside;
     self->has_pending = true;
-}
-
-hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self) {
-    unsigned int status = 0; /* not reported: this is no step */
-    return hystgen_output_code(hystgen_inverse_displaced(self, self->output), &status);
-}
-
-void hystgen_inverse_correct(hystgen_inverse_t *self, hystgen_real_t measured,
-                             hystgen_real_t share) {
-    const hystgen_signal_t more =
-        hystgen_entered_level(measured) - hystgen_inverse_displaced(self, self->output);
-    hystgen_inverse_put_offset(self, self->offset + hystgen_shared(share, more));
 }

@@ -1,4 +1,4 @@
-/* Operators of a model with effects: start memory of engine loop. Called by users. */
+/* Operators of engine loop, with effects or without: start memory. Called by users. */
 #include "compensator/chain/model.h"
 #include "compensator/chain/chain.c"
 #ifndef HYSTGEN_CONFIGURED

@@ -101,26 +101,24 @@ HYSTGEN_APART bool hystgen_inverse_moved(hystgen_inverse_t *self, hystgen_play_t
     return hystgen_inverse_move_on(self, w);
 }
 
-/* The plays follow their input w. Returns their sum. */
-HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self,
-                                                               hystgen_play_t w) {
+/* The plays follow their input w to another sum. */
+HYSTGEN_APART_IN_FIXED void hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
     const bool turns = self->here.rising ? w < self->here.input : w > self->here.input;
     if (turns || !hystgen_forward_move_on(self, w)) {
         hystgen_find_input(&hystgen_model_curve, &self->here, self->corner, w, &self->kink);
         (void)hystgen_forward_moved(self, w);
     }
-    return hystgen_forward_started(self);
+    self->level = hystgen_forward_started(self);
 }
 
-/* The plays follow their input w. Returns their sum. */
-HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self,
-                                                               hystgen_play_t w) {
+/* The plays follow their input w to another sum. */
+HYSTGEN_APART_IN_FIXED void hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
     if (!self->sought || !hystgen_inverse_moved(self, w)) {
         hystgen_find_input(&hystgen_model_curve, &self->here, self->corner, w, &self->kink);
         (void)hystgen_inverse_moved(self, w);
     }
     self->sought = false;
-    return hystgen_inverse_started(self);
+    self->level = hystgen_inverse_started(self);
 }
 
 /* Input of the plays at which their sum is h. */

@@ -40,16 +40,16 @@ static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
     return self->plays.here.input;
 }
 
-/* The plays follow their input w. Returns their sum. */
-static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
+/* The plays follow their input w to another sum. */
+static void hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
     if (w < self->plays.here.input || w > self->plays.here.input) {
         (void)hystgen_plays_step(&hystgen_forward_curve, &self->plays, self->corner, w);
     }
-    return hystgen_forward_started(self);
+    self->level = hystgen_forward_started(self);
 }
 
-/* The plays follow their input w. Returns their sum. */
-static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
+/* The plays follow their input w to another sum. */
+static void hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
     hystgen_plays_t *m = &self->plays;
     if (self->sought && (w < m->here.output || w > m->here.output)) {
         hystgen_copy_place(&m->here, &self->undo);
@@ -59,7 +59,7 @@ static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_
         hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, w);
     }
     self->sought = false;
-    return hystgen_inverse_started(self);
+    self->level = hystgen_inverse_started(self);
 }
 
 /* Input of the plays at which their sum is h. */

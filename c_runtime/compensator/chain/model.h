@@ -3,16 +3,18 @@
    effect, so that a file compiles as it is opened in an editor; see compensator/model.h. */
 #ifndef HYSTGEN_CHAIN_MODEL_H
 #define HYSTGEN_CHAIN_MODEL_H
-#ifndef HYSTGEN_CHAIN
+#if !defined(HYSTGEN_CHAIN) && !defined(HYSTGEN_CONFIGURED)
 #define HYSTGEN_CHAIN
 #endif
 #include "compensator/model.h"
+#ifdef HYSTGEN_CHAIN
 #ifdef HYSTGEN_FIXED
 #include "compensator/chain/tables_fixed.h"
 #include "compensator/chain/state_fixed.h"
 #else
 #include "compensator/chain/tables.h"
 #include "compensator/chain/state.h"
+#endif
 #endif
 #ifndef HYSTGEN_CONFIGURED
 
@@ -129,6 +131,8 @@ typedef struct {
     hystgen_real_t applied;
     hystgen_ramp_t reached;
     hystgen_fine_t drive;
+    hystgen_real_t reference;
+    hystgen_real_t last;
     hystgen_signal_t level;
     hystgen_signal_t output;
     hystgen_real_t answer;
@@ -141,6 +145,7 @@ typedef struct {
     bool ascending;
     bool moving;
     bool has_pending;
+    bool repeat;
     bool stepped;
     bool filled;
     unsigned int bits;
@@ -175,6 +180,11 @@ hystgen_signal_t hystgen_inverse_output_side_rest(hystgen_inverse_t *self, hystg
 hystgen_signal_t hystgen_inverse_output_side_absorb(hystgen_inverse_t *self, hystgen_signal_t h);
 hystgen_signal_t hystgen_inverse_output_side_solve(hystgen_inverse_t *self, hystgen_signal_t y);
 hystgen_signal_t hystgen_inverse_output_side_resting(hystgen_inverse_t *self, hystgen_signal_t y);
+/* Sum of the plays, and what the output side has given last. */
+hystgen_signal_t hystgen_forward_level(const hystgen_forward_t *self);
+hystgen_signal_t hystgen_inverse_level(const hystgen_inverse_t *self);
+hystgen_signal_t hystgen_forward_output(const hystgen_forward_t *self);
+hystgen_signal_t hystgen_inverse_output(const hystgen_inverse_t *self);
 /* Between the output of the chain and the displacement, and the line of references. */
 hystgen_signal_t hystgen_forward_displaced(const hystgen_forward_t *self, hystgen_signal_t y);
 hystgen_signal_t hystgen_inverse_displaced(const hystgen_inverse_t *self, hystgen_signal_t y);

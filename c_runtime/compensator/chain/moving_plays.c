@@ -110,24 +110,24 @@ HYSTGEN_APART hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum
     return sum;
 }
 
-/* The plays follow their input w. Returns their sum. */
-static hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
-    if (!self->moving) {
-        return hystgen_level(hystgen_moved_rest(self->play, self->bent, w));
+/* The plays follow their input w to another sum. */
+static void hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
+    if (self->moving) {
+        self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
+        hystgen_relax(self->play, self->bent);
+    } else {
+        self->level = hystgen_level(hystgen_moved_rest(self->play, self->bent, w));
     }
-    self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
-    hystgen_relax(self->play, self->bent);
-    return self->level;
 }
 
-/* The plays follow their input w. Returns their sum. */
-static hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
-    if (!self->moving) {
-        return hystgen_level(hystgen_moved_rest(self->play, self->bent, w));
+/* The plays follow their input w to another sum. */
+static void hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
+    if (self->moving) {
+        self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
+        hystgen_relax(self->play, self->bent);
+    } else {
+        self->level = hystgen_level(hystgen_moved_rest(self->play, self->bent, w));
     }
-    self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
-    hystgen_relax(self->play, self->bent);
-    return self->level;
 }
 
 /* Sum of the plays in the start memory. */

@@ -1,5 +1,4 @@
-/* Operators of a model with effects: plays of engine loop that no effect changes. Called by chain.c
-   and chain_calls.c. */
+/* Operators of engine loop: plays that no effect changes. Called by chain.c and chain_calls.c. */
 #ifndef HYSTGEN_CHAIN_PLAYS_C
 #define HYSTGEN_CHAIN_PLAYS_C
 #include "compensator/chain/model.h"
@@ -16,23 +15,23 @@ static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
     return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
 }
 
-/* The plays follow their input w. Returns their sum. */
-HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self,
-                                                               hystgen_play_t w) {
+/* The plays follow their input w to another sum. */
+HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_forward_follow(hystgen_forward_t *self,
+                                                         hystgen_play_t w) {
     hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
-    return hystgen_forward_started(self);
+    self->level = hystgen_forward_started(self);
 }
 
-/* The plays follow their input w. Returns their sum. */
-HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self,
-                                                               hystgen_play_t w) {
+/* The plays follow their input w to another sum. */
+HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_inverse_follow(hystgen_inverse_t *self,
+                                                         hystgen_play_t w) {
     hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
-    return hystgen_inverse_started(self);
+    self->level = hystgen_inverse_started(self);
 }
 
 /* Input of the plays at which their sum is h. */
-HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *self,
-                                                             hystgen_signal_t h) {
+HYSTGEN_APART_IN_FIXED_CHAIN hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *self,
+                                                                   hystgen_signal_t h) {
     return hystgen_input_of(self->play, self->level, h);
 }
 

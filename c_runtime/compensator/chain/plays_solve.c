@@ -1,18 +1,12 @@
-/* Operators of a model with effects: plain plays solved for their input. Called by plays.c and by
-   relaxing_plays.c. */
+/* Operators of engine loop: plain plays solved for their input. The kernel sums them up again: a
+   model without effects does not keep the sum, and in fixed point it lacks bits. Called by plays.c
+   and by relaxing_plays.c. */
 #ifndef HYSTGEN_CHAIN_PLAYS_SOLVE_C
 #define HYSTGEN_CHAIN_PLAYS_SOLVE_C
 #include "compensator/chain/model.h"
 #include "compensator/chain/signals.c"
 
-#ifdef HYSTGEN_FIXED
-/* Input of the plays at which their sum is h; `level`, what it is now, lacks the bits below it. */
-static inline hystgen_reach_t hystgen_input_of(const hystgen_play_t *play, hystgen_signal_t level,
-                                               hystgen_signal_t h) {
-    (void)level;
-    return hystgen_loop_solve(&hystgen_model_tables, play, hystgen_asked(h));
-}
-#else
+#if !defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
 /* Input of the plays at which their sum is h; now it is `level`, which tells the direction. Assumes
    first that every play follows, then drops the largest thresholds one by one until the solution
    reaches the last play that is left, and goes no further than where the play dropped last would
@@ -40,6 +34,13 @@ static hystgen_reach_t hystgen_input_of(const hystgen_play_t *play, hystgen_sign
         next = first;
     }
     return play[0]; /* h differs from the present sum only by rounding */
+}
+#else
+/* Input of the plays at which their sum is h. */
+static inline hystgen_reach_t hystgen_input_of(const hystgen_play_t *play, hystgen_signal_t level,
+                                               hystgen_signal_t h) {
+    (void)level;
+    return hystgen_loop_solve(&hystgen_model_tables, play, hystgen_asked(h));
 }
 #endif
 

@@ -1,12 +1,15 @@
-/* Operators of a model with effects: signals between blocks. In floating point they have the type
-   of drives; in fixed point they have bits below those of codes. Called by chain.c, chain_calls.c
-   and the plays. */
+/* Operators of engine loop and of every model with effects: signals between blocks. In floating point
+   they have the type of drives. In fixed point they have bits below those of codes; without effects
+   drives are codes on their way to the plays, and sums of the plays have HYSTGEN_FRACTION bits below
+   an output code. Called by chain.c, chain_calls.c and the plays. */
 #ifndef HYSTGEN_CHAIN_SIGNALS_C
 #define HYSTGEN_CHAIN_SIGNALS_C
 #include "compensator/chain/model.h"
 #include "compensator/clamp.c"
-#ifdef HYSTGEN_FIXED
+#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
 #include "arithmetic/factors.c"
+#elif defined(HYSTGEN_FIXED)
+#include "compensator/code.c"
 #endif
 
 #ifdef HYSTGEN_FIXED
@@ -16,6 +19,20 @@ static inline bool hystgen_finite(hystgen_signal_t x) {
     return true;
 }
 
+static inline bool hystgen_is_drive(hystgen_real_t v) {
+    return hystgen_clamp_drive(v) == v;
+}
+
+static inline bool hystgen_is_reference(hystgen_real_t u) {
+    return hystgen_inverse_clamp(u) == u;
+}
+
+/* An applied drive, limited to its range. */
+static inline hystgen_real_t hystgen_applied_drive(hystgen_real_t v) {
+    return hystgen_clamp_drive(v);
+}
+
+#ifdef HYSTGEN_CHAIN
 /* A signal in front of the plays, in units of their input. */
 static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a) {
     return (hystgen_fine_t)hystgen_nearest(a, HYSTGEN_ARRIVING_BITS);
@@ -35,19 +52,6 @@ static hystgen_reach_t hystgen_drive_code(hystgen_signal_t v) {
         return (hystgen_reach_t)HYSTGEN_LEAST_CODE;
     }
     return (hystgen_reach_t)code;
-}
-
-static inline bool hystgen_is_drive(hystgen_real_t v) {
-    return hystgen_clamp_drive(v) == v;
-}
-
-static inline bool hystgen_is_reference(hystgen_real_t u) {
-    return hystgen_inverse_clamp(u) == u;
-}
-
-/* An applied drive, limited to its range. */
-static inline hystgen_real_t hystgen_applied_drive(hystgen_real_t v) {
-    return hystgen_clamp_drive(v);
 }
 
 /* Output code of a signal, limited to the type. */
@@ -102,6 +106,31 @@ static inline hystgen_play_t hystgen_drawn(hystgen_play_t play, hystgen_play_t w
     }
     return (hystgen_play_t)(w > play ? (hystgen_sum_t)w - r : (hystgen_sum_t)w + r);
 }
+#else
+static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a) {
+    return (hystgen_fine_t)a;
+}
+
+static inline hystgen_signal_t hystgen_entered_level(hystgen_real_t u) {
+    return (hystgen_signal_t)u * ((hystgen_signal_t)1 << HYSTGEN_FRACTION);
+}
+
+static inline hystgen_reach_t hystgen_drive_code(hystgen_signal_t v) {
+    return (hystgen_reach_t)v;
+}
+
+static inline hystgen_real_t hystgen_output_code(hystgen_signal_t y, unsigned int *status) {
+    return hystgen_code(y, status);
+}
+
+static inline hystgen_signal_t hystgen_level(hystgen_sum_t sum) {
+    return sum;
+}
+
+static inline hystgen_sum_t hystgen_asked(hystgen_signal_t h) {
+    return h;
+}
+#endif
 #else
 static bool hystgen_finite(hystgen_signal_t x) {
     return x >= -HYSTGEN_REAL_MAX && x <= HYSTGEN_REAL_MAX; /* false for NaN */

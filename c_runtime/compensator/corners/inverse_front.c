@@ -83,7 +83,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
         } else {
             hystgen_inverse_arrive(self, inside);
         }
-        self->level = level;
+        self->last = level;
         self->repeat = true;
     }
     self->stepped = true;
@@ -112,7 +112,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
 HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start,
                                          const hystgen_drive_t *first) {
     hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, start);
-    self->level = self->plays.here.input + HYSTGEN_OFFSET;
+    self->last = self->plays.here.input + HYSTGEN_OFFSET;
     hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner, first->w);
     self->drive = first->drive;
     self->ascending = first->ascending;

@@ -48,7 +48,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
         const hystgen_reach_t v =
             hystgen_inverse_choose(self, level, (hystgen_reach_t)w, &self->limited);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
-        self->level = level;
+        self->last = level;
         if (self->limited) {
             self->bits |= HYSTGEN_STATUS_DOMAIN;
         }
@@ -85,7 +85,7 @@ static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, 
     self->ascending = first->ascending;
     hystgen_inverse_keep(self);
     self->reference = 0;
-    self->level = hystgen_code(self->here.output, &status);
+    self->last = hystgen_code(self->here.output, &status);
     self->repeat = false;
     self->next = -HYSTGEN_FAR;
     self->bits = 0;

@@ -24,7 +24,7 @@ typedef struct {
     hystgen_real_t undo_drive;
     hystgen_real_t returned;  /* by the last step, if another drive was committed since */
     hystgen_real_t reference; /* of the last step */
-    hystgen_real_t level;     /* the same, limited: the next reference moves up or down from here */
+    hystgen_real_t last;      /* the same, limited: the next reference moves up or down from here */
     bool ascending;           /* direction of the drive's last move */
     bool undo_ascending;
     bool stepped;      /* a step has answered */

@@ -26,7 +26,7 @@ typedef struct {
     hystgen_real_t drive; /* where the plays are */
     hystgen_real_t undo_drive;
     hystgen_real_t reference; /* of the last step */
-    hystgen_real_t level;     /* the same, limited: the next reference moves up or down from here */
+    hystgen_real_t last;      /* the same, limited: the next reference moves up or down from here */
     bool ascending;           /* direction of the drive's last move */
     bool undo_ascending;
     bool repeat;        /* the last answer still stands for `reference` */

@@ -27,7 +27,7 @@ from hystgen.compensator.chain.layout import (
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat
 from hystgen.compensator.chain.sides import Blocks, sides_of
 from hystgen.compensator.layout import clamp_drive, inverse_clamp
-from hystgen.compensator.step import Operations, inverse_answer, inverse_replace, plays_of
+from hystgen.compensator.step import Hooks, Operations, operations_of, plays_of
 from hystgen.effects.ageing.compensator import HIGH as AGEING_HIGH
 from hystgen.effects.ageing.compensator import AgeingState
 from hystgen.effects.creep.compensator import CreepState
@@ -58,27 +58,19 @@ from hystgen.plays.slots import (
     HOLD,
     INPUT_CLAMPED,
     LIMITED_SETTING,
-    OP_CALL,
-    OP_COMMIT,
     OP_CORRECT,
     OP_EXPECTED,
     OP_GAIN,
-    OP_INIT,
     OP_OFFSET,
     OP_PUSH,
-    OP_RESET,
     OP_SETTLE,
-    OP_STEP,
     OP_TEMPERATURE,
     OP_TRAVEL,
     OP_TRAVELLED,
-    OUTPUT_CLAMPED,
     SLEW_LIMITED,
     ZERO,
-    Bytes,
     Counts,
     Reals,
-    read,
 )
 
 SET, OUTPUT, APPLIED, REACHED, ARRIVED, REFERENCE, WAY, MOVED, REST = range(9)
@@ -495,33 +487,25 @@ def made_of(
         s.flags[MOVING] = 0
         seen(t, s, inverse, inside)
 
-    @jit
-    def forward_step(t: ChainTables, s: ChainState, v: Any) -> Any:
-        """One sample of the forward operator."""
-        if not finite(t, v):
-            s.plays.counts[STATUS] |= HELD
-            return s.plays.real[ANSWER]
-        inside = clamp_drive(t, v)
-        if inside != v:
-            s.plays.counts[STATUS] |= INPUT_CLAMPED
-        forward_absorb(t, s, inside)
-        s.plays.real[ANSWER], bits = output_code(t, displacement(t, s, s.real[OUTPUT]))
-        s.plays.counts[STATUS] |= bits
-        return s.plays.real[ANSWER]
+    @jit(inline=True)
+    def plays_in(s: ChainState) -> State:
+        """The memory of the step itself."""
+        return s.plays
+
+    @jit(inline=True)
+    def inverse_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
+        """The actuator has seen drive v."""
+        absorb(t, s, v, v)
+
+    @jit(inline=True)
+    def shown(t: ChainTables, s: ChainState) -> tuple[Any, int]:
+        """The displacement now, and its status."""
+        return output_code(t, displacement(t, s, s.real[OUTPUT]))  # type: ignore[no-any-return]
 
     @jit
-    def inverse_take(t: ChainTables, s: ChainState) -> None:
-        """The actuator has seen the pending drive."""
-        if s.plays.counts[HAS_PENDING]:
-            absorb(t, s, s.plays.real[PENDING], s.plays.real[PENDING])
-            s.plays.counts[HAS_PENDING] = 0
-
-    @jit
-    def inverse_put(t: ChainTables, s: ChainState, u: Any) -> Any:
-        """Take the next reference, through the preview if there is one. Returns the output to reach at this sample."""
-        level = inverse_clamp(t, u)
-        if level != u:
-            s.plays.counts[STATUS] |= INPUT_CLAMPED
+    def inverse_put(t: ChainTables, s: ChainState, level: Any) -> Any:
+        """Take the next reference, within its range, through the preview if there is one. Returns the output to reach
+        at this sample."""
         if t.quiet:
             quiet_count(t, s, entered_level(t, level))
         wanted, limited = undisplaced(t, s, entered_level(t, level))
@@ -536,21 +520,29 @@ def made_of(
     @jit
     def inverse_push(t: ChainTables, s: ChainState, u: Any) -> None:
         """Take the next reference of the preview, without an answer."""
-        if finite(t, u):
-            inverse_put(t, s, u)
-        else:
-            s.plays.counts[STATUS] |= HELD
-            preview_repeat(s.line)
-
-    @jit
-    def inverse_step(t: ChainTables, s: ChainState, u: Any) -> Any:
-        """One sample of the inverse operator."""
-        inverse_take(t, s)
         if not finite(t, u):
             s.plays.counts[STATUS] |= HELD
-            preview_repeat(s.line)
-            return inverse_answer(s.plays, inverse_held(t, s))
-        y = inverse_put(t, s, u)
+            unread(t, s)
+            return
+        level = inverse_clamp(t, u)
+        if level != u:
+            s.plays.counts[STATUS] |= INPUT_CLAMPED
+        inverse_put(t, s, level)
+
+    @jit(inline=True)
+    def unread(t: ChainTables, s: ChainState) -> None:  # noqa: ARG001  the same call for every chain
+        """A reference that is no number: the newest one stands once more."""
+        preview_repeat(s.line)
+
+    @jit(inline=True)
+    def stands(t: ChainTables, s: ChainState, u: Any) -> bool:  # noqa: ARG001
+        """Every reference is answered anew: time has passed for the effects."""
+        return False
+
+    @jit
+    def inverse_sought(t: ChainTables, s: ChainState, level: Any) -> Any:
+        """The drive for the limited reference `level`, in reach of a slew limit."""
+        y = inverse_put(t, s, level)
         moving = s.flags[MOVING] != 0
         h = output_side_solve(t, s, y) if moving else output_side_resting(t, s, y)
         s.plays.counts[BITS] = 0
@@ -565,19 +557,7 @@ def made_of(
         reached = inverse_slewed(t, s, v)
         if reached != v:
             s.plays.counts[BITS] |= SLEW_LIMITED
-        inside = clamp_drive(t, reached)
-        if inside != reached:
-            s.plays.counts[BITS] |= OUTPUT_CLAMPED
-        s.plays.counts[STATUS] |= s.plays.counts[BITS]
-        return inverse_answer(s.plays, inside)
-
-    @jit
-    def inverse_commit(t: ChainTables, s: ChainState, applied: Any) -> None:
-        """`applied` is the drive that was really applied in place of the last answer."""
-        if not finite(t, applied):
-            s.plays.counts[STATUS] |= HELD
-            return
-        inverse_replace(s.plays, applied, clamp_drive(t, applied) + t.limits[ZERO])  # no drive is -0
+        return reached
 
     @jit
     def put_offset(t: ChainTables, s: ChainState, d: Any) -> None:
@@ -635,49 +615,37 @@ def made_of(
             s.plays.counts[STATUS] |= LIMITED_SETTING
 
     @jit
-    def run(t: ChainTables, s: ChainState, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
-        """Run op[i] with argument x[i]. answers[i] is the answer of a step or of `expected`, else 0; status[i] is read
-        and cleared, or left for a later call."""
-        for i in range(len(op)):
-            call = op[i] & OP_CALL
-            answers[i] = t.limits[ZERO]
-            if call == OP_INIT:
-                init(t, s, inverse)
-            elif call == OP_COMMIT:
-                inverse_commit(t, s, x[i])
-            elif call == OP_PUSH:
-                inverse_push(t, s, x[i])
-            elif call == OP_SETTLE:
-                inverse_take(t, s)
-                settle(t, s, inverse, x[i])
-            elif call == OP_OFFSET:
-                set_offset(t, s, entered_level(t, x[i]))
-            elif call == OP_TEMPERATURE:
-                set_temperature(t, s, x[i])
-            elif call == OP_GAIN:
-                set_gain(t, s, x[i])
-            elif call == OP_TRAVEL:
-                set_travel(t, s, entered_travel(t, x[i]))
-            elif call == OP_TRAVELLED:
-                answers[i] = s.ageing.block[0, AGEING_HIGH]
-            elif call == OP_CORRECT:
-                correct(t, s, x[i], t.number[SHARE])
-            elif call == OP_EXPECTED:
-                answers[i] = expected(t, s)
-            else:
-                if call == OP_RESET:
-                    reset(t, s, inverse)
-                if inverse:
-                    inverse_step(t, s, x[i])
-                else:
-                    forward_step(t, s, x[i])
-            if call == OP_STEP:
-                answers[i] = s.plays.real[ANSWER]
-            status[i] = read(s.plays.counts, STATUS, op[i])
+    def other(t: ChainTables, s: ChainState, inverse: int, call: int, x: Any) -> Any:
+        """A call of models with effects alone. Returns its answer, or 0."""
+        if call == OP_PUSH:
+            inverse_push(t, s, x)
+        elif call == OP_SETTLE:
+            if s.plays.counts[HAS_PENDING]:
+                absorb(t, s, s.plays.real[PENDING], s.plays.real[PENDING])
+                s.plays.counts[HAS_PENDING] = 0
+            settle(t, s, inverse, x)
+        elif call == OP_OFFSET:
+            set_offset(t, s, entered_level(t, x))
+        elif call == OP_TEMPERATURE:
+            set_temperature(t, s, x)
+        elif call == OP_GAIN:
+            set_gain(t, s, x)
+        elif call == OP_TRAVEL:
+            set_travel(t, s, entered_travel(t, x))
+        elif call == OP_TRAVELLED:
+            return s.ageing.block[0, AGEING_HIGH]
+        elif call == OP_CORRECT:
+            correct(t, s, x, t.number[SHARE])
+        elif call == OP_EXPECTED:
+            return expected(t, s)
+        return t.limits[ZERO]
 
     @jit
     def visit(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
         """Let the actuator be at drive v before the next sample."""
         seen(t, s, inverse, v)
 
-    return Operations(init, visit, run, forward_step, inverse_step, front_forward, front_inverse)
+    hooks = Hooks(
+        plays_in, finite, forward_absorb, inverse_absorb, shown, unread, inverse_held, stands, inverse_sought, other
+    )
+    return operations_of(init, reset, visit, (front_forward, front_inverse), hooks)

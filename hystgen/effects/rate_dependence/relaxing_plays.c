@@ -15,24 +15,24 @@ static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
     return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
 }
 
-/* The plays follow their input w. Returns their sum. */
-HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_forward_follow(hystgen_forward_t *self,
-                                                               hystgen_play_t w) {
+/* The plays follow their input w to another sum. */
+HYSTGEN_APART_IN_FIXED void hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
     if (self->moving) {
-        return hystgen_level(hystgen_relaxing_follow(self->play, w));
+        self->level = hystgen_level(hystgen_relaxing_follow(self->play, w));
+    } else {
+        hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
+        self->level = hystgen_forward_started(self);
     }
-    hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
-    return hystgen_forward_started(self);
 }
 
-/* The plays follow their input w. Returns their sum. */
-HYSTGEN_APART_IN_FIXED hystgen_signal_t hystgen_inverse_follow(hystgen_inverse_t *self,
-                                                               hystgen_play_t w) {
+/* The plays follow their input w to another sum. */
+HYSTGEN_APART_IN_FIXED void hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
     if (self->moving) {
-        return hystgen_level(hystgen_relaxing_follow(self->play, w));
+        self->level = hystgen_level(hystgen_relaxing_follow(self->play, w));
+    } else {
+        hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
+        self->level = hystgen_inverse_started(self);
     }
-    hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
-    return hystgen_inverse_started(self);
 }
 
 /* Input of the plays at which their sum is h. */

@@ -108,9 +108,36 @@ static hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self, hystgen_r
     return v;
 }
 
+#ifdef HYSTGEN_CHAIN
 /* The last answer once more. */
 static hystgen_real_t hystgen_inverse_held(const hystgen_inverse_t *self) {
     return self->stepped ? self->answer : self->applied;
+}
+#else
+/* The last answer once more. */
+static hystgen_real_t hystgen_inverse_held(const hystgen_inverse_t *self) {
+    return self->stepped ? self->answer : self->drive;
+}
+#endif
+#endif
+
+#ifdef HYSTGEN_CHAIN
+/* Every reference is answered anew: time has passed for the effects. */
+static bool hystgen_inverse_stands(const hystgen_inverse_t *self, hystgen_real_t u) {
+    (void)self;
+    (void)u;
+    return false;
+}
+#else
+/* Whether the last answer still stands for reference u; u is the last reference from now on. */
+static bool hystgen_inverse_stands(hystgen_inverse_t *self, hystgen_real_t u) {
+    if (self->repeat && u >= self->reference && u <= self->reference) {
+        self->status |= self->bits;
+        return true;
+    }
+    self->reference = u;
+    self->repeat = true;
+    return false;
 }
 #endif
 

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 01507dd9598b9d83b30455371f1b5e7ec68487f456fd357731198c8ff879bf2b, without this line
+ * Text: sha256 0a462a66cc0e1e5c77a59088799da0c19e87a90a6b45b45b6d7b072b153a27ed, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -206,6 +206,16 @@ static bent_real_t bent_front_inverse(bent_real_t w) {
     return v;
 }
 
+/* The displacement for an output y of the chain. */
+static bent_real_t bent_forward_displaced(bent_real_t y) {
+    return y + BENT_OFFSET;
+}
+
+/* The output of the chain that gives the displacement u; `limited` tells whether none does. */
+static bent_real_t bent_inverse_undisplaced(bent_real_t u) {
+    return u - BENT_OFFSET;
+}
+
 static bent_real_t bent_clamp_drive(bent_real_t v) {
     const bent_real_t least = v < BENT_DRIVE_MIN ? BENT_DRIVE_MIN : v;
     return (bent_real_t)(least > BENT_DRIVE_MAX ? BENT_DRIVE_MAX : least);
@@ -222,33 +232,58 @@ static bent_real_t bent_inverse_arrive(bent_inverse_t *self, bent_real_t v) {
     return bent_front_forward(v);
 }
 
-static bent_real_t bent_forward_output(const bent_forward_t *self) {
-    return bent_loop_output(&bent_model_tables, self->play) + BENT_OFFSET;
+/* The last answer once more. */
+static bent_real_t bent_inverse_held(const bent_inverse_t *self) {
+    return self->stepped ? self->answer : self->drive;
 }
 
-/* The part common to init and reset, once the plays are set. */
-static void bent_forward_begin(bent_forward_t *self) {
-    self->answer = bent_forward_output(self);
-    self->status = 0;
+/* Whether the last answer still stands for reference u; u is the last reference from now on. */
+static bool bent_inverse_stands(bent_inverse_t *self, bent_real_t u) {
+    if (self->repeat && u >= self->reference && u <= self->reference) {
+        self->status |= self->bits;
+        return true;
+    }
+    self->reference = u;
+    self->repeat = true;
+    return false;
 }
 
-/* Input of the plays that gives output `level`. */
-static bent_real_t bent_inverse_solve(const bent_inverse_t *self, bent_real_t level) {
-    return bent_loop_solve(&bent_model_tables, self->play, level - BENT_OFFSET);
+static bool bent_finite(bent_real_t x) {
+    return x >= -DBL_MAX && x <= DBL_MAX; /* false for NaN */
 }
 
-/* The actuator has seen drive v. */
-static void bent_forward_absorb(bent_forward_t *self, bent_real_t v) {
+static inline bool bent_is_drive(bent_real_t v) {
+    return v >= BENT_DRIVE_MIN && v <= BENT_DRIVE_MAX; /* false for NaN */
+}
+
+static inline bool bent_is_reference(bent_real_t u) {
+    return u >= BENT_OUTPUT_MIN && u <= BENT_OUTPUT_MAX;
+}
+
+/* An applied drive, limited to its range; never -0. */
+static inline bent_real_t bent_applied_drive(bent_real_t v) {
+    return bent_clamp_drive(v) + 0;
+}
+
+/* Drive v has passed through the drive side and moved the plays. */
+static inline void bent_forward_played(bent_forward_t *self, bent_real_t v) {
     bent_loop_absorb(&bent_model_tables, self->play, bent_front_forward(v));
 }
 
-/* The actuator has seen drive v. */
-static void bent_inverse_absorb(bent_inverse_t *self, bent_real_t v) {
+/* Drive v has passed through the drive side and moved the plays. */
+static inline void bent_inverse_played(bent_inverse_t *self, bent_real_t v) {
     bent_loop_absorb(&bent_model_tables, self->play, bent_inverse_arrive(self, v));
 }
 
-/* Returns drive v and leaves it pending: the next step absorbs it, or the drive committed in its
-   place. */
+/* The actuator has seen the pending drive. */
+static void bent_inverse_take(bent_inverse_t *self) {
+    if (self->has_pending) {
+        bent_inverse_played(self, self->pending);
+        self->has_pending = false;
+    }
+}
+
+/* Returns drive v and leaves it pending. */
 static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t v) {
     self->answer = v;
     self->pending = v;
@@ -257,97 +292,23 @@ static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t v) {
     return v;
 }
 
-/* The actuator has seen the pending drive. */
-static void bent_inverse_take(bent_inverse_t *self) {
-    if (self->has_pending) {
-        bent_inverse_absorb(self, self->pending);
-        self->has_pending = false;
-    }
-}
-
-/* Answers reference u, which is `level` after limiting; `bits` is its status so far. */
-static inline bent_real_t bent_inverse_search(bent_inverse_t *self, bent_real_t u,
-                                              bent_real_t level, unsigned int bits) {
-    if (self->repeat && u >= self->reference && u <= self->reference) {
-        self->status |= self->bits;
-        return bent_inverse_answer(self, self->answer);
-    }
-    self->reference = u;
-    self->repeat = true;
-    self->bits = bits;
-    const bent_real_t v = bent_front_inverse(bent_inverse_solve(self, level));
-    const bent_real_t inside = bent_clamp_drive(v);
-    if (inside < v || inside > v) {
-        self->bits |= BENT_STATUS_OUTPUT_CLAMPED;
-    }
-    self->status |= self->bits;
-    return bent_inverse_answer(self, inside);
-}
-
-/* Drive v, which is `applied` after limiting, is pending in place of the last answer. */
-static void bent_inverse_replace(bent_inverse_t *self, bent_real_t applied, bent_real_t v) {
-    if (v < applied || v > applied) {
-        self->status |= BENT_STATUS_INPUT_CLAMPED;
-    }
-    self->repeat = false;
-    self->pending = v;
-    self->has_pending = true;
+/* The part common to init and reset, once the plays are set: they rest at this drive. */
+static void bent_forward_begin(bent_forward_t *self) {
+    self->status = 0;
+    self->answer = bent_forward_displaced(bent_loop_output(&bent_model_tables, self->play));
 }
 
 /* The part common to init and reset, once the plays are set: they rest at this drive. */
 static void bent_inverse_begin(bent_inverse_t *self, bent_real_t drive) {
     self->pending = drive;
-    self->drive = drive;
-    self->reference = 0;
     self->answer = drive;
+    self->reference = 0;
     self->has_pending = false;
     self->repeat = false;
     self->stepped = false;
     self->bits = 0;
+    self->drive = drive;
     self->status = 0;
-}
-
-static bool bent_finite(bent_real_t x) {
-    return x >= -DBL_MAX && x <= DBL_MAX; /* false for NaN */
-}
-
-/* One sample. */
-bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {
-    if (!(v >= BENT_DRIVE_MIN && v <= BENT_DRIVE_MAX)) {
-        if (!bent_finite(v)) {
-            self->status |= BENT_STATUS_HELD;
-            return self->answer;
-        }
-        v = bent_clamp_drive(v);
-        self->status |= BENT_STATUS_INPUT_CLAMPED;
-    }
-    bent_forward_absorb(self, v);
-    self->answer = bent_forward_output(self);
-    return self->answer;
-}
-
-/* One sample. */
-bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u) {
-    bent_real_t level = u;
-    unsigned int bits = 0;
-    bent_inverse_take(self);
-    if (!(u >= BENT_OUTPUT_MIN && u <= BENT_OUTPUT_MAX)) {
-        if (!bent_finite(u)) {
-            self->status |= BENT_STATUS_HELD;
-            return bent_inverse_answer(self, self->stepped ? self->answer : self->drive);
-        }
-        level = bent_inverse_clamp(u);
-        bits = BENT_STATUS_INPUT_CLAMPED;
-    }
-    return bent_inverse_search(self, u, level, bits);
-}
-
-void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied) {
-    if (!bent_finite(applied)) {
-        self->status |= BENT_STATUS_HELD;
-        return;
-    }
-    bent_inverse_replace(self, applied, bent_clamp_drive(applied) + 0); /* no drive is -0 */
 }
 
 void bent_forward_init(bent_forward_t *self) {
@@ -370,6 +331,89 @@ void bent_inverse_reset(bent_inverse_t *self, bent_real_t u) {
     bent_loop_rest(&bent_model_tables, self->play, 0);
     bent_inverse_begin(self, BENT_INVERSE_RESET_DRIVE);
     (void)bent_inverse_step(self, u);
+}
+
+bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {
+    bent_real_t inside = v;
+    if (!bent_is_drive(v)) {
+        if (!bent_finite(v)) {
+            self->status |= BENT_STATUS_HELD;
+            return self->answer;
+        }
+        inside = bent_clamp_drive(v);
+        self->status |= BENT_STATUS_INPUT_CLAMPED;
+    }
+    bent_forward_played(self, inside);
+    const bent_real_t answer = bent_forward_displaced(bent_loop_output(&bent_model_tables,
+                                                                       self->play));
+    self->answer = answer;
+    return answer;
+}
+
+/* Limits a reference that is out of its range. */
+static bent_real_t bent_inverse_outside(bent_inverse_t *self, bent_real_t u) {
+    self->status |= BENT_STATUS_INPUT_CLAMPED;
+    return bent_inverse_clamp(u);
+}
+
+/* A reference that is no number: the newest one stands once more. */
+static void bent_inverse_unread(bent_inverse_t *self) {
+    self->status |= BENT_STATUS_HELD;
+}
+
+/* The drive that leads to an input w of the plays, at which their sum is h, for the limited
+   reference `level`. */
+static inline bent_real_t bent_inverse_sought(bent_inverse_t *self, bent_real_t w) {
+    self->bits = 0;
+    return bent_front_inverse(w);
+}
+
+/* The drive v within its limits. */
+static bent_real_t bent_inverse_limited(bent_inverse_t *self, bent_real_t v) {
+    const bent_real_t inside = bent_clamp_drive(v);
+    if (inside < v || inside > v) {
+        self->bits |= BENT_STATUS_OUTPUT_CLAMPED;
+    }
+    self->status |= self->bits;
+    return inside;
+}
+
+/* The next drive, for reference u; the memory is up to date. */
+static inline bent_real_t bent_inverse_next(bent_inverse_t *self, bent_real_t u) {
+    bent_real_t level = u;
+    if (!bent_is_reference(u)) {
+        if (!bent_finite(u)) {
+            bent_inverse_unread(self);
+            return bent_inverse_answer(self, bent_inverse_held(self));
+        }
+        level = bent_inverse_outside(self, u);
+    }
+    if (bent_inverse_stands(self, u)) {
+        return bent_inverse_answer(self, self->answer);
+    }
+    const bent_real_t h = bent_inverse_undisplaced(level);
+    const bent_real_t w = bent_loop_solve(&bent_model_tables, self->play, h);
+    const bent_real_t v = bent_inverse_sought(self, w);
+    return bent_inverse_answer(self, bent_inverse_limited(self, v));
+}
+
+bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u) {
+    bent_inverse_take(self);
+    return bent_inverse_next(self, u);
+}
+
+void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied) {
+    if (!bent_finite(applied)) {
+        self->status |= BENT_STATUS_HELD;
+        return;
+    }
+    const bent_real_t inside = bent_applied_drive(applied);
+    if (inside < applied || inside > applied) {
+        self->status |= BENT_STATUS_INPUT_CLAMPED;
+    }
+    self->repeat = false;
+    self->pending = inside;
+    self->has_pending = true;
 }
 
 unsigned int bent_forward_status(bent_forward_t *self) {

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 857d74a85a48b78e02d1eabb10c78fc760a5bb4b700114fef5768669af63a576, without this line
+ * Text: sha256 cacce5c0525371449d8a4a59492b76d3a1917a7e09909b0fdaaec48d2ebcede6, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -85,11 +85,11 @@ typedef double bent_real_t;
 #define BENT_STATUS_HELD 4u           /* NaN or infinite input: the last answer was held */
 #define BENT_STATUS_DOMAIN 8u         /* never set: no envelope limits an argument */
 
-/* One forward operator: drive in, output out. Plain data, owned by the caller. */
+/* One forward operator: drive in, displacement out. Plain data, owned by the caller. */
 typedef struct {
     bent_real_t answer; /* output returned last */
     unsigned int status;
-    bent_real_t play[BENT_N_PLAYS + 1]; /* play 0 is the input of the plays */
+    bent_real_t play[7]; /* play 0 is the input of the plays */
 } bent_forward_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
@@ -101,9 +101,9 @@ typedef struct {
     bool has_pending;
     bool repeat;       /* the last answer still stands for `reference` */
     bool stepped;      /* a step has answered */
-    unsigned int bits; /* status of that answer */
+    unsigned int bits; /* of the last step */
     unsigned int status;
-    bent_real_t play[BENT_N_PLAYS + 1]; /* play 0 is the input of the plays */
+    bent_real_t play[7]; /* play 0 is the input of the plays */
 } bent_inverse_t;
 
 /**

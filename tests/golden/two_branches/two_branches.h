@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 5f1d0373b14f6e2e677735c4a63a4537c4107ad35ceead3023fae3c9652e53a1, without this line
+ * Text: sha256 747a77eb26ecf759f4dbc823c6a2bb964171100ae4793c991d3a90e050e64232, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -142,7 +142,7 @@ typedef struct {
     two_branches_real_t returned;  /* by the last step, if another drive was committed since */
     two_branches_real_t reference; /* of the last step */
     /* the same, limited: the next reference moves up or down from here */
-    two_branches_real_t level;
+    two_branches_real_t last;
     bool ascending; /* direction of the drive's last move */
     bool undo_ascending;
     bool stepped;      /* a step has answered */
@@ -803,9 +803,9 @@ TWO_BRANCHES_APART two_branches_real_t
     two_branches_inverse_choose(const two_branches_inverse_t *self, two_branches_real_t level,
                                 two_branches_real_t w, bool *limited) {
     bool up = self->ascending;
-    if (level > self->level) {
+    if (level > self->last) {
         up = true;
-    } else if (level < self->level) {
+    } else if (level < self->last) {
         up = false;
     }
     two_branches_real_t v = two_branches_front_inverse(w, up, limited);
@@ -900,7 +900,7 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
         } else {
             two_branches_inverse_arrive(self, inside);
         }
-        self->level = level;
+        self->last = level;
         self->repeat = true;
     }
     self->stepped = true;
@@ -930,7 +930,7 @@ TWO_BRANCHES_APART void two_branches_inverse_begin(two_branches_inverse_t *self,
                                                    const two_branches_start_t *start,
                                                    const two_branches_drive_t *first) {
     two_branches_start(&two_branches_inverse_curve, &self->plays, self->corner, start);
-    self->level = self->plays.here.input + TWO_BRANCHES_OFFSET;
+    self->last = self->plays.here.input + TWO_BRANCHES_OFFSET;
     two_branches_move_to_output(&two_branches_inverse_curve, &self->plays, self->corner, first->w);
     self->drive = first->drive;
     self->ascending = first->ascending;
