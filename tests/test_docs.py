@@ -259,7 +259,10 @@ def start(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-LONG = {"docs/effects.md", "docs/tutorials/name-what-is-missing.md", "docs/howto/diagnose.md", "docs/plants.md"}
+LONG = {
+    "docs/effects.md", "docs/tutorials/name-what-is-missing.md", "docs/howto/diagnose.md", "docs/howto/python.md",
+    "docs/plants.md",
+}  # fmt: skip
 """Pages that take as long as three others; `make test` has others of their kind."""
 
 

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.thorough
 
 Array = NDArray[np.float64]
 
-PLANTS = Path(__file__).parent / "plants"
+PLANTS = Path(__file__).parents[1] / "benchmarks" / "plants"
 NAMES = sorted(effects.catalogue())
 BENCH = bench.Bench("dynamic", 0.0, 100.0, 40.0, (1000.0, 1000.0), 1000)
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import second_plants
 from numpy.typing import NDArray
-from second_plants import EFFECTS, FOREIGN, Plant, Session, Stage, filtered
 
 import hystgen
+from benchmarks import second_plants
+from benchmarks.second_plants import EFFECTS, FOREIGN, Plant, Session, Stage, filtered
 
 Array = NDArray[np.float64]
 
