@@ -1,4 +1,6 @@
 /* Operators of engine loop and of every model with effects: step and commit. Called by users. */
+#ifndef HYSTGEN_CHAIN_CHAIN_CALLS_C
+#define HYSTGEN_CHAIN_CHAIN_CALLS_C
 #include "compensator/chain/model.h"
 #include "compensator/chain/chain.c"
 #include "compensator/chain/refined_input.c"
@@ -116,3 +118,5 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     self->pending = inside;
     self->has_pending = true;
 }
+
+#endif
