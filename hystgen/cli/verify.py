@@ -95,7 +95,7 @@ def verify(
 
 
 def _check(model: Model, options: Mapping[str, Any]) -> None:
-    """Raise any error of emission now, before the models in front of it take their time."""
+    """Raise any error of emission now, before time is spent on earlier models."""
     from hystgen.emission.calls import emit_options, emitted_model
 
     chosen = emit_options(model, **options)

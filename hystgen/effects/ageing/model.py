@@ -89,7 +89,8 @@ class ExponentialAgeing(_Ageing):
 class SeveralAgeing(_Ageing):
     """Gain `1 - sum loss_i (1 - exp(-D/travel_i))`: losses that end at several distances, wear of different speeds.
 
-    Two of them follow laws between the exponential and the logarithmic one, which spread over decades of travel.
+    With two of them it can follow laws between the exponential and the logarithmic one, which spread over decades of
+    travel.
     """
 
     shape: Literal["exponentials"] = Field(description="losses that come to an end at several distances")

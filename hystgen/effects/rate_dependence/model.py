@@ -49,7 +49,7 @@ NEARLY = 0.3
 """[share of a stretch] A stretch may change by this much in a piece that uses only the leading term of curvature."""
 
 SLIGHT = 1e-4
-"""Share of the speed that friction may remove while its effect is summed along the move without it."""
+"""Share of the speed that friction may take while its effect is integrated along the unperturbed motion."""
 
 
 @jit

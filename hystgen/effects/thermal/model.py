@@ -269,7 +269,7 @@ def _numbers(row: tuple[int | None, int | None], about: About) -> tuple[Array, A
 
 
 def _of_row(x: Array, row: tuple[int | None, int | None], about: About) -> tuple[float, float]:
-    """Gain and offset per degree from such numbers."""
+    """Gain and offset per degree, taken from the numbers of a search."""
     gain, offset = (0.0 if place is None else float(x[place]) for place in row)
     return 0.01 * gain, 0.01 * about.output_range * offset
 
