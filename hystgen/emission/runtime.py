@@ -270,8 +270,8 @@ class Variant:
         if self.finer and self.chain:
             finer = "chain_finer.c" if loops else "chain_corners_finer.c"
         plays = (*plays, finer) if loops else (finer, *plays)
-        chain = ("chain.c", "chain_loop.c" if loops else "chain_corners.c", "chain_calls.c")
-        chain += ("chain_settings.c",) * self.chain
+        settings = ("chain_settings.c",) if self.chain else ()
+        chain = ("chain.c", "chain_loop.c" if loops else "chain_corners.c", "chain_calls.c", *settings)
         start = (self._start,) if loops else ()
         drive = ("loop_branches_drive.c",) if self.branches and not self.chain else ()
         entered = () if self.fixed or self.chain else ("entered_float.c",)
