@@ -532,5 +532,5 @@ STICKY: list[tuple[str, str, str, set[tuple[str, str]]]] = [
     ("two_branches", "float32", "loop", {("inverse_drive", NO_DRIVE)}),
     ("two_branches", "q15", "loop", {LIMITED_DRIVE, ("inverse_drive", NO_DRIVE)}),
     ("curved", "float32", "loop", {("inverse_drive", NO_DRIVE)}),
-    ("everything", "float32", "loop", {("inverse_drive", NO_DRIVE)}),
+    ("everything", "float32", "loop", set()),
 ]

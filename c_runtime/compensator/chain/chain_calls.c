@@ -22,12 +22,6 @@ HYSTGEN_ALONE hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystg
     return answer;
 }
 
-/* Limits a reference that is out of its range. */
-HYSTGEN_APART_IN_CHAIN hystgen_real_t hystgen_inverse_outside(hystgen_inverse_t *self, hystgen_real_t u) {
-    self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
-    return hystgen_inverse_clamp(u);
-}
-
 /* A reference that is no number: the newest one stands once more. */
 static void hystgen_inverse_unread(hystgen_inverse_t *self) {
     self->status |= HYSTGEN_STATUS_HELD;
@@ -60,7 +54,6 @@ HYSTGEN_APART_IN_FIXED_CHAIN hystgen_reach_t hystgen_inverse_sought(hystgen_inve
                                                                     hystgen_real_t level,
                                                                     hystgen_signal_t h,
                                                                     hystgen_reach_t w) {
-    self->bits = 0;
     const hystgen_signal_t a =
         hystgen_inverse_finer(self, h, w, hystgen_inverse_drive(self, level, w));
     return hystgen_drive_code(self->moving ? hystgen_inverse_drive_side_solve(self, a) : a);
@@ -80,20 +73,23 @@ static hystgen_real_t hystgen_inverse_limited(hystgen_inverse_t *self, hystgen_r
     return inside;
 }
 
-/* The next drive, for reference u; the memory is up to date. */
+/* The next drive, for reference u; the memory is up to date. `bits` is its status so far. */
 HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_next(hystgen_inverse_t *self,
                                                            hystgen_real_t u) {
     hystgen_real_t level = u;
+    unsigned int bits = 0;
     if (!hystgen_is_reference(u)) {
         if (!hystgen_finite(u)) {
             hystgen_inverse_unread(self);
             return hystgen_inverse_answer(self, hystgen_inverse_held(self));
         }
-        level = hystgen_inverse_outside(self, u);
+        level = hystgen_inverse_clamp(u);
+        bits = HYSTGEN_STATUS_INPUT_CLAMPED;
     }
     if (hystgen_inverse_stands(self, u)) {
         return hystgen_inverse_answer(self, self->answer);
     }
+    self->bits = bits;
     const hystgen_signal_t h = hystgen_inverse_wanted(self, hystgen_inverse_put(self, level));
     const hystgen_reach_t w = hystgen_inverse_input(self, h);
     const hystgen_reach_t v = hystgen_inverse_sought(self, level, h, w);

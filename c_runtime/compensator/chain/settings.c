@@ -10,7 +10,8 @@ void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u) {
             hystgen_inverse_unread(self);
             return;
         }
-        level = hystgen_inverse_outside(self, u);
+        level = hystgen_inverse_clamp(u);
+        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
     (void)hystgen_inverse_put(self, level);
 }

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 0a462a66cc0e1e5c77a59088799da0c19e87a90a6b45b45b6d7b072b153a27ed, without this line
+ * Text: sha256 6cb4d1ec9dfb2afbd7efe05f3974da9b86e79f834a8f7e1b0413b4662c016c2b, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -350,22 +350,9 @@ bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {
     return answer;
 }
 
-/* Limits a reference that is out of its range. */
-static bent_real_t bent_inverse_outside(bent_inverse_t *self, bent_real_t u) {
-    self->status |= BENT_STATUS_INPUT_CLAMPED;
-    return bent_inverse_clamp(u);
-}
-
 /* A reference that is no number: the newest one stands once more. */
 static void bent_inverse_unread(bent_inverse_t *self) {
     self->status |= BENT_STATUS_HELD;
-}
-
-/* The drive that leads to an input w of the plays, at which their sum is h, for the limited
-   reference `level`. */
-static inline bent_real_t bent_inverse_sought(bent_inverse_t *self, bent_real_t w) {
-    self->bits = 0;
-    return bent_front_inverse(w);
 }
 
 /* The drive v within its limits. */
@@ -378,22 +365,25 @@ static bent_real_t bent_inverse_limited(bent_inverse_t *self, bent_real_t v) {
     return inside;
 }
 
-/* The next drive, for reference u; the memory is up to date. */
+/* The next drive, for reference u; the memory is up to date. `bits` is its status so far. */
 static inline bent_real_t bent_inverse_next(bent_inverse_t *self, bent_real_t u) {
     bent_real_t level = u;
+    unsigned int bits = 0;
     if (!bent_is_reference(u)) {
         if (!bent_finite(u)) {
             bent_inverse_unread(self);
             return bent_inverse_answer(self, bent_inverse_held(self));
         }
-        level = bent_inverse_outside(self, u);
+        level = bent_inverse_clamp(u);
+        bits = BENT_STATUS_INPUT_CLAMPED;
     }
     if (bent_inverse_stands(self, u)) {
         return bent_inverse_answer(self, self->answer);
     }
+    self->bits = bits;
     const bent_real_t h = bent_inverse_undisplaced(level);
     const bent_real_t w = bent_loop_solve(&bent_model_tables, self->play, h);
-    const bent_real_t v = bent_inverse_sought(self, w);
+    const bent_real_t v = bent_front_inverse(w);
     return bent_inverse_answer(self, bent_inverse_limited(self, v));
 }
 
