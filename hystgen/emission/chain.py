@@ -38,7 +38,7 @@ from hystgen.plays import slots
 class Field:
     """A field of an instance: `kind` is that of a number, flag, status, or of a block and then made of `members`, real
     numbers r or those of fixed point as in `Kind`, and `flags`, or a type of the corner engine; with a `count` it is an
-    array."""
+    array, which C gives the length `length`, if any."""
 
     kind: str
     name: str
@@ -46,11 +46,12 @@ class Field:
     count: int = 0
     members: str = ""
     flags: int = 0
+    length: str = ""
 
     def text(self) -> str:
         """Its declaration."""
         kind = {"flag": "bool", "status": "unsigned int"}.get(self.kind, f"hystgen_{self.kind}_t")
-        size = f"[{self.count}]" if self.count else ""
+        size = f"[{self.length or self.count}]" if self.count else ""
         return f"{kind} {self.name}{size};" + (f" /* {self.comment} */" if self.comment else "")
 
 
@@ -457,7 +458,8 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
           else []),
         Field("status", "status"),
         *(_corners(t, inverse, plays) if t.corners
-          else [Field("play", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept)]),
+          else [Field("play", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept,
+                      length="" if kept else "HYSTGEN_N_PLAYS + 1")]),
         *([Field("signal", "bent", "what each contributes", plays + 1)] if moving else []),
     ]  # fmt: skip
 

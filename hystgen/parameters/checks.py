@@ -455,7 +455,7 @@ class _Checker:
         if chosen.moves_plays():
             first = self._mover = self._mover or (made.name, path_text(path))
             if first != (made.name, path_text(path)):
-                said = f"says how the plays move, as does {printable(first[0])} does (in {first[1]}); keep one of them"
+                said = f"says how the plays move, as {printable(first[0])} does (in {first[1]}); keep one of them"
                 self.add((*path, "name"), f"{printable(made.name)} {said}")
         for keys, message in made.problems(self._thresholds()):
             self.add((*path, *keys), message)
