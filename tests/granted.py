@@ -168,7 +168,7 @@ STATES = [
     (r"(NAME_sum_t NAME_\w+_displaced\([^{]*\{\n)", r"\1    WITHIN(y, SIGNAL);\n"),
     (r"            return \(NAME_play_t\)(low|high);\n",
      r"            WITHIN(\1, PLAY);\n            return (NAME_play_t)\1;\n"),
-    (r"(    const NAME_play_t left = rest \+ more;\n)", r"    WITHIN(rest, REST);\n\1"),
+    (r"(    const NAME_play_t left = ramp->rest \+ more;\n)", r"    WITHIN(ramp->rest, REST);\n\1"),
     (r"(    return \(NAME_play_t\)rest;\n)", r"    WITHIN(rest, PLAY);\n\1"),
     (r"(        const int64_t z = play\[i\] \+ NAME_times[^;]*;\n)", r"\1        WITHIN(z, PLAY);\n"),
     (r"(void NAME_put\([^{]*\{\n)", r"\1    WITHIN(z, PLAY);\n"),
