@@ -326,7 +326,7 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
      "    hystgen_inverse_repeat(self);\n", "", "late", "float32"),
     ("a set offset leaves the clock running", "compensator/chain/settings.c",
      "        hystgen_inverse_clock_start(self);\n", "", "drifting", "float32"),
-    ("a rising drive is not slewed", "effects/slew_limit/slewed.c", "beyond = v > ramp->drive ||", "beyond = v > v ||",
+    ("a rising drive is not slewed", "effects/slew_limit/slewed.c", "        if (v > ramp->drive ||", "        if (v > v ||",
      "quick", "float32"),
     ("the clock stands", "effects/drift/clock.c", "self->low + 1", "self->low + 0", "drifting", "float32"),
     ("drift is not foreseen", "effects/drift/clock.c",

@@ -165,11 +165,13 @@ class _Folding:
     def _unused_parameters(self) -> None:
         for name in list(self.functions):
             function = self.functions[name]
+            if function.parameters == ("void",):
+                continue
             used = _MARK.sub("", function.body)
             kept = [bool(re.search(rf"(?<![.>])\b{each}\b", used)) for each in function.names]
             for place, keep in enumerate(kept):
                 kept[place] = keep or not all(_pure(arguments[place]) for arguments in self._given(name))
-            if not function.own or all(kept) or function.parameters == ("void",):
+            if not function.own or all(kept):
                 continue
             gone = [each for each, keep in zip(function.names, kept, strict=True) if not keep]
             parameters = _where(function.parameters, kept) or ("void",)
@@ -193,11 +195,12 @@ class _Folding:
     def _fold(self, function: Function) -> None:
         """Put what a function does in the place of its calls, where that is nothing, or one thing as it stands."""
         does = function.statements
+        if function.own and does == "":
+            self._calls(function.name, _no_statement)
+            return
         if not function.own or function.before.startswith(self._apart):
             return
-        if does == "":
-            self._calls(function.name, _no_statement)
-        elif (found := re.fullmatch(r"return (\w+);", does)) and found[1] in function.names:
+        if (found := re.fullmatch(r"return (\w+);", does)) and found[1] in function.names:
             place = function.names.index(found[1])
             same = self._same(function.types[place], function.answer)
             self._calls(function.name, functools.partial(_argument, place=place, same=same))

@@ -33,18 +33,19 @@ static void hystgen_ramp_on(hystgen_ramp_t *ramp, hystgen_reach_t move, hystgen_
 
 /* Takes the ramp to v, or as near to it as the amplifier gets in one step. */
 HYSTGEN_APART_IN_FIXED void hystgen_ramp_towards(hystgen_ramp_t *ramp, hystgen_reach_t v) {
-    bool beyond;
     if (v > ramp->drive || (v >= ramp->drive && ramp->rest < 0)) {
         hystgen_ramp_on(ramp, HYSTGEN_SLEW_RISING, HYSTGEN_SLEW_RISING_REST);
-        beyond = v > ramp->drive || (v >= ramp->drive && ramp->rest < 0);
+        if (v > ramp->drive || (v >= ramp->drive && ramp->rest < 0)) {
+            return;
+        }
     } else {
         hystgen_ramp_on(ramp, -HYSTGEN_SLEW_FALLING, -HYSTGEN_SLEW_FALLING_REST);
-        beyond = v < ramp->drive || (v <= ramp->drive && ramp->rest > 0);
+        if (v < ramp->drive || (v <= ramp->drive && ramp->rest > 0)) {
+            return;
+        }
     }
-    if (!beyond) {
-        ramp->drive = v;
-        ramp->rest = 0;
-    }
+    ramp->drive = v;
+    ramp->rest = 0;
 }
 
 /* The drive nearest to v that the amplifier reaches in one step; v itself in the first one. */
