@@ -56,14 +56,14 @@ def test_a_bound_that_is_too_small_is_noticed(arithmetic: str, engine: str, tmp_
 
 # What goes wrong: the operator that shows it, a pattern in the emitted C, the text in its place
 CHANGES = {
-    "a pending drive is forgotten": ("inverse", r"above_inverse_absorb\(self, self->pending\);", ";"),
-    "a commit is not limited": ("inverse", r"above_clamp_drive\(applied\)", "applied"),
+    "a pending drive is forgotten": ("inverse", r"above_inverse_(absorb|played)\(self, self->pending\);", ";"),
+    "a commit is not limited": ("inverse", r"above_applied_drive\(applied\)", "applied"),
     "a commit does not count": ("inverse", r"(_inverse_commit\(above_inverse_t \*self[^{;]*\{)", r"\1 return;"),
     "a limited drive has no bit": ("inverse", r"\|= ABOVE_STATUS_OUTPUT_CLAMPED", "|= 0u"),
     "a limited reference has no bit": ("inverse", r"= ABOVE_STATUS_INPUT_CLAMPED;", "= 0u;"),
     "a limited input has no bit": ("forward", r"\|= ABOVE_STATUS_INPUT_CLAMPED", "|= 0u"),
     "a limit lies elsewhere": ("forward", r"\? ABOVE_DRIVE_MIN\b", "? (above_real_t)(ABOVE_DRIVE_MAX / 2)"),
-    "an output lies elsewhere": ("forward", r"(self->answer = [^;]*);", r"\1 + 2;"),
+    "an output lies elsewhere": ("forward", r"return (answer|above_code\(.*\));", r"return \1 + 2;"),
 }
 
 
@@ -231,7 +231,7 @@ model:
 """
 
 # What goes wrong with a drive at a limited rate: a pattern in the emitted C, and the text in its place, with a number
-# of the arithmetic: a step that is a five hundredth too large
+# of the arithmetic: a step that is a five hundredth too large. In fixed point every code is a number: none is held.
 AT_A_RATE = {
     "its rounding adds up": (r"other \? 0 : self->reached\.rest", "0"),
     "it is too fast": (r"(#define M_SLEW_RISING_REST) (\S+)", r"\1 (\2 + {})"),
@@ -244,7 +244,7 @@ FASTER = {"float32": "2.0e-9f", "q31": "80000"}
 def test_a_drive_that_leaves_its_rate_is_noticed(arithmetic: str, tmp_path: Path) -> None:
     (tmp_path / "slow.yaml").write_text(SLOW)
     case = effects.read(tmp_path / "slow.yaml", arithmetic)
-    for change in ("", *AT_A_RATE):
+    for change in ("", *(each for each in AT_A_RATE if "held" not in each or arithmetic == "float32")):
         folder = tmp_path / (change or "right").replace(" ", "_")  # a library is loaded once from a path
         folder.mkdir()
         assert effects.emit(case, folder)
@@ -254,8 +254,7 @@ def test_a_drive_that_leaves_its_rate_is_noticed(arithmetic: str, tmp_path: Path
             assert count
             (folder / "m.c").write_text(text)
         found = {operator: result for _, operator, result in effects.follow([case], folder, 1, 200_000)}
-        none = not change or ("held" in change and arithmetic == "q31")  # where every code is a number
-        assert (found["inverse"].faults == 0) == none, change
+        assert (found["inverse"].faults == 0) == (not change), change
         assert found["forward"].faults == 0 or change == "it is too fast"
 
 
