@@ -31,7 +31,11 @@ def bench() -> ModuleType:
     assert spec.loader
     made = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = made
-    spec.loader.exec_module(made)
+    sys.path.insert(0, str(path.parent))  # as for a program: others stand beside it
+    try:
+        spec.loader.exec_module(made)
+    finally:
+        sys.path.remove(str(path.parent))
     return made
 
 
