@@ -74,7 +74,8 @@ def model(effect: str) -> Model:
     text = "hystgen: 1\nname: bench\ninput_range: [-10, 10]\nsample_time: 1.0e-3\nmodel:\n  pi:\n"
     text += f"    thresholds: {[0.45 * k for k in range(CODE_PLAYS + 1)]}\n    weights: {[0.7] + [0.05] * CODE_PLAYS}\n"
     text += f"  effects:\n    - {{{EFFECTS[effect]}}}\n" if effect else ""
-    text += f"emit: {{compensation: {{compensate: [drift, self_heating], quiet: {str(effect == 'quiet').lower()}}}}}\n"
+    how = f"compensate: [drift, self_heating], quiet: {str(effect == 'quiet').lower()}, noise_gain: 1.0e+9"
+    text += f"emit: {{compensation: {{{how}}}}}\n"
     return Model(parse_parameters(text, "bench.yaml"))
 
 

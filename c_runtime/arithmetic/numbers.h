@@ -42,8 +42,8 @@ typedef hystgen_real_t hystgen_sum_t;
 
 /* In a model with effects, signal: between its blocks, in fixed point wider than codes; fine: a
    drive in front of its plays, in fixed point with bits below a code; travel: the distance that the
-   drive has covered. Without effects, and in floating point, all of them have the caller's type, but
-   signals of engine loop are sums of its plays. */
+   drive has covered. Without effects, and in floating point, all of them have the caller's type,
+   but signals of engine loop are sums of its plays. */
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
 typedef hystgen_sum_t hystgen_signal_t;
 typedef hystgen_play_t hystgen_fine_t;

@@ -58,7 +58,8 @@ HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_forward_passed_on(hystgen_forward_t *s
 }
 
 /* The actuator has seen drive v. */
-HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_forward_absorb(hystgen_forward_t *self, hystgen_real_t v) {
+HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_forward_absorb(hystgen_forward_t *self,
+                                                         hystgen_real_t v) {
     if (self->moving) {
         hystgen_forward_travelled(self, v);
     }
@@ -83,7 +84,8 @@ HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_inverse_passed_on(hystgen_inverse_t *s
 }
 
 /* The actuator has seen drive v. */
-HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_inverse_absorb(hystgen_inverse_t *self, hystgen_real_t v) {
+HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_inverse_absorb(hystgen_inverse_t *self,
+                                                         hystgen_real_t v) {
     if (self->moving) {
         hystgen_inverse_travelled(self, v);
     }

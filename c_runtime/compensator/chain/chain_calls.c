@@ -31,7 +31,7 @@ static void hystgen_inverse_unread(hystgen_inverse_t *self) {
 /* Takes the next reference, which lies within its range. Returns the output that the output side
    has to reach at this sample. */
 HYSTGEN_APART_IN_FIXED_CHAIN hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self,
-                                                            hystgen_real_t level) {
+                                                                  hystgen_real_t level) {
     bool limited = false;
     const hystgen_signal_t wanted =
         hystgen_inverse_undisplaced(self, hystgen_entered_level(level), &limited);
@@ -43,7 +43,7 @@ HYSTGEN_APART_IN_FIXED_CHAIN hystgen_signal_t hystgen_inverse_put(hystgen_invers
 
 /* The sum of the plays with which the output side gives y; the memory is up to date. */
 HYSTGEN_APART_IN_FIXED_CHAIN hystgen_signal_t hystgen_inverse_wanted(hystgen_inverse_t *self,
-                                                               hystgen_signal_t y) {
+                                                                     hystgen_signal_t y) {
     return self->moving ? hystgen_inverse_output_side_solve(self, y)
                         : hystgen_inverse_output_side_resting(self, y);
 }

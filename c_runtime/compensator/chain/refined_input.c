@@ -1,6 +1,7 @@
 /* Operators of engine loop and of every model with effects: bits of the plays' input below a drive
-   code, for which the inverse of some models refines a solution. The inverse of a lag would amplify the rounding to a code into noise.
-   Called by chain_calls.c and, for engine corners, corners_fixed.c. */
+   code, for which the inverse of some models refines a solution. The inverse of a lag would amplify
+   the rounding to a code into noise. Called by chain_calls.c and, for engine corners,
+   corners_fixed.c. */
 #ifndef HYSTGEN_CHAIN_REFINED_INPUT_C
 #define HYSTGEN_CHAIN_REFINED_INPUT_C
 #include "compensator/chain/model.h"

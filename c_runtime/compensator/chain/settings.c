@@ -121,8 +121,7 @@ hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self) {
 
 void hystgen_inverse_correct(hystgen_inverse_t *self, hystgen_real_t measured,
                              hystgen_real_t share) {
-    const hystgen_signal_t more =
-        hystgen_entered_level(measured) -
-        hystgen_inverse_displaced(self, hystgen_inverse_output(self));
+    const hystgen_signal_t more = hystgen_entered_level(measured) -
+                                  hystgen_inverse_displaced(self, hystgen_inverse_output(self));
     hystgen_inverse_put_offset(self, self->offset + hystgen_shared(share, more));
 }

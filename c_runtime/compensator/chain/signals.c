@@ -1,7 +1,7 @@
-/* Operators of engine loop and of every model with effects: signals between blocks. In floating point
-   they have the type of drives. In fixed point they have bits below those of codes; without effects
-   drives are codes on their way to the plays, and sums of the plays have HYSTGEN_FRACTION bits below
-   an output code. Called by chain.c, chain_calls.c and the plays. */
+/* Operators of engine loop and of every model with effects: signals between blocks. In floating
+   point they have the type of drives. In fixed point they have bits below those of codes; without
+   effects drives are codes on their way to the plays, and sums of the plays have HYSTGEN_FRACTION
+   bits below an output code. Called by chain.c, chain_calls.c and the plays. */
 #ifndef HYSTGEN_CHAIN_SIGNALS_C
 #define HYSTGEN_CHAIN_SIGNALS_C
 #include "compensator/chain/model.h"
