@@ -576,7 +576,8 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         *values.precision,
         "",
         "Cost (32-bit target):",
-        f"    code at -O2       about {estimate.code_words}, as measured for such a model{uncounted}",
+        f"    code at -O2       about {estimate.code_words}, as measured for such a model with 10 plays"
+        f"{uncounted}",
         f"    constant tables   {estimate.memory.tables} bytes",
         *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.memory.instances),
         *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 105c5453ba05e49210156ff6c534fbd424b4e1c393e1df1ded30e50539272cf0, without this line
+ * Text: sha256 630d14b6ea85eb8ceefa19138feba2422ed1a12878910aec1ab01799e5545c44, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -13,7 +13,7 @@
  *
  * Cost (32-bit target):
  *     code at -O2       about 3936 bytes on a Cortex-M0+, 4392 on a Cortex-M4F, as measured for
- *         such a model
+ *         such a model with 10 plays
  *     constant tables   512 bytes
  *     forward instance  72 bytes of RAM
  *     inverse instance  104 bytes of RAM

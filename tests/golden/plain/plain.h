@@ -5,14 +5,14 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 391a0b39eda30da9b51568fb5597f4d4487b16835d8ce679d9a67cd3d21d49d3, without this line
+ * Text: sha256 bedbfe6275ec37b3ac9113040d2bd445019303638672514c4d5d80cc54bbf2a0, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
  *
  * Cost (32-bit target):
  *     code at -O2       about 3580 bytes on a Cortex-M0+, 3136 on a Cortex-M4F, as measured for
- *         such a model
+ *         such a model with 10 plays
  *     constant tables   212 bytes
  *     inverse instance  200 bytes of RAM
  *     inverse step, worst case: 17 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)

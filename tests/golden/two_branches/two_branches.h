@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 1783f735de9365ce0bd61f4b8bb199338808137995e4e7d8939f445b7e040899, without this line
+ * Text: sha256 693a8daa08ef6c22f84ccbaaa6c7dd3c6e823e532b66172d5e03f628ccb6d061, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -13,7 +13,7 @@
  *
  * Cost (32-bit target):
  *     code at -O2       about 5080 bytes on a Cortex-M0+, 4460 on a Cortex-M4F, as measured for
- *         such a model
+ *         such a model with 10 plays
  *     constant tables   832 bytes
  *     inverse instance  220 bytes of RAM
  *     inverse step, worst case: 32 multiplications, 58 comparisons (46 + 4 b, b = 3 the bits of n),
