@@ -660,8 +660,10 @@ def test_at_a_limit_of_the_drive(n: int, bench: ModuleType, tmp_path: Path) -> N
     ],
 )
 def test_memory_in_the_header_is_what_a_core_needs(name: str, arithmetic: str, engine: str) -> None:
-    """RAM to the byte; code, which was measured for another model of the kind with as many plays, to a fifth. With other
-    numbers of plays a compiler may take all of them at once, or no longer."""
+    """RAM to the byte; code, which was measured for another model of the kind with as many plays, to a fifth.
+
+    With another number of plays a compiler may take all of them at once, or no longer.
+    """
     one = with_plays(name, 10)
     options = {"operator": "both", "arithmetic": arithmetic, "engine": engine}
     header = emitted_files(one, **options)[f"{name}.h"]
