@@ -61,19 +61,28 @@ class Memory:
 @dataclass(frozen=True)
 class Cost:
     """Code of the module by core (`hystgen.compensator.engines`), memory on a 32-bit target and on an 8-bit AVR, where
-    tables lie in RAM too (None in float64, which it lacks), and worst-case operations of a step in words, for each
-    operator."""
+    tables lie in RAM too (None in float64, which it lacks), and for each operator worst-case operations of a step in
+    words, and the dearest sample of such models on each core."""
 
     code: Mapping[str, int]
     memory: Memory
     avr: Memory | None
     worst_case: list[tuple[str, str]]
+    dearest: dict[str, dict[str, engines.Dearest]]
 
     @property
     def code_words(self) -> str:
         """The code in words."""
         small, large = (self.code[core] for core in engines.CORES)
         return f"{small} bytes on a Cortex-M0+, {large} on a Cortex-M4F"
+
+    def dearest_words(self, operator: str) -> str:
+        """The dearest sample of an operator in words."""
+        small, large = (self.dearest[operator][core] for core in engines.CORES)
+        return (
+            f"{small.instructions} instructions and {small.stack} bytes of stack on a Cortex-M0+, "
+            f"{large.instructions} and {large.stack} on a Cortex-M4F"
+        )
 
 
 _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "uint16_t": 2, "uint8_t": 1, "int64_t": 8,
@@ -215,7 +224,14 @@ def estimate(
         for op, _ in worst:
             more = costs.code_bytes(numbers, options.arithmetic, op)
             code = {core: size + more[core] for core, size in code.items()}
-    return Cost(code, memory, avr if known else None, worst)
+    dearest = {
+        op: engines.dearest(
+            cascade, op, options.arithmetic, options.engine,
+            costs.parts(numbers, op) if isinstance(numbers, ChainTables) else None,
+        )
+        for op, _ in worst
+    }  # fmt: skip
+    return Cost(code, memory, avr if known else None, worst, dearest)
 
 
 def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layout) -> tuple[int, int]:

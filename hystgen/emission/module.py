@@ -581,6 +581,8 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         f"    constant tables   {estimate.memory.tables} bytes",
         *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.memory.instances),
         *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),
+        *(f"    {op} step, dearest: about {estimate.dearest_words(op)}, as measured for such a model{uncounted}"
+          for op, _ in estimate.worst_case),
         *avr,
         "",
         use,

@@ -20,6 +20,9 @@ is found by a search, `braked` for a lag and a slew limit together, `quiet` for 
 OPERATORS = {"preview": "inverse", "quiet": "inverse", "mode": "forward", "delay": "forward"}
 """Parts that only one operator has, and that operator."""
 
+PER_PLAY = ("relaxing", "dilated", "dashpot", "polynomial", "centre")
+"""Parts that move or bend plays: each play adds to what a sample takes."""
+
 
 def parts(t: ChainTables, operator: str) -> list[str]:
     """The parts that an operator of a model has; two blocks of one kind share their code."""

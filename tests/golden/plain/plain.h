@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 bedbfe6275ec37b3ac9113040d2bd445019303638672514c4d5d80cc54bbf2a0, without this line
+ * Text: sha256 c8c056bcb3826c8c947fb41dd7255cf81b2830d088ddd61cfb9da66714bf76b2, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -16,6 +16,8 @@
  *     constant tables   212 bytes
  *     inverse instance  200 bytes of RAM
  *     inverse step, worst case: 17 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)
+ *     inverse step, dearest: about 2477 instructions and 248 bytes of stack on a Cortex-M0+, 272
+ *         and 112 on a Cortex-M4F, as measured for such a model
  * On an 8-bit AVR constants lie in RAM too: at most 384 bytes of RAM in all, 31 of them for each
  * play
  *
