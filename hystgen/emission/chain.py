@@ -8,30 +8,16 @@ import textwrap
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from hystgen.compensator.chain import blocks, moving
-from hystgen.compensator.chain.layout import (
-    ARRIVING_BITS,
-    BRAKED_DROP,
-    DITHER,
-    DRIVE_BITS,
-    LARGEST_LEVEL,
-    LEAST_CODE,
-    LEVEL_BITS,
-    LEVEL_DROP,
-    MOST_CODE,
-    SHARE_BITS,
-    ChainTables,
-    Compiled,
-)
-from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
-from hystgen.effects.bend import Bends
-from hystgen.effects.drift import compensator as drift
-from hystgen.effects.drift import fixed as drift_fixed
-from hystgen.effects.kinds import Constants, Kind
 from hystgen.emission.text import WIDTH, constant, literal, operand, structure, table
 from hystgen.plays import slots
+
+if TYPE_CHECKING:
+    from hystgen.compensator.chain.layout import ChainTables, Compiled
+    from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
+    from hystgen.effects.bend import Bends
+    from hystgen.effects.kinds import Constants, Kind
 
 
 @dataclass(frozen=True)
@@ -119,6 +105,8 @@ def _table(declared: str, entries: Sequence[str]) -> str:
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
     """The blocks of an operator in front of the plays, starting from the drive, and those behind them."""
+    from hystgen.compensator.chain import blocks
+
     found: list[list[Block]] = []
     for side in blocks.sides(t, operator):
         counts: Counter[str] = Counter()
@@ -207,6 +195,8 @@ def plays(t: ChainTables) -> tuple[str, str]:
 
 def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, str, str]]]:
     """Tables and numbers of plays that an effect moves or bends."""
+    from hystgen.compensator.chain import moving
+
     real_t = f"{prefix}_real_t"
     arrays: list[str] = []
     if t.scanned:
@@ -243,6 +233,8 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
 
 def _fixed_moving(t: FixedMovingTables, prefix: str, inverse: bool) -> tuple[list[str], list[tuple[str, str, str]]]:
     """Tables and numbers of plays that an effect moves or bends in fixed point."""
+    from hystgen.compensator.chain import moving
+
     factor_t = f"{prefix}_factor_t {prefix}"
     numbers = [("LARGEST_INPUT", operand(t.farthest), "of the plays, for a search")]
     if t.scanned:
@@ -327,6 +319,11 @@ class Glue:
 
 def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, Any]]) -> Glue:
     """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
+    from hystgen.compensator.chain import blocks, moving
+    from hystgen.compensator.chain.layout import DITHER
+    from hystgen.effects.drift import compensator as drift
+    from hystgen.effects.drift import fixed as drift_fixed
+
     t = compiled.tables
     shape = Shape.of(t)
     named = {op: sides(t, op) for op in operators}
@@ -379,7 +376,7 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     if t.moving.used:
         more, numbers = (
             _fixed_moving(t.moving, prefix, "inverse" in operators)
-            if isinstance(t.moving, FixedMovingTables) else _moving(t.moving, prefix)
+            if isinstance(t.moving, moving.FixedMovingTables) else _moving(t.moving, prefix)
         )  # fmt: skip
         arrays, constants = arrays + more, constants + numbers
     searched = t.moving.used and not t.moving.scanned
@@ -409,6 +406,18 @@ def with_fields(made: Glue, named: Mapping[str, Collection[str]]) -> Glue:
 
 def _fixed_constants(t: ChainTables) -> list[tuple[str, str, str]]:
     """Numbers that functions name in fixed point alone."""
+    from hystgen.compensator.chain.layout import (
+        ARRIVING_BITS,
+        BRAKED_DROP,
+        DRIVE_BITS,
+        LARGEST_LEVEL,
+        LEAST_CODE,
+        LEVEL_BITS,
+        LEVEL_DROP,
+        MOST_CODE,
+        SHARE_BITS,
+    )
+
     low, high = t.plays.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
     return [
         ("FINE_MIN", operand(low), "what the ends of the drive's range are in front of the plays"),
