@@ -243,7 +243,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         compiled is not None, compiled is not None and bool(compiled.tables.slew),
         compiled is not None and bool(compiled.tables.braked), compiled is not None and bool(compiled.tables.quiet),
         compiled is not None and bool(compiled.tables.turning),
-        compiled is not None and compiled.tables.delay.samples > 0,
+        compiled is not None and compiled.tables.number_of("delay") > 0,
         compiled is not None and bool(compiled.parts.ageing), *(chain.plays(compiled.tables) if compiled else ()),
     )  # fmt: skip
     glue: chain.Glue | None = getattr(values, "glue", None)
@@ -442,7 +442,7 @@ def _settings(compiled: Compiled) -> list[tuple[str, str, str]]:
     degree = ("TEMPERATURE_LSB", repr(2.0**-kept), "degC a code of set_temperature")
     gain = ("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")
     t = compiled.tables
-    return [*([degree] if len(t.gain) else []), *([gain] if len(t.ageing.turns) else [])]
+    return [*([degree] if "set_temperature" in t.calls else []), *([gain] if "set_gain" in t.calls else [])]
 
 
 def _status(values: SimpleNamespace) -> list[str]:

@@ -184,7 +184,7 @@ class Bounds:
     def _creep(self, j: int) -> float:
         """Roundings of the output of creep j, in output codes."""
         numbers, size = self.creeps[j], self.sizes.creeps[j]
-        bits, drop = (int(x) for x in self.tables.creep.block[j, [creep_fixed.BITS, creep_fixed.DROP]])
+        bits, drop = (int(x) for x in self.tables.of("creep").block[j, [creep_fixed.BITS, creep_fixed.DROP]])
         state = 2.0**-bits * self._signal
         found = 0.0
         for rate, _, late, weight in numbers.terms.tolist():
@@ -215,7 +215,7 @@ class Bounds:
         `given`, `asked`: sizes of the input, and of the output asked for.
         """
         exact, (rate, second, late, inverse) = self.lags[j]
-        bits, drop = (int(x) for x in self.tables.lag.block[j, [lag_fixed.BITS, lag_fixed.DROP]])
+        bits, drop = (int(x) for x in self.tables.of("lag").block[j, [lag_fixed.BITS, lag_fixed.DROP]])
         state, scale = 2.0**-bits, 2.0**drop
         sizes = lag_fixed.Sizes(exact, rate, late, given, asked, bool(self.tables.turning))
         kept = state * (0.5 / rate + scale) + 2.0 * given * missed(rate * scale) / scale / rate
@@ -391,7 +391,7 @@ class Bounds:
     def forward(self) -> float:
         """Bound of the forward operator, in output codes."""
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
-        waited = 0.5 * 2.0**self._fine * bool(self.tables.delay.samples and self.tables.delay.share[0])
+        waited = 0.5 * 2.0**self._fine * bool(self.tables.of("delay").samples and self.tables.of("delay").share[0])
         error = self._plays(self._arrival()[0] + short + waited + self.slewed * 2.0**self._fine)
         if (self.lags or self.ahead) and self.static.branches_differ:  # the front may settle on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)
@@ -401,7 +401,7 @@ class Bounds:
             error = error * each.linear.forward.largest + each.output * self._signal
         for gain in self._gains:
             error = gain.largest * error + gain.there + self._signal
-        for mode, size, row in zip(self.modes, self.sizes.modes, self.tables.mode, strict=True):
+        for mode, size, row in zip(self.modes, self.sizes.modes, self.tables.of("mode"), strict=True):
             scale = 2.0**self.bits
             error = error * mode.largest + resonance_fixed.rounding(mode, row, size * scale) / scale
         beside = self._saturation()[2] + 0.5 + (1.0 + self.drifted) * self._signal

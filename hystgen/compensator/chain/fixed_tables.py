@@ -175,26 +175,30 @@ class _Builder:
             plays,
             limits,
             self._need(lambda: self._moving(plays), "effects on plays"),
-            self._need(self._lags, "effects in front of the plays" if self.own_drives else "a lag"),
-            self._need(self._creep_tables, "creep"),
-            self._need(self._delay, "a delay"),
-            self._need(self._mode_tables, "resonance"),
-            self._need(lambda: self._ageing(span), "ageing"),
-            self._need(self._gains, "a temperature"),
-            self._need(self._heat_tables, "own heat"),
-            self._need(self._clock_tables, "drift"),
-            own_fixed.build([*self.ahead, *self.behind], len(self.ahead)),
+            (
+                self._need(self._delay, "a delay"),
+                self._need(self._lags, "effects in front of the plays" if self.own_drives else "a lag"),
+                own_fixed.build(self.ahead),
+                self._need(self._creep_tables, "creep"),
+                own_fixed.build(self.behind),
+                self._need(lambda: self._ageing(span), "ageing"),
+                self._need(self._heat_tables, "own heat"),
+                self._need(self._gains, "a temperature"),
+                self._need(self._mode_tables, "resonance"),
+                self._need(self._clock_tables, "drift"),
+            ),
+            self.parts.count(delay.numbers(self.parts.delay, self.seconds)[1]),
             saturations,
             self._need(self._tap, "the preview"),
             np.array(self._numbers(), dtype=np.int64),
             int(bool(self.parts.slew)),
-            braked(self.parts, [exact for exact, _ in self.lags]),
             quiet(self.how, self.taps),
             int(self.turning),
         )
         if self.parts.own_drives or self.parts.own_outputs:
             tables = OwnChainTables(*tables)
-            tables.own_effects = tuple(map(type, (*self.parts.own_drives, *self.parts.own_outputs)))
+            own_sides = self.parts.own_drives, self.parts.own_outputs
+            tables.own_sides = tuple(map(type, own_sides[0])), tuple(map(type, own_sides[1]))
         slewed = (0.5 + self._slewed) * bool(self.parts.slew)
         max_rate = fastest(static, self.parts, self.seconds, self.how)
         weights = self.taps.weights.tolist() if self.taps else []
@@ -448,7 +452,7 @@ class _Builder:
             asked = sizes.answer
             if asked > 2.0**60:
                 raise OverflowError("no room")
-        return lag_fixed.tables(rows[::-1])
+        return lag_fixed.tables(rows[::-1], braked(self.parts, [exact for exact, _ in self.lags]))
 
     def _creep_tables(self) -> Any:
         scale = 2.0**self.bits

@@ -186,24 +186,27 @@ def build(
         plays,
         plays.limits,
         moving.build(static, parts.plays, seconds, min(max_rate * seconds, drive_span), dtype),
-        lag.tables(lags, reals),
-        creep.tables(creeps, reals),
-        DelayTables(reals([waited] * (waiting > 0), "the delay"), waiting),
-        reals([resonance.numbers(each, seconds).table for each in parts.modes], "the modes").reshape(-1, 5),
-        _ageing(parts, drive_span, reals, float(np.finfo(dtype).eps) / 2),
-        reals([thermal.numbers(each, span) for each in parts.thermal], "temperatures").reshape(-1, 8),
-        _heat(parts, static.input_range, span, seconds, reals, float(np.finfo(dtype).eps) / 2),
-        reals([drift.numbers(each, seconds, span, ahead) for each in parts.drift], "drift").reshape(-1, 8),
-        own.build(drives, outputs, reals),
+        (
+            DelayTables(reals([waited] * (waiting > 0), "the delay"), waiting),
+            lag.tables(lags, reals, braked(parts, [exact for exact, _ in lags])),
+            own.build(drives, reals),
+            creep.tables(creeps, reals),
+            own.build(outputs, reals),
+            _ageing(parts, drive_span, reals, float(np.finfo(dtype).eps) / 2),
+            _heat(parts, static.input_range, span, seconds, reals, float(np.finfo(dtype).eps) / 2),
+            reals([thermal.numbers(each, span) for each in parts.thermal], "temperatures").reshape(-1, 8),
+            reals([resonance.numbers(each, seconds).table for each in parts.modes], "the modes").reshape(-1, 5),
+            reals([drift.numbers(each, seconds, span, ahead) for each in parts.drift], "drift").reshape(-1, 8),
+        ),
+        parts.count(waiting),
         _behind(parts, arithmetic),
         reals(taps.weights if taps else [], "weights of the preview"),
         reals([static.output_offset, span, *slew[::2], *slew[1::2], VERIFIED_SHARE, dither], "offset or rates"),
         int(bool(parts.slew)),
-        braked(parts, [exact for exact, _ in lags]),
         quiet(how, taps),
         int(turning),
     )
     if drives or outputs:
         tables = OwnChainTables(*tables)
-        tables.own_effects = tuple(type(one.effect) for one in (*drives, *outputs))
+        tables.own_sides = tuple(map(type, parts.own_drives)), tuple(map(type, parts.own_outputs))
     return Compiled(tables, taps, parts, seconds, static, max_rate, how.preview, *reading[1:])

@@ -13,21 +13,17 @@ import numpy as np
 
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import noise, own, preview
+from hystgen.compensator.chain.catalogue import LED, NAMES, PARTS
 from hystgen.compensator.chain.noise import Smoothing
-from hystgen.compensator.chain.own import Linear, OwnTables
+from hystgen.compensator.chain.own import Linear
 from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.chain.preview import Shaped, Taps
-from hystgen.effects.ageing.compensator import AgeingTables
 from hystgen.effects.base import Effect
 from hystgen.effects.creep import compensator as creep
-from hystgen.effects.creep.compensator import CreepTables
-from hystgen.effects.delay.compensator import DelayTables
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.lag.compensator import LagTables
 from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.resonance.compensator import ModeNumbers
 from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal.compensator import HeatTables
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import MOST_REFERENCES, Compensation
 from hystgen.plays.slots import Counts, Reals
@@ -87,20 +83,12 @@ class ChainTables(NamedTuple):
     plays: Any  # `Tables` or `FixedTables`
     limits: Reals
     moving: Any  # `MovingTables` or `FixedMovingTables`
-    lag: LagTables
-    creep: CreepTables
-    delay: DelayTables  # of the forward operator, like the modes
-    mode: Reals  # (k, 5), in fixed point (k, 13)
-    ageing: AgeingTables
-    gain: Reals  # (k, 8)
-    heat: HeatTables
-    clock: Reals  # (k, 8), in fixed point (k, 7)
-    own: OwnTables
+    blocks: tuple[Any, ...]  # tables of each of `catalogue.PARTS`
+    count: Counts  # of their blocks
     behind: Any  # `Stages`, or in fixed point `hystgen.effects.saturation.fixed.Saturations`
     tap: Reals  # (L,), in fixed point factors (L, 2); none without a preview
     number: Reals
     slew: int  # 1 if the rate of the drive is limited
-    braked: int  # 1 if a lag behind that limit is kept from overshooting
     quiet: int  # equal references after which the drive stands still, 0 if it never has to
     turning: int  # 1 if a lag must not arrive at two branches from the wrong side
 
@@ -108,6 +96,24 @@ class ChainTables(NamedTuple):
     def fixed(self) -> bool:
         """Whether the arithmetic is fixed point."""
         return bool(self.plays.fixed)
+
+    def of(self, part: str) -> Any:
+        """The tables of a part of the chain."""
+        return self.blocks[NAMES.index(part)]
+
+    def number_of(self, part: str) -> int:
+        """Of blocks of a part of the chain."""
+        return int(self.count[NAMES.index(part)])
+
+    @property
+    def calls(self) -> set[str]:
+        """What its blocks add to the interface."""
+        return {call for part in PARTS if self.number_of(part.name) for call in part.calls}
+
+    @property
+    def braked(self) -> bool:
+        """Whether a lag behind a slew limit is kept from overshooting."""
+        return bool(self.blocks[LED].braked)
 
     @property
     def threshold(self) -> Reals:
@@ -117,15 +123,20 @@ class ChainTables(NamedTuple):
 
 
 class OwnChainTables(ChainTables):
-    """The same of a model with effects of the user's own, whose classes are in the order of `own`."""
+    """The same of a model with effects of the user's own: their classes, in front of the plays and behind."""
 
-    own_effects: tuple[type[Effect], ...]
+    own_sides: tuple[tuple[type[Effect], ...], tuple[type[Effect], ...]]
+
+    @property
+    def own_effects(self) -> tuple[type[Effect], ...]:
+        """All of them."""
+        return (*self.own_sides[0], *self.own_sides[1])
 
     @property
     def own_blocks(self) -> tuple[tuple[OwnBlock, ...], tuple[OwnBlock, ...]]:
         """Their blocks, in front of the plays and behind."""
-        blocks = tuple(effect.block for effect in self.own_effects if effect.block is not None)
-        return blocks[: self.own.ahead], blocks[self.own.ahead :]
+        ahead, behind = (tuple(e.block for e in side if e.block is not None) for side in self.own_sides)
+        return ahead, behind
 
 
 @dataclass(frozen=True)
@@ -171,7 +182,7 @@ class Compiled:
     @property
     def largest_way(self) -> float:
         """Largest move of the plays' input in such a step."""
-        return largest_way(self.static, self.own[: self.tables.own.ahead], self.largest_step)
+        return largest_way(self.static, self.own_ahead, self.largest_step)
 
     @property
     def ahead(self) -> int:
@@ -184,9 +195,14 @@ class Compiled:
         return Read(self.taps, self.smoothing, self.shaped).late(self.asked)
 
     @cached_property
-    def own(self) -> list[Linear]:
-        """Blocks of the user's own, in the order of `tables.own`."""
-        return [own.linear(each, self.seconds) for each in (*self.parts.own_drives, *self.parts.own_outputs)]
+    def own_ahead(self) -> list[Linear]:
+        """Blocks of the user's own in front of the plays."""
+        return [own.linear(each, self.seconds) for each in self.parts.own_drives]
+
+    @cached_property
+    def own_behind(self) -> list[Linear]:
+        """Blocks of the user's own behind the plays."""
+        return [own.linear(each, self.seconds) for each in self.parts.own_outputs]
 
     @cached_property
     def modes(self) -> list[ModeNumbers]:

@@ -8,6 +8,7 @@ by sums of powers of A, whichever is smaller; if two modes coincide, only by pow
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -19,8 +20,12 @@ from numpy.typing import NDArray
 from hystgen.basics.jit import jit
 from hystgen.effects import own
 from hystgen.effects.base import Array, Effect, Place
-from hystgen.effects.kinds import Constants
+from hystgen.effects.kinds import Constants, OwnBlock
+from hystgen.effects.part import Arithmetic, Function, Verbs
 from hystgen.plays.slots import Counts, Reals
+
+Glue = tuple[Function, Function, Function]
+"""What an arithmetic puts around blocks: product, a signal into a block, and a signal out of it."""
 
 SAME = 1e-9
 """Relative difference up to which two answers of a block differ only by rounding, for time constants of up to a million
@@ -28,15 +33,13 @@ samples, with which a difference of states loses as many digits."""
 
 
 class OwnTables(NamedTuple):
-    """Blocks in front of the plays, then those behind: `number` (m,), in fixed point (m, 4), of block j from `first[j]`
-    (k + 1) on; its memory from `place[j]` (k + 1) on; `bits` (k,): bits of its signals below those of the chain, in
-    fixed point; `ahead`: the number of blocks in front."""
+    """Blocks on one side of the plays: `number` (m,), in fixed point (m, 4), of block j from `first[j]` (k + 1) on; its
+    memory from `place[j]` (k + 1) on; `bits` (k,): bits of its signals below those of the chain, in fixed point."""
 
     first: Counts
     number: Reals
     place: Counts
     bits: Counts
-    ahead: int
 
 
 @dataclass(frozen=True)
@@ -297,15 +300,13 @@ def _adds_up(one: Linear, seconds: float) -> bool:
     return True
 
 
-def build(drives: Sequence[Linear], outputs: Sequence[Linear], reals: Any) -> OwnTables:
-    """The numbers of blocks in front of the plays and behind."""
-    every = [*drives, *outputs]
+def build(every: Sequence[Linear], reals: Any) -> OwnTables:
+    """The numbers of the blocks on one side of the plays."""
     return OwnTables(
         np.cumsum([0, *(len(each.numbers) for each in every)]).astype(np.int64),
         reals(np.concatenate([np.empty(0), *(each.numbers for each in every)]), "numbers of effects of your own"),
         np.cumsum([0, *(len(each.settled) for each in every)]).astype(np.int64),
         np.zeros(len(every), dtype=np.int64),
-        len(drives),
     )
 
 
@@ -337,3 +338,57 @@ def product(number: Any, x: Any) -> Any:
 def passed(t: OwnTables, j: int, x: Any) -> Any:  # noqa: ARG001  as in fixed point
     """A signal of the chain as one of block j, and the reverse: the same number."""
     return x
+
+
+# ---------------------------------------------------------------- as a part of the chain
+
+
+def memory(t: OwnTables, dtype: Any) -> Reals:
+    """Memory (m,) of all blocks on one side of the plays."""
+    return np.zeros(t.place[-1], dtype)
+
+
+def arithmetic(blocks: Sequence[OwnBlock], effects: Sequence[type[Effect]], made: Glue) -> Arithmetic:
+    """Blocks on one side of the plays, one after the other, as one of the chain."""
+
+    def through(verb: str) -> Function:
+        calls = [_one(made, block, verb, j) for j, block in enumerate(blocks)]
+        return functools.reduce(_both, calls[::-1] if verb in ("solve", "resting") else calls)
+
+    verbs = Verbs(memory, *map(through, ("rest", "absorb", "resting", "solve"))) if blocks else Verbs(memory)
+    return Arithmetic(verbs, lambda t: constants(t, effects))
+
+
+def _both(first: Function, behind: Function) -> Function:
+    """A verb applied by two blocks, one after the other."""
+
+    @jit
+    def both(t: OwnTables, s: Reals, j: int, x: Any) -> Any:
+        return behind(t, s, j, first(t, s, j, x))
+
+    return both
+
+
+def _one(made: Glue, block: OwnBlock, verb: str, j: int) -> Function:
+    """A verb of block j, with its numbers and memory picked."""
+    product, entered, left = made
+    function = block.compiled(verb, product)
+    if verb == "resting":
+
+        @jit
+        def resting(t: OwnTables, s: Reals, k: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+            return left(t, j, function(t.number[t.first[j] : t.first[j + 1]], entered(t, j, y)))
+
+        return resting
+
+    @jit
+    def call(t: OwnTables, s: Reals, k: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+        row, memory = t.number[t.first[j] : t.first[j + 1]], s[t.place[j] : t.place[j + 1]]
+        return left(t, j, function(row, memory, entered(t, j, x)))
+
+    return call
+
+
+GLUE: Glue = product, passed, passed
+NONE = arithmetic((), (), GLUE)
+"""Of a model without such blocks."""

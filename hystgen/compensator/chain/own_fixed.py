@@ -16,7 +16,11 @@ import numpy as np
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, error, factor, lifted, times
 from hystgen.basics.jit import jit
+from hystgen.compensator.chain import own
 from hystgen.compensator.chain.own import Linear, OwnTables
+from hystgen.effects.base import Effect
+from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.part import Part
 from hystgen.plays.fixed import nearest
 
 MANTISSA, SHIFT, DROP, LIFT = range(4)
@@ -141,15 +145,14 @@ def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
     return Formats(linear, rows, bits, output / 2.0**bits + 0.5, answer / 2.0**bits + 0.5)
 
 
-def build(rows: Sequence[Formats], ahead: int) -> OwnTables:
-    """Blocks in front of the plays, `ahead` of them, and behind."""
+def build(rows: Sequence[Formats]) -> OwnTables:
+    """The numbers of the blocks on one side of the plays."""
     table = [number for each in rows for number in each.table]
     return OwnTables(
         np.cumsum([0, *(len(each.table) for each in rows)]).astype(np.int64),
         np.array(table, dtype=np.int64).reshape(-1, 4),
         np.cumsum([0, *(len(each.linear.settled) for each in rows)]).astype(np.int64),
         np.array([each.bits for each in rows], dtype=np.int64),
-        ahead,
     )
 
 
@@ -172,3 +175,9 @@ def entered(t: OwnTables, j: int, x: Any) -> Any:
 def left(t: OwnTables, j: int, x: Any) -> Any:
     """A signal of block j as one of the chain."""
     return nearest(x, t.bits[j])
+
+
+def part(name: str, blocks: Sequence[OwnBlock], effects: Sequence[type[Effect]]) -> Part:
+    """Blocks on one side of the plays as a part of the chain."""
+    glues = own.GLUE, (product, entered, left)
+    return Part(name, *(own.arithmetic(blocks, effects, glue) for glue in glues))

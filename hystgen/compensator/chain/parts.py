@@ -7,7 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from hystgen.effects.base import Effect, Place
+from hystgen.plays.slots import Counts
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,13 @@ class Parts:
             [effect for effect in effects if effect.block and effect.place is Place.DRIVE],
             [effect for effect in effects if effect.block and effect.place is not Place.DRIVE],
         )  # fmt: skip
+
+    def count(self, waiting: int) -> Counts:
+        """As in `ChainTables`; `waiting`: drives that a delay keeps."""
+        return np.array([
+            waiting > 0, len(self.lags), len(self.own_drives) > 0, len(self.creeps), len(self.own_outputs) > 0,
+            len(self.ageing), len(self.heat), len(self.thermal), len(self.modes), len(self.drift),
+        ], dtype=np.int64)  # fmt: skip
 
     def turning(self, branches: bool) -> bool:
         """Whether a lag alone is in front of a memoryless part that has two `branches`."""

@@ -13,6 +13,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.part import Arithmetic, Verbs
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -144,6 +145,11 @@ class AgeingState(NamedTuple):
     own: Counts
 
 
+def memory(t: AgeingTables, dtype: Any) -> AgeingState:
+    """Memory of all gains."""
+    return AgeingState(np.zeros((len(t.turns), 4), dtype), np.zeros(len(t.turns), np.int64))
+
+
 @jit
 def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
     """The gain at a travel; past the last piece it stays constant."""
@@ -178,6 +184,18 @@ def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> b
 
 
 @jit
+def ageing_reset(t: AgeingTables, s: AgeingState, j: int) -> None:
+    """As in the parameter file: nothing has been travelled."""
+    ageing_set_travel(t, s, j, zero(t.number[j, LAST]))
+
+
+@jit
+def ageing_travelled(s: AgeingState, j: int) -> Any:
+    """The travel."""
+    return s.block[j, HIGH]
+
+
+@jit
 def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
     """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
     inside = gain
@@ -192,8 +210,9 @@ def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
 
 
 @jit
-def ageing_move(t: AgeingTables, s: AgeingState, j: int, way: Any) -> None:
-    """The drive has moved by `way`, either sign."""
+def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) -> None:
+    """The drive has moved to v."""
+    way = v - before
     change = (way if way >= zero(way) else -way) + s.block[j, LOW]
     high = s.block[j, HIGH]
     following = high + change
@@ -212,12 +231,21 @@ def ageing_move(t: AgeingTables, s: AgeingState, j: int, way: Any) -> None:
 
 
 @jit(inline=True)
-def ageing_solve(s: AgeingState, j: int, y: Any) -> Any:
+def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
     """The input that gives the output y."""
     return y * s.block[j, INVERSE]
 
 
 @jit(inline=True)
-def ageing_absorb(s: AgeingState, j: int, x: Any) -> Any:
+def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """The output for the input x."""
     return s.block[j, GAIN] * x
+
+
+ARITHMETIC = Arithmetic(
+    Verbs(
+        memory, absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move, set_gain=ageing_set,
+        set_travel=ageing_set_travel, travelled=ageing_travelled,
+    ),
+    constants,
+)  # fmt: skip

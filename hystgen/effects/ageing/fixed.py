@@ -12,9 +12,10 @@ from hystgen.arithmetic.factors import LARGEST as MOST
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.ageing import compensator as floating
-from hystgen.effects.ageing.compensator import GAIN, HIGH, INVERSE, LAST, AgeingState, AgeingTables
+from hystgen.effects.ageing.compensator import GAIN, HIGH, INVERSE, LAST, AgeingState, AgeingTables, ageing_travelled
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.part import Arithmetic, Verbs
 from hystgen.effects.thermal.fixed import GAIN_BITS, LARGEST, LEAST, ONE, followed, reciprocal
 from hystgen.plays.slots import zero
 
@@ -109,6 +110,12 @@ def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> b
 
 
 @jit
+def ageing_reset(t: AgeingTables, s: AgeingState, j: int) -> None:
+    """As in the parameter file: nothing has been travelled."""
+    ageing_set_travel(t, s, j, zero(t.number[j, LAST]))
+
+
+@jit
 def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
     """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
     given = gain << t.number[j, BITS]
@@ -124,8 +131,9 @@ def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
 
 
 @jit
-def ageing_move(t: AgeingTables, s: AgeingState, j: int, way: Any) -> None:
-    """The drive has moved by `way`, either sign."""
+def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) -> None:
+    """The drive has moved to v."""
+    way = v - before
     following = s.block[j, HIGH] + (way if way >= 0 else -way)
     if following > t.number[j, LAST]:
         following = t.number[j, LAST]
@@ -137,12 +145,21 @@ def ageing_move(t: AgeingTables, s: AgeingState, j: int, way: Any) -> None:
 
 
 @jit
-def ageing_solve(s: AgeingState, j: int, y: Any) -> Any:
+def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
     """The input that gives the output y."""
     return times(y, s.block[j, INVERSE], GAIN_BITS)
 
 
 @jit
-def ageing_absorb(s: AgeingState, j: int, x: Any) -> Any:
+def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """The output for the input x."""
     return times(x, s.block[j, GAIN], GAIN_BITS)
+
+
+ARITHMETIC = Arithmetic(
+    Verbs(
+        floating.memory, absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
+        set_gain=ageing_set, set_travel=ageing_set_travel, travelled=ageing_travelled,
+    ),
+    constants,
+)  # fmt: skip

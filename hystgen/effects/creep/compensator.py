@@ -12,6 +12,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.base import Array, Block, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
 from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.part import Arithmetic, Verbs
 from hystgen.plays.slots import Counts, Reals, zero
 
 EFFECTS = (ExponentialCreep, LogarithmicCreep)
@@ -114,6 +115,11 @@ class CreepState(NamedTuple):
     state: Reals
 
 
+def memory(t: CreepTables, dtype: Any) -> CreepState:
+    """Memory of all blocks."""
+    return CreepState(np.zeros((len(t.block), 2), dtype), np.zeros((len(t.term), 2), dtype))
+
+
 @jit
 def creep_rest(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     """Everything has settled at the input x. Returns the output."""
@@ -155,6 +161,8 @@ def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     return y
 
 
+ARITHMETIC = Arithmetic(Verbs(memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants)
+
 # ---------------------------------------------------------------- at steps of any length
 
 
@@ -165,7 +173,7 @@ class UnevenCreep(Block):
         self._numbers = functools.lru_cache(maxsize=64)(functools.partial(numbers, effect))
         self._tables = functools.lru_cache(maxsize=256)(self._of_steps)
         self.advance(1.0)
-        self.state = CreepState(np.zeros((1, 2)), np.zeros((len(self.table.term), 2)))
+        self.state = memory(self.table, np.float64)
 
     def _of_steps(self, seconds: float, later: float) -> CreepTables:
         """As `tables`, with the states on their way to the next output, by the E and b0 of the next step; an input has

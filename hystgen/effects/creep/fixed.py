@@ -19,6 +19,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.creep import compensator as floating
 from hystgen.effects.creep.compensator import AHEAD, BEFORE, HIGH, CreepNumbers, CreepState, CreepTables
 from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.part import Arithmetic, Verbs
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import zero
 
@@ -116,3 +117,6 @@ def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     s.block[j, BEFORE] = x
     s.block[j, AHEAD] = direct + nearest(following, t.block[j, BITS])
     return direct + nearest(total, t.block[j, BITS])
+
+
+ARITHMETIC = Arithmetic(Verbs(floating.memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants)

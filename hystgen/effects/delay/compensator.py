@@ -8,8 +8,11 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
+from hystgen.effects.part import Arithmetic, Function, Verbs
 from hystgen.plays.slots import Counts, Reals
 
 MOST_SAMPLES = 2**15
@@ -75,3 +78,30 @@ def fixed_delayed(t: DelayTables, line: Waiting) -> Any:
     """The same in fixed point, to the nearest code."""
     oldest = line.sample[line.oldest[0]]
     return oldest + times(line.sample[delay_next(line)] - oldest, t.share[0], t.share[1])
+
+
+def memory(t: DelayTables, dtype: Any) -> Waiting:
+    """Memory of the delay of a model."""
+    return Waiting(np.zeros(t.samples, dtype), np.zeros(1, np.int64))
+
+
+def verbs(delayed: Function) -> Verbs:
+    """What a delay does in an arithmetic, by the function of this name."""
+
+    @jit
+    def rest(t: DelayTables, line: Waiting, j: int, v: Any) -> Any:  # noqa: ARG001  as of every block
+        """The drive has always been v. Returns the one that leaves the delay."""
+        delay_rest(line, v)
+        return delayed(t, line)
+
+    @jit
+    def absorb(t: DelayTables, line: Waiting, j: int, v: Any) -> Any:  # noqa: ARG001  as of every block
+        """The drive is v at this sample. Returns the one that leaves the delay."""
+        delay_put(line, v)
+        return delayed(t, line)
+
+    return Verbs(memory, rest, absorb)
+
+
+ARITHMETIC = Arithmetic(verbs(delayed), lambda _: ())
+FIXED_ARITHMETIC = Arithmetic(verbs(fixed_delayed), lambda _: ())

@@ -12,6 +12,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.base import Block, decays
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag.model import Lag
+from hystgen.effects.part import Arithmetic, Led, Verbs
 from hystgen.plays.slots import Counts, Reals, zero
 
 LONG_STEP = 2.0
@@ -85,26 +86,34 @@ EXACT_KIND = Kind(
 
 
 class LagTables(NamedTuple):
-    """All lags of a model: `exact` (k,), 1 where it is inverted exactly; `block` (k, 4), in fixed point (k, 8)."""
+    """All lags of a model: `exact` (k,), 1 where it is inverted exactly; `block` (k, 4), in fixed point (k, 8);
+    `braked`: 1 if the only one is kept from overshooting behind a slew limit."""
 
     exact: Counts
     block: Reals
+    braked: int
 
 
 def tables(
-    lags: Sequence[tuple[bool, tuple[float, float, float, float]]], reals: Callable[[Any, str], Any]
+    lags: Sequence[tuple[bool, tuple[float, float, float, float]]], reals: Callable[[Any, str], Any], braked: int = 0
 ) -> LagTables:
     """The tables of several lags in floating point; `reals`: numbers, with a name, as those of the arithmetic."""
     return LagTables(
         np.array([int(exact) for exact, _ in lags], dtype=np.int64),
         reals([row for _, row in lags], "constants of the lag").reshape(len(lags), 4),
+        braked,
     )
 
 
-def constants(t: LagTables, braked: bool) -> Iterator[Constants]:
-    """The numbers of each lag; `braked`: of the one that there is, behind a slew limit."""
+def constants(t: LagTables) -> Iterator[Constants]:
+    """The numbers of each lag."""
     for exact, row in zip(t.exact, t.block, strict=True):
-        yield Constants(EXACT_KIND if exact else BRAKED_KIND if braked else KIND, row, (3, 3 if exact else 2))
+        yield Constants(EXACT_KIND if exact else BRAKED_KIND if t.braked else KIND, row, (3, 3 if exact else 2))
+
+
+def memory(t: LagTables, dtype: Any) -> Reals:
+    """Memory (k, 6) of all lags."""
+    return np.zeros((len(t.exact), 6), dtype)
 
 
 @jit
@@ -266,6 +275,15 @@ def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any
         return room
     return -room if over < -room else over
 
+
+@jit
+def steady_state(s: Reals) -> Any:
+    """Where the lag is."""
+    return s[0, HIGH]
+
+
+LED = Led(steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked, HALVES)
+ARITHMETIC = Arithmetic(Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants)
 
 # ---------------------------------------------------------------- at steps of any length
 

@@ -18,6 +18,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag import compensator as floating
 from hystgen.effects.lag.compensator import HALVES, LagTables, steady_led
+from hystgen.effects.part import Arithmetic, Led, Verbs
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
@@ -29,10 +30,15 @@ BRAKED_KIND = Kind("braked", own=KIND.own, letters=KIND.letters, memory=KIND.mem
 EXACT_KIND = Kind("lag_exact", own=("rest", "solve", "absorb"), letters="fffbb", memory="ww")
 
 
-def constants(t: LagTables, braked: bool) -> Iterator[Constants]:
+def constants(t: LagTables) -> Iterator[Constants]:
     """As in floating point."""
-    for each, exact in zip(floating.constants(t, braked), t.exact, strict=True):
-        yield replace(each, kind=EXACT_KIND if exact else BRAKED_KIND if braked else KIND, products=(8, 4))
+    for each, exact in zip(floating.constants(t), t.exact, strict=True):
+        yield replace(each, kind=EXACT_KIND if exact else BRAKED_KIND if t.braked else KIND, products=(8, 4))
+
+
+def memory(t: LagTables, dtype: Any) -> Reals:
+    """Memory (k, 5) of all lags."""
+    return np.zeros((len(t.exact), 5), dtype)
 
 
 class Sizes:
@@ -53,7 +59,7 @@ class Sizes:
             self.answer = given + self.state / rate
 
 
-def tables(rows: list[tuple[bool, tuple[float, float, float, float], Sizes]]) -> LagTables:
+def tables(rows: list[tuple[bool, tuple[float, float, float, float], Sizes]], braked: int) -> LagTables:
     """All lags of a model, with the sizes of their signals. Raises OverflowError where states have no room."""
     block: list[list[int]] = []
     for exact, numbers, sizes in rows:
@@ -71,7 +77,7 @@ def tables(rows: list[tuple[bool, tuple[float, float, float, float], Sizes]]) ->
             given = (rate * 2.0**drop, second * 2.0**drop, inverse * 2.0 ** (drop - bits))
         block.append([*(part for x in given for part in factor(x)), bits, drop])
     return LagTables(
-        np.array([int(exact) for exact, *_ in rows], dtype=np.int64), np.array(block, np.int64).reshape(-1, 8)
+        np.array([int(exact) for exact, *_ in rows], dtype=np.int64), np.array(block, np.int64).reshape(-1, 8), braked
     )
 
 
@@ -253,3 +259,7 @@ def coarse(x: Any, drop: Any) -> Any:
 def coarsely(t: LagTables, x: Any, drop: Any) -> Any:
     """`x/(1 - E)` of numbers to search with."""
     return coarse(scaled(t, 0, x << (t.block[0, BITS] + drop), INVERSE), drop)
+
+
+LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked)
+ARITHMETIC = Arithmetic(Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants)

@@ -17,6 +17,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.part import Arithmetic, Verbs
 from hystgen.effects.resonance.model import Resonance
 from hystgen.plays.slots import Reals, zero
 
@@ -107,8 +108,13 @@ def constants(t: Reals) -> Iterator[Constants]:
         yield Constants(KIND, row, (6, 0))
 
 
+def memory(t: Reals, dtype: Any) -> Reals:
+    """Memory (k, 3) of all modes."""
+    return np.zeros((len(t), 3), dtype)
+
+
 @jit
-def mode_rest(s: Reals, j: int, x: Any) -> Any:
+def mode_rest(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """Everything has settled at the input x. Returns the output."""
     s[j, BEFORE] = x
     s[j, OFF] = zero(x)
@@ -126,3 +132,6 @@ def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
     s[j, RATE] = rate + ((t[j, SWING] * rate - t[j, TURN] * off) + t[j, PUSH] * change)
     s[j, BEFORE] = x
     return x + s[j, OFF]
+
+
+ARITHMETIC = Arithmetic(Verbs(memory, mode_rest, mode_absorb), constants)

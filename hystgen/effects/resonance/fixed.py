@@ -16,6 +16,7 @@ from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifte
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.part import Arithmetic, Verbs
 from hystgen.effects.resonance import compensator
 from hystgen.effects.resonance.compensator import BEFORE, OFF, RATE, ModeNumbers
 from hystgen.plays.fixed import nearest
@@ -97,3 +98,6 @@ def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
     s[j, RATE] = rate + (scaled(t, j, rate, SWING) - scaled(t, j, off, TURN) + push)
     s[j, BEFORE] = x
     return x + nearest(s[j, OFF], t[j, BITS])
+
+
+ARITHMETIC = Arithmetic(Verbs(compensator.memory, mode_rest, mode_absorb), constants)

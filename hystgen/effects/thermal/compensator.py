@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.part import Arithmetic, Verbs
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -64,6 +65,11 @@ def numbers(effect: LoggedThermal, span: float) -> tuple[float, ...]:
     )  # fmt: skip
 
 
+def memory(t: Reals, dtype: Any) -> Reals:
+    """Memory (k, 3) of all gains."""
+    return np.zeros((len(t), 3), dtype)
+
+
 @jit
 def gain_reset(t: Reals, s: Reals, j: int) -> None:
     """As in the parameter file: gain 1, offset 0."""
@@ -100,13 +106,13 @@ def gain_heat(t: Reals, s: Reals, j: int, temperature: Any) -> bool:
 
 
 @jit(inline=True)
-def gain_solve(s: Reals, j: int, y: Any) -> Any:
+def gain_solve(t: Reals, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
     """The input that gives the output y."""
     return (y - s[j, OFFSET]) * s[j, INVERSE]
 
 
 @jit(inline=True)
-def gain_absorb(s: Reals, j: int, x: Any) -> Any:
+def gain_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """The output for the input x."""
     return s[j, GAIN] * x + s[j, OFFSET]
 
@@ -267,6 +273,11 @@ def heat_constants(t: HeatTables) -> Iterator[Constants]:
         yield Constants(HEAT_KIND, row[:HEAT_ONE], (7 + 2 * turns, 1), counts=(turns,))
 
 
+def heat_memory(t: HeatTables, dtype: Any) -> Reals:
+    """Memory of all blocks."""
+    return np.zeros((len(t.turns), HEAT_STATE), dtype)
+
+
 @jit
 def heat_reset(t: HeatTables, s: Reals, j: int) -> None:
     """As warm as its surroundings."""
@@ -306,13 +317,13 @@ def heat_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> None:
 
 
 @jit(inline=True)
-def heat_solve(s: Reals, j: int, y: Any) -> Any:
+def heat_solve(t: HeatTables, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
     """The input that gives the output y."""
     return (y - s[j, HEAT_OFFSET]) * s[j, HEAT_INVERSE]
 
 
 @jit(inline=True)
-def heat_absorb(s: Reals, j: int, x: Any) -> Any:
+def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """The output for the input x."""
     return s[j, HEAT_GAIN] * x + s[j, HEAT_OFFSET]
 
@@ -355,3 +366,11 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
         s[j, AT + i] = to
         odd = odd + t.number[j, HEAT_TWO]
     return amount
+
+
+ARITHMETIC = Arithmetic(
+    Verbs(memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat), constants
+)
+HEAT_ARITHMETIC = Arithmetic(
+    Verbs(heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move), heat_constants
+)

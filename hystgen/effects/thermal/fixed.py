@@ -12,6 +12,7 @@ import numpy as np
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.part import Arithmetic, Verbs
 from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
     AT,
@@ -110,13 +111,13 @@ def gain_heat(t: Reals, s: Reals, j: int, temperature: Any) -> bool:
 
 
 @jit
-def gain_solve(s: Reals, j: int, y: Any) -> Any:
+def gain_solve(t: Reals, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
     """The input that gives the output y."""
     return times(y - s[j, OFFSET], s[j, INVERSE], GAIN_BITS)
 
 
 @jit
-def gain_absorb(s: Reals, j: int, x: Any) -> Any:
+def gain_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """The output for the input x."""
     return times(x, s[j, GAIN], GAIN_BITS) + s[j, OFFSET]
 
@@ -222,13 +223,13 @@ def heat_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> None:
 
 
 @jit
-def heat_solve(s: Reals, j: int, y: Any) -> Any:
+def heat_solve(t: HeatTables, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
     """The input that gives the output y."""
     return times(y - s[j, HEAT_OFFSET], s[j, HEAT_INVERSE], GAIN_BITS)
 
 
 @jit
-def heat_absorb(s: Reals, j: int, x: Any) -> Any:
+def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """The output for the input x."""
     return times(x, s[j, HEAT_GAIN], GAIN_BITS) + s[j, HEAT_OFFSET]
 
@@ -274,3 +275,11 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
             break
         s[j, AT + i] = to
     return amount
+
+
+ARITHMETIC = Arithmetic(
+    Verbs(floating.memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat), constants
+)
+HEAT_ARITHMETIC = Arithmetic(
+    Verbs(floating.heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move), heat_constants
+)

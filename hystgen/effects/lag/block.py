@@ -1,0 +1,8 @@
+"""A lag as a part of the chain, in front of the plays."""
+
+from __future__ import annotations
+
+from hystgen.effects.lag import compensator, fixed
+from hystgen.effects.part import Part
+
+LAG = Part("lag", compensator.ARITHMETIC, fixed.ARITHMETIC)
