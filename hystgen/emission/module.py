@@ -244,7 +244,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         compiled is not None and bool(compiled.tables.braked), compiled is not None and bool(compiled.tables.quiet),
         compiled is not None and bool(compiled.tables.turning),
         compiled is not None and compiled.tables.number_of("delay") > 0,
-        compiled is not None and bool(compiled.parts.ageing), *(chain.plays(compiled.tables) if compiled else ()),
+        compiled is not None and "travel" in compiled.tables.calls, *(chain.plays(compiled.tables) if compiled else ()),
     )  # fmt: skip
     glue: chain.Glue | None = getattr(values, "glue", None)
     values.timing = _timing(parameters, compiled, about["family"])

@@ -28,8 +28,8 @@ import numpy as np
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, LoopRoundings, error_bounds
-from hystgen.compensator.chain import moving, own
-from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, crossing, lead
+from hystgen.compensator.chain import moving
+from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, ahead_of, crossing, lead
 from hystgen.compensator.chain.parts import Parts
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import TABLE_ERROR
@@ -107,7 +107,8 @@ def _saturation(compiled: Compiled, u: float, kind: str) -> tuple[float, float, 
 
 def _creep(compiled: Compiled, j: int, size: float, u: float) -> tuple[float, float]:
     """Roundings of the output of a block whose input is at most `size`, and the gain of its inverse."""
-    _, rest, terms = creep.numbers(compiled.parts.creeps[j], compiled.seconds)
+    one = compiled.ones["creep"][j]
+    rest, terms = one.rest, one.terms
     rate, late, weight = terms[:, creep.RATE], terms[:, creep.LATE], terms[:, creep.WEIGHT]
     total = float(np.sum(weight))
     states = (16.0 + len(terms)) * total + u * float(np.sum(weight / rate))
@@ -118,7 +119,8 @@ def _creep(compiled: Compiled, j: int, size: float, u: float) -> tuple[float, fl
 
 def _late(compiled: Compiled) -> float:
     """Largest change of the ageing gain in a step at the fastest rate, share of the output, plus its table's error."""
-    return max(ageing.most_at_once(each, compiled.largest_step) for each in compiled.parts.ageing) + TABLE_ERROR
+    effects = compiled.parts.blocks["ageing"]
+    return max(ageing.most_at_once(each, compiled.largest_step) for each in effects) + TABLE_ERROR
 
 
 def _warmed(compiled: Compiled) -> float:
@@ -127,7 +129,7 @@ def _warmed(compiled: Compiled) -> float:
     return math.fsum(
         thermal.most_at_once(each, ends, compiled.largest_step, compiled.seconds)
         * (abs(each.gain_per_degree) * output + abs(each.offset_per_degree))
-        for each in compiled.parts.heat
+        for each in compiled.parts.blocks["heat"]
     )
 
 
@@ -135,7 +137,7 @@ def _misjudged(compiled: Compiled, u: float, emitted: bool) -> float:
     """Change of the output by what the plays that rub are wrong about the heat at the fastest rate."""
     ends, output, step = compiled.static.input_range, _sizes(compiled).output, compiled.largest_step
     found = 0.0
-    for each in compiled.parts.heat:
+    for each in compiled.parts.blocks["heat"]:
         rubbing = thermal.thresholds(each, ends)
         if not rubbing:
             continue
@@ -153,7 +155,7 @@ def _gain_ends(compiled: Compiled) -> tuple[float, float]:
     """Least and largest product of the gains: those that are set, and those of own heat at the fastest rate."""
     set_ones = len(compiled.tables.of("gain")) + len(compiled.tables.of("ageing").turns)
     least, largest = LEAST_GAIN**set_ones, LARGEST_GAIN**set_ones
-    for each in compiled.parts.heat:
+    for each in compiled.parts.blocks["heat"]:
         _, low, high = thermal.reached(each, compiled.static.input_range, compiled.largest_step, compiled.seconds)
         least, largest = least * low, largest * high
     return least, largest
@@ -241,7 +243,7 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
         forward = forward * each.forward.largest + there_own
     forward = gain * (forward + 3.0 * u * sizes.output * gains) + misjudged + TABLE_ERROR * sizes.output * (late > 0.0)
     size, ringing = gain * sizes.output + sizes.displacement, 1.0
-    for mode in compiled.modes:
+    for mode in compiled.ones["mode"]:
         forward = mode.largest * forward + resonance.rounding(mode, size, u)
         size, ringing = mode.largest * size, ringing * mode.largest
     return forward + ringing * there + 3.0 * u * ringing * sizes.displacement, inverse
@@ -308,8 +310,8 @@ def kept_branch(compiled: Compiled) -> float:
     beyond a target that has half of that rounding itself. Between neighbours in a grid of drives both branches rise, so
     that their values there bound those in between.
     """
-    static, seconds, t = compiled.static, compiled.seconds, compiled.tables
-    theta = lag.numbers(compiled.parts.lags[0], seconds, True)[1][lag.THETA] if t.turning else 0.0
+    static, t = compiled.static, compiled.tables
+    theta = compiled.ones["lag"][0].row[lag.THETA] if t.turning else 0.0
     unit = 1.0
     if compiled.codes is not None:
         unit = float(compiled.codes.drive_lsb) / 2.0 ** float(t.number[DRIVE_BITS])
@@ -324,7 +326,7 @@ def kept_branch(compiled: Compiled) -> float:
         far = last + theta * (last - other) + math.copysign(more, last - first)
         worst = max(worst, abs(float(static.front(far, up)) - begin))
     steep = 1.0 + abs(moving.steepest_bend(static, compiled.parts.plays))
-    rest = math.prod(creep.numbers(each, seconds).rest for each in compiled.parts.creeps)
+    rest = math.prod(one.rest for one in compiled.ones["creep"])
     rest *= math.prod(each.forward.largest for each in compiled.own_behind)
     return worst * static.pi.slopes[-1] * steep * rest * _gain_ends(compiled)[1]
 
@@ -334,8 +336,7 @@ def swing(static: StaticModel, parts: Parts, seconds: float) -> float:
     the other, in drive units; 0 where it comes to rest."""
     if not static.branches_differ or not parts.own_drives:
         return 0.0
-    lags = [lag.numbers(each, seconds) for each in parts.lags]
-    gain = lead(lags, [own.linear(each, seconds) for each in parts.own_drives])
+    gain = lead(ahead_of(parts.ones(seconds)))
     low, high = static.input_range
     return min(gain * static.branch_gap / static.front_slopes[0], high - low)
 
@@ -405,5 +406,5 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     rest = math.prod(float(row[creep.REST]) for row in compiled.tables.of("creep").block)
     rest *= math.prod(each.forward.largest for each in compiled.own_behind)
     most = _gain_ends(compiled)[1] * rest
-    most *= math.prod(mode.largest for mode in compiled.modes)
+    most *= math.prod(mode.largest for mode in compiled.ones["mode"])
     return ErrorBounds(SECOND_ORDER * (forward + most * plays.forward), inverse, rounding)

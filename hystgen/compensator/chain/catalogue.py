@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hystgen.compensator.chain import own, own_fixed
+from hystgen.compensator.chain import own_fixed
 from hystgen.effects.ageing.block import AGEING
-from hystgen.effects.base import Effect
+from hystgen.effects.base import Effect, Place
 from hystgen.effects.creep.block import CREEP
 from hystgen.effects.delay.block import DELAY
 from hystgen.effects.drift.block import CLOCK
@@ -16,7 +16,7 @@ from hystgen.effects.part import Part
 from hystgen.effects.resonance.block import MODE
 from hystgen.effects.thermal.block import GAIN, HEAT
 
-OWN_AHEAD, OWN_BEHIND = (Part(name, own.NONE, own.NONE) for name in ("own_ahead", "own_behind"))
+OWN_AHEAD, OWN_BEHIND = own_fixed.part("own_ahead", Place.DRIVE), own_fixed.part("own_behind", Place.LINEAR)
 
 SENT = (DELAY,)
 """What a drive passes on its way to the amplifier."""
@@ -42,7 +42,7 @@ def parts_with(
 ) -> list[Part]:
     """The parts of a model with blocks of the user's own; `effects`: the classes of all of these."""
     given = {
-        OWN_AHEAD.name: own_fixed.part(OWN_AHEAD.name, ahead, effects[: len(ahead)]),
-        OWN_BEHIND.name: own_fixed.part(OWN_BEHIND.name, behind, effects[len(ahead) :]),
+        OWN_AHEAD.name: own_fixed.part(OWN_AHEAD.name, Place.DRIVE, ahead, effects[: len(ahead)]),
+        OWN_BEHIND.name: own_fixed.part(OWN_BEHIND.name, Place.LINEAR, behind, effects[len(ahead) :]),
     }
     return [given.get(part.name, part) for part in PARTS]

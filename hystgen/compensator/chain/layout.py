@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -12,18 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.chain import noise, own, preview
-from hystgen.compensator.chain.catalogue import LED, NAMES, PARTS
+from hystgen.compensator.chain import noise, preview
+from hystgen.compensator.chain.catalogue import AHEAD, LED, NAMES, PARTS
 from hystgen.compensator.chain.noise import Smoothing
 from hystgen.compensator.chain.own import Linear
 from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.chain.preview import Shaped, Taps
 from hystgen.effects.base import Effect
-from hystgen.effects.creep import compensator as creep
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.resonance import compensator as resonance
-from hystgen.effects.resonance.compensator import ModeNumbers
-from hystgen.effects.thermal import compensator as thermal
+from hystgen.effects.part import One
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import MOST_REFERENCES, Compensation
 from hystgen.plays.slots import Counts, Reals
@@ -194,20 +191,20 @@ class Compiled:
         """Samples by which the motion is late on a ramp."""
         return Read(self.taps, self.smoothing, self.shaped).late(self.asked)
 
-    @cached_property
+    @property
     def own_ahead(self) -> list[Linear]:
         """Blocks of the user's own in front of the plays."""
-        return [own.linear(each, self.seconds) for each in self.parts.own_drives]
+        return self.ones["own_ahead"]
 
-    @cached_property
+    @property
     def own_behind(self) -> list[Linear]:
         """Blocks of the user's own behind the plays."""
-        return [own.linear(each, self.seconds) for each in self.parts.own_outputs]
+        return self.ones["own_behind"]
 
     @cached_property
-    def modes(self) -> list[ModeNumbers]:
-        """Modes of the stage."""
-        return [resonance.numbers(each, self.seconds) for each in self.parts.modes]
+    def ones(self) -> dict[str, list[Any]]:
+        """Its blocks."""
+        return self.parts.ones(self.seconds, bool(self.tables.turning))
 
     @property
     def gain(self) -> noise.Gain:
@@ -231,20 +228,19 @@ def quiet(how: Compensation, taps: Taps | None) -> int:
     return QUIET + (len(taps.weights) if taps else 1) - 1 if how.quiet else 0
 
 
-def lead(lags: Sequence[tuple[bool, tuple[float, float, float, float]]], ahead: Sequence[Linear]) -> float:
+def ahead_of(ones: Mapping[str, Sequence[Any]]) -> list[Any]:
+    """The blocks in front of the plays."""
+    return [one for part in AHEAD for one in ones[part.name]]
+
+
+def lead(ahead: Sequence[One]) -> float:
     """Largest gain from what arrives in front of the plays to the drive, 0 if the drive itself arrives there."""
-    if not lags and not ahead:
-        return 0.0
-    gains = [
-        (2.0 - rate) / (late - second) if exact else (1.0 + 2.0 * second) * (2.0 - rate) / rate
-        for exact, (rate, second, late, _) in lags
-    ]
-    return math.prod([*gains, *(max(one.backward.largest, 1.0) for one in ahead)])
+    return math.prod(one.lead for one in ahead) if ahead else 0.0
 
 
-def braked(parts: Parts, exact: Sequence[bool]) -> int:
-    """1 where a slew limit has one lag behind it that is led; `exact`: whether each lag is inverted exactly."""
-    return int(bool(parts.slew) and list(exact) == [False])
+def braked(parts: Parts, ones: Mapping[str, Sequence[Any]]) -> int:
+    """1 where a slew limit has one block behind it that is led."""
+    return int(bool(parts.slew) and [one.exact for one in ones[NAMES[LED]]] == [False])
 
 
 def rates(parts: Parts, seconds: float) -> tuple[Fraction, ...]:
@@ -289,7 +285,7 @@ def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation
     ends = static.input_range
     asked = how.max_rate or (ends[1] - ends[0]) / (SAMPLES_A_SWEEP * seconds)
     low, high = output_range(static, parts, seconds)
-    moves = [thermal.farthest(each, ends, high - low, seconds) for each in parts.heat]
+    moves = [one.farthest(ends, high - low, seconds) for one in parts.behind(seconds)]
     slew = (rate for each in parts.slew for rate in (each.rate, each.falling_rate))
     return float(min([asked, *slew, *(move / seconds for move in moves)]))
 
@@ -364,12 +360,8 @@ def settled(static: StaticModel, effects: Sequence[Effect], w: float) -> float:
 def output_range(static: StaticModel, parts: Parts, seconds: float) -> tuple[float, float]:
     """Extremes of the settled output over every drive history inside the input range."""
     low, high = (settled(static, parts.plays, end) for end in static.play_range)
-    for each in parts.creeps:
-        rest = creep.numbers(each, seconds).rest
-        low, high = low * rest, high * rest
-    for each in parts.own_outputs:
-        rest = own.linear(each, seconds).rest
-        low, high = low * rest, high * rest
+    for one in parts.behind(seconds):
+        low, high = one.at_rest(low), one.at_rest(high)
     for effect in parts.saturations:
         low, high = (float(end) for end in effect.mapped(np.array([low, high]), None))
     return low + static.output_offset, high + static.output_offset

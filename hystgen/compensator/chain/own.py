@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -21,7 +21,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects import own
 from hystgen.effects.base import Array, Effect, Place
 from hystgen.effects.kinds import Constants, OwnBlock
-from hystgen.effects.part import Arithmetic, Function, Verbs
+from hystgen.effects.part import Arithmetic, Function, Margin, One, Response, Verbs
 from hystgen.plays.slots import Counts, Reals
 
 Glue = tuple[Function, Function, Function]
@@ -122,7 +122,7 @@ class System:
 
 
 @dataclass(frozen=True)
-class Linear:
+class Linear(One):
     """A block at one step length: forwards and backwards, its gain at rest, and the states (n,) of the input 1."""
 
     effect: Effect
@@ -137,6 +137,41 @@ class Linear:
         """Whether solve gives the input for which absorb returns the output asked for."""
         f, b = self.forward, self.backward
         return abs(b.d * f.d - 1.0) <= SAME and bool(np.all(np.abs(b.c + b.d * f.c) <= SAME * (1.0 + np.abs(f.c))))
+
+    @property
+    def lead(self) -> float:
+        """Largest gain of its inverse."""
+        return max(self.backward.largest, 1.0)
+
+    @property
+    def ringing(self) -> Array:
+        """Frequencies (k,) in rad a sample at which its inverse may ring."""
+        return np.asarray(np.abs(np.angle(np.linalg.eigvals(self.backward.a))))
+
+    def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
+        """What it makes of frequencies, behind other blocks."""
+        found = found._replace(rest=found.rest * self.rest)
+        if not self.exact:
+            return found._replace(led=found.led * self.backward.response(z))
+        return found._replace(passed=found.passed * self.forward.response(z), direct=found.direct * self.forward.d)
+
+    @property
+    def fineness(self) -> float:
+        """Bits that its lead takes from a signal in front of the plays."""
+        return math.log2(2.0 * self.backward.largest)
+
+    def at_rest(self, x: float) -> float:
+        """The settled output for an input."""
+        return x * self.rest
+
+    def grown(self, size: float, margin: Margin) -> float:
+        """Largest output for inputs within a size."""
+        return size * self.forward.largest * margin.slack + 1.0
+
+    def asked(self, given: float, asked: float, margin: Margin) -> float:
+        """Largest input that solve or resting can give for an output within a size, after inputs `given`."""
+        now, before = abs(self.forward.d), self.forward.before()
+        return max((asked + before * given) / now, asked / self.rest) * margin.slack + 1.0
 
     def sizes(self) -> Array:
         """Largest states (n,) for inputs within 1, from rest at one."""
@@ -348,15 +383,17 @@ def memory(t: OwnTables, dtype: Any) -> Reals:
     return np.zeros(t.place[-1], dtype)
 
 
-def arithmetic(blocks: Sequence[OwnBlock], effects: Sequence[type[Effect]], made: Glue) -> Arithmetic:
-    """Blocks on one side of the plays, one after the other, as one of the chain."""
+def arithmetic(
+    blocks: Sequence[OwnBlock], effects: Sequence[type[Effect]], made: Glue, *tables: Callable[..., Any]
+) -> Arithmetic:
+    """Blocks on one side of the plays, one after the other, as one of the chain; `tables` and formats as it has."""
 
     def through(verb: str) -> Function:
         calls = [_one(made, block, verb, j) for j, block in enumerate(blocks)]
         return functools.reduce(_both, calls[::-1] if verb in ("solve", "resting") else calls)
 
     verbs = Verbs(memory, *map(through, ("rest", "absorb", "resting", "solve"))) if blocks else Verbs(memory)
-    return Arithmetic(verbs, lambda t: constants(t, effects))
+    return Arithmetic(verbs, lambda t: constants(t, effects), *tables)
 
 
 def _both(first: Function, behind: Function) -> Function:
@@ -390,5 +427,3 @@ def _one(made: Glue, block: OwnBlock, verb: str, j: int) -> Function:
 
 
 GLUE: Glue = product, passed, passed
-NONE = arithmetic((), (), GLUE)
-"""Of a model without such blocks."""

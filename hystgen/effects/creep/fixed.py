@@ -8,7 +8,7 @@ rounding leaves is a dead band, and no cycle.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -49,7 +49,7 @@ def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
     return bits, max(0, math.ceil(math.log2(states)) + bits + 2 - (LARGEST.bit_length() - 1))
 
 
-def tables(blocks: list[tuple[CreepNumbers, float]], code: int) -> CreepTables:
+def tables(blocks: Sequence[tuple[CreepNumbers, float]], code: int) -> CreepTables:
     """All creep blocks of a model, each with the largest size of its input; `code` as for `guard`, which may raise."""
     block: list[list[int]] = []
     term: list[list[int]] = []
@@ -119,4 +119,7 @@ def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     return direct + nearest(total, t.block[j, BITS])
 
 
-ARITHMETIC = Arithmetic(Verbs(floating.memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants)
+ARITHMETIC = Arithmetic(
+    Verbs(floating.memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
+    lambda blocks, about: tables(blocks, about.bits), lambda one, about, given, _: (one, given * 2.0**about.bits),
+)  # fmt: skip

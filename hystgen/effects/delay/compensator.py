@@ -6,13 +6,14 @@ The inverse has it in its preview (`hystgen.compensator.chain.preview`).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hystgen.arithmetic.factors import times
+from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
-from hystgen.effects.part import Arithmetic, Function, Verbs
+from hystgen.effects.part import Arithmetic, Function, Surroundings, Verbs
 from hystgen.plays.slots import Counts, Reals
 
 MOST_SAMPLES = 2**15
@@ -103,5 +104,17 @@ def verbs(delayed: Function) -> Verbs:
     return Verbs(memory, rest, absorb)
 
 
-ARITHMETIC = Arithmetic(verbs(delayed), lambda _: ())
-FIXED_ARITHMETIC = Arithmetic(verbs(fixed_delayed), lambda _: ())
+def tables(seconds: Sequence[float], about: Surroundings, share: Callable[[float], Any]) -> DelayTables:
+    """The tables of all delays of a model, which follow one another; `share`: that of an arithmetic."""
+    waited, waiting = numbers(math.fsum(seconds), about.seconds)
+    return DelayTables(share(waited) if waiting else share(0.0)[:0], waiting)
+
+
+ARITHMETIC = Arithmetic(
+    verbs(delayed), lambda _: (),
+    lambda blocks, about: tables(blocks, about, lambda share: about.reals([share], "the delay")),
+)  # fmt: skip
+FIXED_ARITHMETIC = Arithmetic(
+    verbs(fixed_delayed), lambda _: (),
+    lambda blocks, about: tables(blocks, about, lambda share: np.array(factor(share), dtype=np.int64)),
+)  # fmt: skip

@@ -5,4 +5,7 @@ from __future__ import annotations
 from hystgen.effects.drift import compensator, fixed
 from hystgen.effects.part import Part
 
-CLOCK = Part("clock", compensator.ARITHMETIC, fixed.ARITHMETIC)
+CLOCK = Part(
+    "clock", "drift", lambda effect: effect.name == "drift", lambda effect, *_: effect,
+    compensator.ARITHMETIC, fixed.ARITHMETIC,
+)  # fmt: skip

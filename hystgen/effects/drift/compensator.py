@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import Arithmetic, Function, Verbs
+from hystgen.effects.part import Arithmetic, Floating, Function, Verbs
 from hystgen.plays.slots import Reals, zero
 
 # ---------------------------------------------------------------- clock.c
@@ -97,4 +98,11 @@ def verbs(memory: Function, start: Function, tick: Function, drift: Function, on
     return Verbs(memory, reset=start, move=tick, added=added, lead=lead, ahead=ahead)
 
 
-ARITHMETIC = Arithmetic(verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants)
+def tables(effects: Sequence[LinearDrift | CurvedDrift], about: Floating) -> Reals:
+    """The tables (k, 8) of the clock of a model."""
+    rows = [numbers(each, about.seconds, about.span, about.ahead) for each in effects]
+    found: Reals = about.reals(rows, "drift").reshape(-1, 8)
+    return found
+
+
+ARITHMETIC = Arithmetic(verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants, tables)

@@ -5,4 +5,7 @@ from __future__ import annotations
 from hystgen.effects.lag import compensator, fixed
 from hystgen.effects.part import Part
 
-LAG = Part("lag", compensator.ARITHMETIC, fixed.ARITHMETIC)
+LAG = Part(
+    "lag", "a lag", lambda effect: effect.name == "lag" and effect.time_constant > 0.0, compensator.numbers,
+    compensator.ARITHMETIC, fixed.ARITHMETIC,
+)  # fmt: skip

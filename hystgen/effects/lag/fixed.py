@@ -7,7 +7,7 @@ move `lead` of the lag that it was to make: what another input makes of it is `c
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag import compensator as floating
-from hystgen.effects.lag.compensator import HALVES, LagTables, steady_led
+from hystgen.effects.lag.compensator import HALVES, LagNumbers, LagTables, Sizes, steady_led
 from hystgen.effects.part import Arithmetic, Led, Verbs
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
@@ -41,28 +41,11 @@ def memory(t: LagTables, dtype: Any) -> Reals:
     return np.zeros((len(t.exact), 5), dtype)
 
 
-class Sizes:
-    """Largest sizes of a lag's signals: its input, the output asked of it, its states, the answer of its inverse;
-    `turning`: in front of two branches."""
-
-    def __init__(
-        self, exact: bool, rate: float, late: float, given: float, asked: float, turning: bool = False
-    ) -> None:
-        self.given, self.asked = given, asked
-        if exact:
-            self.state = given + asked
-            self.answer = given + self.state / late
-        else:
-            # |wanted| <= theta^2 asked + (1 - theta)(theta |wanted| + given), theta at most 1/2; or with two branches
-            # asked and a move that is led, 2 asked, less what the input was short of, (1 - theta)(2 asked + 3 given)
-            self.state = 3.0 * (given + (2.0 if turning else 1.0) * asked)
-            self.answer = given + self.state / rate
-
-
-def tables(rows: list[tuple[bool, tuple[float, float, float, float], Sizes]], braked: int) -> LagTables:
+def tables(rows: Sequence[tuple[LagNumbers, Sizes]], braked: int) -> LagTables:
     """All lags of a model, with the sizes of their signals. Raises OverflowError where states have no room."""
     block: list[list[int]] = []
-    for exact, numbers, sizes in rows:
+    for one, sizes in rows:
+        exact, numbers = one.exact, one.row
         room = STATE_BITS - math.ceil(math.log2(sizes.state))
         wanted = EXACT_BITS if exact else max(math.ceil(-math.log2(numbers[floating.RATE])), 0) + GUARD
         bits = min(wanted, room)
@@ -77,7 +60,7 @@ def tables(rows: list[tuple[bool, tuple[float, float, float, float], Sizes]], br
             given = (rate * 2.0**drop, second * 2.0**drop, inverse * 2.0 ** (drop - bits))
         block.append([*(part for x in given for part in factor(x)), bits, drop])
     return LagTables(
-        np.array([int(exact) for exact, *_ in rows], dtype=np.int64), np.array(block, np.int64).reshape(-1, 8), braked
+        np.array([int(one.exact) for one, _ in rows], dtype=np.int64), np.array(block, np.int64).reshape(-1, 8), braked
     )
 
 
@@ -262,4 +245,8 @@ def coarsely(t: LagTables, x: Any, drop: Any) -> Any:
 
 
 LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked)
-ARITHMETIC = Arithmetic(Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants)
+ARITHMETIC = Arithmetic(
+    Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
+    lambda blocks, about: tables(blocks, about.braked),
+    lambda one, about, given, asked: (one, one.sizes(given, asked, about.margin.turning)),
+)  # fmt: skip

@@ -5,4 +5,8 @@ from __future__ import annotations
 from hystgen.effects.part import Part
 from hystgen.effects.resonance import compensator, fixed
 
-MODE = Part("mode", compensator.ARITHMETIC, fixed.ARITHMETIC, forward=True)
+MODE = Part(
+    "mode", "resonance", lambda effect: effect.name == "resonance" and effect.block is None,
+    lambda effect, seconds, _: compensator.numbers(effect, seconds),
+    compensator.ARITHMETIC, fixed.ARITHMETIC, forward=True,
+)  # fmt: skip

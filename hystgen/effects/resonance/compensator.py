@@ -17,7 +17,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import Arithmetic, Verbs
+from hystgen.effects.part import Arithmetic, Margin, One, Verbs
 from hystgen.effects.resonance.model import Resonance
 from hystgen.plays.slots import Reals, zero
 
@@ -40,7 +40,7 @@ def denominator(effect: Resonance, step: float) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class ModeNumbers:
+class ModeNumbers(One):
     """A mode at one step length, and sums of sizes over all samples of what it does.
 
     `table`: (5,) what `off` and `rate` lose of themselves in a step, how they turn into each other, and what a change
@@ -55,6 +55,10 @@ class ModeNumbers:
     rate_after: float
     turned: float
     slowed: float
+
+    def grown(self, size: float, margin: Margin) -> float:
+        """Largest output for inputs within a size."""
+        return size * self.largest * margin.slack + 1.0
 
 
 def numbers(effect: Resonance, seconds: float) -> ModeNumbers:
@@ -134,4 +138,7 @@ def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
     return x + s[j, OFF]
 
 
-ARITHMETIC = Arithmetic(Verbs(memory, mode_rest, mode_absorb), constants)
+ARITHMETIC = Arithmetic(
+    Verbs(memory, mode_rest, mode_absorb), constants,
+    lambda blocks, about: about.reals([one.table for one in blocks], "the modes").reshape(-1, 5),
+)  # fmt: skip

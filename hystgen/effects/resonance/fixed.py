@@ -7,7 +7,7 @@ below the sample rate a small factor, to 31 bits of its own.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -68,7 +68,7 @@ def rounding(one: ModeNumbers, table: Any, size: float) -> float:
     return lost + 0.5 * state + 0.5
 
 
-def tables(rows: list[list[int]]) -> Any:
+def tables(rows: Sequence[list[int]]) -> Any:
     """All modes of a model, (k, 13)."""
     return np.array(rows, dtype=np.int64).reshape(-1, 13)
 
@@ -100,4 +100,7 @@ def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
     return x + nearest(s[j, OFF], t[j, BITS])
 
 
-ARITHMETIC = Arithmetic(Verbs(compensator.memory, mode_rest, mode_absorb), constants)
+ARITHMETIC = Arithmetic(
+    Verbs(compensator.memory, mode_rest, mode_absorb), constants, lambda rows, _: tables(rows),
+    lambda one, about, given, _: row(one, given * 2.0**about.bits),
+)  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Verbs
+from hystgen.effects.part import Arithmetic, Floating, Margin, One, Verbs
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -43,6 +44,30 @@ def constants(t: Reals) -> Iterator[Constants]:
     """The numbers of each gain, of tables (k, 8)."""
     for row in t:
         yield Constants(KIND, row[:ONE], (1, 1))
+
+
+@dataclass(frozen=True)
+class Warm(One):
+    """The block of an effect."""
+
+    effect: LoggedThermal | OwnHeat
+
+    def farthest(self, ends: tuple[float, float], span: float, seconds: float) -> float:
+        """Largest move of a drive within `ends` that may be repeated in every step, where the output spans `span`."""
+        return math.inf if isinstance(self.effect, LoggedThermal) else farthest(self.effect, ends, span, seconds)
+
+    def grown(self, size: float, margin: Margin) -> float:
+        """Largest output for inputs within a size."""
+        return size * LARGEST_GAIN + margin.span
+
+    def asked(self, given: float, asked: float, margin: Margin) -> float:
+        """Largest input that it is solved for, by outputs within a size."""
+        return (asked + margin.span) / LEAST_GAIN
+
+
+def tables(blocks: Sequence[Warm], about: Floating) -> Any:
+    """The tables (k, 8) of several gains in floating point."""
+    return about.reals([numbers(one.effect, about.span) for one in blocks], "temperatures").reshape(-1, 8)
 
 
 def numbers(effect: LoggedThermal, span: float) -> tuple[float, ...]:
@@ -267,6 +292,19 @@ def heat_turns(effect: OwnHeat, ends: tuple[float, float], seconds: float, round
     return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
 
 
+def heat_tables(blocks: Sequence[Warm], about: Floating) -> HeatTables:
+    """The tables of several blocks in floating point."""
+    effects: list[Any] = [one.effect for one in blocks]
+    ends, seconds = about.ends, about.seconds
+    rubbing = [thresholds(each, ends) for each in effects]
+    return HeatTables(
+        about.reals([heat_numbers(e, ends, about.span, seconds) for e in effects], "temperatures").reshape(-1, 7),
+        np.array([heat_turns(each, ends, seconds, about.roundoff) for each in effects], dtype=np.int64),
+        about.reals(padded(rubbing), "thresholds"),
+        np.array([len(each) for each in rubbing], dtype=np.int64),
+    )
+
+
 def heat_constants(t: HeatTables) -> Iterator[Constants]:
     """The numbers of each block."""
     for row, turns in zip(t.number, map(int, t.turns), strict=True):
@@ -369,8 +407,10 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
 
 
 ARITHMETIC = Arithmetic(
-    Verbs(memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat), constants
-)
+    Verbs(memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
+    constants, tables,
+)  # fmt: skip
 HEAT_ARITHMETIC = Arithmetic(
-    Verbs(heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move), heat_constants
-)
+    Verbs(heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
+    heat_constants, heat_tables,
+)  # fmt: skip
