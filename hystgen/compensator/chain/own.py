@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from hystgen.basics.jit import jit
 from hystgen.effects import own
 from hystgen.effects.base import Array, Effect, Place
-from hystgen.effects.kinds import Constants, OwnBlock
+from hystgen.effects.kinds import VERBS, Constants, OwnBlock
 from hystgen.effects.part import Arithmetic, Function, Margin, One, Response, Verbs
 from hystgen.plays.slots import Counts, Reals
 
@@ -392,8 +392,8 @@ def arithmetic(
         calls = [_one(made, block, verb, j) for j, block in enumerate(blocks)]
         return functools.reduce(_both, calls[::-1] if verb in ("solve", "resting") else calls)
 
-    verbs = Verbs(memory, *map(through, ("rest", "absorb", "resting", "solve"))) if blocks else Verbs(memory)
-    return Arithmetic(verbs, lambda t: constants(t, effects), *tables)
+    verbs = {verb: through(verb) for verb in VERBS} if blocks else {}
+    return Arithmetic(Verbs(memory, **verbs), lambda t: constants(t, effects), *tables)
 
 
 def _both(first: Function, behind: Function) -> Function:

@@ -67,7 +67,8 @@ class Warm(One):
 
 def tables(blocks: Sequence[Warm], about: Floating) -> Any:
     """The tables (k, 8) of several gains in floating point."""
-    return about.reals([numbers(one.effect, about.span) for one in blocks], "temperatures").reshape(-1, 8)
+    effects: list[Any] = [one.effect for one in blocks]
+    return about.reals([numbers(each, about.span) for each in effects], "temperatures").reshape(-1, 8)
 
 
 def numbers(effect: LoggedThermal, span: float) -> tuple[float, ...]:
