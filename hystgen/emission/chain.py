@@ -299,7 +299,7 @@ class Shape:
         """That of a model with effects."""
         return cls(
             t.fixed, True, t.plays.engine == slots.CORNERS, bool(t.slew), bool(t.braked), bool(t.quiet),
-            bool(t.turning), len(t.tap), t.delay.samples,
+            bool(t.turning), len(t.tap), t.of("delay").samples,
         )  # fmt: skip
 
 
@@ -321,8 +321,6 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
     from hystgen.compensator.chain import blocks, moving
     from hystgen.compensator.chain.layout import DITHER
-    from hystgen.effects.drift import compensator as drift
-    from hystgen.effects.drift import fixed as drift_fixed
 
     t = compiled.tables
     shape = Shape.of(t)
@@ -335,8 +333,8 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     functions = [
         line for op in operators for line in _functions(op, shape, *named[op], behind, clocks, rubbing)
     ]
-    heated = ["set_temperature"] * (len(t.gain) > 0)
-    aged = ["set_gain", "travel", "set_travel"] * (len(t.ageing.turns) > 0)
+    heated = ["set_temperature"] * ("set_temperature" in t.calls)
+    aged = ["set_gain", "travel", "set_travel"] * ("travel" in t.calls)
     every = ["settle", "set_offset", *heated, *aged]
     calls = {
         "forward": every,
@@ -346,8 +344,9 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     own = {op: [*before, *after, *beside] for op, (before, after) in named.items()}
     largest = max(own.values(), key=len)  # the forward operator has what the inverse has, and modes
     arrays = [text for block in largest for text in block.arrays(prefix)]
-    if "forward" in operators and t.delay.samples and t.fixed:
-        arrays.append(f"static const {prefix}_factor_t {prefix}_waited = {{{_entries(t.delay.share, 'f')[1:-1]}}};\n")
+    if "forward" in operators and t.of("delay").samples and t.fixed:
+        share = _entries(t.of("delay").share, "f")[1:-1]
+        arrays.append(f"static const {prefix}_factor_t {prefix}_waited = {{{share}}};\n")
     if "inverse" in operators and len(t.tap):
         arrays.append(
             constant(f"{prefix}_factor_t {prefix}_tap[{len(t.tap)}]", [f"    {_entries(row, 'f')}," for row in t.tap])
@@ -364,11 +363,11 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "SLEW_FALLING_REST": "",
     }
     constants = [(name, operand(value), words[name]) for name, value in number.items()]
-    farthest = (drift_fixed if t.fixed else drift).MOST_AHEAD
-    constants += [("LEAD", operand(row[farthest]), "samples that references come ahead") for row in t.clock]
-    constants.append(("WAITING", f"{t.delay.samples}u", "samples of the drive that wait"))
-    if t.delay.samples and not t.fixed:
-        constants.append(("WAITED", operand(t.delay.share[0]), "part of the step after the oldest that is over"))
+    constants += [("LEAD", operand(row[-1]), "samples that references come ahead") for row in t.of("clock")]
+    waited = t.of("delay")
+    constants.append(("WAITING", f"{waited.samples}u", "samples of the drive that wait"))
+    if waited.samples and not t.fixed:
+        constants.append(("WAITED", operand(waited.share[0]), "part of the step after the oldest that is over"))
     constants.append(("QUIET", f"{t.quiet}u", "equal references after which the drive stands still"))
     constants.append(("DITHER", operand(t.number[DITHER]), "signal by which a drive at rest goes to and fro"))
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))

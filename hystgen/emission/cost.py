@@ -251,7 +251,7 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     kinds = list(map(int, t.behind.kind if t.fixed else t.behind.stage_kind))
     envelopes = kinds.count(slots.TANH)
     everything, inverse = blocks.every(t, "forward"), blocks.every(t, "inverse")
-    forward = sum(each.products[0] for each in everything) + (1 + t.fixed) * bool(t.delay.samples)
+    forward = sum(each.products[0] for each in everything) + (1 + t.fixed) * t.number_of("delay")
     absorbed, solved = (sum(each.products[way] for each in inverse) for way in (0, 1))
     if t.fixed:
         stages = 2 * (len(kinds) - envelopes) + envelopes * t.behind.bends.coefficient.shape[1]

@@ -100,7 +100,7 @@ def _settings(compiled: Compiled) -> list[tuple[str, str, str]]:
     degree = ("TEMPERATURE_LSB", repr(2.0**-kept), "degC a code of set_temperature")
     gain = ("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")
     t = compiled.tables
-    return [*([degree] if len(t.gain) else []), *([gain] if len(t.ageing.turns) else [])]
+    return [*([degree] if "set_temperature" in t.calls else []), *([gain] if "set_gain" in t.calls else [])]
 
 
 def _quiet(compiled: Compiled, drive: str) -> list[str]:

@@ -225,8 +225,8 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         compiled is not None, compiled is not None and bool(compiled.tables.slew),
         compiled is not None and bool(compiled.tables.braked), compiled is not None and bool(compiled.tables.quiet),
         compiled is not None and bool(compiled.tables.turning),
-        compiled is not None and compiled.tables.delay.samples > 0,
-        compiled is not None and bool(compiled.parts.ageing), *(chain.plays(compiled.tables) if compiled else ()),
+        compiled is not None and compiled.tables.number_of("delay") > 0,
+        compiled is not None and "travel" in compiled.tables.calls, *(chain.plays(compiled.tables) if compiled else ()),
     )  # fmt: skip
     glue: chain.Glue | None = getattr(values, "glue", None)
     kind = np.float64 if values.fixed else np.dtype(values.family.arithmetic.number).type

@@ -81,11 +81,11 @@ def _setting(numbers: ChainTables, call: str, turn: int) -> float:
         return way * (high - low)
     if call == "set_temperature":
         place, bits = (fixed.REFERENCE, fixed.TEMPERATURE_BITS) if numbers.fixed else (thermal.REFERENCE, 0)
-        return degree * (float(numbers.gain[0, place]) / 2.0**bits + 40.0 * way)
+        return degree * (float(numbers.of("gain")[0, place]) / 2.0**bits + 40.0 * way)
     if call == "set_gain":
         return one * (1.0 + way)
     if call == "set_travel":
-        return abs(way) * float(numbers.ageing.number[0, ageing.LAST])
+        return abs(way) * float(numbers.of("ageing").number[0, ageing.LAST])
     return low + (0.5 + way) * (high - low)
 
 

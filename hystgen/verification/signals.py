@@ -144,9 +144,9 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
     drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
     rng = np.random.default_rng(20261126)
     kinds = [slots.OP_SETTLE, slots.OP_OFFSET]
-    if len(tables.gain):
+    if "set_temperature" in tables.calls:
         kinds.append(slots.OP_TEMPERATURE)
-    if len(tables.ageing.turns):
+    if "travel" in tables.calls:
         kinds += [slots.OP_GAIN, slots.OP_TRAVEL, slots.OP_TRAVELLED]
     if inverse:
         kinds += [slots.OP_COMMIT, slots.OP_EXPECTED, slots.OP_CORRECT, *([slots.OP_PUSH] * (len(tables.tap) > 0))]
