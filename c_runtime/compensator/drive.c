@@ -6,10 +6,10 @@
 #include "front/front.c"
 #include "compensator/clamp.c"
 
-/* The actuator is at drive v; of two branches, its move picks one. */
+/* The actuator is at drive v. */
 static void hystgen_operator_set_drive(hystgen_operator_t *self, hystgen_fine_t v) {
 #ifdef HYSTGEN_HAS_TWO_BRANCHES
-    if (v > self->drive) {
+    if (v > self->drive) { /* the direction of the move picks the branch */
         self->ascending = true;
     } else if (v < self->drive) {
         self->ascending = false;

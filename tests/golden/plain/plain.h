@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 bedbfe6275ec37b3ac9113040d2bd445019303638672514c4d5d80cc54bbf2a0, without this line
+ * Text: sha256 c7b5b02c88b41ecb35c23f350e076d76cdb35b0fcfbbdb7f537ab445264af7aa, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -147,15 +147,15 @@ typedef struct {
 void plain_inverse_init(plain_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step to reference u.
+ * All plays 0, status cleared, then one ordinary step with x.
  *
  * @param self the instance
- * @param u reference, um; limited to PLAIN_OUTPUT_MIN .. MAX; NaN and infinite: held
+ * @param x reference, um; limited to PLAIN_OUTPUT_MIN .. MAX; NaN and infinite: held
  * @pre after init; at any time
  * @note Status bits: cleared, then those of the step
  * @note Cost: that of init and of a step
  */
-void plain_inverse_reset(plain_inverse_t *self, plain_real_t u);
+void plain_inverse_reset(plain_inverse_t *self, plain_real_t x);
 
 /**
  * One sample: reference u in, drive out, inside PLAIN_DRIVE_MIN .. MAX. Cannot fail.
