@@ -7,7 +7,6 @@ The model is called `hystgen`, so that its macros and tables have the names that
 
 from __future__ import annotations
 
-import re
 from pathlib import Path
 from types import SimpleNamespace
 

@@ -261,7 +261,8 @@ class Variant:
         """What is true of the model, beside what its arithmetic says."""
         bent = self.bends not in ("", "none")
         found = {
-            "CORNERS": self.engine == "corners", "START_LIST": self.start_list, "FRONT": self.fronts, "TWO_BRANCHES": self.branches,
+            "CORNERS": self.engine == "corners", "START_LIST": self.start_list,
+            "FRONT": self.fronts, "TWO_BRANCHES": self.branches,
             "FINE_PLAYS": self.finer and not self.chain, "FINE_SIGNAL": self.finer and self.chain,
             "LIMITED_CODES": self.saturates, "SLEW_LIMIT": self.slew, "BRAKED_LAG": self.braked,
             "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waits,
