@@ -1,6 +1,6 @@
 """The files of `c_runtime/` and of effects as they stand, in one unit with the numbers of a model.
 
-Nothing is renamed or picked but what conditions on the model choose.
+Nothing is renamed or picked but what conditions on the model choose; files for either operator stand there for each.
 
 The model is called `hystgen`, so that its macros and tables have the names that the files use.
 """
@@ -110,8 +110,9 @@ def lines(name: str, arithmetic: str, engine: str) -> set[tuple[str, int]]:
         folder = EFFECTS.parent if file.startswith("effects/") else RUNTIME
         text = (folder / file).read_text(encoding="utf-8").splitlines()
         numbered = "".join(f"{line}\n" if line.startswith("#") else f"{n}\n" for n, line in enumerate(text, 1))
-        chosen = runtime.chosen(numbered, values.family.facts | values.variant.facts).splitlines()
-        found |= {(file, int(line)) for line in chosen if not line.startswith("#")}
+        own = numbered + "hystgen_operator_t\n" * any("hystgen_operator_t" in line for line in text)
+        chosen = "".join(runtime.forms(own, values.family.facts | values.variant.facts)).splitlines()
+        found |= {(file, int(line)) for line in chosen if line.isdecimal()}
     return found
 
 
@@ -141,15 +142,22 @@ def _blocks(values: SimpleNamespace) -> list[str]:
     return [file for file in blocks if not file.startswith(left_out)]
 
 
+def _included(file: str, facts: frozenset[str]) -> list[str]:
+    """What puts a file into a unit: one for either operator as emission has it for each."""
+    text = ((EFFECTS.parent if file.startswith("effects/") else RUNTIME) / file).read_text(encoding="utf-8")
+    forms = runtime.forms(text, facts)
+    if len(forms) == 1:
+        return [f'#include "{file}"']
+    return list({piece.name: piece.text for form in forms for piece in runtime.split_pieces(form)}.values())
+
+
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     """The unit of both operators of a model, with its kernels."""
     values = _values(name, arithmetic, engine)
     chain, loop = values.variant.chain, values.family.loop
-    headers = [*_states(values), *([] if values.instances else ["compensator/api.h"])]
-    types = [] if not values.instances else [
-        *([f'#include "{values.family.chain_types[0]}"'] * chain), *values.instances.values(),
-        '#include "compensator/api.h"', *['#include "compensator/chain/api.h"'] * chain,
-    ]  # fmt: skip
+    facts = values.family.facts | values.variant.facts
+    types = [*([f'#include "{values.family.chain_types[0]}"'] * chain), *values.instances.values()]
+    api = ["compensator/api.h", *["compensator/chain/api.h"] * chain]
     text = "\n".join(
         [
             "#define HYSTGEN_CONFIGURED",
@@ -161,13 +169,14 @@ def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
             *values.limits,
             *values.status,
             *(f"#define HYSTGEN_{macro} {value}" for macro, value, _ in values.constants),
-            *(f'#include "{header}"' for header in headers),
+            *(f'#include "{header}"' for header in _states(values)),
             *types,
+            *(line for header in api for line in _included(header, facts)),
             *(f'#include "{file}"' for file in values.family.kernel_files),
             *values.every,
             *(f'#include "{file}"' for file in _blocks(values)),
             values.functions,
-            *(f'#include "{file}"' for file in values.variant.sources()),
+            *(line for file in values.variant.sources() for line in _included(file, facts)),
         ]
     )
     source = folder / f"unit_{name}_{arithmetic}_{engine}.c"

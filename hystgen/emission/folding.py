@@ -390,7 +390,7 @@ def _argument(
 
 _FLAG = re.compile(r"^ *bool (\w+)(?: = false)?;(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
 """A local flag that is false, or without a value, at first."""
-_UNUSED = re.compile(r"^ *(?:const )?(?:unsigned )?\w+ (\w+) =\s([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
+_UNUSED = re.compile(r"^ *(?:const )?(?:unsigned )?\w+ \*?(\w+) =\s([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
 """A local variable with its first value."""
 _ANSWERED = re.compile(r"^    const (\w+) (\w+) =\s+([^;{]*);\n    return \2;\n\Z", re.MULTILINE)
 """A constant that is the answer; the initializer of a struct is no expression."""

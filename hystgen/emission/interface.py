@@ -74,7 +74,8 @@ def documented(pieces: Sequence[Piece], values: SimpleNamespace) -> Iterator[Pie
         call, op = found["call"], found["op"]
         names = [re.findall(r"\w+", each)[-1] for each in found["given"].split(", ")]
         lines = [("", " ".join(words.split())), ("", "")]
-        lines += [(f"@param {name}", _parameter(name, call, values)) for name in names]
+        meaning = {"x": "u" if op == "inverse" else "v"}
+        lines += [(f"@param {name}", _parameter(meaning.get(name, name), call, values)) for name in names]
         if found["answer"] != "void":
             lines.append(("@return", _answer(call, op, values)))
         lines += [

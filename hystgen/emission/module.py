@@ -262,7 +262,7 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         tables = [piece for piece in tabled if piece not in states]
         values.types = runtime.render_operators(tables, name, 0, prefix, family)
     else:
-        states = runtime.state_pieces(values.variant, operators, pieces)
+        states = runtime.state_pieces(values.variant, family, operators, pieces)
     values.states = runtime.render_operators(states, name, values.corners, prefix, family)
     if corners and not shared:
         values.states = runtime.all_types(family.states, prefix, family) + "\n" + values.states

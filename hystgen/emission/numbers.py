@@ -235,7 +235,7 @@ def _corner_fields(numbers: Tables, name: str, prefix: str, options: Options, ch
                     f"{'true' if numbers.ascending[j] else 'false'}}}"
                     for j in (first, first + 1)
                 )
-                arrays.append(f"static const {prefix}_drive_t {name}_{operator}_drive[2] = {{{drives}}};\n")
+                arrays.append(f"static const {prefix}_drive_t {name}_{operator}_first_drive[2] = {{{drives}}};\n")
     return arrays
 
 
@@ -436,7 +436,7 @@ def _fixed_corner_fields(numbers: FixedTables, name: str, prefix: str, options: 
                 f"{{{literal(numbers.applied[j])}, {'true' if numbers.ascending[j] else 'false'}}}"
                 for j in (first, first + 1)
             )
-            arrays.append(f"static const {prefix}_drive_t {name}_{operator}_drive[2] = {{{drives}}};\n")
+            arrays.append(f"static const {prefix}_drive_t {name}_{operator}_first_drive[2] = {{{drives}}};\n")
     return arrays
 
 

@@ -20,8 +20,11 @@ from hystgen.emission import folding
 
 VERSION = 2  # of the interface between emitted models and a shared run time
 
-FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")
+FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")
 """Macros that say what a model has. Conditions on them are decided when C is emitted; others are carried."""
+
+OPERATORS = ("forward", "inverse")
+"""A file with functions `hystgen_operator_..` is written for either: it is emitted for each, under its name."""
 
 FLOAT_KERNELS = (
     "front/tanh_{bits}.c",
@@ -258,7 +261,8 @@ class Variant:
         """What is true of the model, beside what its arithmetic says."""
         bent = self.bends not in ("", "none")
         found = {
-            "CORNERS": self.engine == "corners", "FRONT": self.fronts, "TWO_BRANCHES": self.branches,
+            "CORNERS": self.engine == "corners", "START_LIST": self.start_list,
+            "FRONT": self.fronts, "TWO_BRANCHES": self.branches,
             "FINE_PLAYS": self.finer and not self.chain, "FINE_SIGNAL": self.finer and self.chain,
             "LIMITED_CODES": self.saturates, "SLEW_LIMIT": self.slew, "BRAKED_LAG": self.braked,
             "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waits,
@@ -271,26 +275,17 @@ class Variant:
     @property
     def state(self) -> str:
         """The header with the types of both instances in engine corners without effects."""
-        return f"compensator/corners/state{'_front' * self.fronts}{'_fixed' * self.fixed}.h"
+        return "compensator/corners/state.h"
 
     def sources(self) -> tuple[str, ...]:
         """The files with the functions of both operators, callees before callers."""
         files = ["compensator/clamp.c"]
         if self.fixed and not self.chain:
             files.append("compensator/code.c")
-        if self.fixed or (not self.fronts and (self.chain or self.engine == "loop")):
+        if self.fixed or not self.fronts:
             files.append("front/front.c")
-        if self.fronts:
-            files.append(f"compensator/{'chain/' * (self.chain and self.branches)}branches.c")
         own = self._chain() if self.chain or self.engine == "loop" else self._corners()
-        return (*files, *own, "compensator/status.c")
-
-    @property
-    def _front(self) -> tuple[str, ...]:
-        """The file with what is in front of the plays of engine loop, and with its start memory before that."""
-        front = "branches" if self.branches else "front" if self.fronts else "plain"
-        start = (f"compensator/loop_start{'_list' * self.start_list}.c",) if self.engine == "loop" else ()
-        return (*start, f"compensator/loop_{front}.c")
+        return (*files, "compensator/drive.c", *own, "compensator/status.c")
 
     def _chain(self) -> tuple[str, ...]:
         """The files of a chain, apart from its blocks: of a model with effects, or of engine loop."""
@@ -308,19 +303,18 @@ class Variant:
             plays = (*before, "effects/noncongruent/bent.c", moved, f"{chain}moving_plays.c", f"{chain}moving_search.c",
                      refined)  # fmt: skip
         brake = ("effects/slew_limit/brake.c",) if self.braked else ()
-        drive = ("compensator/loop_branches_drive.c",) if self.branches and not self.chain else ()
         entered = () if self.chain else (f"{chain}drive_signal.c",)
         limits = ("effects/delay/forward.c", "effects/slew_limit/slewed.c")
-        signals = (*drive, *limits, *entered, f"{chain}signals.c", *brake)
-        start = f"{chain}{'chain_loop' if loops else 'corners_start'}.c"
+        signals = (*limits, *entered, f"{chain}signals.c", *brake)
+        start = (*("compensator/loop_start.c",) * loops, f"{chain}chain_start.c")
         ageing = ("effects/ageing/calls.c",) if self.ages else ()
         settings = (f"{chain}settings.c",) if self.chain else ()
-        calls = (f"{chain}chain.c", start, f"{chain}chain_calls.c", *settings, *ageing)
-        return (*self._front, *signals, *plays, *calls)
+        calls = (f"{chain}chain.c", *start, f"{chain}chain_calls.c", *settings, *ageing)
+        return (*signals, *plays, *calls)
 
     def _corners(self) -> tuple[str, ...]:
-        kind = "_front" * self.fronts + "_fixed" * self.fixed
-        return (f"compensator/corners/forward{kind}.c", f"compensator/corners/inverse{kind}.c")
+        corners, kind = "compensator/corners/", "_front" * self.fronts + "_fixed" * self.fixed
+        return (f"{corners}forward.c", f"{corners}inverse{kind}.c", f"{corners}start.c")
 
 
 def data_folder(name: str) -> Path:
@@ -434,8 +428,19 @@ def _holds(word: str, condition: str, facts: Collection[str]) -> bool:
     return all((term[2] in facts) == (not term[1]) for term in terms if term)
 
 
+def forms(source: str, facts: Collection[str]) -> list[str]:
+    """The text of a file with what its conditions choose: of one for either operator, that of both."""
+    if "hystgen_operator_" not in source:
+        return [chosen(source, facts)]
+    return [
+        chosen(source, {*facts, f"HYSTGEN_{op.upper()}"})
+        .replace("hystgen_operator_", f"hystgen_{op}_").replace("HYSTGEN_OPERATOR_", f"HYSTGEN_{op.upper()}_")
+        for op in OPERATORS
+    ]  # fmt: skip
+
+
 def _pieces(files: Iterable[str], facts: Collection[str]) -> list[Piece]:
-    return [piece for file in files for piece in split_pieces(chosen(_read(file), facts))]
+    return [piece for file in files for text in forms(_read(file), facts) for piece in split_pieces(text)]
 
 
 def kernel_pieces(family: Family) -> list[Piece]:
@@ -515,12 +520,12 @@ def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
     return [*usual, *(piece for piece in _pieces(["compensator/chain/api.h"], ()) if piece.name in chain)]
 
 
-def state_pieces(variant: Variant, operators: Iterable[str], functions: Sequence[Piece]) -> list[Piece]:
+def state_pieces(variant: Variant, family: Family, operators: Iterable[str], functions: Sequence[Piece]) -> list[Piece]:
     """The types of instances, with the fields that these functions name."""
     made = []
     for op in operators:
         named = fields(functions, op)
-        for piece in needed(_pieces([variant.state], variant.facts), [f"hystgen_{op}_t"]):
+        for piece in needed(_pieces([variant.state], family.facts | variant.facts), [f"hystgen_{op}_t"]):
             lines = piece.text.split("\n")
             member = re.compile(r"^    [\w ]+?(\w+)(?:\[.*\])?;")
             kept = [line for line in lines if not (found := member.match(line)) or found[1] in named]
