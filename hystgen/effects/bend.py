@@ -53,7 +53,7 @@ def bends(
         whole([one.knot for one in flat]), whole([one.coefficients for one in flat], degree + 1),
         whole([one.scale for one in flat]), whole(first), whole([len(each) for each in pieces]),
         whole(domain, 2), whole(scaled, 2),
-    )  # fmt: skip
+    )
 
 
 @jit

@@ -43,7 +43,7 @@ def header(
             [f"    {{ {steps}u, {every}u }}," for steps, every in stretches],
         ),
         codes=text.table(kind, f"{name}_session_codes", codes[nodes(stretches)].tolist()),
-    )  # fmt: skip
+    )
     top, bottom = session.history
     details = [dac.sentence(f" {unit}" if unit else "", top - bottom)]
     banner = module.banner_of(values, file(parameters), f"drives of a diagnosis of {name}", details)

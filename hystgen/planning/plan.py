@@ -256,7 +256,7 @@ def plan(
                 f"{number:02d}_{record.name}.csv", record.purpose, record.shows, record.held_out,
                 tempo.seconds(step), tempo.seconds(every), np.array([tempo.seconds(k) for k in ticks]), v, codes,
             )
-        )  # fmt: skip
+        )
     rest = tempo.seconds(tempo.rest)
     own = tuple(os.fspath(path) for path in effects)
     made = Plan(file, named, own, tuple(drives), (top, bottom), rest, max_rate, sample_time, tuple(defaults))

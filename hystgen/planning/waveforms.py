@@ -186,7 +186,7 @@ def _staircase(course: Course) -> None:
     course.hold(2 * course.pace)
     for level, slower in (
         (0.35, 0), (0.8, 2), (0.55, 0), (1.0, 0), (0.0, 0), (0.9, 0), (0.45, 4), (0.65, 0), (0.2, 0)
-    ):  # fmt: skip
+    ):
         course.go(level, slower * course.pace)
         course.hold(70)
 
@@ -293,7 +293,7 @@ RECORDS = (
         "slow_again", "The first record once more: changes in the session due to neither rate nor amplitude.",
         ("drift", "ageing", "thermal"), _slow, _lasting(1.0),
     ),
-)  # fmt: skip
+)
 """The records of a session, in order."""
 
 

@@ -379,7 +379,7 @@ class _Body:
                     io.StringIO(text), delimiter=None if dialect.delimiter == BLANKS else dialect.delimiter,
                     comments=None, ndmin=2, quotechar='"', encoding=None, usecols=None if everything else stored,
                     converters=None if self.clock_column is None else {self.clock_column: clock.seconds},
-                )  # fmt: skip
+                )
         except (ValueError, UserWarning):
             return None
         if cells.shape != (lines, len(stored)):

@@ -530,7 +530,7 @@ def pi_gcs(reading: Reading, lines: Sequence[str]) -> Layout | None:
     names = [entries.get(f"NAME{k}", (0, ""))[1] or str(k + 1) for k in range(width)]
     header = entries.get("NAME0", entries["END_HEADER"])[0]
     found = Layout(Dialect(BLANKS if separator.isspace() and separator != "\t" else separator), names,
-                   entries["END_HEADER"][0] + 1, header, kind="PI GCS array", another="END_HEADER")  # fmt: skip
+                   entries["END_HEADER"][0] + 1, header, kind="PI GCS array", another="END_HEADER")
     if "NDATA" in entries:
         found.rows = _whole(reading, entries, "NDATA")
     if "SAMPLE_TIME" in entries:
@@ -626,7 +626,7 @@ def rigol(reading: Reading, lines: Sequence[str]) -> Layout | None:
     seconds = _number(reading, Dialect(), step, tag, line)
     blank = [""] * (len(cells) - len(names))
     return Layout(Dialect(), [*names, *blank], line + 1, 1, [*units, *blank], kind="Rigol CSV",
-                  steps=[Step(seconds, f"{tag} {seconds:g} s (line {line})")] if seconds > 0.0 else [])  # fmt: skip
+                  steps=[Step(seconds, f"{tag} {seconds:g} s (line {line})")] if seconds > 0.0 else [])
 
 
 # CSV of Yokogawa's ScopeCorders and oscilloscopes -------------------------------------------------------------
@@ -655,7 +655,7 @@ def yokogawa(reading: Reading, lines: Sequence[str]) -> Layout | None:
     found = Layout(
         dialect, ["", *names], first, header, ["", *(settings.get("VUnit", (0, []))[1] + blank)[: len(names)]],
         kind="Yokogawa CSV",
-    )  # fmt: skip
+    )
     seconds = {_number(reading, dialect, step, "HResolution", place) for step in steps if step}
     if len(seconds) > 1:
         raise reading.refuse("its channels have different sample rates; export them with one rate", place)

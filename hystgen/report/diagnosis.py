@@ -172,7 +172,7 @@ def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
         return [
             row for key, each in value.items()
             for row in _numbers(each, known.get(key), f"{name} {key.replace('_', ' ')}".strip())
-        ]  # fmt: skip
+        ]
     if isinstance(value, tuple):
         alike = len(value) > 1 and isinstance(value[0], tuple) and all(each == value[0] for each in value)
         chosen = value[:1] if alike else value
@@ -180,7 +180,7 @@ def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
             row for k, each in enumerate(chosen)
             for row in _numbers(each, sure[k] if sure else None,
                                 f"{name} of each play" if alike else f"{name} {k + 1}" if len(value) > 1 else name)
-        ]  # fmt: skip
+        ]
     if isinstance(value, bool | str):
         return [[name, str(value), "", ""]]
     return [[name, f"{value:.4g}", *_pair(sure)]]
@@ -231,7 +231,7 @@ def _faults(result: Result) -> list[Text | Table]:
         samples = each.get("count") if single else each.get("samples")
         done = "put right" if each["kind"] == "swapped_channels" else (
             "bridged" if each.get("channel") == "v" else "not compared"
-        )  # fmt: skip
+        )
         rows.append(
             [
                 each["record"],

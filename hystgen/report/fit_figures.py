@@ -150,7 +150,7 @@ def loop_panel(axes: Any, each: Shown, units: Units) -> None:
             axes.plot(
                 each.drive[here], np.where(known, values[here], np.nan), **drawing.LINES[name],
                 label=None if k else name, rasterized=stop - start > drawing.MOST_POINTS,
-            )  # fmt: skip
+            )
     axes.set(xlabel=label("drive", units.drive), ylabel=label("displacement", units.output))
     axes.set_title(f"{each.record.name} ({role(each)})", pad=20)
     drawing.legend_above(axes)
@@ -168,12 +168,12 @@ def _shade(axes: Any, each: Shown, named: bool) -> None:
         axes.axvspan(
             t[a], t[b - 1] + step, color=drawing.IGNORED, alpha=0.25, linewidth=0,
             label="ignored" if named and not k else None,
-        )  # fmt: skip
+        )
     for k, g in enumerate(each.used.gaps):
         axes.axvspan(
             t[g - 1], t[g], color=drawing.GAP, alpha=0.3, linewidth=0,
             label="gap" if named and not k else None,
-        )  # fmt: skip
+        )
 
 
 def overlay_panel(axes: Any, each: Shown, units: Units) -> None:
@@ -208,7 +208,7 @@ def residual_panel(axes: Any, each: Shown, units: Units, colour: str = drawing.R
         axes.plot(
             each.time[chosen], each.residual[chosen], color=colour, linewidth=0.8,
             label=None if k else f"{each.record.name} ({role(each)})",
-        )  # fmt: skip
+        )
     axes.axhline(0.0, color=drawing.QUIET, linewidth=0.6)
     axes.set(xlabel="time (s)", ylabel=label("residual", units.output))
 
@@ -219,13 +219,13 @@ def _against_panel(axes: Any, x: Array, residual: Array, noise: float | None) ->
     x, residual = x[known], residual[known]
     chosen = drawing.sampled(len(x))
     axes.plot(x[chosen], residual[chosen], ".", color=drawing.RESIDUAL, alpha=0.5, markersize=3.0,
-              markeredgewidth=0, rasterized=True, label="samples")  # fmt: skip
+              markeredgewidth=0, rasterized=True, label="samples")
     low, high = _limits(x)
     middle, mean, spread = binned(x, residual, low, high)
     axes.fill_between(
         middle, mean - spread, mean + spread, color=drawing.RESIDUAL, alpha=0.25, linewidth=0,
         label="mean \N{PLUS-MINUS SIGN} 1 sd in bins",
-    )  # fmt: skip
+    )
     axes.plot(middle, mean, color="#14532d", linewidth=1.6, label="mean in bins", marker="o", markersize=2.2)
     axes.axhline(0.0, color=drawing.QUIET, linewidth=0.6)
     drawing.noise_lines(axes, noise)
@@ -383,7 +383,7 @@ def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
                 ax.plot(v, cascade.front(v, up) - straight * v, color=colour, linewidth=1.4, label=name)
             ax.plot(v, (1.0 - straight) * v, color=drawing.QUIET, linewidth=0.9, linestyle="--", label="straight line")
             ax.set(xlabel=label("drive", units.drive), ylabel=label("front" if not straight else "front - line",
-                                                                    units.drive))  # fmt: skip
+                                                                    units.drive))
             ax.set_title(title, pad=20)
         drawing.legend_above(front[0])
     return figure
@@ -408,5 +408,5 @@ def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
 
 FIGURES: dict[str, Callable[[Fit, Sequence[Shown], bool], Any]] = {
     "loop": loop, "time": time, "residual": residual, "loading": loading, "weights": weights,
-}  # fmt: skip
+}
 """All figures by the name of their file."""

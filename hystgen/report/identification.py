@@ -105,7 +105,7 @@ def write(
             figures[name] = Figure(
                 name, svg, drawing.content(draw(fit, shown, False), "svg"), CAPTIONS[name](fit, shown),
                 ALTERNATIVES[name](fit, shown),
-            )  # fmt: skip
+            )
     text = page(
         f"{fit.parameters.name}: identification report",
         _verdict(fit, parameter_file or f"{fit.parameters.name}.yaml"),
@@ -215,7 +215,7 @@ def _data(shown: Sequence[Shown]) -> list[Text | Table | Listing]:
     head = (
         "record", "part", "samples", "compared", "start, as asked", "start, memory unknown", "outliers of y",
         "faulty stretches of y", "v bridged", "gaps", "left out between gaps",
-    )  # fmt: skip
+    )
     rows = [
         (
             each.used.name,
@@ -266,7 +266,7 @@ def _range(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
                 each.used.name, fit_figures.role(each), f"{drive.min():.6g}", f"{drive.max():.6g}", str(outside),
                 f"{far:.4g}" if outside else "0", percent(far / (high - low)),
             )
-        )  # fmt: skip
+        )
     said = (
         f"The model was fitted on drives from {low:.6g} to {high:.6g}{unit}, and the emitted code keeps its drive "
         "inside this range. "
@@ -279,7 +279,7 @@ def _range(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
     head = (
         "record", "part", f"least{unit and f' [{unit.strip()}]'}", f"largest{unit and f' [{unit.strip()}]'}",
         "samples outside", f"farthest outside{unit and f' [{unit.strip()}]'}", "of the range",
-    )  # fmt: skip
+    )
     return [Text(said), Table([head, *rows], (0, 1))]
 
 
@@ -290,7 +290,7 @@ def _provenance(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
             f"{each.time[-1]:.4g}", _fingerprint(each.record),
         )
         for each in shown
-    ]  # fmt: skip
+    ]
     head = ("record", "part", "samples", "sample time [s]", "duration [s]", "SHA-256 of t, v, y")
     made = (
         f"Made by hystgen {__version__}. SHA-256 of the parameters: {parameters_sha256(fit.parameters)[:16]}. The same "
@@ -433,7 +433,7 @@ def _weights_alt(fit: Fit, _shown: Sequence[Shown]) -> str:
 CAPTIONS = {
     "loop": _loop_caption, "time": _time_caption, "residual": _residual_caption, "loading": _loading_caption,
     "weights": _weights_caption,
-}  # fmt: skip
+}
 ALTERNATIVES = {
     "loop": _loop_alt, "time": _time_alt, "residual": _residual_alt, "loading": _loading_alt, "weights": _weights_alt,
-}  # fmt: skip
+}

@@ -141,7 +141,7 @@ class Core:
             return _Registers(
                 tuple(arguments), arguments[0], arm_const.UC_ARM_REG_LR, arm_const.UC_ARM_REG_SP,
                 arm_const.UC_ARM_REG_PC,
-            )  # fmt: skip
+            )
         self._uc = unicorn.Uc(unicorn.UC_ARCH_RISCV, unicorn.UC_MODE_RISCV32, getattr(riscv_const, target.cpu))
         if target.fpu:
             self._uc.reg_write(riscv_const.UC_RISCV_REG_MSTATUS, 1 << 13)  # FS: the FPU on
@@ -149,7 +149,7 @@ class Core:
         return _Registers(
             tuple(arguments), arguments[0], riscv_const.UC_RISCV_REG_RA, riscv_const.UC_RISCV_REG_SP,
             riscv_const.UC_RISCV_REG_PC,
-        )  # fmt: skip
+        )
 
     @property
     def counts(self) -> NDArray[np.uint32]:

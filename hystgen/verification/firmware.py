@@ -44,7 +44,7 @@ def run(machine: Machine, image: Path) -> int:
     command = [
         QEMU, "-M", machine.name, "-nographic", "-monitor", "none", "-serial", "none",
         "-semihosting-config", "enable=on,target=native", "-icount", "shift=6", "-kernel", str(image),
-    ]  # fmt: skip
+    ]
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=SECONDS

@@ -66,7 +66,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
         able = [
             j for j, n in enumerate(lengths)
             if n * frequency >= acceptance.LINE_PERIODS and 2.0 * frequency <= rates[j]
-        ]  # fmt: skip
+        ]
         strength = sum(p[0] for p in near)
         common = len(seen) >= max(2, acceptance.SEEN_IN * len(able)) or len(able) == len(seen)
         rules = min(p[0] for p in near) > acceptance.RULING_SHARE

@@ -187,7 +187,7 @@ def _unexplained(
         alone = tuple(
             item.name for item, e in zip(ready.held, after[1], strict=True)
             if rms([e]) > acceptance.HELD_OUT_ALONE * usual
-        )  # fmt: skip
+        )
         remaining.append(described(everything, errors, noise, alone))
     return remaining
 

@@ -234,7 +234,7 @@ class Records:
         return cls(
             to_fit, held, full, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(),
             signals.one_loop([*to_fit, *held]), signals.one_speed(to_fit), taking_part / recorded,
-        )  # fmt: skip
+        )
 
     def terms(self, now: Fitted, other: Fitted) -> list[Fitted]:
         """A hypothesis, and the same with the weights that suit the start states which another one leaves free.
