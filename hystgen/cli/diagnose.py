@@ -131,7 +131,7 @@ def diagnose(
     from hystgen import diagnosis, records
     from hystgen.basics import drawing, extras, writing
     from hystgen.effects import load_user_effects
-    from hystgen.planning.session import Session
+    from hystgen.planning.session import PlayedSession
     from hystgen.report import diagnosis as report
 
     model = load_model(params, effects)
@@ -147,7 +147,7 @@ def diagnose(
         own = [kind for path in effects for kind in load_user_effects(path)]
         to_fit: list[Any] = list(data)
         if session is not None:
-            played = Session.read(session)
+            played = PlayedSession.read(session)
             read = records.read_records(to_fit, **read_as)
             (recording,) = records.in_units(read, model.parameters.units, sources=to_fit)
             to_fit, held = played.cut(recording)

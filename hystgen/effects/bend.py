@@ -14,7 +14,7 @@ from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals
 
 
-class Piece(Protocol):
+class BendPiece(Protocol):
     """A piece of a curve, as of `hystgen.compensator.fixed_tables.FixedCurve`."""
 
     @property
@@ -39,7 +39,7 @@ class Bends(NamedTuple):
 
 
 def bends(
-    pieces: Sequence[Sequence[Piece]], domain: Sequence[Any], scaled: Sequence[Any], degree: int
+    pieces: Sequence[Sequence[BendPiece]], domain: Sequence[Any], scaled: Sequence[Any], degree: int
 ) -> Bends:
     """The tables of curves; none has pieces that are not called for."""
     flat = list(itertools.chain.from_iterable(pieces))

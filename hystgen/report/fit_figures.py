@@ -120,7 +120,7 @@ def role(each: Shown) -> str:
 
 
 @dataclass(frozen=True)
-class Units:
+class AxisUnits:
     """Units of drive and output, empty if unknown."""
 
     drive: str
@@ -132,16 +132,16 @@ class Units:
         return f"{self.output}/{self.drive}" if self.drive and self.output else ""
 
 
-def units_of(fit: Fit) -> Units:
+def units_of(fit: Fit) -> AxisUnits:
     """The units of a fit's parameters."""
     units = fit.parameters.units
-    return Units(units.input or "", units.output or "")
+    return AxisUnits(units.input or "", units.output or "")
 
 
 # Panels: one pair of axes each ---------------------------------------------------------------
 
 
-def loop_panel(axes: Any, each: Shown, units: Units) -> None:
+def loop_panel(axes: Any, each: Shown, units: AxisUnits) -> None:
     """Measured loop and model over the compared samples."""
     for k, (start, stop) in enumerate(each.used.parts):
         here = slice(start, stop)
@@ -176,7 +176,7 @@ def _shade(axes: Any, each: Shown, named: bool) -> None:
         )
 
 
-def overlay_panel(axes: Any, each: Shown, units: Units) -> None:
+def overlay_panel(axes: Any, each: Shown, units: AxisUnits) -> None:
     """Measured and model over time; samples that were not compared are shaded or marked."""
     _shade(axes, each, True)
     good = each.measured[np.isfinite(each.measured)]
@@ -201,7 +201,7 @@ def overlay_panel(axes: Any, each: Shown, units: Units) -> None:
     drawing.legend_above(axes, 3)
 
 
-def residual_panel(axes: Any, each: Shown, units: Units, colour: str = drawing.RESIDUAL) -> None:
+def residual_panel(axes: Any, each: Shown, units: AxisUnits, colour: str = drawing.RESIDUAL) -> None:
     """The residual over time."""
     for k, (start, stop) in enumerate(each.used.parts):
         chosen = drawing.kept(start, stop, each.residual)
@@ -254,7 +254,7 @@ def _limits(x: Array) -> tuple[float, float]:
     return (inner_low, inner_high) if high - low > FAR * (inner_high - inner_low) > 0.0 else (low, high)
 
 
-def weight_panel(axes: Any, fit: Fit, units: Units, places: Sequence[int]) -> None:
+def weight_panel(axes: Any, fit: Fit, units: AxisUnits, places: Sequence[int]) -> None:
     """Some of the weights as bars, named by their thresholds, with their intervals."""
     part = fit.parameters.model.pi
     at = np.arange(len(places))

@@ -347,7 +347,7 @@ VARIABLE_NAMES = {
 
 
 @dataclass(frozen=True)
-class Structure(Finding):
+class Structured(Finding):
     """An error that is not noise and that no effect removes.
 
     `share_by_variable`: shares of its variance that smooth functions of one variable explain on samples that they have
