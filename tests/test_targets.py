@@ -525,7 +525,7 @@ def test_a_step_of_four_instructions_counts_four(target: targets.Target, tmp_pat
     files = sources.Sources("naked", ("forward",), (tmp_path / "naked.c",), tmp_path / "harness.c")
     flags = [*compilers.STRICT, "-Wno-error"]
     image = emulator.Image.load(
-        cross.find(target, "zig").image(files, tmp_path / "build", flags, cross.Layout(), "hystgen_harness_forward")
+        cross.find(target, "zig").image(files, tmp_path / "build", flags, cross.MemoryMap(), "hystgen_harness_forward")
     )
     core = emulator.Core(target, image)
     call = np.array([slots.OP_STEP, slots.OP_RESET, slots.OP_INIT, slots.OP_STEP] * 5, dtype=np.uint8)
