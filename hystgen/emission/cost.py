@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
-from hystgen.arithmetic import ARITHMETICS, Arithmetic
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.chain import blocks, costs, moving
 from hystgen.compensator.chain.layout import ARRIVING_BITS, ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
-from hystgen.effects.kinds import Kind, Rows
 from hystgen.effects.lag import compensator as lag
-from hystgen.emission.chain import Field
+from hystgen.emission.compensator import AnyTables, Table
 from hystgen.emission.options import Options
-from hystgen.emission.runtime import Piece
+from hystgen.emission.runtime import Family, Member, Piece
 from hystgen.plays import slots
 
 
@@ -76,151 +74,79 @@ class Cost:
         return f"{small} bytes on a Cortex-M0+, {large} on a Cortex-M4F"
 
 
-_SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "uint16_t": 2, "uint8_t": 1, "int64_t": 8,
-          "sum_t": 8, "play_t": 0, "uint_least16_t": 2, "uint_least8_t": 1}  # fmt: skip
+Size: TypeAlias = tuple[int, int]
+"""Size and alignment of a type."""
 
 
-_MEMBER = re.compile(r"(unsigned int|\w+) \w+((?:\[[^\]]+\])*)(?: : (\d+))?")
-
-
-def declared(
-    pieces: Iterable[Piece], arithmetic: Arithmetic, layout: Layout, lengths: Mapping[str, int]
-) -> dict[str, tuple[int, int]]:
-    """Sizes and alignments of the structures of `c_runtime/`, by their names without prefix, from their declarations.
+def sizes(pieces: Iterable[Piece], family: Family, layout: Layout, lengths: Mapping[str, int]) -> dict[str, Size]:
+    """Of the types of a model, by their names without prefix, from their declarations.
 
     `pieces`: in an order in which a type stands before those that contain it; `lengths`: macros in lengths of arrays.
     """
-    real = (arithmetic.bytes, arithmetic.bytes)
-    play = (4, 4) if arithmetic.fixed else real
-    reach = 2 * (arithmetic.reach_bytes,) if arithmetic.fixed else real
-    found = {"real_t": real, "play_t": play, "reach_t": reach, "unsigned int": (layout.integer, layout.integer)}
-    found |= {name: (size, size) for name, size in _SIZES.items() if size} | {"bool": (1, 1)}
+    plain = {"bool": 1, "unsigned int": layout.integer} | LANGUAGE
+    plain |= {name: LANGUAGE[kind] for name, kind in {"real_t": family.real, **family.types}.items()}
+    found = {name: (size, size) for name, size in plain.items()}
+
+    def field(member: Member) -> Size:
+        if member.pointer:
+            return layout.pointer, layout.pointer
+        size, alignment = found[family.meaning(member.kind)]
+        return size * math.prod(_length(each, lengths) for each in member.lengths), alignment
+
     for piece in pieces:
-        _, opened, members = piece.code.partition("{")
-        if not opened or "typedef struct" not in piece.code:
-            continue
-        fields: list[tuple[int, int]] = []
-        bits = 0
-        for member in re.findall(r"[^;{}]+(?=;)", members.rpartition("}")[0]):
-            if "*" in member:
-                fields.append((layout.pointer, layout.pointer))
-                continue
-            parts = _MEMBER.fullmatch(" ".join(member.split()))
-            assert parts, f"{piece.name}: {member}"
-            kind, sizes, width = parts.groups()
-            bits += int(width or 0)
-            if width:
-                continue
-            size, alignment = found[kind.removeprefix("hystgen_")]
-            for length in re.findall(r"\[(.+?)\]", sizes):
-                size *= sum(lengths[term] if term in lengths else int(term) for term in length.split(" + "))
-            fields.append((size, alignment))
-        if bits:  # side by side in whole numbers, which stand last
-            fields.append((-(-bits // 8), min(-(-bits // 8), layout.integer)))
-        found[piece.name.removeprefix("hystgen_")] = layout.struct(*fields)
+        if members := piece.members:
+            whole = [field(each) for each in members if not each.bits]
+            if bits := sum(each.bits for each in members):  # side by side in whole numbers, which stand last
+                whole.append((-(-bits // 8), min(-(-bits // 8), layout.integer)))
+            found[piece.name.removeprefix("hystgen_")] = layout.struct(*whole)
     return found
 
 
-_LETTERS = {"w": (8, 8), "i": (4, 4), "c": (16, 4), "b": (1, 1)}
-"""Sizes and alignments of the numbers of a block in fixed point, by the letters of `Kind`."""
+LANGUAGE = {"float": 4, "double": 8, "int64_t": 8, "int32_t": 4, "int16_t": 2, "uint32_t": 4, "uint16_t": 2,
+            "uint8_t": 1, "uint_least16_t": 2, "uint_least8_t": 1}
+"""Bytes of the types of the language, in which they are aligned too."""
 
 
-def _block_structs(kinds: Iterable[Kind], real: tuple[int, int], layout: Layout) -> dict[str, tuple[int, int]]:
-    """Sizes and alignments of the tables of a chain's blocks."""
-    factor = layout.struct((4, 4), (1, 1))
-    sizes = {**_LETTERS, "f": factor, "n": layout.struct(factor, (1, 1), (1, 1))}
-
-    def made_of(numbers: Kind | Rows) -> list[tuple[int, int]]:
-        return [sizes[letter] for letter in numbers.letters] or len(numbers.table) * [real]
-
-    found = {}
-    for kind in kinds:
-        members = [(layout.pointer, layout.pointer)] * bool(kind.rows) + made_of(kind)
-        counts = [(2, 2) if i == 0 else (1, 1) for i, _ in enumerate(kind.counts)]
-        found[f"_{kind.tabled}_table_t"] = layout.struct(*members, *counts)
-        if kind.rows:
-            found[f"_{kind.name}_{kind.rows.name}_t"] = layout.struct(*made_of(kind.rows))
-    return found
+def _length(words: str, lengths: Mapping[str, int]) -> int:
+    """The length of an array: a sum of numbers and macros."""
+    return sum(lengths[term] if term in lengths else int(term) for term in words.split(" + "))
 
 
-def _constants(
-    text: str,
-    arithmetic: Arithmetic,
-    layout: Layout,
-    types: Mapping[str, tuple[int, int]],
-    kinds: Iterable[Kind],
-    plays: int = 1,
-) -> int:
-    """Bytes of the constants that the C text defines, without padding between them; for constants with an entry for
-    each of `plays`, the bytes of one entry. `types`: as `declared` gives them; `kinds`: of the blocks of a chain."""
-    fixed = arithmetic.fixed
-    real = arithmetic.reach_bytes if fixed else arithmetic.bytes
-    reach = (real, real)
-    count = (2, 2)
-    factor, table = layout.struct((4, 4), (1, 1)), (layout.pointer, layout.pointer)
-    bend = layout.struct(table, table, table, (4, 4), (4, 4), count, *3 * [(1, 1)])
-    behind = {
-        "factor_t": factor,
-        "bend_curve_t": bend,
-        "bend_t": layout.struct(bend, bend),
-        "bump_t": layout.struct(table, table, table, count),
-        "yield_t": layout.struct((4, 4), (16, 4), (1, 1), (1, 1)),
-        "stops_t": layout.struct(*2 * [(8, 8)], factor, factor),
-    }
-    structs = {
-        **{name: size for name, size in types.items() if name not in _SIZES},
-        **_block_structs(kinds, reach, layout),
-        **(behind if fixed else {}),
-    }
-    total = 0
-    found = re.findall(r"^static const (\w+) \w+((?:\[\d+\])*) = ", text, flags=re.MULTILINE)
-    for members in re.findall(r"^static const struct \{\n(.*?)^\} \w+ = ", text, flags=re.MULTILINE | re.DOTALL):
-        found += re.findall(r"^    (\w+) \w+(\[\d+\]);", members, flags=re.MULTILINE)
-    for kind, sizes in found:
-        endings = sorted(structs, key=len, reverse=True)  # a name may end in another one
-        own = next((structs[ending][0] for ending in endings if kind.endswith(ending)), None)
-        if own is None:
-            own = next(width for ending, width in _SIZES.items() if kind.endswith(ending))
-            own = own or (4 if fixed else real)
-        total += own * (math.prod(map(int, re.findall(r"\d+", sizes))) // plays)
-    return total
+def _constants(contents: Iterable[tuple[str, int]], known: Mapping[str, Size], family: Family, plays: int = 1) -> int:
+    """Bytes of constants, without padding between them; for such with an entry for each of `plays`, of one entry."""
+    return sum(known[family.meaning(kind)][0] * (count // plays) for kind, count in contents)
 
 
-def estimate(
-    cascade: StaticModel,
-    options: Options,
-    numbers: Tables | FixedTables | ChainTables,
-    text: str,
-    plays: str,
-    types: Sequence[Piece],
-    fields: Mapping[str, Sequence[Field]],
-) -> Cost:
-    """Cost of the emitted model whose implementation is `text`, with the parts of a shared run time that it needs.
+@dataclass(frozen=True)
+class Data:
+    """What a model has in memory: types, an instance of each operator, tables with an entry for each play, and all
+    constants, with those of the run time."""
 
-    `plays`: the part of it that defines the tables with an entry for each play; `types`: declarations of the tables and
-    of the instances; `fields`: of a model with effects, the memory of each operator.
-    """
+    family: Family
+    types: Sequence[Piece]
+    plays: Sequence[Table]
+    constants: Sequence[tuple[str, int]]
+
+
+def estimate(cascade: StaticModel, options: Options, numbers: AnyTables, data: Data) -> Cost:
+    """Cost of the emitted model, with the parts of a shared run time that it needs."""
     corners = options.engine == "corners"
     known = options.arithmetic != "float64"  # a double of the AVR is a float
-    worst = [
-        (op, worst_case(cascade.pi.n, op, corners, numbers)) for op in ("forward", "inverse") if getattr(options, op)
-    ]
+    worst = [(op, worst_case(cascade.pi.n, op, corners, numbers)) for op in options.operators]
+    memory, avr = (_memory(cascade.pi.n, options, data, layout) for layout in (CORE_32, AVR))
+    code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))
     if isinstance(numbers, ChainTables):
         products = chain_products(numbers)
         worst = [(op, f"{words}; effects: {products[op]} multiplications") for op, words in worst]
-    kinds = [each.kind for each in blocks.every(numbers, "forward")] if isinstance(numbers, ChainTables) else []
-    memory, avr = (_memory(cascade, options, text, plays, layout, types, fields, kinds) for layout in (CORE_32, AVR))
-    code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))
-    if isinstance(numbers, ChainTables):
-        for op, _ in worst:
+        for op in options.operators:
             more = costs.code_bytes(numbers, options.arithmetic, op)
             code = {core: size + more[core] for core, size in code.items()}
     return Cost(code, memory, avr if known else None, worst)
 
 
-def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layout) -> tuple[int, int]:
-    """Bytes of a self-test's samples, and of the instance that its operators use one after the other."""
-    real = ARITHMETICS[options.arithmetic].bytes
+def selftest_bytes(real: int, memory: Memory, samples: int, layout: Layout) -> tuple[int, int]:
+    """Bytes of a self-test's samples, whose numbers have `real` each, and of the instance that its operators use one
+    after the other."""
     sample, _ = layout.struct((1, 1), (real, real), (real, real), (layout.integer, layout.integer))
     return samples * sample, max(size for _, size in memory.instances)
 
@@ -242,44 +168,14 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     return {"forward": forward + stages, "inverse": absorbed + solved + braked + stages + len(t.tap)}
 
 
-def _memory(
-    cascade: StaticModel,
-    options: Options,
-    text: str,
-    plays: str,
-    layout: Layout,
-    types: Sequence[Piece],
-    chain: Mapping[str, Sequence[Field]],
-    kinds: Sequence[Kind],
-) -> Memory:
-    n = cascade.pi.n
-    arithmetic = ARITHMETICS[options.arithmetic]
-    lengths = {"HYSTGEN_N_PLAYS": n, "HYSTGEN_CORNERS": max(n, 1) if arithmetic.fixed else n + 1}
-    known = declared(types, arithmetic, layout, lengths)
-    sizes = []
-    for op in ("forward", "inverse"):
-        if getattr(options, op):
-            fields = chain.get(op)
-            members = [_field(each, arithmetic, layout, known) for each in fields] if fields else [known[f"{op}_t"]]
-            sizes.append((op, layout.struct(*members)[0]))
-    a_play, _ = known["corner_t" if options.engine == "corners" else "play_t"]
-    more = _constants(plays, arithmetic, layout, known, kinds, n + 1) + a_play * len(sizes)
-    return Memory(_constants(text, arithmetic, layout, known, kinds), sizes, more)
-
-
-def _field(
-    field: Field, arithmetic: Arithmetic, layout: Layout, known: Mapping[str, tuple[int, int]]
-) -> tuple[int, int]:
-    """Size and alignment of a field of an instance; `known`: of the types of the corner engine."""
-    real = (arithmetic.bytes, arithmetic.bytes)
-    signal, fine = ((8, 8), (4, 4)) if arithmetic.fixed else (real, real)
-    whole = (layout.integer, layout.integer)
-    ramp = layout.struct(known["reach_t"], known["play_t"])
-    one = {"flag": (1, 1), "status": whole, "signal": signal, "fine": fine, "play": fine, "ramp": ramp}.get(field.kind)
-    one = one or known.get(f"{field.kind}_t", real)
-    members = [*(_LETTERS.get(letter, real) for letter in field.members), *field.flags * [(1, 1)]]
-    size, alignment = layout.struct(*members) if members else one
-    return size * max(field.count, 1), alignment
+def _memory(n: int, options: Options, data: Data, layout: Layout) -> Memory:
+    lengths = {"HYSTGEN_N_PLAYS": n, "HYSTGEN_CORNERS": data.family.corners(n)}
+    known = sizes(data.types, data.family, layout, lengths)
+    a_play, _ = known["corner_t" if options.engine == "corners" else data.family.meaning("play_t")]
+    of_plays = [each for table in data.plays for each in table.contents]
+    instances = [(op, known[f"{op}_t"][0]) for op in options.operators]
+    more = _constants(of_plays, known, data.family, n + 1) + a_play * len(instances)
+    return Memory(_constants(data.constants, known, data.family), instances, more)
 
 
 def worst_case(n: int, op: str, corners: bool, tables: Tables | FixedTables | ChainTables) -> str:

@@ -32,7 +32,7 @@ CALLED = frozenset(["if", "for", "while", "switch", "return", "sizeof"])
 REFUSED = {
     "float": "hystgen_signal_t", "double": "hystgen_signal_t", "extern": "nothing", "volatile": "nothing",
     "asm": "C", "union": "struct", "goto": "a loop", "register": "nothing", "auto": "a type",
-}  # fmt: skip
+}
 """Words that a file may not contain, and what to write instead."""
 
 GIVEN = frozenset(["hystgen_signal_t", "hystgen_number_t", "hystgen_product"])
