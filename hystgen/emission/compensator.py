@@ -10,6 +10,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, TypeAlias
 
+import numpy as np
+
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain.layout import ChainTables, Compiled
 from hystgen.compensator.layout import FixedTables, Tables
@@ -208,7 +210,7 @@ class Effects:
 
 
 class Form(ABC):
-    """How one kind of arithmetic writes the numbers of a model, and the words for them.
+    """How one kind of arithmetic writes the numbers of a model, and the words for them: of its own where it has codes.
 
     `apart`: how functions begin whose products would need the stack of what calls them; `most_ahead`: place of the
     samples that a clock is ahead; `suffix`: of names of macros that are counted in codes; `held`: what the status bit
@@ -216,36 +218,12 @@ class Form(ABC):
     the model's name.
     """
 
-    apart: ClassVar[str]
+    apart = "static"
     most_ahead: ClassVar[int]
-    suffix: ClassVar[str]
+    suffix = ""
     held: ClassVar[str]
-    warning: ClassVar[str]
+    warning = ""
     settings: ClassVar[Mapping[str, str]]
-
-    @abstractmethod
-    def counted(self, side: str, unit: str) -> str:
-        """What numbers of the drive or the output count."""
-
-    @abstractmethod
-    def unit(self, unit: str, side: str = "") -> str:
-        """The unit behind a number, of which side where that is said."""
-
-    @abstractmethod
-    def quantity(self, words: str, macro: str, unit: str) -> str:
-        """A quantity with its unit; `macro`: with the size of a code."""
-
-    @abstractmethod
-    def unless_held(self, call: str) -> str:
-        """What a call does with arguments that are no numbers."""
-
-    @abstractmethod
-    def between(self, low: Number, high: Number, part: float) -> Number:
-        """The number at this fraction of a range, in operations of the arithmetic."""
-
-    @abstractmethod
-    def arguments(self, t: AnyTables, values: Sequence[Number]) -> Reals:
-        """The nearest arguments of calls."""
 
     @abstractmethod
     def numbers(self, parameters: Parameters, cascade: StaticModel, options: Options, writer: Writer) -> Numbers:
@@ -266,26 +244,6 @@ class Form(ABC):
         """Tables and numbers of plays that an effect moves or bends."""
 
     @abstractmethod
-    def effects(self, t: ChainTables) -> list[Macro]:
-        """Numbers of a model with effects that the other kind has not."""
-
-    @abstractmethod
-    def code_sizes(self, t: ChainTables) -> list[Macro]:
-        """Sizes of the codes that set a temperature or a gain."""
-
-    @abstractmethod
-    def drive_bits(self, t: ChainTables) -> int:
-        """Bits of a signal in front of the plays below a drive."""
-
-    @abstractmethod
-    def setting_codes(self, t: ChainTables) -> tuple[float, float]:
-        """What sets a degree more, and the gain 1."""
-
-    @abstractmethod
-    def reference_temperature(self, t: ChainTables) -> float:
-        """The temperature, degC, at which the model's gain holds."""
-
-    @abstractmethod
     def tap(self, t: ChainTables, writer: Writer) -> Table:
         """The weights of the references that are summed."""
 
@@ -296,6 +254,50 @@ class Form(ABC):
     @abstractmethod
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         """The memory of the plays of engine corners in a model with effects."""
+
+    def effects(self, t: ChainTables) -> list[Macro]:
+        """Numbers of a model with effects that codes need."""
+        return []
+
+    def code_sizes(self, t: ChainTables) -> list[Macro]:
+        """Sizes of the codes that set a temperature or a gain."""
+        return []
+
+    def setting_codes(self, t: ChainTables) -> tuple[float, float]:
+        """What sets a degree more, and the gain 1."""
+        return 1.0, 1.0
+
+    def drive_bits(self, t: ChainTables) -> int:
+        """Bits of a signal in front of the plays below a drive."""
+        return 0
+
+    @abstractmethod
+    def reference_temperature(self, t: ChainTables) -> float:
+        """The temperature, degC, at which the model's gain holds."""
+
+    @abstractmethod
+    def between(self, low: Number, high: Number, part: float) -> Number:
+        """The number at this fraction of a range, in operations of the arithmetic."""
+
+    def arguments(self, t: AnyTables, values: Sequence[Number]) -> Reals:
+        """The nearest arguments of calls."""
+        return np.array(values, dtype=t.threshold.dtype)
+
+    def counted(self, side: str, unit: str) -> str:
+        """What numbers of the drive or the output count."""
+        return self.quantity(side, "", unit)
+
+    def unit(self, unit: str, side: str = "") -> str:
+        """The unit behind a number, of which side where that is said."""
+        return f" {unit}" if unit else ""
+
+    def quantity(self, words: str, macro: str, unit: str) -> str:
+        """A quantity with its unit; `macro`: with the size of a code."""
+        return f"{words}, {unit}" if unit else words
+
+    def unless_held(self, call: str) -> str:
+        """What a call does with arguments that are no numbers."""
+        return ""
 
 
 def limits(numbers: Tables | FixedTables | ChainTables) -> tuple[tuple[str, str], tuple[str, str]]:

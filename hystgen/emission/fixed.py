@@ -71,7 +71,6 @@ class Fixed(Form):
     most_ahead = drift.MOST_AHEAD
     suffix = "_LSB"
     held = "never set: every code is a number"
-    warning = ""
     settings: ClassVar[Mapping[str, str]] = {
         "temperature": "temperature, in codes of MODEL_TEMPERATURE_LSB",
         "gain": "gain over that of the parameter file, in codes of MODEL_GAIN_LSB",

@@ -19,7 +19,6 @@ from hystgen.compensator.layout import Tables
 from hystgen.effects.drift import compensator as drift
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.emission.compensator import (
-    AnyTables,
     Effects,
     Errors,
     Field,
@@ -42,7 +41,6 @@ from hystgen.front.stage import StageTables
 from hystgen.parameters.files import Parameters
 from hystgen.plays import slots
 from hystgen.plays.corners.corners_float import Curve, Start
-from hystgen.plays.slots import Reals
 
 COLUMNS = (("threshold", "threshold", True), ("inverse_slope", "reciprocal", False), ("weight", "weight", True),
            ("lift", "lift", False))
@@ -67,9 +65,7 @@ MOVING = (
 class Floating(Form):
     """Floating point."""
 
-    apart = "static"
     most_ahead = drift.MOST_AHEAD
-    suffix = ""
     held = "NaN or infinite input: the last answer was held"
     warning = (
         " Not for targets that flush denormal numbers to zero or round other than to nearest, nor for flags that "
@@ -82,23 +78,11 @@ class Floating(Form):
         "share": "0 to 1",
     }
 
-    def counted(self, side: str, unit: str) -> str:
-        return f"{side}, {unit}" if unit else side
-
-    def unit(self, unit: str, side: str = "") -> str:
-        return f" {unit}" if unit else ""
-
-    def quantity(self, words: str, macro: str, unit: str) -> str:
-        return f"{words}, {unit}" if unit else words
-
     def unless_held(self, call: str) -> str:
         return f"; NaN and infinite: {'held' if call in ('step', 'reset') else 'ignored'}"
 
     def between(self, low: Number, high: Number, part: float) -> Number:
         return low + (high - low) * type(high)(part)
-
-    def arguments(self, t: AnyTables, values: Sequence[Number]) -> Reals:
-        return np.array(values, dtype=t.threshold.dtype)
 
     def numbers(self, parameters: Parameters, cascade: StaticModel, options: Options, writer: Writer) -> Numbers:
         t = float_tables.build_float(cascade, options.arithmetic, options.engine, True, True)
@@ -149,18 +133,6 @@ class Floating(Form):
             ("HALVES", f"{plays.halves}u", "steps of the search"),
             ("YIELDS", f"{len(plays.yields)}u", "pieces of what a dashpot yields"),
         ]
-
-    def effects(self, t: ChainTables) -> list[Macro]:
-        return []
-
-    def code_sizes(self, t: ChainTables) -> list[Macro]:
-        return []
-
-    def drive_bits(self, t: ChainTables) -> int:
-        return 0
-
-    def setting_codes(self, t: ChainTables) -> tuple[float, float]:
-        return 1.0, 1.0
 
     def reference_temperature(self, t: ChainTables) -> float:
         return float(t.gain[0, thermal.REFERENCE])

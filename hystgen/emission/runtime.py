@@ -167,9 +167,9 @@ class Family(ABC):
         return self.arithmetic.types
 
     @property
-    @abstractmethod
     def signals(self) -> dict[str, str]:
         """Names in code that models with and without effects share, and their meaning here."""
+        return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE
 
     @property
     def casts(self) -> bool:
@@ -180,13 +180,13 @@ class Family(ABC):
     def storage(self, corners: bool) -> dict[str, str]:
         """Words before functions, and what stands there in this arithmetic, in engine corners or loop."""
 
-    @abstractmethod
     def corners(self, plays: int) -> int:
         """How many corners the corner engine takes for so many plays."""
+        return max(plays, 1)
 
-    @abstractmethod
     def alike(self, kind: str) -> str:
         """The name of a type, or that of the type that it is."""
+        return kind
 
     def meaning(self, kind: str) -> str:
         """The type that a name stands for here, both without prefix."""
@@ -220,15 +220,20 @@ class FloatFamily(Family):
     """Floating point: one type for every number."""
 
     kind, ending, moves_apart = "float", "", False
-    chain_types, chain_blocks = CHAIN_TYPES, CHAIN_BLOCKS
-    curves, codes = (), ()
+    chain_types, chain_blocks, curves, codes = CHAIN_TYPES, CHAIN_BLOCKS, (), ()
     opening = ("arithmetic/rounding_begin.h",)
     opening_apart = ("arithmetic/rounding_push.h",)
     closing = ("arithmetic/rounding_end.h",)
 
     @property
-    def signals(self) -> dict[str, str]:
-        return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE
+    def kernel_files(self) -> tuple[str, ...]:
+        return tuple(file.format(bits=self.bits) for file in FLOAT_KERNELS)
+
+    def corners(self, plays: int) -> int:
+        return plays + 1
+
+    def alike(self, kind: str) -> str:
+        return "real_t" if kind in SUMS else kind
 
     def storage(self, corners: bool) -> dict[str, str]:
         return {
@@ -241,30 +246,19 @@ class FloatFamily(Family):
             "HYSTGEN_FIXED_KERNEL ": "HYSTGEN_API ",
         }
 
-    def corners(self, plays: int) -> int:
-        return plays + 1
-
-    def alike(self, kind: str) -> str:
-        return "real_t" if kind in SUMS else kind
-
-    @property
-    def kernel_files(self) -> tuple[str, ...]:
-        return tuple(file.format(bits=self.bits) for file in FLOAT_KERNELS)
-
 
 class FixedFamily(Family):
     """Fixed point."""
 
     kind, ending, moves_apart = "fixed", "_fixed", True
     chain_types, chain_blocks = FIXED_CHAIN_TYPES, FIXED_CHAIN_BLOCKS
-    curves, codes = ("front/front.c",), ("compensator/code.c",)
+    curves, codes, kernel_files = ("front/front.c",), ("compensator/code.c",), FIXED_KERNELS
 
     @property
     def signals(self) -> dict[str, str]:
         if self.chain:
             return SIGNALS
-        sums = {"hystgen_signal_t": "hystgen_sum_t"} if self.loop else {}
-        return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE | sums
+        return super().signals | ({"hystgen_signal_t": "hystgen_sum_t"} if self.loop else {})
 
     @property
     def casts(self) -> bool:
@@ -280,16 +274,6 @@ class FixedFamily(Family):
             "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ": APART,
             "HYSTGEN_FIXED_KERNEL ": "HYSTGEN_KERNEL ",
         }
-
-    def corners(self, plays: int) -> int:
-        return max(plays, 1)
-
-    def alike(self, kind: str) -> str:
-        return kind
-
-    @property
-    def kernel_files(self) -> tuple[str, ...]:
-        return FIXED_KERNELS
 
 
 FAMILIES: dict[str, Family] = {
