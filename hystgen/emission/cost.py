@@ -11,8 +11,10 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.chain import blocks, costs, moving
 from hystgen.compensator.chain.layout import ARRIVING_BITS, ChainTables
+from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.effects.lag import compensator as lag
+from hystgen.effects.saturation.fixed import Saturations
 from hystgen.emission.compensator import AnyTables, Table
 from hystgen.emission.options import Options
 from hystgen.emission.runtime import Family, Member, Piece
@@ -151,21 +153,71 @@ def selftest_bytes(real: int, memory: Memory, samples: int, layout: Layout) -> t
     return samples * sample, max(size for _, size in memory.instances)
 
 
+@dataclass(frozen=True)
+class Counts:
+    """Operations of a kind of arithmetic, counted in the bit reference (`tests/test_cost.py`), and rounded up to what a
+    search that bisects its whole list would take.
+
+    `factor`: multiplications of a product with a factor; `words`: about a multiplication; `plays`: by operator and
+    engine multiplications, comparisons, and further ones per play and per bit of n, of plays, checks and limits, with
+    engine `fast` for corners without a front; `both`: the same of corners that are solved for and follow what was
+    applied, which may be elsewhere; `solved`: multiplications per play of an inverse in engine loop, and `chained` of
+    one with effects multiplications, comparisons, and both per play; `braked`: multiplications of a lag behind a slew
+    limit, and per halving of its search.
+    """
+
+    factor: int
+    words: str
+    plays: Mapping[tuple[str, str], tuple[int, int, int, int]]
+    both: tuple[int, int, int, int]
+    solved: int
+    chained: tuple[int, int, int, int]
+    braked: tuple[int, int]
+
+
+FLOAT = Counts(
+    1, "",
+    {("forward", "loop"): (1, 7, 2, 0), ("inverse", "loop"): (3, 14, 3, 0),
+     # the sign of a move takes a multiplication too; up to eight plays are tried one by one before either search
+     ("forward", "corners"): (17, 18, 0, 2), ("inverse", "corners"): (26, 24, 0, 4),
+     ("forward", "fast"): (17, 18, 0, 2), ("inverse", "fast"): (17, 18, 0, 2)},
+    both=(30, 26, 0, 4), solved=3, chained=(4, 17, 4, 3), braked=(7, 2),
+)
+FIXED = Counts(
+    2, " of 32 by 32 bits",
+    {("forward", "loop"): (1, 11, 2, 0), ("inverse", "loop"): (3, 14, 3, 0),
+     # the corner, then the play in its block: either is bisected; clamps, the code, what lies ahead
+     # the output of a corner is the sum of its parts, for the top one and the one behind it
+     ("forward", "corners"): (1, 15, 0, 2), ("inverse", "corners"): (5, 19, 0, 4),
+     ("forward", "fast"): (1, 15, 0, 2), ("inverse", "fast"): (7, 22, 0, 4)},
+    both=(7, 25, 0, 4), solved=2, chained=(4, 21, 3, 3), braked=(13, 1),
+)
+
+
+def _counts(t: AnyTables) -> Counts:
+    return FIXED if isinstance(t.plays if isinstance(t, ChainTables) else t, FixedTables) else FLOAT
+
+
+def _refined(t: ChainTables) -> bool:
+    """Whether a solution of an inverse has a remainder, which is searched for too."""
+    return len(t.number) > ARRIVING_BITS and bool(t.number[ARRIVING_BITS])
+
+
 def chain_products(t: ChainTables) -> dict[str, int]:
-    """Multiplications of the blocks in front of the plays and behind them in one step, of each operator; in fixed point
-    a product of a signal takes two."""
-    kinds = list(map(int, t.behind.kind if t.fixed else t.behind.stage_kind))
+    """Multiplications of the blocks in front of the plays and behind them in one step, of each operator."""
+    counts, behind = _counts(t), t.behind
+    if isinstance(behind, Saturations):
+        kinds, envelope = list(map(int, behind.kind)), behind.bends.coefficient.shape[1]
+    else:
+        kinds, envelope = list(map(int, behind.stage_kind)), 2
     envelopes = kinds.count(slots.TANH)
+    stages = counts.factor * (len(kinds) - envelopes) + envelopes * envelope
     everything, inverse = blocks.every(t, "forward"), blocks.every(t, "inverse")
-    forward = sum(each.products[0] for each in everything) + (1 + t.fixed) * bool(t.delay.samples)
-    absorbed, solved = (sum(each.products[way] for each in inverse) for way in (0, 1))
-    if t.fixed:
-        stages = 2 * (len(kinds) - envelopes) + envelopes * t.behind.bends.coefficient.shape[1]
-        braked = t.braked * (13 + lag.HALVES) + 2 * t.turning
-        return {"forward": forward + stages, "inverse": absorbed + solved + braked + stages + 2 * len(t.tap)}
-    stages = len(kinds) + envelopes
-    braked = t.braked * (7 + 2 * lag.HALVES) + t.turning
-    return {"forward": forward + stages, "inverse": absorbed + solved + braked + stages + len(t.tap)}
+    forward = sum(each.products[0] for each in everything) + counts.factor * bool(t.delay.samples)
+    both = sum(sum(each.products) for each in inverse)
+    once, halving = counts.braked
+    led = t.braked * (once + halving * lag.HALVES) + counts.factor * (t.turning + len(t.tap))
+    return {"forward": forward + stages, "inverse": both + led + stages}
 
 
 def _memory(n: int, options: Options, data: Data, layout: Layout) -> Memory:
@@ -178,49 +230,39 @@ def _memory(n: int, options: Options, data: Data, layout: Layout) -> Memory:
     return Memory(_constants(data.constants, known, data.family), instances, more)
 
 
-def worst_case(n: int, op: str, corners: bool, tables: Tables | FixedTables | ChainTables) -> str:
+def worst_case(n: int, op: str, corners: bool, tables: AnyTables) -> str:
     """The largest numbers of multiplications and comparisons in one step as functions of n, without those of tanh and
     atanh, and of effects; b are the bits of n."""
     numbers: Tables | FixedTables = tables.plays if isinstance(tables, ChainTables) else tables
-    stages: list[tuple[int, int]] = []
-    fixed = isinstance(numbers, FixedTables)
-    if isinstance(numbers, FixedTables):
-        fronts = bool(numbers.fronts)
-    else:
-        stages = [(int(kind), int(size)) for kind, size in zip(numbers.stage_kind, numbers.stage_size, strict=True)]
-        fronts = bool(stages)
-    products, compares, per_play, per_bit = _worst_of_plays(op, corners, fixed, corners and not fronts)
-    if corners and op == "inverse" and isinstance(tables, ChainTables):
-        # plays follow what was applied, which may be elsewhere than what was solved for: two searches
-        products, compares, per_bit = (7, 25, 4) if fixed else (30, 26, 4)
-        if fixed and tables.number[ARRIVING_BITS]:  # and a third one for the remainder of a solution
-            products, compares, per_bit = products + 2, compares + 10, per_bit + 2
-    per_play_products = 0 if corners else 1 if op == "forward" else 2 if fixed else 3
-    curves = 0
-    if not corners and isinstance(tables, ChainTables):
+    counts, passes, curves = _counts(tables), 1 if op == "forward" else 2 + int(numbers.branches), 0
+    engine = "loop" if not corners else "corners" if numbers.has_front else "fast"
+    products, compares, per_play, per_bit = counts.plays[op, engine]
+    per_play_products = 0 if corners else 1 if op == "forward" else counts.solved
+    if isinstance(tables, ChainTables) and not corners:
         products, per_play_products, compares, per_play, curves = _worst_of_chain(op, tables)
-    passes = 1 if op == "forward" else 2 + int(numbers.branches)
+    elif isinstance(tables, ChainTables) and op == "inverse":
+        refined = _refined(tables)
+        products, compares, per_play, per_bit = counts.both
+        products, compares, per_bit = products + 2 * refined, compares + 10 * refined, per_bit + 2 * refined
     compares += (2 if op == "forward" else 16) * int(bool(numbers.branches))
-    kernels = ""
-    if isinstance(numbers, FixedTables) and fronts:
+    envelopes = 0
+    if isinstance(numbers, Tables):
+        for kind, size in zip(map(int, numbers.stage_kind), map(int, numbers.stage_size), strict=True):
+            envelopes += kind == slots.TANH
+            products += passes if kind == slots.DEAD_ZONE else 2 * passes
+            compares += passes * size.bit_length() if kind == slots.DEAD_ZONE else 2 * passes
+    elif numbers.fronts:
         products += passes * numbers.coefficient.shape[1]
         compares += passes * (int(max(numbers.pieces)).bit_length() + 2)
-    envelopes = sum(kind == slots.TANH for kind, _ in stages)
-    for kind, size in stages:
-        products += passes if kind == slots.DEAD_ZONE else 2 * passes
-        compares += passes * size.bit_length() if kind == slots.DEAD_ZONE else 2 * passes
-    if envelopes:
-        kernels = f", {envelopes} tanh"
-        if op == "inverse":
-            kernels += f", {envelopes * (1 + int(numbers.branches))} atanh"
+    kernels = f", {envelopes} tanh" if envelopes else ""
+    if envelopes and op == "inverse":
+        kernels += f", {envelopes * (1 + int(numbers.branches))} atanh"
     if curves:
         kernels += f", {curves * n} tanh of plays"
-    many = products + per_play_products * n
-    words = f"{many} multiplications" + " of 32 by 32 bits" * fixed
+    words = f"{products + per_play_products * n} multiplications{counts.words}"
     if per_play_products:
         words += f" ({products} + {per_play_products} n)"
-    total = compares + per_play * n + per_bit * n.bit_length()
-    words += f", {total} comparisons"
+    words += f", {compares + per_play * n + per_bit * n.bit_length()} comparisons"
     if per_bit:
         words += f" ({compares} + {per_bit} b, b = {n.bit_length()} the bits of n)"
     elif per_play:
@@ -233,34 +275,26 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
     loop of a model with effects.
 
     Plain plays follow and are solved for one after the other. Plays that an effect moves or bends in a way of their own
-    are searched for: all of them are summed up once for each bisection. Counted in the bit reference
-    (`tests/test_cost.py`).
+    are searched for: all of them are summed up once for each bisection.
     """
-    m, share = t.moving, 1 + t.fixed  # a product with a factor takes two
-    inverse = op == "inverse"
-    finer = inverse and t.fixed and bool(t.number[ARRIVING_BITS])
+    m, counts, inverse = t.moving, _counts(t), op == "inverse"
+    factor, more = counts.factor, counts.factor - 1  # a comparison more where a product with a factor has two parts
     if not m.used or m.scanned:
         if not inverse:
-            return 1, 1 + 2 * share * m.scanned, 11 + 2 * t.fixed, 4 + 2 * t.fixed if m.scanned else 2, 0
-        products, per_play, compares, more = (4, 3, 21, 3) if t.fixed else (4, 4, 17, 3)
-        if m.scanned:
-            per_play, more = per_play + 2 * share, more + 3 + t.fixed
-        return products + 2 * finer, per_play + finer, compares + 12 * finer, more + 3 * finer, 0
-    yields = len(m.yields).bit_length() + 3 + 2 * t.fixed
+            return 1, 1 + 2 * factor * m.scanned, 11 + 2 * more, 4 + 2 * more if m.scanned else 2, 0
+        refined = _refined(t)
+        products, compares, per_play, looked = counts.chained
+        per_play, looked = per_play + 2 * factor * m.scanned, looked + (3 + more) * m.scanned
+        return products + 2 * refined, per_play + refined, compares + 12 * refined, looked + 3 * refined, 0
+    yields = len(m.yields).bit_length() + 3 + 2 * more
     moved, kept = {
-        moving.DILATED: ((share, 3 + t.fixed), (0, 0)),
-        moving.RELAXING: ((share, 2 + t.fixed), (share, 2 + t.fixed)),
-        moving.DASHPOT: ((share + 3 + t.fixed, yields), (0, 0)),
+        moving.DILATED: ((factor, 3 + more), (0, 0)),
+        moving.RELAXING: ((factor, 2 + more), (factor, 2 + more)),
+        moving.DASHPOT: ((factor + 3 + more, yields), (0, 0)),
     }.get(m.moves, ((0, 2), (0, 0)))
-    bent, looked = 0, 0
-    if m.bends != moving.STRAIGHT and t.fixed:
-        bent, looked = m.bump.coefficient.shape[1], int(max(m.bump.pieces)).bit_length() + 5
-    elif m.bends != moving.STRAIGHT:
-        bent = m.curve.shape[1] + 3 if m.bends == moving.POLYNOMIAL else 2
-    tanh = int(m.bends == moving.CENTRE and not t.fixed)
+    bent, looked, tanh, sums, halved = _bent(m)
     twice = 1 + (m.moves == moving.RELAXING)  # what a play contributes, and where it will rest
-    sums = 0 if not inverse else 3 + (2 * m.farthest).bit_length() if t.fixed else 1 + m.halves
-    halved = 0 if t.fixed or not inverse else m.halves
+    sums, halved = sums * inverse, halved * inverse
     return (
         sums + 1 + halved,
         sums * (1 + moved[0] + bent) + 1 + moved[0] + kept[0] + twice * bent,
@@ -270,20 +304,14 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
     )
 
 
-def _worst_of_plays(op: str, corners: bool, fixed: bool, fast: bool) -> tuple[int, int, int, int]:
-    """Multiplications; comparisons; further ones per play and per bit of n; of plays, checks and limits.
-
-    Counted in the bit reference (`tests/test_cost.py`), and rounded up to what a search that bisects its whole list
-    would take.
-    """
-    if not corners:
-        if op == "forward":
-            return 1, 11 if fixed else 7, 2, 0
-        return 3, 14, 3, 0
-    if fixed:  # the corner, then the play in its block: either is bisected; clamps, the code, what lies ahead
-        # the output of a corner is the sum of its parts, for the top one and the one behind it
-        return (1, 15, 0, 2) if op == "forward" else (5 + 2 * fast, 19 + 3 * fast, 0, 4)
-    # the sign of a move takes a multiplication too; up to eight plays are tried one by one before either search
-    if op == "forward" or fast:
-        return 17, 18, 0, 2
-    return 26, 24, 0, 4
+def _bent(m: MovingTables | FixedMovingTables) -> tuple[int, int, int, int, int]:
+    """Multiplications, comparisons and tanh of what a play adds to itself; how often a search sums the plays up, and
+    multiplications of its halvings."""
+    straight = m.bends == moving.STRAIGHT
+    if isinstance(m, FixedMovingTables):
+        sums = 3 + (2 * m.farthest).bit_length()
+        if straight:
+            return 0, 0, 0, sums, 0
+        return m.bump.coefficient.shape[1], int(max(m.bump.pieces)).bit_length() + 5, 0, sums, 0
+    bent = 0 if straight else m.curve.shape[1] + 3 if m.bends == moving.POLYNOMIAL else 2
+    return bent, 0, int(m.bends == moving.CENTRE), 1 + m.halves, m.halves
