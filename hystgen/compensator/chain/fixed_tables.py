@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import FIXED
 from hystgen.arithmetic.factors import LARGEST, factor
 from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
@@ -119,7 +119,7 @@ class _Builder:
         engine: str,
     ) -> None:
         self.arithmetic, self.seconds, self.how, self.engine = arithmetic, seconds, how, engine
-        self.about = ARITHMETICS[arithmetic]
+        self.about = FIXED[arithmetic]
         self.static, self.parts = chain.cascade, Parts.of(chain.effects)
         self.low, self.high = output_range(self.static, self.parts, seconds)
         self.drive_lsb, self.output_lsb = lsbs(self.static, arithmetic, *lsb, (self.low, self.high))
