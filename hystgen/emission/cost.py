@@ -331,6 +331,7 @@ def _bent(m: MovingTables | FixedMovingTables) -> tuple[int, int, int, int, int]
     """Multiplications, comparisons and tanh of what a play adds to itself; how often a search sums the plays up, and
     multiplications of its halvings."""
     from hystgen.compensator.chain import moving
+    from hystgen.compensator.chain.moving import FixedMovingTables
 
     straight = m.bends == moving.STRAIGHT
     if isinstance(m, FixedMovingTables):

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.version import __version__
 from hystgen.compensator.bounds import UNSLEWED, together
-from hystgen.effects.base import USER
 from hystgen.emission import cost, runtime
 from hystgen.emission.compensator import Compensator, Macro
 from hystgen.emission.cost import Cost
@@ -50,10 +49,11 @@ def banner(file: str, what: str, command: str, sha256: str, details: Sequence[st
 def command(parameters: Parameters, options: Options) -> str:
     """The command that emits a model again."""
     origins: dict[str, None] = {}
-    if users := [type(effect) for effect in parameters.model.effects if effect.name.startswith(USER)]:
+    if effects := parameters.model.effects:
         from hystgen.effects import own as own_effects
+        from hystgen.effects.base import USER
 
-        origins = dict.fromkeys(map(own_effects.origin, users))
+        origins = {own_effects.origin(type(each)): None for each in effects if each.name.startswith(USER)}
     more = " --allow-partial" * bool(options.left_out) + "".join(f" --effects {shlex.quote(each)}" for each in origins)
     chosen = " ".join(f"--{key} {getattr(options, key)}" for key in OPTIONS)
     return f"hystgen emit {parameters.name}.yaml {chosen}{more}"

@@ -8,7 +8,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
 from hystgen.emission import chain, cost, interface, runtime, selftest
 from hystgen.emission.compensator import Compensator, Form, Glue, Names, Numbers, Table, Writer
@@ -59,6 +58,7 @@ def _compiled(parameters: Parameters, cascade: StaticModel, options: Options) ->
     effects, emit = parameters.model.effects, parameters.emit
     if not effects:
         return None
+    from hystgen.chain.chain import Chain
     from hystgen.compensator.chain import tables as chain_tables
 
     assert parameters.sample_time is not None, "emit_options asks for it"
