@@ -89,8 +89,58 @@ class Response(NamedTuple):
     rest: float
 
 
+class Speed(NamedTuple):
+    """How fast a drive within `ends` moves: by at most `step` in each of steps of `seconds`."""
+
+    ends: tuple[float, float]
+    step: float
+    seconds: float
+
+
+class Gained(NamedTuple):
+    """A gain behind the plays: roundings of its own, its ends, and what it adds to errors of its output (`there`) and
+    of the output asked for (`back`)."""
+
+    roundings: float
+    least: float
+    largest: float
+    there: float
+    back: float
+
+
 class One:
     """One block at a step length, in double precision."""
+
+    @property
+    def growth(self) -> float:
+        """Largest output for inputs within 1."""
+        return 1.0
+
+    @property
+    def misses(self) -> bool:
+        """Whether what arrives differs from what it was solved for."""
+        return False
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it has states that see what it gets."""
+        return False
+
+    def rounding(self, size: float, u: float) -> tuple[float, float]:
+        """Roundings of the output for inputs within `size`, and of the input that it is solved for."""
+        return 0.0, 0.0
+
+    def solved(self, error: float, size: float, u: float, same: bool) -> float:
+        """Error of the input that it is solved for, by one of the output; `same`: its states have seen the same."""
+        return error
+
+    def seen(self) -> float:
+        """Factor by which states that see its input multiply an error of that."""
+        return 1.0
+
+    def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
+        """It as a gain, for outputs within a size; `emitted`: with the approximations of the C."""
+        return Gained(0.0, 1.0, 1.0, 0.0, 0.0)
 
     def at_rest(self, x: float) -> float:
         """The settled output for an input."""
@@ -131,6 +181,69 @@ class One:
     def asked(self, given: float, asked: float, margin: Margin) -> float:
         """Largest input that it is solved for, by outputs within a size and after inputs `given`."""
         return asked
+
+
+class Gain(NamedTuple):
+    """A gain in fixed point: its ends, and in output codes what it adds to errors of its output and of its input that
+    is solved for, beside the rounding of either, and the largest offset."""
+
+    least: float
+    largest: float
+    there: float
+    back: float
+    offset: float = 0.0
+
+
+class Coding(NamedTuple):
+    """Units per code of drive and output, and the `span` of the output in codes."""
+
+    drive_lsb: float
+    output_lsb: float
+    span: float
+
+
+class Sought(NamedTuple):
+    """What a block behind the plays is solved for: sizes of its input and of the sum asked of the plays, the unit of
+    signals, how far states that see the sum of the plays, and their inputs, may be `apart`; `same`: they are not."""
+
+    size: float
+    asked: float
+    signal: float
+    apart: float
+    seen: float
+    same: bool
+
+
+class Coded:
+    """One block in fixed point; errors of those behind the plays are in output codes, of those in front in signals."""
+
+    one: Any
+
+    @property
+    def arrived(self) -> float:
+        """Roundings of the output in front of the plays."""
+        return 0.0
+
+    @property
+    def follows(self) -> float:
+        """What a change of its input in one sample is of the output."""
+        return 1.0
+
+    def there(self, size: float, signal: float) -> float:
+        """Roundings of the output for inputs within a size, with signals of this unit."""
+        return 0.0
+
+    def solved(self, error: float, at: Sought) -> float:
+        """Error of the input that it is solved for, by one of the output."""
+        return error
+
+    def residual(self, missed: float, same: bool) -> float:
+        """The error of an output that the inverse makes of one of the sum of the plays."""
+        return missed
+
+    def gain(self, size: float, speed: Speed, at: Coding) -> Gain | None:
+        """It as a gain, for inputs within a size."""
+        return None
 
 
 @dataclass(frozen=True)

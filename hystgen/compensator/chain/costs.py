@@ -26,7 +26,7 @@ def parts(t: ChainTables, operator: str) -> list[str]:
     """The parts that an operator of a model has; two blocks of one kind share their code."""
     exact = t.of("lag").exact.tolist()
     kinds = [int(kind) for kind in (t.behind.kind if t.fixed else t.behind.stage_kind)]
-    found = Counter(dict(zip(NAMES, t.count.tolist(), strict=True)) | {
+    found = Counter(dict(zip(NAMES, t.counts.tolist(), strict=True)) | {
         "lag": exact.count(0), "lag_exact": exact.count(1), "friction": t.of("heat").plays.any(), "preview": len(t.tap),
         "slew": t.slew, "braked": t.braked,
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),

@@ -10,6 +10,7 @@ can overflow, whatever is called in whatever order; a model that does not fit is
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable
 from fractions import Fraction
@@ -155,7 +156,7 @@ class _Builder:
             limits,
             self._need(lambda: self._moving(plays), "effects on plays"),
             self._tables(),
-            self.parts.count,
+            self.parts.counts,
             saturations,
             self._need(self._tap, "the preview"),
             np.array(self._numbers(), dtype=np.int64),
@@ -171,9 +172,9 @@ class _Builder:
         max_rate = fastest(static, self.parts, self.seconds, self.how)
         weights = self.taps.weights.tolist() if self.taps else []
         bounds = Bounds(
-            static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.ones, self.formats,
-            self.in_front, weights, self.bends, (self.low, self.high), slewed, self.reached, self._largest_step(),
-            self.finer, self.seconds, self.bumps,
+            static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.formats, weights,
+            self.bends, (self.low, self.high), slewed, self.reached, self._largest_step(), self.finer, self.seconds,
+            self.bumps,
         )  # fmt: skip
         if static.branches_differ:
             plays.limits[slots.HOLD] = hold(bounds.hold(), tables.number[DITHER], self.turning)
@@ -395,7 +396,7 @@ class _Builder:
         for part in PARTS:
             if part not in AHEAD:
                 names = " and ".join(dict.fromkeys(getattr(each, "name", "") for each in self.parts.blocks[part.name]))
-                found[part.name] = self._need(lambda part=part: made(part), part.words or names)
+                found[part.name] = self._need(functools.partial(made, part), part.words or names)
         return tuple(found[name] for name in NAMES)
 
     def _behind(self, part: Part) -> list[tuple[float, float]]:

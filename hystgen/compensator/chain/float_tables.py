@@ -148,7 +148,7 @@ def build(
         plays.limits,
         moving.build(static, parts.plays, seconds, min(max_rate * seconds, drive_span), dtype),
         tuple(part.floating.tables(ones[part.name], about) for part in PARTS),
-        parts.count,
+        parts.counts,
         _behind(parts, arithmetic),
         reals(taps.weights if taps else [], "weights of the preview"),
         reals([static.output_offset, span, *slew[::2], *slew[1::2], VERIFIED_SHARE, dither], "offset or rates"),

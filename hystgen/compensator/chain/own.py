@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from hystgen.basics.jit import jit
 from hystgen.effects import own
 from hystgen.effects.base import Array, Effect, Place
-from hystgen.effects.kinds import VERBS, Constants, OwnBlock
+from hystgen.effects.kinds import Constants, OwnBlock
 from hystgen.effects.part import Arithmetic, Function, Margin, One, Response, Verbs
 from hystgen.plays.slots import Counts, Reals
 
@@ -142,6 +142,28 @@ class Linear(One):
     def lead(self) -> float:
         """Largest gain of its inverse."""
         return max(self.backward.largest, 1.0)
+
+    @property
+    def growth(self) -> float:
+        """Largest output for inputs within 1."""
+        return self.forward.largest
+
+    def solved(self, error: float, size: float, u: float, same: bool) -> float:  # noqa: ARG002  as of every block
+        """Error of the input that it is solved for, by an error of the output."""
+        return self.passed(error) + self.rounding(size, u)[1]
+
+    def led(self, error: float, drive: float, u: float, same: bool, turning: bool) -> float:  # noqa: ARG002
+        """The same in front of the plays."""
+        return self.solved(error, drive, u, same)
+
+    def seen(self) -> float:
+        """Factor by which states that see its input multiply an error of that."""
+        return self.passed(0.0, 1.0)
+
+    @property
+    def misses(self) -> bool:
+        """Whether what arrives may differ from what it was solved for."""
+        return True
 
     @property
     def ringing(self) -> Array:
@@ -392,8 +414,10 @@ def arithmetic(
         calls = [_one(made, block, verb, j) for j, block in enumerate(blocks)]
         return functools.reduce(_both, calls[::-1] if verb in ("solve", "resting") else calls)
 
-    verbs = {verb: through(verb) for verb in VERBS} if blocks else {}
-    return Arithmetic(Verbs(memory, **verbs), lambda t: constants(t, effects), *tables)
+    verbs = Verbs(memory)
+    if blocks:
+        verbs = Verbs(memory, through("rest"), through("absorb"), through("resting"), through("solve"))
+    return Arithmetic(verbs, lambda t: constants(t, effects), *tables)
 
 
 def _both(first: Function, behind: Function) -> Function:

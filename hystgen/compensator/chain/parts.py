@@ -57,7 +57,7 @@ class Parts:
         return self.blocks["own_behind"]
 
     @property
-    def count(self) -> Counts:
+    def counts(self) -> Counts:
         """As in `ChainTables`."""
         found = [len(self.blocks[part.name]) for part in PARTS]
         most = [1 if part.joined else len(self.blocks[part.name]) for part in PARTS]

@@ -6,7 +6,6 @@ and time-invariant, so that their order makes no difference.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -54,7 +53,7 @@ def _then(first: Function, k: int, verb: Function) -> Function:
 
     @jit(inline=True)
     def through(t: ChainTables, s: Any, x: Any) -> Any:
-        return each(t.blocks[k], s.blocks[k], s.count[k], first(t, s, x))
+        return each(t.blocks[k], s.blocks[k], s.counts[k], first(t, s, x))
 
     return through
 
@@ -70,7 +69,7 @@ def _back(first: Function, k: int, verb: Function) -> Function:
 
     @jit(inline=True)
     def through(t: ChainTables, s: Any, x: Any) -> Any:
-        return each(t.blocks[k], s.blocks[k], s.count[k], first(t, s, x))
+        return each(t.blocks[k], s.blocks[k], s.counts[k], first(t, s, x))
 
     return through
 
@@ -88,7 +87,9 @@ def sides_of(every: Sequence[Verbs]) -> Sides:
         back = verb in ("resting", "solve")
         places = [PARTS.index(part) for part in (reversed(side) if back else side)]
         found = [(k, function) for k in places if (function := every[k].verb(verb))]
-        made = functools.reduce(lambda first, one: (_back if back else _then)(first, *one), found, _nothing)
+        made: Function = _nothing
+        for k, function in found:
+            made = (_back if back else _then)(made, k, function)
 
         @jit
         def call(t: ChainTables, s: Any, x: Any) -> Any:
@@ -105,8 +106,10 @@ def sides_of(every: Sequence[Verbs]) -> Sides:
 
 def _all(every: Sequence[Verbs], verb: str, and_then: Function, nothing: Function) -> Function:
     """A verb by all blocks that have it, from `nothing` on by one part after the other."""
-    found = [(k, function) for k, verbs in enumerate(every) if (function := getattr(verbs, verb))]
-    return functools.reduce(lambda first, one: and_then(first, *one), found, nothing)
+    for k, verbs in enumerate(every):
+        if function := getattr(verbs, verb):
+            nothing = and_then(nothing, k, function)
+    return nothing
 
 
 def told(every: Sequence[Verbs], verb: str) -> Function:
@@ -116,7 +119,7 @@ def told(every: Sequence[Verbs], verb: str) -> Function:
         @jit(inline=True)
         def both(t: ChainTables, s: Any, x: Any) -> bool:
             limited = first(t, s, x)
-            for j in range(s.count[k]):
+            for j in range(s.counts[k]):
                 limited = function(t.blocks[k], s.blocks[k], j, x) or limited
             return bool(limited)
 
@@ -136,7 +139,7 @@ def resetting(every: Sequence[Verbs]) -> Function:
         @jit(inline=True)
         def both(t: ChainTables, s: Any) -> None:
             first(t, s)
-            for j in range(s.count[k]):
+            for j in range(s.counts[k]):
                 function(t.blocks[k], s.blocks[k], j)
 
         return both
@@ -155,7 +158,7 @@ def moves(every: Sequence[Verbs]) -> Function:
         @jit(inline=True)
         def both(t: ChainTables, s: Any, before: Any, v: Any) -> None:
             first(t, s, before, v)
-            for j in range(s.count[k]):
+            for j in range(s.counts[k]):
                 function(t.blocks[k], s.blocks[k], j, before, v)
 
         return both

@@ -157,8 +157,9 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:
 
 # ---------------------------------------------------------------- chain_braked.c
 
-assert PARTS[LED].fixed.verbs.led
-led_braked = PARTS[LED].fixed.verbs.led.braked
+led = PARTS[LED].fixed.verbs.led
+assert led
+led_braked = led.braked
 
 
 @jit

@@ -55,8 +55,9 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:  # noqa: ARG001  as in fi
 
 # ---------------------------------------------------------------- chain_braked.c
 
-assert PARTS[LED].floating.verbs.led
-led_braked, HALVES = PARTS[LED].floating.verbs.led[-2:]
+led = PARTS[LED].floating.verbs.led
+assert led
+led_braked, HALVES = led.braked, led.halves
 
 
 @jit

@@ -14,7 +14,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Floating, Margin, One, Verbs
+from hystgen.effects.part import Arithmetic, Floating, Gained, Margin, One, Speed, Verbs
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -108,6 +108,11 @@ class Aged(One):
     """The block of an effect."""
 
     effect: Ageing
+
+    def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
+        """It as a gain; the C takes the gain at the travel one sample before, from a table."""
+        late = most_at_once(self.effect, speed.step) + TABLE_ERROR if emitted else 0.0
+        return Gained(1.0, LEAST_GAIN, LARGEST_GAIN, TABLE_ERROR * output * emitted, late * output)
 
     def grown(self, size: float, margin: Margin) -> float:
         """Largest output for inputs within a size."""

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
-from hystgen.effects.part import Arithmetic, Function, Surroundings, Verbs
+from hystgen.effects.part import Arithmetic, Function, One, Surroundings, Verbs
 from hystgen.plays.slots import Counts, Reals
 
 MOST_SAMPLES = 2**15
@@ -33,6 +34,17 @@ class Waiting(NamedTuple):
 
     sample: Reals
     oldest: Counts
+
+
+@dataclass(frozen=True)
+class Wait(One):
+    """A delay, in s."""
+
+    time: float
+
+    def rounding(self, size: float, u: float) -> tuple[float, float]:
+        """Roundings of the drive that leaves it."""
+        return 4.0 * u * size, 0.0
 
 
 def numbers(seconds: float, step: float) -> tuple[float, int]:
@@ -104,9 +116,9 @@ def verbs(delayed: Function) -> Verbs:
     return Verbs(memory, rest, absorb)
 
 
-def tables(seconds: Sequence[float], about: Surroundings, share: Callable[[float], Any]) -> DelayTables:
+def tables(waits: Sequence[Wait], about: Surroundings, share: Callable[[float], Any]) -> DelayTables:
     """The tables of all delays of a model, which follow one another; `share`: that of an arithmetic."""
-    waited, waiting = numbers(math.fsum(seconds), about.seconds)
+    waited, waiting = numbers(math.fsum(one.time for one in waits), about.seconds)
     return DelayTables(share(waited) if waiting else share(0.0)[:0], waiting)
 
 

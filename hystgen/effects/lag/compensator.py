@@ -50,6 +50,30 @@ class LagNumbers(One):
         """The same, for results on the way."""
         return 2.0 / self.row[LATE if self.exact else RATE]
 
+    @property
+    def misses(self) -> bool:
+        """Whether what arrives differs from what it was solved for."""
+        return not self.exact
+
+    def rounding(self, size: float, u: float) -> tuple[float, float]:
+        """Roundings of the output for inputs within `size`; those of the inverse are in `led`."""
+        return u * size * (8.0 + u / self.row[RATE]), 0.0
+
+    def led(self, error: float, drive: float, u: float, same: bool, turning: bool) -> float:
+        """The error of the input for an error of the output asked for.
+
+        States that have seen the same drives pass on `goal/rate`, and the target before, which follows from earlier
+        targets, `W = theta^2 e + theta (1 - theta) W`.
+        """
+        rate, theta, late, _ = self.row
+        if self.exact:
+            return ((2.0 - rate) * error + 8.0 * u * drive) / (late - theta)
+        states = u * drive * (5.0 + u / rate)
+        farthest = (1.0 + 2.0 * theta) / (1.0 - theta)
+        before = shifted(theta, turning) if same else farthest
+        goal = before * error + farthest * states + 6.0 * u * drive
+        return (goal + states) * (1.0 if same else 2.0 - rate) / rate + u * drive * (2.0 + 6.0 / rate)
+
     def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
         """What it makes of frequencies, behind other blocks."""
         rate, second, late, _ = self.row

@@ -56,6 +56,19 @@ class ModeNumbers(One):
     turned: float
     slowed: float
 
+    @property
+    def growth(self) -> float:
+        """Largest output for inputs within 1."""
+        return self.largest
+
+    def rounding(self, size: float, u: float) -> tuple[float, float]:
+        """Roundings of the output, in floating point with roundings `u`, for inputs up to `size`."""
+        keep, turn, swing, lead, push = map(abs, self.table)
+        off, rate = (1.0 + self.largest) * size, self.fastest * size
+        steps = keep * off + turn * rate + 2.0 * lead * size, swing * rate + turn * off + 2.0 * push * size
+        lost = [u * (state + 5.0 * step) for state, step in zip((off, rate), steps, strict=True)]
+        return lost[0] * self.off_after + lost[1] * self.rate_after + u * self.largest * size, 0.0
+
     def grown(self, size: float, margin: Margin) -> float:
         """Largest output for inputs within a size."""
         return size * self.largest * margin.slack + 1.0
@@ -86,15 +99,6 @@ def numbers(effect: Resonance, seconds: float) -> ModeNumbers:
     fastest = abs(push) + total(np.diff(rate)) + 2.0 * size * tail
     table = (c - 1.0 + zeta * s, s, c - 1.0 - zeta * s, lead, push)
     return ModeNumbers(table, largest, fastest, total(keeping), total(turning), total(turning), total(rates))
-
-
-def rounding(one: ModeNumbers, size: float, u: float) -> float:
-    """Roundings of the output, in floating point with roundings `u`, for inputs up to `size`."""
-    keep, turn, swing, lead, push = map(abs, one.table)
-    off, rate = (1.0 + one.largest) * size, one.fastest * size
-    steps = keep * off + turn * rate + 2.0 * lead * size, swing * rate + turn * off + 2.0 * push * size
-    lost = [u * (state + 5.0 * step) for state, step in zip((off, rate), steps, strict=True)]
-    return lost[0] * one.off_after + lost[1] * one.rate_after + u * one.largest * size
 
 
 # ---------------------------------------------------------------- mode.c

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Floating, Margin, One, Verbs
+from hystgen.effects.part import Arithmetic, Floating, Gained, Margin, One, Speed, Verbs
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -51,6 +51,17 @@ class Warm(One):
     """The block of an effect."""
 
     effect: LoggedThermal | OwnHeat
+
+    def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
+        """It as a gain; the C leaves out the heat of one sample."""
+        effect = self.effect
+        if isinstance(effect, LoggedThermal):
+            return Gained(1.0, LEAST_GAIN, LARGEST_GAIN, 0.0, 0.0)
+        degree = abs(effect.gain_per_degree) * output + abs(effect.offset_per_degree)
+        _, least, largest = reached(effect, *speed)
+        warmed = most_at_once(effect, *speed) * degree if emitted else 0.0
+        wrong = misjudged(effect, speed, u, emitted) * degree
+        return Gained(9.0, least, largest, wrong, warmed + wrong)  # the temperature has roundings too
 
     def farthest(self, ends: tuple[float, float], span: float, seconds: float) -> float:
         """Largest move of a drive within `ends` that may be repeated in every step, where the output spans `span`."""
@@ -264,6 +275,18 @@ def coarseness(effect: OwnHeat, ends: tuple[float, float], move: float, seconds:
     cell = top / FRICTION_PLAYS
     begun = 0.25 * cell * top * top * (1.0 + 2.0 / (3.0 * FRICTION_PLAYS)) * lost(effect, seconds)
     return effect.heating * (0.0873 * cell * cell * move + begun) / seconds
+
+
+def misjudged(effect: OwnHeat, speed: Speed, u: float, emitted: bool) -> float:
+    """How wrong the plays that rub are about the rise, degrees; `emitted`: as of all plays that rub."""
+    rubbing = thresholds(effect, speed.ends)
+    if not rubbing:
+        return 0.0
+    # each play stands by a rounding off, and one that stays because another one does by three
+    amount = len(rubbing) ** 2 * 4.0 * u * (max(map(abs, speed.ends)) + rubbing[-1])
+    amount += (len(rubbing) + 3.0) * u * most_amount(effect, speed.ends, speed.step)
+    found = amount * per_amount(effect, speed.ends, speed.seconds)
+    return found + coarseness(effect, *speed) if emitted else found
 
 
 def heat_numbers(effect: OwnHeat, ends: tuple[float, float], span: float, seconds: float) -> tuple[float, ...]:
