@@ -39,7 +39,7 @@ class Formats(Coded):
     answer: float
 
     @property
-    def one(self) -> Linear:  # type: ignore[override]
+    def one(self) -> Linear:
         """The block in double precision."""
         return self.linear
 

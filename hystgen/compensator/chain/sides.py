@@ -116,7 +116,7 @@ def told(every: Sequence[Verbs], verb: str) -> Function:
     """A verb with a number from the caller; whether any block had to limit it."""
 
     def and_then(first: Function, k: int, function: Function) -> Function:
-        @jit(inline=True)
+        @jit
         def both(t: ChainTables, s: Any, x: Any) -> bool:
             limited = first(t, s, x)
             for j in range(s.counts[k]):
@@ -136,7 +136,7 @@ def resetting(every: Sequence[Verbs]) -> Function:
     """All blocks as in the parameter file."""
 
     def and_then(first: Function, k: int, function: Function) -> Function:
-        @jit(inline=True)
+        @jit
         def both(t: ChainTables, s: Any) -> None:
             first(t, s)
             for j in range(s.counts[k]):
@@ -155,7 +155,7 @@ def moves(every: Sequence[Verbs]) -> Function:
     """All blocks that see how the drive moves, as it does."""
 
     def and_then(first: Function, k: int, function: Function) -> Function:
-        @jit(inline=True)
+        @jit
         def both(t: ChainTables, s: Any, before: Any, v: Any) -> None:
             first(t, s, before, v)
             for j in range(s.counts[k]):

@@ -76,7 +76,7 @@ def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
 def verbs(memory: Function, start: Function, tick: Function, drift: Function, one: int, most: int) -> Verbs:
     """What a clock does, by its functions in an arithmetic and the places of 1 and of the farthest lead in tables."""
 
-    @jit(inline=True)
+    @jit
     def added(t: Reals, s: Reals, j: int) -> Any:
         """The drift now."""
         return drift(t, s, j, zero(t[j, one]))
@@ -89,7 +89,7 @@ def verbs(memory: Function, start: Function, tick: Function, drift: Function, on
             following = following + s[j, LEAD]
         s[j, LEAD] = t[j, most] if following > t[j, most] else following
 
-    @jit(inline=True)
+    @jit
     def ahead(t: Reals, s: Reals, j: int, filled: int, moving: int) -> Any:
         """The drift by the time of the newest reference."""
         late = s[j, LEAD] if filled else zero(t[j, one])
