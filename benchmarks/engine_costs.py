@@ -91,7 +91,7 @@ def means(folder: Path, n: int, kind: str, arithmetic: str, engine: str) -> dict
 
 def _program(files: sources.Sources, folder: Path, core: str, compiler: str) -> Path:
     entry = f"hystgen_harness_{files.operators[0]}"
-    return cross.find(targets.find(core), compiler).image(files, folder, compilers.STRICT, cross.Layout(), entry)
+    return cross.find(targets.find(core), compiler).image(files, folder, compilers.STRICT, cross.MemoryMap(), entry)
 
 
 def code(folder: Path, kind: str, operator: str, arithmetic: str, engine: str) -> dict[str, int]:
@@ -100,7 +100,7 @@ def code(folder: Path, kind: str, operator: str, arithmetic: str, engine: str) -
     assert engines.kind(one.cascade, arithmetic) == kind
     options = emit_options(one, operator, arithmetic, engine)
     files = sources.write(folder, one, options)
-    constants = module.cost_of(one.parameters, one.cascade, options).memory.tables
+    constants = module.of(one.parameters, one.cascade, options).cost.memory.tables
     found = {}
     for core in engines.CORES:
         built = [_program(files, folder / f"{core}-{compiler}", core, compiler) for compiler in ("zig", "gcc")]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import arguments, display, drawing
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError, counted
 from hystgen.cascade import PI, Cascade
@@ -175,7 +175,7 @@ class Model:
             "limit it by averages of the reference with emit.compensation.noise_gain: 10, or allow it with "
             f"noise_gain: {math.ceil(gain)}"
         )
-        if ARITHMETICS[arithmetic].fixed:
+        if arithmetic in FIXED:
             compiled = chain_tables.build(self.chain, arithmetic, seconds, how, self._lsb)
             low, high = (int(end) for end in compiled.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
             if gain > MOST_A_CODE * (high - low):

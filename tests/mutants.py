@@ -23,7 +23,7 @@ CURVE = "c_runtime/front/curve.c"
 CHAIN = "c_runtime/compensator/chain/corners_fixed.c"
 CHAIN_FINER = "c_runtime/compensator/chain/refined_input.c"
 CHAIN_FLOAT = "c_runtime/compensator/chain/corners_float.c"
-TURN = "c_runtime/compensator/chain/branches.c"
+TURN = "c_runtime/compensator/drive.c"
 LAG = "hystgen/effects/lag/steady.c"
 
 ROUND = """
@@ -212,7 +212,7 @@ KILLED = (
     ),
     Mutant(
         "what is pending stays out of the memory", "c_runtime/compensator/chain/chain.c",
-        "hystgen_inverse_absorb(self, self->pending);", "self->drive = self->pending;", "plain", "float32", "loop",
+        "hystgen_operator_absorb(self, self->pending);", "self->drive = self->pending;", "plain", "float32", "loop",
     ),
     Mutant(
         "the limit of a reference counts as the reference", ALONE, "self->reference = u;",
@@ -258,13 +258,12 @@ KILLED = (
     ),
     Mutant(
         "with effects, plays go on from a kink that was not sought", CHAIN,
-        "if (!self->sought || !hystgen_inverse_moved(self, w)) {", "if (!hystgen_inverse_moved(self, w)) {",
+        "if (!self->sought || !hystgen_operator_moved(self, w)) {", "if (!hystgen_operator_moved(self, w)) {",
         "led", "q31",
     ),
     Mutant(
         "with effects, a kink counts as sought for good", CHAIN,
-        "    self->sought = false;\n    self->level = hystgen_inverse_started(self);",
-        "    self->level = hystgen_inverse_started(self);",
+        "    self->sought = false;\n#endif\n    self->level", "#endif\n    self->level",
         "led", "q31",
     ),
     Mutant(
@@ -319,13 +318,13 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
      "low = middle;", "high = middle;", "braked", "q31"),
     ("a limited offset is not told", "compensator/chain/settings.c",
      "= -HYSTGEN_FARTHEST_OFFSET;\n        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;\n",
-     "= -HYSTGEN_FARTHEST_OFFSET;\n", "creeping", "float32", 2),
+     "= -HYSTGEN_FARTHEST_OFFSET;\n", "creeping", "float32"),
     ("a settled actuator keeps moving", "compensator/chain/settings.c",
-     "    self->moving = false;\n", "", "creeping", "q31", 2),
+     "    self->moving = false;\n", "", "creeping", "q31"),
     ("a reference that is no number is forgotten", "compensator/chain/chain_calls.c",
      "    hystgen_inverse_repeat(self);\n", "", "late", "float32"),
     ("a set offset leaves the clock running", "compensator/chain/settings.c",
-     "        hystgen_inverse_clock_start(self);\n", "", "drifting", "float32"),
+     "        hystgen_operator_clock_start(self);\n", "", "drifting", "float32"),
     ("a rising drive is not slewed", "effects/slew_limit/slewed.c",
      "        if (v > ramp->drive ||", "        if (v > v ||", "quick", "float32"),
     ("the clock stands", "effects/drift/clock.c", "self->low + 1", "self->low + 0", "drifting", "float32"),
@@ -418,14 +417,14 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
      "    if (self->moving) {", "    if (sizeof self->waiting > 0) {", "late", "float32"),
     ("the finer input goes the other way", "compensator/chain/refined_input.c",
      "left < 0 ? whole - more", "left > 0 ? whole - more", "led", "q31"),
-    ("a reset keeps the plays", "compensator/chain/chain_loop.c",
-     "    hystgen_loop_rest(&hystgen_model_tables, self->play, 0);\n", "", "creeping", "float32", 2),
-    ("an init keeps the settings", "compensator/chain/chain_loop.c",
-     "    hystgen_inverse_settings_init(self);\n", "", "warm", "float32"),
+    ("a reset keeps the plays", "compensator/chain/chain_start.c",
+     "    hystgen_loop_rest(&hystgen_model_tables, self->play, 0);\n", "", "creeping", "float32"),
+    ("an init keeps the settings", "compensator/chain/chain_start.c",
+     "    hystgen_operator_settings_init(self);\n", "", "warm", "float32"),
     ("a bent play is not bent anew", "compensator/chain/moving_plays.c",
      "play[i] < before || play[i] > before", "play[i] < before", "dilated", "float32"),
     ("plays stay, inverse", "compensator/chain/plays.c", "hystgen_loop_absorb(&hystgen_model_tables, self->play, w);",
-     "hystgen_loop_absorb(&hystgen_model_tables, self->play, self->play[0] + 0 * w);", "creeping", "float32", 2),
+     "hystgen_loop_absorb(&hystgen_model_tables, self->play, self->play[0] + 0 * w);", "creeping", "float32"),
     ("viscous plays are solved for as plain ones", "effects/rate_dependence/relaxing_plays.c",
      "self->moving ? hystgen_relaxing_input(self->play, hystgen_asked(h))",
      "!self->moving ? hystgen_relaxing_input(self->play, hystgen_asked(h))", "relaxing", "float32"),
@@ -445,9 +444,9 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
      "    self->has_pending = true;\n", "", "creeping", "float32"),
     ("a limited travel is not told", "effects/ageing/calls.c",
      "hystgen_ageing_set_travel(&hystgen_ageing_1, &self->ageing_1, travel)) {",
-     "hystgen_ageing_set_travel(&hystgen_ageing_1, &self->ageing_1, travel) && travel < 0) {", "worn", "float32", 2),
-    ("a drive that turns is not sought again", "compensator/chain/branches.c", "hystgen_front_inverse(w, !up",
-     "hystgen_front_inverse(w, up", "aged", "float32"),
+     "hystgen_ageing_set_travel(&hystgen_ageing_1, &self->ageing_1, travel) && travel < 0) {", "worn", "float32"),
+    ("a drive that turns is not sought again", "compensator/drive.c", "hystgen_front_inverse(w, !up, &limited",
+     "hystgen_front_inverse(w, up, &limited", "aged", "float32"),
     ("relaxing plays move back, fixed", "effects/rate_dependence/relaxing.c",
      "z + left", "z - left", "relaxing", "q31"),
     ("a delay is whole samples, fixed", "effects/delay/delay.c",

@@ -177,7 +177,7 @@ BITS = [("creeping", "float32"), ("creeping", "q31"), ("everything", "float32"),
 def test_c_gives_the_bits_of_the_reference(name: str, arithmetic: str) -> None:
     one = model({**CHAINS, **LED}[name])
     with jit.plain():
-        report = hystgen.verify(one, arithmetic, "both", engine="corners", compiler=["gcc"], length=1500)
+        report = hystgen.verify(one, arithmetic, "both", engine="corners", compiler=["gcc"], length=500)
     assert report.ok, report.table()
     assert {row.operator for row in report.rows} >= {"forward", "inverse"}
 

@@ -231,6 +231,7 @@ def test_bits_equal_where_rounding_decides_on_a_limit(ends: tuple[float, float],
     assert made == [(build, 60_000, 0) for build, _ in host.BUILDS]
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("layout", LAYOUTS[1:])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["listed", "mixed"])
@@ -607,7 +608,7 @@ def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Pa
     """Memory in the banner is counted from the declarations of `c_runtime/`; here by the compiler of this machine."""
     family = runtime.FAMILIES[arithmetic]
     variants = [
-        runtime.Variant(engine, family.fixed, fronts, branches)
+        runtime.Variant(engine, family, fronts, branches)
         for engine in ("corners", "loop")
         for fronts, branches in ((False, False), (True, False), (True, True))
     ]
@@ -617,9 +618,9 @@ def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Pa
     shared = [*runtime.memory_pieces(family), *runtime.table_pieces(family)]
     for number, variant in enumerate(variants):
         operators = ["forward", "inverse"]
-        functions = runtime.operator_pieces(variant, family, operators, "")
-        pieces = [*shared, *runtime.state_pieces(variant, operators, functions)]
-        sizes = cost.declared(pieces, ARITHMETICS[arithmetic], cost.Layout(4, 8, packed=False), lengths)
+        functions = runtime.operator_pieces(variant, operators, "")
+        pieces = [*shared, *runtime.state_pieces(variant, family, operators, functions)]
+        sizes = cost.sizes(pieces, family, cost.Layout(4, 8, packed=False), lengths)
         types = [each.name for each in pieces if "typedef struct" in each.code]
         assert {"hystgen_corner_t", "hystgen_inverse_t", "hystgen_forward_t"} <= set(types)
         lines = ["#include <stdbool.h>", "#include <stdint.h>", "#include <stdio.h>"]
@@ -706,7 +707,8 @@ def test_same_bytes_from_any_directory(tmp_path: Path, monkeypatch: pytest.Monke
     assert [p.split(" ")[1] for p in hystgen.differences("p.yaml", "b")] == ["is", "has"]
 
 
-@pytest.mark.thorough(but_one_in=3)
+@pytest.mark.slow(one_in=2)
+@pytest.mark.thorough(but_one_in=6)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64"])
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("name", FILES)

@@ -289,13 +289,14 @@ def test_neither_facts_nor_the_default_model_are_emitted(name: str, arithmetic: 
 
 
 def test_functions_of_engine_loop_have_one_name_in_c_and_python() -> None:
-    """What both operators do alike has their prefixes in C alone; Python has no status function, a run reads it."""
+    """What both operators do alike has a prefix in C alone; Python has no status function, a run reads it."""
     modules = (loop, fixed, step, step_float, step_fixed, chain_step, chain_step_float, chain_step_fixed)
     trees = (ast.parse(Path(module.__file__).read_text(encoding="utf-8")) for module in modules)
     own = {node.name for tree in trees for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)}
-    steps = (RUNTIME / "compensator" / "chain").glob("chain*.c")
+    steps = [RUNTIME / "compensator" / "drive.c", *(RUNTIME / "compensator" / "chain").glob("chain*.c")]
     texts = [path.read_text() for path in (*RUNTIME.rglob("loop*.c"), *steps)]
-    names = {piece.name.removeprefix("hystgen_") for text in texts for piece in runtime.split_pieces(text)}
+    written = {piece.name.removeprefix("hystgen_") for text in texts for piece in runtime.split_pieces(text)}
+    names = {re.sub("^operator_", f"{op}_", name) for name in written for op in runtime.OPERATORS}
     assert len(names) > 20
     start = {"loop_init"}  # of two files, one of which is chosen where Python asks how long the list is
     parts = {"played", "passed_on", "next", "limited", "wanted"}  # of a step: lines in Python, apart in C for its stack

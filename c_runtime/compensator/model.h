@@ -1,6 +1,10 @@
 /* What emission writes for each model, in front of the operators: constants, tables and, for a
    memoryless part in floating point, functions. Here is that of a small model, so that a file
-   compiles as it is opened in an editor. With HYSTGEN_CONFIGURED a real model comes instead. */
+   compiles as it is opened in an editor. With HYSTGEN_CONFIGURED a real model comes instead.
+
+   A function whose name begins with hystgen_operator_ is the same in the forward and in the inverse
+   operator: emission writes it for each of them. Here the operator is the inverse, or the forward
+   one with HYSTGEN_FORWARD. */
 #ifndef HYSTGEN_MODEL_H
 #define HYSTGEN_MODEL_H
 #if !defined(HYSTGEN_CONFIGURED) && !defined(HYSTGEN_HAS_CORNERS) && !defined(HYSTGEN_CHAIN)
@@ -8,6 +12,9 @@
 #endif
 #include "hystgen_runtime.h"
 #ifndef HYSTGEN_CONFIGURED
+#ifndef HYSTGEN_FORWARD
+#define HYSTGEN_INVERSE
+#endif
 
 #define HYSTGEN_N_PLAYS 6
 #define HYSTGEN_CORNERS 7
@@ -17,14 +24,10 @@
 #define HYSTGEN_STATUS_DOMAIN 8u
 #define HYSTGEN_STATUS_SLEW_LIMITED 16u
 #define HYSTGEN_STATUS_LIMITED_SETTING 32u
-#define HYSTGEN_FORWARD_INIT_DRIVE 0
-#define HYSTGEN_FORWARD_INIT_ASCENDING false
-#define HYSTGEN_FORWARD_RESET_DRIVE 0
-#define HYSTGEN_FORWARD_RESET_ASCENDING false
-#define HYSTGEN_INVERSE_INIT_DRIVE 0
-#define HYSTGEN_INVERSE_INIT_ASCENDING true
-#define HYSTGEN_INVERSE_RESET_DRIVE 0
-#define HYSTGEN_INVERSE_RESET_ASCENDING true
+#define HYSTGEN_OPERATOR_INIT_DRIVE 0
+#define HYSTGEN_OPERATOR_INIT_ASCENDING true
+#define HYSTGEN_OPERATOR_RESET_DRIVE 0
+#define HYSTGEN_OPERATOR_RESET_ASCENDING true
 #define HYSTGEN_OFFSET 0
 #define HYSTGEN_START 0
 extern const hystgen_tables_t hystgen_model_tables;
@@ -51,10 +54,8 @@ extern const hystgen_play_t hystgen_model_zero[HYSTGEN_N_PLAYS + 1];
 #define HYSTGEN_OUTPUT_MIN (-10.0f)
 #define HYSTGEN_OUTPUT_MAX 10.0f
 #define HYSTGEN_HOLD 0.001f
-extern const hystgen_curve_t hystgen_forward_curve;
-extern const hystgen_curve_t hystgen_inverse_curve;
-extern const hystgen_start_t hystgen_forward_start[2];
-extern const hystgen_start_t hystgen_inverse_start[2];
+extern const hystgen_curve_t hystgen_operator_curve;
+extern const hystgen_start_t hystgen_operator_start[2];
 #endif
 
 #ifdef HYSTGEN_HAS_FRONT
@@ -91,22 +92,18 @@ hystgen_real_t hystgen_front_forward(hystgen_real_t v, bool ascending);
 hystgen_real_t hystgen_front_inverse(hystgen_real_t w, bool ascending, bool *limited);
 #endif
 #ifdef HYSTGEN_HAS_CORNERS
-extern const hystgen_drive_t hystgen_forward_drive[2];
-extern const hystgen_drive_t hystgen_inverse_drive[2];
+extern const hystgen_drive_t hystgen_operator_first_drive[2];
 #endif
 #endif
 
 #ifdef HYSTGEN_CHAIN
 #include "compensator/chain/model.h"
 #else
-#if defined(HYSTGEN_FIXED) && defined(HYSTGEN_HAS_FRONT)
-#include "compensator/corners/state_front_fixed.h"
-#elif defined(HYSTGEN_FIXED)
-#include "compensator/corners/state_fixed.h"
-#elif defined(HYSTGEN_HAS_FRONT)
-#include "compensator/corners/state_front.h"
-#else
 #include "compensator/corners/state.h"
+#ifdef HYSTGEN_FORWARD
+typedef hystgen_forward_t hystgen_operator_t;
+#else
+typedef hystgen_inverse_t hystgen_operator_t;
 #endif
 #include "compensator/api.h"
 #endif

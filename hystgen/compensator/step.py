@@ -1,9 +1,10 @@
 """One step, and the operations around it: commit, reset, init. `operations_of` has what every chain shares, `made_of`
 the chain without blocks, engine loop of a model without effects; `hystgen.compensator.chain` has those with blocks.
 
-Every function has a counterpart of the same name in `c_runtime/`. Functions that both operators share exist twice in C
-(`forward_begin`, `inverse_begin`) and once here (`begin`). Engine corners without effects has its own functions in
-`hystgen.compensator.corners` and shares the memoryless part and the tables.
+Every function has a counterpart of the same name in `c_runtime/`. Functions that both operators share begin with
+`operator_` there (`hystgen_operator_begin`; emission writes one for each) and have no prefix here (`begin`). Engine
+corners without effects has its own functions in `hystgen.compensator.corners` and shares the memoryless part and the
+tables.
 """
 
 from __future__ import annotations
@@ -127,14 +128,19 @@ def plays_of(
         begin(t, s, 2 * inverse + 1)
 
     @jit(inline=True)
-    def arrive(t: Tables | FixedTables, s: State, v: Any) -> Any:
-        """The actuator is at drive v; its move picks the branch. Returns the input of the plays."""
+    def set_drive(t: Tables | FixedTables, s: State, v: Any) -> None:
+        """The actuator is at drive v; of two branches, its move picks one."""
         if t.branches:
             if v > s.real[DRIVE]:
                 s.counts[ASCENDING] = 1
             elif v < s.real[DRIVE]:
                 s.counts[ASCENDING] = 0
         s.real[DRIVE] = v
+
+    @jit(inline=True)
+    def arrive(t: Tables | FixedTables, s: State, v: Any) -> Any:
+        """The actuator is at drive v. Returns the input of the plays."""
+        set_drive(t, s, v)
         return front_forward(t, v, s.counts[ASCENDING])
 
     @jit

@@ -8,14 +8,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import arguments, writing
 from hystgen.basics.problems import FormatError, NotInvertibleError
 from hystgen.basics.problems import Path as Key
 from hystgen.compensator import engines
-from hystgen.compensator.chain.bounds import swing
-from hystgen.compensator.chain.parts import Parts
-from hystgen.emission import module, worth
+from hystgen.emission import module
 from hystgen.emission.options import LAYOUTS, OPERATORS, Options
 from hystgen.model import Model, ModelSource, as_model, check_arithmetic
 from hystgen.parameters.files import parameters_sha256
@@ -55,6 +53,8 @@ def emit_options(
     arguments.choice("layout", layout, LAYOUTS)
     left_out: tuple[str, ...] = ()
     if allow_partial and (refused := model.refusals(operator, arithmetic)):
+        from hystgen.emission import worth
+
         left_out = tuple(worth.sentence(model, effect, reason) for effect, reason in refused)
         model = model.without([effect for effect, _ in refused])
     _check_codes(model, arithmetic, operator)
@@ -66,14 +66,15 @@ def emit_options(
 
 def _check_codes(model: Model, arithmetic: str, operator: str) -> None:
     """Raise FormatError for sizes of codes in floating point, where only a quiet drive has one, its converter's."""
-    if ARITHMETICS[arithmetic].fixed:
-        return
     emit = model.parameters.emit
-    quiet = emit.compensation.quiet and model.effects and operator != "forward"
-    given = {"drive_lsb": None if quiet else emit.drive_lsb, "output_lsb": emit.output_lsb}
-    fixed = " or ".join(each.name for each in ARITHMETICS.values() if each.fixed)
+    quiet = emit.compensation.quiet and bool(model.effects) and operator != "forward"
+    fixed = " or ".join(FIXED)
     words = f"is the size of a code, and {arithmetic} has no codes; remove it, or emit with --arithmetic {fixed}"
-    problems: list[tuple[Key, str]] = [(("emit", key), words) for key, value in given.items() if value is not None]
+    problems: list[tuple[Key, str]] = [
+        (("emit", key), words)
+        for key in ARITHMETICS[arithmetic].unused
+        if getattr(emit, key) is not None and not (quiet and key == "drive_lsb")
+    ]
     if problems:
         raise FormatError(*problems)
 
@@ -97,10 +98,10 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
     for model in models:
         chosen = emit_options(model, **options)
         kept = emitted_model(model, chosen)
-        texts, found = module.emitted(kept.parameters, model.cascade, chosen, parameters_sha256(model.parameters))
-        for doubt in (*doubts(model), *found):
+        whole = module.of(kept.parameters, model.cascade, chosen, parameters_sha256(model.parameters))
+        for doubt in (*doubts(model), *whole.doubts):
             warnings.warn(f"{model.name}: {doubt}", stacklevel=3)
-        made |= texts
+        made |= module.files(whole)
     return made
 
 
@@ -119,14 +120,22 @@ def doubts(model: Model) -> list[str]:
             "the sensor was diagnosed as curved, and the records could not tell that from an asymmetry of the stage; "
             f"if it is the stage's, the inverse leaves it as it is. {advice}, and diagnose again"
         )
-    seconds = model.parameters.sample_time
-    if seconds and (reach := swing(model.cascade, Parts.of(model.effects), seconds)):
+    if model.effects and (reach := _swing(model)):
         found.append(
             "an effect of your own leads the drive in front of two branches of the memoryless part, between which it "
             f"may then go to and fro at rest, by up to {reach:.3g} {model.parameters.units.input}".rstrip()
             + "; make the effect a lag, or give both branches the same numbers"
         )
     return found
+
+
+def _swing(model: Model) -> float:
+    """How far the drive of a model with effects may go to and fro at rest, in drive units."""
+    from hystgen.compensator.chain.bounds import swing
+    from hystgen.compensator.chain.parts import Parts
+
+    seconds = model.parameters.sample_time
+    return swing(model.cascade, Parts.of(model.effects), seconds) if seconds else 0.0
 
 
 def check_names(models: Sequence[Model]) -> None:

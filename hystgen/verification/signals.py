@@ -58,7 +58,7 @@ def _onto_the_plays(
 def _coincidences(
     tables: Tables | FixedTables, inverse: bool, low: float, high: float, length: int,
     rng: np.random.Generator,
-) -> tuple[Bytes, NDArray[np.float64]]:  # fmt: skip
+) -> tuple[Bytes, NDArray[np.float64]]:
     """Turns right where plays start to follow, from other such turns and from the ends of the range.
 
     With round thresholds several corners end at the same drive, exactly or to within a last bit: no search may depend
@@ -100,7 +100,7 @@ def _bends(tables: Tables | FixedTables) -> NDArray[np.float64]:
 def _onto_the_bends(
     bends: NDArray[np.float64], least: Any, tables: Tables | FixedTables, inverse: bool, length: int,
     rng: np.random.Generator,
-) -> NDArray[np.float64]:  # fmt: skip
+) -> NDArray[np.float64]:
     """Drives at bends of the memoryless part, or references that lead there, give or take last bits.
 
     A piece between two bends can be as short as one code.

@@ -3,41 +3,31 @@
 #ifndef HYSTGEN_CHAIN_API_H
 #define HYSTGEN_CHAIN_API_H
 
-/* Everything comes to rest at drive v; the next step finds it moving from there. */
-void hystgen_forward_settle(hystgen_forward_t *self, hystgen_real_t v);
-/* An offset of the displacement, from the next step on. */
-void hystgen_forward_set_offset(hystgen_forward_t *self, hystgen_real_t d);
-/* The temperature, degC, from the next step on. */
-void hystgen_forward_set_temperature(hystgen_forward_t *self, hystgen_real_t temperature);
-/* A gain in place of the one by travel, from the next step on, until a travel is set. */
-void hystgen_forward_set_gain(hystgen_forward_t *self, hystgen_real_t gain);
-/* Distance that the drive has travelled: store it where it survives a power cycle, and set it again
-   after init. */
-hystgen_travel_t hystgen_forward_travel(const hystgen_forward_t *self);
-/* The distance travelled so far, and the gain that belongs to it. */
-void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_travel_t travel);
-
+#ifdef HYSTGEN_INVERSE
 /* The next reference of the preview, without an answer; HYSTGEN_PREVIEW times before the first one.
  */
 void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u);
+#endif
 /* Everything comes to rest at drive v; the next step finds it moving from there. */
-void hystgen_inverse_settle(hystgen_inverse_t *self, hystgen_real_t v);
+void hystgen_operator_settle(hystgen_operator_t *self, hystgen_real_t v);
 /* An offset of the displacement, from the next step on. */
-void hystgen_inverse_set_offset(hystgen_inverse_t *self, hystgen_real_t d);
+void hystgen_operator_set_offset(hystgen_operator_t *self, hystgen_real_t d);
 /* The temperature, degC, from the next step on. */
-void hystgen_inverse_set_temperature(hystgen_inverse_t *self, hystgen_real_t temperature);
+void hystgen_operator_set_temperature(hystgen_operator_t *self, hystgen_real_t temperature);
 /* A gain in place of the one by travel, from the next step on, until a travel is set. */
-void hystgen_inverse_set_gain(hystgen_inverse_t *self, hystgen_real_t gain);
+void hystgen_operator_set_gain(hystgen_operator_t *self, hystgen_real_t gain);
 /* Distance that the drive has travelled: store it where it survives a power cycle, and set it again
    after init. */
-hystgen_travel_t hystgen_inverse_travel(const hystgen_inverse_t *self);
+hystgen_travel_t hystgen_operator_travel(const hystgen_operator_t *self);
 /* The distance travelled so far, and the gain that belongs to it. */
-void hystgen_inverse_set_travel(hystgen_inverse_t *self, hystgen_travel_t travel);
+void hystgen_operator_set_travel(hystgen_operator_t *self, hystgen_travel_t travel);
+#ifdef HYSTGEN_INVERSE
 /* The displacement that the model expects from the last applied drive. */
 hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self);
 /* Trim the offset by this share, 0 to 1, of what a sensor measures beyond the expected
  * displacement. */
 void hystgen_inverse_correct(hystgen_inverse_t *self, hystgen_real_t measured,
                              hystgen_real_t share);
+#endif
 
 #endif

@@ -27,7 +27,7 @@
 #include "effects/slew_limit/slewed.c"
 #include "compensator/chain/signals.c"
 #ifndef HYSTGEN_CONFIGURED
-#include "compensator/loop_plain.c"
+#include "compensator/drive.c"
 #ifndef HYSTGEN_HAS_CORNERS
 #include "compensator/chain/plays.c"
 #elif defined(HYSTGEN_FIXED)
@@ -38,66 +38,45 @@
 #endif
 
 /* Drive v has passed through the drive side and moved the plays. */
-static inline void hystgen_forward_played(hystgen_forward_t *self, hystgen_real_t v) {
+static inline void hystgen_operator_played(hystgen_operator_t *self, hystgen_real_t v) {
+#ifdef HYSTGEN_FORWARD
     const hystgen_reach_t late = hystgen_forward_waited(self, v);
     const hystgen_reach_t reached = hystgen_forward_slewed(self, late);
     if (reached < late || reached > late) {
         self->status |= HYSTGEN_STATUS_SLEW_LIMITED;
     }
     const hystgen_signal_t x = hystgen_entered_drive(reached);
-    const hystgen_signal_t a = self->moving ? hystgen_forward_drive_side_absorb(self, x)
-                                            : hystgen_forward_drive_side_rest(self, x);
-    hystgen_forward_follow(self, hystgen_forward_arrive(self, hystgen_arriving(a)));
-}
-
-/* The plays have moved: their sum passes through the output side. */
-HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_forward_passed_on(hystgen_forward_t *self) {
-    self->output = self->moving ? hystgen_forward_output_side_absorb(self, self->level)
-                                : hystgen_forward_output_side_rest(self, self->level);
-    self->moving = true;
-}
-
-/* The actuator has seen drive v. */
-HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_forward_absorb(hystgen_forward_t *self,
-                                                         hystgen_real_t v) {
-    if (self->moving) {
-        hystgen_forward_travelled(self, v);
-    }
-    self->applied = v;
-    hystgen_forward_played(self, v);
-    hystgen_forward_passed_on(self);
-}
-
-/* Drive v has passed through the drive side and moved the plays. */
-static inline void hystgen_inverse_played(hystgen_inverse_t *self, hystgen_real_t v) {
+#else
     const hystgen_signal_t x = hystgen_entered_drive(v);
-    const hystgen_signal_t a = self->moving ? hystgen_inverse_drive_side_absorb(self, x)
-                                            : hystgen_inverse_drive_side_rest(self, x);
-    hystgen_inverse_follow(self, hystgen_inverse_arrive(self, hystgen_arriving(a)));
+#endif
+    const hystgen_signal_t a = self->moving ? hystgen_operator_drive_side_absorb(self, x)
+                                            : hystgen_operator_drive_side_rest(self, x);
+    hystgen_operator_follow(self, hystgen_operator_arrive(self, hystgen_arriving(a)));
 }
 
 /* The plays have moved: their sum passes through the output side. */
-HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_inverse_passed_on(hystgen_inverse_t *self) {
-    self->output = self->moving ? hystgen_inverse_output_side_absorb(self, self->level)
-                                : hystgen_inverse_output_side_rest(self, self->level);
+HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_operator_passed_on(hystgen_operator_t *self) {
+    self->output = self->moving ? hystgen_operator_output_side_absorb(self, self->level)
+                                : hystgen_operator_output_side_rest(self, self->level);
     self->moving = true;
 }
 
 /* The actuator has seen drive v. */
-HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_inverse_absorb(hystgen_inverse_t *self,
-                                                         hystgen_real_t v) {
+HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_operator_absorb(hystgen_operator_t *self,
+                                                          hystgen_real_t v) {
     if (self->moving) {
-        hystgen_inverse_travelled(self, v);
+        hystgen_operator_travelled(self, v);
     }
     self->applied = v;
-    hystgen_inverse_played(self, v);
-    hystgen_inverse_passed_on(self);
+    hystgen_operator_played(self, v);
+    hystgen_operator_passed_on(self);
 }
 
+#ifdef HYSTGEN_INVERSE
 /* The actuator has seen the pending drive. */
 static void hystgen_inverse_take(hystgen_inverse_t *self) {
     if (self->has_pending) {
-        hystgen_inverse_absorb(self, self->pending);
+        hystgen_operator_absorb(self, self->pending);
         self->has_pending = false;
     }
 }
@@ -110,40 +89,20 @@ static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_re
     self->stepped = true;
     return v;
 }
+#endif
 
 /* The displacement now. */
-static hystgen_real_t hystgen_forward_shown(const hystgen_forward_t *self) {
+static hystgen_real_t hystgen_operator_shown(const hystgen_operator_t *self) {
     unsigned int status = 0; /* not reported: this is no step */
-    return hystgen_output_code(hystgen_forward_displaced(self, hystgen_forward_output(self)),
-                               &status);
-}
-
-/* The displacement now. */
-static hystgen_real_t hystgen_inverse_shown(const hystgen_inverse_t *self) {
-    unsigned int status = 0; /* not reported: this is no step */
-    return hystgen_output_code(hystgen_inverse_displaced(self, hystgen_inverse_output(self)),
+    return hystgen_output_code(hystgen_operator_displaced(self, hystgen_operator_output(self)),
                                &status);
 }
 
 /* The part common to init and reset, once the plays are set: they rest at this drive. */
-HYSTGEN_APART_IN_CHAIN void hystgen_forward_begin(hystgen_forward_t *self, hystgen_real_t drive,
-                                                  bool ascending) {
+HYSTGEN_APART_IN_CHAIN void hystgen_operator_begin(hystgen_operator_t *self, hystgen_real_t drive,
+                                                   bool ascending) {
     const hystgen_signal_t x = hystgen_entered_drive(drive);
-    self->applied = drive;
-    self->drive = hystgen_arriving(x);
-    self->ascending = ascending;
-    self->moving = false;
-    self->status = 0;
-    self->level = hystgen_forward_started(self);
-    (void)hystgen_forward_drive_side_rest(self, x);
-    self->output = hystgen_forward_output_side_rest(self, self->level);
-    self->answer = hystgen_forward_shown(self);
-}
-
-/* The part common to init and reset, once the plays are set: they rest at this drive. */
-HYSTGEN_APART_IN_CHAIN void hystgen_inverse_begin(hystgen_inverse_t *self, hystgen_real_t drive,
-                                                  bool ascending) {
-    const hystgen_signal_t x = hystgen_entered_drive(drive);
+#ifdef HYSTGEN_INVERSE
     self->pending = drive;
     self->answer = drive;
     self->reference = 0;
@@ -152,15 +111,20 @@ HYSTGEN_APART_IN_CHAIN void hystgen_inverse_begin(hystgen_inverse_t *self, hystg
     self->stepped = false;
     self->filled = false;
     self->bits = 0;
+#endif
     self->applied = drive;
     self->drive = hystgen_arriving(x);
     self->ascending = ascending;
     self->moving = false;
     self->status = 0;
-    self->level = hystgen_inverse_started(self);
-    (void)hystgen_inverse_drive_side_rest(self, x);
-    self->output = hystgen_inverse_output_side_rest(self, self->level);
-    self->last = hystgen_inverse_shown(self);
+    self->level = hystgen_operator_started(self);
+    (void)hystgen_operator_drive_side_rest(self, x);
+    self->output = hystgen_operator_output_side_rest(self, self->level);
+#ifdef HYSTGEN_FORWARD
+    self->answer = hystgen_operator_shown(self);
+#else
+    self->last = hystgen_operator_shown(self);
+#endif
 }
 
 #endif

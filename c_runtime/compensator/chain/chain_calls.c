@@ -5,7 +5,8 @@
 #include "compensator/chain/chain.c"
 #include "compensator/chain/refined_input.c"
 
-HYSTGEN_ALONE hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
+#ifdef HYSTGEN_FORWARD
+HYSTGEN_ALONE hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t v) {
     hystgen_real_t inside = v;
     if (!hystgen_is_drive(v)) {
         if (!hystgen_finite(v)) {
@@ -15,13 +16,13 @@ HYSTGEN_ALONE hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystg
         inside = hystgen_clamp_drive(v);
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    hystgen_forward_absorb(self, inside);
+    hystgen_operator_absorb(self, inside);
     const hystgen_real_t answer = hystgen_output_code(
-        hystgen_forward_displaced(self, hystgen_forward_output(self)), &self->status);
+        hystgen_operator_displaced(self, hystgen_operator_output(self)), &self->status);
     self->answer = answer;
     return answer;
 }
-
+#else
 /* A reference that is no number: the newest one stands once more. */
 static void hystgen_inverse_unread(hystgen_inverse_t *self) {
     self->status |= HYSTGEN_STATUS_HELD;
@@ -96,7 +97,7 @@ HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_next(hystgen_inverse_t *se
     return hystgen_inverse_answer(self, hystgen_inverse_limited(self, v));
 }
 
-HYSTGEN_ALONE hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
+HYSTGEN_ALONE hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u) {
     hystgen_inverse_take(self);
     return hystgen_inverse_next(self, u);
 }
@@ -114,5 +115,6 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     self->pending = inside;
     self->has_pending = true;
 }
+#endif
 
 #endif

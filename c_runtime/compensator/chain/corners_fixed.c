@@ -2,7 +2,7 @@
    bits as those of engine loop. Up to the output `next`, along the move, plays go on from the kink
    that was found last; the inverse has found it when it solved for their input. A search is called
    with as little of the stack in use as there can be. Called by chain.c, chain_calls.c and
-   corners_start.c. */
+   chain_start.c. */
 #ifndef HYSTGEN_CHAIN_CORNERS_FIXED_C
 #define HYSTGEN_CHAIN_CORNERS_FIXED_C
 #include "arithmetic/fixed.h"
@@ -15,62 +15,37 @@
 #include "compensator/chain/signals.c"
 
 /* Nothing is known of the plays but where they are. */
-static void hystgen_forward_plays_begin(hystgen_forward_t *self) {
+static void hystgen_operator_plays_begin(hystgen_operator_t *self) {
     self->kink.output = 0;
     self->kink.input = 0;
     self->kink.k = 0;
     self->kink.depth = 0;
     self->next = -HYSTGEN_FAR;
-}
-
-/* All plays hold their start values. */
-static void hystgen_forward_plays_init(hystgen_forward_t *self) {
-    hystgen_start(&hystgen_model_curve, &self->here, self->corner, hystgen_model_start,
-                  HYSTGEN_START_STEP);
-    hystgen_forward_plays_begin(self);
-}
-
-/* All plays are 0. */
-static void hystgen_forward_plays_reset(hystgen_forward_t *self) {
-    hystgen_start(&hystgen_model_curve, &self->here, self->corner, hystgen_model_zero, 0);
-    hystgen_forward_plays_begin(self);
-}
-
-/* Nothing is known of the plays but where they are. */
-static void hystgen_inverse_plays_begin(hystgen_inverse_t *self) {
-    self->kink.output = 0;
-    self->kink.input = 0;
-    self->kink.k = 0;
-    self->kink.depth = 0;
-    self->next = -HYSTGEN_FAR;
+#ifdef HYSTGEN_INVERSE
     self->sought = false;
+#endif
 }
 
 /* All plays hold their start values. */
-static void hystgen_inverse_plays_init(hystgen_inverse_t *self) {
+static void hystgen_operator_plays_init(hystgen_operator_t *self) {
     hystgen_start(&hystgen_model_curve, &self->here, self->corner, hystgen_model_start,
                   HYSTGEN_START_STEP);
-    hystgen_inverse_plays_begin(self);
+    hystgen_operator_plays_begin(self);
 }
 
 /* All plays are 0. */
-static void hystgen_inverse_plays_reset(hystgen_inverse_t *self) {
+static void hystgen_operator_plays_reset(hystgen_operator_t *self) {
     hystgen_start(&hystgen_model_curve, &self->here, self->corner, hystgen_model_zero, 0);
-    hystgen_inverse_plays_begin(self);
+    hystgen_operator_plays_begin(self);
 }
 
 /* Sum of the plays. */
-static hystgen_signal_t hystgen_forward_started(const hystgen_forward_t *self) {
-    return hystgen_level(self->here.output);
-}
-
-/* Sum of the plays. */
-static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
+static hystgen_signal_t hystgen_operator_started(const hystgen_operator_t *self) {
     return hystgen_level(self->here.output);
 }
 
 /* Moves the plays to an input between the kink and the next one. False if it lies elsewhere. */
-HYSTGEN_APART bool hystgen_forward_move_on(hystgen_forward_t *self, hystgen_play_t w) {
+HYSTGEN_APART bool hystgen_operator_move_on(hystgen_operator_t *self, hystgen_play_t w) {
     const int64_t moved = hystgen_gained(&hystgen_model_curve, &self->here, &self->kink, w);
     if (moved < 0 || self->kink.output + moved > self->next) {
         return false;
@@ -80,47 +55,29 @@ HYSTGEN_APART bool hystgen_forward_move_on(hystgen_forward_t *self, hystgen_play
 }
 
 /* The same to any input between this kink and its next one, once it has been found. */
-HYSTGEN_APART bool hystgen_forward_moved(hystgen_forward_t *self, hystgen_play_t w) {
+HYSTGEN_APART bool hystgen_operator_moved(hystgen_operator_t *self, hystgen_play_t w) {
     self->next = hystgen_next_output(&hystgen_model_curve, &self->here, self->corner, &self->kink);
-    return hystgen_forward_move_on(self, w);
-}
-
-/* Moves the plays to an input between the kink and the next one. False if it lies elsewhere. */
-HYSTGEN_APART bool hystgen_inverse_move_on(hystgen_inverse_t *self, hystgen_play_t w) {
-    const int64_t moved = hystgen_gained(&hystgen_model_curve, &self->here, &self->kink, w);
-    if (moved < 0 || self->kink.output + moved > self->next) {
-        return false;
-    }
-    hystgen_go_on(&self->here, &self->kink, w, moved);
-    return true;
-}
-
-/* The same to any input between this kink and its next one, once it has been found. */
-HYSTGEN_APART bool hystgen_inverse_moved(hystgen_inverse_t *self, hystgen_play_t w) {
-    self->next = hystgen_next_output(&hystgen_model_curve, &self->here, self->corner, &self->kink);
-    return hystgen_inverse_move_on(self, w);
+    return hystgen_operator_move_on(self, w);
 }
 
 /* The plays follow their input w to another sum. */
-HYSTGEN_APART_IN_FIXED void hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
+HYSTGEN_APART_IN_FIXED void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
+#ifdef HYSTGEN_FORWARD
     const bool turns = self->here.rising ? w < self->here.input : w > self->here.input;
-    if (turns || !hystgen_forward_move_on(self, w)) {
+    if (turns || !hystgen_operator_move_on(self, w)) {
+#else
+    if (!self->sought || !hystgen_operator_moved(self, w)) {
+#endif
         hystgen_find_input(&hystgen_model_curve, &self->here, self->corner, w, &self->kink);
-        (void)hystgen_forward_moved(self, w);
+        (void)hystgen_operator_moved(self, w);
     }
-    self->level = hystgen_forward_started(self);
-}
-
-/* The plays follow their input w to another sum. */
-HYSTGEN_APART_IN_FIXED void hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
-    if (!self->sought || !hystgen_inverse_moved(self, w)) {
-        hystgen_find_input(&hystgen_model_curve, &self->here, self->corner, w, &self->kink);
-        (void)hystgen_inverse_moved(self, w);
-    }
+#ifdef HYSTGEN_INVERSE
     self->sought = false;
-    self->level = hystgen_inverse_started(self);
+#endif
+    self->level = hystgen_operator_started(self);
 }
 
+#ifdef HYSTGEN_INVERSE
 /* Input of the plays at which their sum is h. */
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self,
                                                              hystgen_signal_t h) {
@@ -130,5 +87,6 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *
     hystgen_inverse_seen(self, w);
     return w;
 }
+#endif
 
 #endif

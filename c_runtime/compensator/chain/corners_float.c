@@ -1,6 +1,6 @@
 /* Operators of a model with effects: plays of engine corners in floating point. The inverse moves
    its plays to the solution; where another drive is applied than leads there, it takes that back.
-   Called by chain.c, chain_calls.c and corners_start.c. */
+   Called by chain.c, chain_calls.c and chain_start.c. */
 #ifndef HYSTGEN_CHAIN_CORNERS_FLOAT_C
 #define HYSTGEN_CHAIN_CORNERS_FLOAT_C
 #ifndef HYSTGEN_CONFIGURED
@@ -9,57 +9,52 @@
 #include "compensator/chain/model.h"
 
 /* All plays hold their start values. */
-static void hystgen_forward_plays_init(hystgen_forward_t *self) {
-    hystgen_start(&hystgen_forward_curve, &self->plays, self->corner, &hystgen_forward_start[0]);
+static void hystgen_operator_plays_init(hystgen_operator_t *self) {
+    hystgen_start(&hystgen_operator_curve, &self->plays, self->corner, &hystgen_operator_start[0]);
+#ifdef HYSTGEN_INVERSE
+    self->sought = false;
+#endif
 }
 
 /* All plays are 0. */
-static void hystgen_forward_plays_reset(hystgen_forward_t *self) {
-    hystgen_start(&hystgen_forward_curve, &self->plays, self->corner, &hystgen_forward_start[1]);
-}
-
-/* All plays hold their start values. */
-static void hystgen_inverse_plays_init(hystgen_inverse_t *self) {
-    hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, &hystgen_inverse_start[0]);
+static void hystgen_operator_plays_reset(hystgen_operator_t *self) {
+    hystgen_start(&hystgen_operator_curve, &self->plays, self->corner, &hystgen_operator_start[1]);
+#ifdef HYSTGEN_INVERSE
     self->sought = false;
+#endif
 }
 
-/* All plays are 0. */
-static void hystgen_inverse_plays_reset(hystgen_inverse_t *self) {
-    hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, &hystgen_inverse_start[1]);
-    self->sought = false;
-}
-
+#ifdef HYSTGEN_FORWARD
 /* Sum of the plays. */
-static hystgen_signal_t hystgen_forward_started(const hystgen_forward_t *self) {
+static hystgen_signal_t hystgen_operator_started(const hystgen_operator_t *self) {
     return self->plays.here.output;
 }
 
+/* The plays follow their input w to another sum. */
+static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
+    if (w < self->plays.here.input || w > self->plays.here.input) {
+        (void)hystgen_plays_step(&hystgen_operator_curve, &self->plays, self->corner, w);
+    }
+    self->level = hystgen_operator_started(self);
+}
+#else
 /* Sum of the plays: the curve of the inverse leads from there to their input. */
-static hystgen_signal_t hystgen_inverse_started(const hystgen_inverse_t *self) {
+static hystgen_signal_t hystgen_operator_started(const hystgen_operator_t *self) {
     return self->plays.here.input;
 }
 
 /* The plays follow their input w to another sum. */
-static void hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
-    if (w < self->plays.here.input || w > self->plays.here.input) {
-        (void)hystgen_plays_step(&hystgen_forward_curve, &self->plays, self->corner, w);
-    }
-    self->level = hystgen_forward_started(self);
-}
-
-/* The plays follow their input w to another sum. */
-static void hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
+static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     hystgen_plays_t *m = &self->plays;
     if (self->sought && (w < m->here.output || w > m->here.output)) {
         hystgen_copy_place(&m->here, &self->undo);
         hystgen_forget_line(m);
     }
     if (w < m->here.output || w > m->here.output) {
-        hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, w);
+        hystgen_move_to_output(&hystgen_operator_curve, m, self->corner, w);
     }
     self->sought = false;
-    self->level = hystgen_inverse_started(self);
+    self->level = hystgen_operator_started(self);
 }
 
 /* Input of the plays at which their sum is h. */
@@ -67,9 +62,10 @@ static hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self, hystgen_si
     hystgen_copy_place(&self->undo, &self->plays.here);
     self->sought = true;
     if (h < self->plays.here.input || h > self->plays.here.input) {
-        (void)hystgen_plays_step(&hystgen_inverse_curve, &self->plays, self->corner, h);
+        (void)hystgen_plays_step(&hystgen_operator_curve, &self->plays, self->corner, h);
     }
     return self->plays.here.output;
 }
+#endif
 
 #endif

@@ -97,35 +97,7 @@ extern const hystgen_real_t hystgen_curve[HYSTGEN_N_PLAYS + 1][HYSTGEN_TERMS];
 extern const hystgen_lag_table_t hystgen_braked_1;
 extern const hystgen_ageing_table_t hystgen_ageing_1;
 
-typedef struct {
-    hystgen_real_t applied;
-    hystgen_ramp_t reached;
-    hystgen_fine_t drive;
-    hystgen_signal_t level;
-    hystgen_signal_t output;
-    hystgen_real_t answer;
-    hystgen_signal_t offset;
-    hystgen_ageing_t ageing_1;
-    hystgen_real_t waiting[HYSTGEN_WAITING];
-    unsigned int oldest;
-    bool ascending;
-    bool moving;
-    unsigned int status;
-#ifndef HYSTGEN_HAS_CORNERS
-    hystgen_play_t play[2 * HYSTGEN_N_PLAYS + 1];
-    hystgen_sum_t bent[HYSTGEN_N_PLAYS + 1];
-#else
-#ifdef HYSTGEN_FIXED
-    hystgen_place_t here;
-    hystgen_signal_t next;
-    hystgen_kink_t kink;
-#else
-    hystgen_plays_t plays;
-#endif
-    hystgen_corner_t corner[HYSTGEN_CORNERS];
-#endif
-} hystgen_forward_t;
-
+/* Either operator: the fields of both. */
 typedef struct {
     hystgen_real_t pending;
     hystgen_real_t applied;
@@ -142,6 +114,8 @@ typedef struct {
     hystgen_steady_t steady;
     hystgen_quiet_t quiet;
     hystgen_signal_t line[HYSTGEN_TAPS];
+    hystgen_real_t waiting[HYSTGEN_WAITING];
+    unsigned int oldest;
     bool ascending;
     bool moving;
     bool has_pending;
@@ -165,42 +139,33 @@ typedef struct {
 #endif
     hystgen_corner_t corner[HYSTGEN_CORNERS];
 #endif
-} hystgen_inverse_t;
+} hystgen_operator_t;
+typedef hystgen_operator_t hystgen_forward_t;
+typedef hystgen_operator_t hystgen_inverse_t;
 
 /* Blocks in front of the plays, and behind them. */
-hystgen_signal_t hystgen_forward_drive_side_rest(hystgen_forward_t *self, hystgen_signal_t v);
-hystgen_signal_t hystgen_forward_drive_side_absorb(hystgen_forward_t *self, hystgen_signal_t v);
-hystgen_signal_t hystgen_forward_output_side_rest(hystgen_forward_t *self, hystgen_signal_t h);
-hystgen_signal_t hystgen_forward_output_side_absorb(hystgen_forward_t *self, hystgen_signal_t h);
-hystgen_signal_t hystgen_inverse_drive_side_rest(hystgen_inverse_t *self, hystgen_signal_t v);
-hystgen_signal_t hystgen_inverse_drive_side_absorb(hystgen_inverse_t *self, hystgen_signal_t v);
+hystgen_signal_t hystgen_operator_drive_side_rest(hystgen_operator_t *self, hystgen_signal_t v);
+hystgen_signal_t hystgen_operator_drive_side_absorb(hystgen_operator_t *self, hystgen_signal_t v);
 hystgen_signal_t hystgen_inverse_drive_side_solve(hystgen_inverse_t *self, hystgen_signal_t a);
 hystgen_signal_t hystgen_inverse_missed(hystgen_signal_t way);
-hystgen_signal_t hystgen_inverse_output_side_rest(hystgen_inverse_t *self, hystgen_signal_t h);
-hystgen_signal_t hystgen_inverse_output_side_absorb(hystgen_inverse_t *self, hystgen_signal_t h);
+hystgen_signal_t hystgen_operator_output_side_rest(hystgen_operator_t *self, hystgen_signal_t h);
+hystgen_signal_t hystgen_operator_output_side_absorb(hystgen_operator_t *self, hystgen_signal_t h);
 hystgen_signal_t hystgen_inverse_output_side_solve(hystgen_inverse_t *self, hystgen_signal_t y);
 hystgen_signal_t hystgen_inverse_output_side_resting(hystgen_inverse_t *self, hystgen_signal_t y);
 /* Sum of the plays, and what the output side has given last. */
-hystgen_signal_t hystgen_forward_level(const hystgen_forward_t *self);
-hystgen_signal_t hystgen_inverse_level(const hystgen_inverse_t *self);
-hystgen_signal_t hystgen_forward_output(const hystgen_forward_t *self);
-hystgen_signal_t hystgen_inverse_output(const hystgen_inverse_t *self);
+hystgen_signal_t hystgen_operator_level(const hystgen_operator_t *self);
+hystgen_signal_t hystgen_operator_output(const hystgen_operator_t *self);
 /* Between the output of the chain and the displacement, and the line of references. */
-hystgen_signal_t hystgen_forward_displaced(const hystgen_forward_t *self, hystgen_signal_t y);
-hystgen_signal_t hystgen_inverse_displaced(const hystgen_inverse_t *self, hystgen_signal_t y);
+hystgen_signal_t hystgen_operator_displaced(const hystgen_operator_t *self, hystgen_signal_t y);
 hystgen_signal_t hystgen_inverse_undisplaced(hystgen_inverse_t *self, hystgen_signal_t u,
                                              bool *limited);
 hystgen_signal_t hystgen_inverse_ahead(hystgen_inverse_t *self, hystgen_signal_t y);
 void hystgen_inverse_repeat(hystgen_inverse_t *self);
 /* What is set from outside, and what follows the drive's way. */
-void hystgen_forward_settings_init(hystgen_forward_t *self);
-void hystgen_inverse_settings_init(hystgen_inverse_t *self);
-void hystgen_forward_travelled(hystgen_forward_t *self, hystgen_real_t v);
-void hystgen_inverse_travelled(hystgen_inverse_t *self, hystgen_real_t v);
-void hystgen_forward_clock_start(hystgen_forward_t *self);
-void hystgen_inverse_clock_start(hystgen_inverse_t *self);
-bool hystgen_forward_heat(hystgen_forward_t *self, hystgen_real_t temperature);
-bool hystgen_inverse_heat(hystgen_inverse_t *self, hystgen_real_t temperature);
+void hystgen_operator_settings_init(hystgen_operator_t *self);
+void hystgen_operator_travelled(hystgen_operator_t *self, hystgen_real_t v);
+void hystgen_operator_clock_start(hystgen_operator_t *self);
+bool hystgen_operator_heat(hystgen_operator_t *self, hystgen_real_t temperature);
 
 #include "compensator/api.h"
 #include "compensator/chain/api.h"

@@ -111,17 +111,7 @@ HYSTGEN_APART hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum
 }
 
 /* The plays follow their input w to another sum. */
-static void hystgen_forward_follow(hystgen_forward_t *self, hystgen_play_t w) {
-    if (self->moving) {
-        self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
-        hystgen_relax(self->play, self->bent);
-    } else {
-        self->level = hystgen_level(hystgen_moved_rest(self->play, self->bent, w));
-    }
-}
-
-/* The plays follow their input w to another sum. */
-static void hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
+static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     if (self->moving) {
         self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
         hystgen_relax(self->play, self->bent);
@@ -131,12 +121,7 @@ static void hystgen_inverse_follow(hystgen_inverse_t *self, hystgen_play_t w) {
 }
 
 /* Sum of the plays in the start memory. */
-static hystgen_signal_t hystgen_forward_started(hystgen_forward_t *self) {
-    return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
-}
-
-/* Sum of the plays in the start memory. */
-static hystgen_signal_t hystgen_inverse_started(hystgen_inverse_t *self) {
+static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
     return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
 }
 

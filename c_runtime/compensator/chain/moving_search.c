@@ -1,7 +1,9 @@
 /* Operators of a model with effects: the input of moving or bent plays at which their sum is given,
    by bisection. Called by chain_calls.c. */
 #include "compensator/chain/model.h"
+#ifndef HYSTGEN_CONFIGURED
 #include "compensator/chain/moving_plays.c"
+#endif
 #include "compensator/chain/signals.c"
 
 #ifdef HYSTGEN_FIXED

@@ -1,11 +1,29 @@
-/* The forward operator without a memoryless part, in floating point. Called by users. */
+/* The forward operator of engine corners, with or without a memoryless part. Called by users. */
+#if !defined(HYSTGEN_CONFIGURED) && !defined(HYSTGEN_FORWARD)
+#define HYSTGEN_FORWARD
+#endif
 #ifndef HYSTGEN_CONFIGURED
 #define HYSTGEN_HAS_CORNERS
 #endif
 #include "compensator/model.h"
+#include "compensator/drive.c"
+#ifdef HYSTGEN_FIXED
+#include "compensator/code.c"
+#endif
 
+#ifdef HYSTGEN_FORWARD
 /* One sample. */
-hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
+hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t v) {
+#ifdef HYSTGEN_FIXED
+    const hystgen_real_t inside = hystgen_clamp_drive(v);
+    if (inside != v) {
+        self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
+    }
+    const int64_t sum =
+        hystgen_plays_step(&hystgen_model_curve, &self->here, self->corner, &self->kink,
+                           &self->next, hystgen_operator_arrive(self, inside));
+    return hystgen_code(sum, &self->status);
+#else
     if (!(v >= HYSTGEN_DRIVE_MIN && v <= HYSTGEN_DRIVE_MAX)) {
         if (!(v >= -HYSTGEN_REAL_MAX && v <= HYSTGEN_REAL_MAX)) {
             self->status |= HYSTGEN_STATUS_HELD;
@@ -14,20 +32,19 @@ hystgen_real_t hystgen_forward_step(hystgen_forward_t *self, hystgen_real_t v) {
         v = v < HYSTGEN_DRIVE_MIN ? HYSTGEN_DRIVE_MIN : HYSTGEN_DRIVE_MAX;
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    return hystgen_plays_step(&hystgen_forward_curve, &self->plays, self->corner, v) +
+    return hystgen_plays_step(&hystgen_operator_curve, &self->plays, self->corner,
+                              hystgen_operator_arrive(self, v)) +
            HYSTGEN_OFFSET;
+#endif
 }
 
-static void hystgen_forward_begin(hystgen_forward_t *self, const hystgen_start_t *start) {
-    hystgen_start(&hystgen_forward_curve, &self->plays, self->corner, start);
-    self->status = 0;
+/* The plays hold a start memory. */
+static void hystgen_operator_rest(hystgen_operator_t *self, unsigned int which) {
+    (void)which;
+#ifdef HYSTGEN_FIXED
+    self->next = self->here.input;
+#else
+    (void)self;
+#endif
 }
-
-void hystgen_forward_init(hystgen_forward_t *self) {
-    hystgen_forward_begin(self, &hystgen_forward_start[0]);
-}
-
-void hystgen_forward_reset(hystgen_forward_t *self, hystgen_real_t v) {
-    hystgen_forward_begin(self, &hystgen_forward_start[1]);
-    (void)hystgen_forward_step(self, v);
-}
+#endif

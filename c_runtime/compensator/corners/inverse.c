@@ -1,13 +1,14 @@
-/* The inverse without a memoryless part, in floating point. Called by users. */
+/* The inverse without a memoryless part, in floating point. Called by users and by start.c. */
 #ifndef HYSTGEN_CONFIGURED
 #define HYSTGEN_HAS_CORNERS
 #endif
 #include "compensator/model.h"
 #include "compensator/clamp.c"
 
+#ifdef HYSTGEN_INVERSE
 /* Any sample but a usual one. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
-    const hystgen_curve_t *t = &hystgen_inverse_curve;
+    const hystgen_curve_t *t = &hystgen_operator_curve;
     hystgen_plays_t *m = &self->plays;
     hystgen_real_t x = u - HYSTGEN_OFFSET;
     unsigned int bits = 0;
@@ -46,7 +47,7 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
    no       yes        the committed drive  the committed drive  the committed drive
    yes      no         the last answer      the last answer      the last answer
    yes      yes        the committed drive  the committed drive  the last answer, `returned` */
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
+hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u) {
     hystgen_plays_t *m = &self->plays;
     const hystgen_real_t x = u - HYSTGEN_OFFSET;
     const bool on = m->here.rising ? x > m->here.input : x < m->here.input;
@@ -66,7 +67,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
     if (on && (m->here.rising ? x < m->cap : x > m->cap)) {
         hystgen_copy_place(&self->undo, &m->here);
         self->before = x;
-        if (hystgen_move_in_block(&hystgen_inverse_curve, m, x)) {
+        if (hystgen_move_in_block(&hystgen_operator_curve, m, x)) {
             return m->here.output;
         }
     }
@@ -92,26 +93,18 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     }
     hystgen_copy_place(&m->here, &self->undo);
     hystgen_forget_line(m);
-    hystgen_move_to_output(&hystgen_inverse_curve, m, self->corner, v);
+    hystgen_move_to_output(&hystgen_operator_curve, m, self->corner, v);
     self->before = m->here.input;
 }
 
-HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start) {
-    hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, start);
-    hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner,
+/* The plays hold a start memory: the drive rests within its range. */
+static void hystgen_operator_rest(hystgen_operator_t *self, unsigned int which) {
+    (void)which;
+    hystgen_move_to_output(&hystgen_operator_curve, &self->plays, self->corner,
                            hystgen_clamp_drive(self->plays.here.output));
     hystgen_copy_place(&self->undo, &self->plays.here);
     self->before = self->plays.here.input;
     self->stepped = false;
     self->committed = false;
-    self->status = 0;
 }
-
-void hystgen_inverse_init(hystgen_inverse_t *self) {
-    hystgen_inverse_begin(self, &hystgen_inverse_start[0]);
-}
-
-void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u) {
-    hystgen_inverse_begin(self, &hystgen_inverse_start[1]);
-    (void)hystgen_inverse_step(self, u);
-}
+#endif

@@ -1,4 +1,4 @@
-/* The inverse without a memoryless part, in fixed point. Called by users. */
+/* The inverse without a memoryless part, in fixed point. Called by users and by start.c. */
 #include "arithmetic/fixed.h"
 #ifndef HYSTGEN_CONFIGURED
 #define HYSTGEN_HAS_CORNERS
@@ -7,6 +7,7 @@
 #include "front/front.c"
 #include "compensator/clamp.c"
 
+#ifdef HYSTGEN_INVERSE
 #ifdef HYSTGEN_HAS_FINE_PLAYS
 /* What an input move `way` leaves of an output move `on`; the input is finer than codes. */
 static inline int64_t hystgen_inverse_left(int64_t on, uint32_t slope, uint32_t way) {
@@ -88,7 +89,7 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
    init        the start memory      nothing               is solved for
    step        the last answer       the last answer       has the same answer
    commit      the committed drive   the committed drive   is solved for */
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
+hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u) {
     hystgen_place_t *here = &self->here;
     const int64_t output = (int64_t)u * ((int64_t)1 << HYSTGEN_FRACTION);
     const int64_t on = here->rising ? output - here->output : here->output - output;
@@ -130,22 +131,14 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
                           hystgen_front_forward(v));
 }
 
-static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step) {
-    hystgen_start(&hystgen_model_curve, &self->here, self->corner, play, step);
+/* The plays hold a start memory. */
+static void hystgen_operator_rest(hystgen_operator_t *self, unsigned int which) {
+    (void)which;
     hystgen_copy_place(&self->undo, &self->here);
     hystgen_inverse_stay(self);
     self->before = 0;
     self->reference = 0;
     self->repeat = false;
     self->bits = 0;
-    self->status = 0;
 }
-
-void hystgen_inverse_init(hystgen_inverse_t *self) {
-    hystgen_inverse_begin(self, hystgen_model_start, HYSTGEN_START_STEP);
-}
-
-void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u) {
-    hystgen_inverse_begin(self, hystgen_model_zero, 0);
-    (void)hystgen_inverse_step(self, u);
-}
+#endif

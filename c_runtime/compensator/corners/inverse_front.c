@@ -1,28 +1,17 @@
-/* The inverse with a memoryless part, in floating point. Called by users. */
+/* The inverse with a memoryless part, in floating point. Called by users and by start.c. */
 #ifndef HYSTGEN_CONFIGURED
 #define HYSTGEN_HAS_CORNERS
 #define HYSTGEN_HAS_FRONT
 #endif
 #include "compensator/model.h"
-#include "front/front.c"
-#include "compensator/clamp.c"
-#include "compensator/branches.c"
+#include "compensator/drive.c"
 
+#ifdef HYSTGEN_INVERSE
 /* Keeps the place for a commit to go back to. */
 static void hystgen_inverse_keep(hystgen_inverse_t *self) {
     hystgen_copy_place(&self->undo, &self->plays.here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
-}
-
-/* The actuator is at drive v; its move sets the direction. */
-static void hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v) {
-    if (v > self->drive) {
-        self->ascending = true;
-    } else if (v < self->drive) {
-        self->ascending = false;
-    }
-    self->drive = v;
 }
 
 /* Undoes the last step: the actuator has gone to v instead. */
@@ -31,10 +20,9 @@ HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real
     hystgen_forget_line(&self->plays);
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
-    hystgen_inverse_arrive(self, v);
-    const hystgen_real_t w = hystgen_front_forward(v, self->ascending);
+    const hystgen_real_t w = hystgen_operator_arrive(self, v);
     if (w < self->plays.here.output || w > self->plays.here.output) {
-        hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner, w);
+        hystgen_move_to_output(&hystgen_operator_curve, &self->plays, self->corner, w);
     }
 }
 
@@ -56,7 +44,7 @@ static hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self) {
    no       yes        the committed drive  the committed drive  the committed drive
    yes      no         the last answer      the last answer      the last answer
    yes      yes        the committed drive  the committed drive  the last answer, `returned` */
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
+hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u) {
     if (!(u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX)) {
         return hystgen_inverse_hold(self);
     }
@@ -70,7 +58,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
         }
         self->bits = level < u || level > u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
         self->reference = u;
-        const hystgen_real_t w = hystgen_plays_step(&hystgen_inverse_curve, &self->plays,
+        const hystgen_real_t w = hystgen_plays_step(&hystgen_operator_curve, &self->plays,
                                                     self->corner, level - HYSTGEN_OFFSET);
         const hystgen_real_t v = hystgen_inverse_choose(self, level, w, &self->limited);
         const hystgen_real_t inside = hystgen_clamp_drive(v);
@@ -81,7 +69,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
             self->bits |= clamped ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u;
             hystgen_inverse_replace(self, inside);
         } else {
-            hystgen_inverse_arrive(self, inside);
+            hystgen_operator_set_drive(self, inside);
         }
         self->last = level;
         self->repeat = true;
@@ -109,13 +97,11 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     hystgen_inverse_replace(self, v);
 }
 
-HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_start_t *start,
-                                         const hystgen_drive_t *first) {
-    hystgen_start(&hystgen_inverse_curve, &self->plays, self->corner, start);
+/* The plays hold a start memory: the drive rests within its range. */
+static void hystgen_operator_rest(hystgen_operator_t *self, unsigned int which) {
     self->last = self->plays.here.input + HYSTGEN_OFFSET;
-    hystgen_move_to_output(&hystgen_inverse_curve, &self->plays, self->corner, first->w);
-    self->drive = first->drive;
-    self->ascending = first->ascending;
+    hystgen_move_to_output(&hystgen_operator_curve, &self->plays, self->corner,
+                           hystgen_operator_first_drive[which].w);
     hystgen_inverse_keep(self);
     self->returned = self->drive;
     self->reference = 0;
@@ -123,14 +109,5 @@ HYSTGEN_APART void hystgen_inverse_begin(hystgen_inverse_t *self, const hystgen_
     self->committed = false;
     self->repeat = false;
     self->bits = 0;
-    self->status = 0;
 }
-
-void hystgen_inverse_init(hystgen_inverse_t *self) {
-    hystgen_inverse_begin(self, &hystgen_inverse_start[0], &hystgen_inverse_drive[0]);
-}
-
-void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u) {
-    hystgen_inverse_begin(self, &hystgen_inverse_start[1], &hystgen_inverse_drive[1]);
-    (void)hystgen_inverse_step(self, u);
-}
+#endif

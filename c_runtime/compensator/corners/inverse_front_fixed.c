@@ -1,31 +1,19 @@
-/* The inverse with a memoryless part, in fixed point. Called by users. */
+/* The inverse with a memoryless part, in fixed point. Called by users and by start.c. */
 #include "arithmetic/fixed.h"
 #ifndef HYSTGEN_CONFIGURED
 #define HYSTGEN_HAS_CORNERS
 #define HYSTGEN_HAS_FRONT
 #endif
 #include "compensator/model.h"
-#include "front/front.c"
-#include "compensator/clamp.c"
+#include "compensator/drive.c"
 #include "compensator/code.c"
-#include "compensator/branches.c"
 
+#ifdef HYSTGEN_INVERSE
 /* Keeps the place for a commit to go back to. */
 HYSTGEN_APART void hystgen_inverse_keep(hystgen_inverse_t *self) {
     hystgen_copy_place(&self->undo, &self->here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
-}
-
-/* The actuator is at drive v; its move sets the direction. Returns the input of the plays. */
-HYSTGEN_APART int32_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_real_t v) {
-    if (v > self->drive) {
-        self->ascending = true;
-    } else if (v < self->drive) {
-        self->ascending = false;
-    }
-    self->drive = v;
-    return hystgen_front_forward(v, self->ascending);
 }
 
 /* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
@@ -35,7 +23,7 @@ HYSTGEN_APART int32_t hystgen_inverse_arrive(hystgen_inverse_t *self, hystgen_re
    init        the start memory      nothing               is solved for
    step        the last answer       the last answer       has the same answer
    commit      the committed drive   the committed drive   is solved for */
-hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
+hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u) {
     hystgen_inverse_keep(self);
     if (!self->repeat || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
@@ -55,7 +43,7 @@ hystgen_real_t hystgen_inverse_step(hystgen_inverse_t *self, hystgen_real_t u) {
         if (inside != v) {
             self->bits |= HYSTGEN_STATUS_OUTPUT_CLAMPED;
         }
-        const int32_t to = hystgen_inverse_arrive(self, inside);
+        const int32_t to = hystgen_operator_arrive(self, inside);
         self->next = hystgen_move_to_solution(&hystgen_model_curve, &self->here, self->corner,
                                               &self->kink, to);
     }
@@ -74,29 +62,18 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     self->repeat = false;
     self->next = -HYSTGEN_FAR;
     hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, &self->kink,
-                          hystgen_inverse_arrive(self, v));
+                          hystgen_operator_arrive(self, v));
 }
 
-static void hystgen_inverse_begin(hystgen_inverse_t *self, const int32_t *play, unsigned int step,
-                                  const hystgen_drive_t *first) {
+/* The plays hold a start memory. */
+static void hystgen_operator_rest(hystgen_operator_t *self, unsigned int which) {
     unsigned int status = 0; /* not reported: this is no step */
-    hystgen_start(&hystgen_model_curve, &self->here, self->corner, play, step);
-    self->drive = (hystgen_real_t)first->drive;
-    self->ascending = first->ascending;
+    (void)which;
     hystgen_inverse_keep(self);
     self->reference = 0;
     self->last = hystgen_code(self->here.output, &status);
     self->repeat = false;
     self->next = -HYSTGEN_FAR;
     self->bits = 0;
-    self->status = 0;
 }
-
-void hystgen_inverse_init(hystgen_inverse_t *self) {
-    hystgen_inverse_begin(self, hystgen_model_start, HYSTGEN_START_STEP, &hystgen_inverse_drive[0]);
-}
-
-void hystgen_inverse_reset(hystgen_inverse_t *self, hystgen_real_t u) {
-    hystgen_inverse_begin(self, hystgen_model_zero, 0, &hystgen_inverse_drive[1]);
-    (void)hystgen_inverse_step(self, u);
-}
+#endif

@@ -19,7 +19,7 @@ from hystgen.effects.thermal import fixed as thermal_fixed
 KINDS = (
     creep.KIND, lag.KIND, lag.EXACT_KIND, lag.BRAKED_KIND, ageing.KIND, thermal.HEAT_KIND, thermal.KIND, resonance.KIND,
     drift.KIND, thermal.FRICTION_KIND,
-)  # fmt: skip
+)
 """The kinds of blocks in the catalogue, each with its C in the folder of its effect."""
 
 
@@ -30,7 +30,7 @@ def of(t: ChainTables, parts: Sequence[Part], operator: str = "forward") -> list
     return [
         each for part, tables in pairs if operator == "forward" or not part.forward
         for each in part.arithmetic(t.fixed).constants(tables)
-    ]  # fmt: skip
+    ]
 
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constants]]:

@@ -27,7 +27,7 @@ import numpy as np
 
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
-from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, LoopRoundings, error_bounds
+from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, ErrorBounds, LoopRoundings, error_bounds, together
 from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.catalogue import SENT
 from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, ahead_of, crossing, lead
@@ -39,16 +39,9 @@ from hystgen.front.tanh import kernels
 from hystgen.plays import slots
 
 SAME = "both have seen the same drives"
-UNSLEWED = "no slew limit acts"
 
 STILL = "the drive does not stand still"
 """Of a quiet drive in front of a lag: what has arrived is then within twice its dither of what is sought."""
-
-
-def together(*conditions: str) -> str:
-    """Conditions that all have to hold, in words; empty ones are left out."""
-    *others, last = [each for each in conditions if each] or [""]
-    return f"{', '.join(others)} and {last}" if others else last
 
 
 @dataclasses.dataclass(frozen=True)

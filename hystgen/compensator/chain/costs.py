@@ -13,13 +13,16 @@ from hystgen.plays import slots
 PARTS = (
     "any", "creep", "lag", "lag_exact", "ageing", "heat", "friction", "gain", "clock", "preview", "slew", "braked",
     "tanh", "dead_zone", "relaxing", "dilated", "dashpot", "polynomial", "centre", "mode", "delay", "quiet",
-)  # fmt: skip
+)
 """Parts of the code: `any` (with engine corners `any_corners`) once for a model with effects, the others once for
 each kind of block in it; `friction` beside `heat` for the heat of plays that rub, `dilated` for all plays whose input
 is found by a search, `braked` for a lag and a slew limit together, `quiet` for a drive that stands still at rest."""
 
 OPERATORS = {"preview": "inverse", "quiet": "inverse", "mode": "forward", "delay": "forward"}
 """Parts that only one operator has, and that operator."""
+
+PER_PLAY = ("relaxing", "dilated", "dashpot", "polynomial", "centre")
+"""Parts that move or bend plays: each play adds to what a sample takes."""
 
 
 def parts(t: ChainTables, operator: str) -> list[str]:
@@ -34,7 +37,7 @@ def parts(t: ChainTables, operator: str) -> list[str]:
         "dashpot": t.moving.moves == moving.DASHPOT,
         "quiet": t.quiet,
         "polynomial": t.moving.bends == moving.POLYNOMIAL, "centre": t.moving.bends == moving.CENTRE,
-    })  # fmt: skip
+    })
     common = "any" if t.plays.engine == slots.LOOP else "any_corners"
     return [common, *(part for part in PARTS[1:] if found[part] and OPERATORS.get(part, operator) == operator)]
 

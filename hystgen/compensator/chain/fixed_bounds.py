@@ -25,8 +25,8 @@ import numpy as np
 
 from hystgen.arithmetic.factors import error as missed
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.bounds import SECOND_ORDER
-from hystgen.compensator.chain.bounds import SAME, STILL, UNSLEWED, together
+from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, together
+from hystgen.compensator.chain.bounds import SAME, STILL
 from hystgen.compensator.chain.catalogue import BEHIND, LED, NAMES
 from hystgen.compensator.chain.layout import DITHER, ChainTables, ahead_of, largest_way
 from hystgen.compensator.chain.moving import (

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import FIXED
 from hystgen.arithmetic.factors import LARGEST, factor
 from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
@@ -120,7 +120,7 @@ class _Builder:
         engine: str,
     ) -> None:
         self.arithmetic, self.seconds, self.how, self.engine = arithmetic, seconds, how, engine
-        self.about = ARITHMETICS[arithmetic]
+        self.about = FIXED[arithmetic]
         self.static, self.parts = chain.cascade, Parts.of(chain.effects)
         self.low, self.high = output_range(self.static, self.parts, seconds)
         self.drive_lsb, self.output_lsb = lsbs(self.static, arithmetic, *lsb, (self.low, self.high))
@@ -175,13 +175,13 @@ class _Builder:
             static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.formats, weights,
             self.bends, (self.low, self.high), slewed, self.reached, self._largest_step(), self.finer, self.seconds,
             self.bumps,
-        )  # fmt: skip
+        )
         if static.branches_differ:
             plays.limits[slots.HOLD] = hold(bounds.hold(), tables.number[DITHER], self.turning)
         codes = Codes(
             self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
             bounds.condition, math.ceil(self.sizes.largest * 2**self.bits),
-        )  # fmt: skip
+        )
         about = (self.parts, self.seconds, static, max_rate, self.how.preview, *self.reading[1:])
         return Compiled(tables, self.taps, *about, codes)
 
@@ -198,7 +198,7 @@ class _Builder:
                 ("model", "effects"),
                 f"{what}: states and constants do not fit {self.arithmetic}, whose signals have "
                 f"{self.bits} bits below an output code; use {self.about.finer}",
-            )) from error  # fmt: skip
+            )) from error
 
     # ------------------------------------------------------------ ranges
 
@@ -374,7 +374,7 @@ class _Builder:
             braked(self.parts, self.ones), self.drive_lsb, self.output_lsb, self.bits, self.about.code_bits,
             self.about.code_max, TEMPERATURE_BITS[self.about.code_bits], max(map(abs, self.inner.drive)),
             self.signal(self.high - self.low), margin,
-        )  # fmt: skip
+        )
 
         def made(part: Part) -> Any:
             pairs = zip(self.in_front.get(part.name) or self._behind(part), self.ones[part.name], strict=True)
@@ -458,7 +458,7 @@ class _Builder:
                 lower, upper, give = (
                     (-effect.level, effect.level, 0.0) if isinstance(effect, HardSaturation)
                     else (effect.lower, effect.upper, effect.give)
-                )  # fmt: skip
+                )
                 most = LARGEST // 2
                 ends = [min(max(self.signal(end), -most), most) for end in (lower, upper)]
                 over = self._need(lambda give=give: factor(1.0 / give if give else 0.0), "stops")  # type: ignore[misc]

@@ -219,4 +219,4 @@ def part(name: str, place: Place, blocks: Sequence[OwnBlock] = (), effects: Sequ
         own.arithmetic(blocks, effects, own.GLUE, lambda every, about: own.build(every, about.reals)),
         own.arithmetic(blocks, effects, (product, entered, left), lambda rows, _: build(rows), format_of),
         joined=True,
-    )  # fmt: skip
+    )

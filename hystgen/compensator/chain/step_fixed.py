@@ -170,7 +170,7 @@ def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
     drive = led_braked(
         t.blocks[LED], s.blocks[LED], near << bits, beyond << bits, t.number[FALLING] << bits, t.number[RISING] << bits,
         1 << bits, t.number[BRAKED_DROP],
-    )  # fmt: skip
+    )
     return drive_code(t, drive)
 
 
@@ -189,8 +189,8 @@ def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
 BLOCKS = Blocks(
     lambda part: part.fixed.verbs, (saturated, unsaturated), preview_target, (front_forward, front_inverse),
     moving_fixed.PLAYS, finer, braked, ramp,
-)  # fmt: skip
+)
 CORNERS = BLOCKS._replace(plays=corners_fixed.PLAYS, finer=corners_fixed.finer)
 CODES = Codes(
     step_fixed.finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared
-)  # fmt: skip
+)

@@ -84,6 +84,6 @@ def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
 BLOCKS = Blocks(
     lambda part: part.floating.verbs, (bent, unbent), preview_target, (front_forward, front_inverse),
     moving_float.PLAYS, finer, braked, ramp,
-)  # fmt: skip
+)
 CORNERS = BLOCKS._replace(plays=corners_float.PLAYS)
 CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)

@@ -1,4 +1,4 @@
-"""The forward operator in fixed point: `forward_fixed.c`, with or without a memoryless part."""
+"""The forward operator in fixed point: `forward.c`, with or without a memoryless part."""
 
 from __future__ import annotations
 

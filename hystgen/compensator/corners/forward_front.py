@@ -1,4 +1,4 @@
-"""The forward operator with a memoryless part: `forward_front.c`."""
+"""The forward operator with a memoryless part: `forward.c`."""
 
 from __future__ import annotations
 

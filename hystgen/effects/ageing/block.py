@@ -8,4 +8,4 @@ from hystgen.effects.part import Part
 AGEING = Part(
     "ageing", "ageing", lambda effect: effect.name == "ageing", lambda effect, *_: compensator.Aged(effect),
     compensator.ARITHMETIC, fixed.ARITHMETIC, calls=("set_gain", "travel", "set_travel"),
-)  # fmt: skip
+)

@@ -7,15 +7,11 @@
 #include "effects/ageing/ageing.c"
 #endif
 
-hystgen_travel_t hystgen_forward_travel(const hystgen_forward_t *self) {
+hystgen_travel_t hystgen_operator_travel(const hystgen_operator_t *self) {
     return self->ageing_1.high;
 }
 
-hystgen_travel_t hystgen_inverse_travel(const hystgen_inverse_t *self) {
-    return self->ageing_1.high;
-}
-
-void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_travel_t travel) {
+void hystgen_operator_set_travel(hystgen_operator_t *self, hystgen_travel_t travel) {
     if (!hystgen_finite(travel)) {
         self->status |= HYSTGEN_STATUS_HELD;
     } else if (hystgen_ageing_set_travel(&hystgen_ageing_1, &self->ageing_1, travel)) {
@@ -23,23 +19,7 @@ void hystgen_forward_set_travel(hystgen_forward_t *self, hystgen_travel_t travel
     }
 }
 
-void hystgen_inverse_set_travel(hystgen_inverse_t *self, hystgen_travel_t travel) {
-    if (!hystgen_finite(travel)) {
-        self->status |= HYSTGEN_STATUS_HELD;
-    } else if (hystgen_ageing_set_travel(&hystgen_ageing_1, &self->ageing_1, travel)) {
-        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
-    }
-}
-
-void hystgen_forward_set_gain(hystgen_forward_t *self, hystgen_real_t gain) {
-    if (!hystgen_finite(gain)) {
-        self->status |= HYSTGEN_STATUS_HELD;
-    } else if (hystgen_ageing_set(&hystgen_ageing_1, &self->ageing_1, gain)) {
-        self->status |= HYSTGEN_STATUS_LIMITED_SETTING;
-    }
-}
-
-void hystgen_inverse_set_gain(hystgen_inverse_t *self, hystgen_real_t gain) {
+void hystgen_operator_set_gain(hystgen_operator_t *self, hystgen_real_t gain) {
     if (!hystgen_finite(gain)) {
         self->status |= HYSTGEN_STATUS_HELD;
     } else if (hystgen_ageing_set(&hystgen_ageing_1, &self->ageing_1, gain)) {

@@ -140,7 +140,7 @@ KIND = Kind(
     "ageing", ("least", "largest", "last"), ("high", "low", "gain", "inverse"),
     rows=Rows("piece", ("begin", "inverse_length", "c0", "c1", "c2", "c3")), counts=("n", "turns"), flags=("own",),
     reading=(), own=("solve", "absorb"),
-)  # fmt: skip
+)
 
 
 class AgeingTables(NamedTuple):
@@ -282,4 +282,4 @@ ARITHMETIC = Arithmetic(
         set_travel=ageing_set_travel, travelled=ageing_travelled,
     ),
     constants, tables,
-)  # fmt: skip
+)

@@ -43,7 +43,7 @@ LONGEST = 2**61
 KIND = Kind(
     "ageing", rows=Rows("piece", letters="wfbc"), counts=("n", "turns", "bits"), flags=("own",), reading=(),
     own=("solve", "absorb"), letters="w", memory="wii",
-)  # fmt: skip
+)
 
 
 def constants(t: AgeingTables) -> Iterator[Constants]:
@@ -204,4 +204,4 @@ ARITHMETIC = Arithmetic(
         set_gain=ageing_set, set_travel=ageing_set_travel, travelled=ageing_travelled,
     ),
     constants, made, formats,
-)  # fmt: skip
+)

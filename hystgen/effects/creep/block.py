@@ -9,4 +9,4 @@ CREEP = Part(
     "creep", "creep", lambda effect: effect.name == "creep",
     lambda effect, seconds, _: compensator.numbers(effect, seconds),
     compensator.ARITHMETIC, fixed.ARITHMETIC,
-)  # fmt: skip
+)

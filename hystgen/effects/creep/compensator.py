@@ -133,7 +133,7 @@ HIGH, LOW = 0, 1
 KIND = Kind(
     "creep", ("slope", "inverse_slope", "rest", "inverse_rest"), ("ahead",),
     rows=Rows("term", ("rate", "share"), ("high", "low")), counts=("n",),
-)  # fmt: skip
+)
 
 
 class CreepTables(NamedTuple):
@@ -219,7 +219,7 @@ def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
 ARITHMETIC = Arithmetic(
     Verbs(memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
     lambda blocks, about: tables(blocks, about.reals),
-)  # fmt: skip
+)
 
 # ---------------------------------------------------------------- at steps of any length
 

@@ -164,4 +164,4 @@ def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
 ARITHMETIC = Arithmetic(
     Verbs(floating.memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
     tables, formats,
-)  # fmt: skip
+)

@@ -8,4 +8,4 @@ from hystgen.effects.part import Part
 DELAY = Part(
     "delay", "a delay", lambda effect: effect.name == "delay" and effect.time > 0.0,
     lambda effect, *_: Wait(effect.time), ARITHMETIC, FIXED_ARITHMETIC, forward=True, joined=True,
-)  # fmt: skip
+)

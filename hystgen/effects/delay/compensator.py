@@ -125,8 +125,8 @@ def tables(waits: Sequence[Wait], about: Surroundings, share: Callable[[float], 
 ARITHMETIC = Arithmetic(
     verbs(delayed), lambda _: (),
     lambda blocks, about: tables(blocks, about, lambda share: about.reals([share], "the delay")),
-)  # fmt: skip
+)
 FIXED_ARITHMETIC = Arithmetic(
     verbs(fixed_delayed), lambda _: (),
     lambda blocks, about: tables(blocks, about, lambda share: np.array(factor(share), dtype=np.int64)),
-)  # fmt: skip
+)

@@ -8,4 +8,4 @@ from hystgen.effects.part import Part
 CLOCK = Part(
     "clock", "drift", lambda effect: effect.name == "drift", lambda effect, *_: effect,
     compensator.ARITHMETIC, fixed.ARITHMETIC,
-)  # fmt: skip
+)

@@ -20,7 +20,7 @@ CARRY_SAMPLES = 2.0**24
 
 KIND = Kind(
     "clock", ("sample", "block", "carry", "rate", "half_change", "farthest"), ("high", "low", "lead"), own=(),
-)  # fmt: skip
+)
 
 SAMPLE, BLOCK, CARRY, RATE, HALF_CHANGE, FARTHEST, ONE, MOST_AHEAD = range(8)
 HIGH, LOW, LEAD = range(3)

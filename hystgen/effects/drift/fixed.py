@@ -136,4 +136,4 @@ def formats(effect: LinearDrift | CurvedDrift, about: Fixed, *_: float) -> Clock
 ARITHMETIC = Arithmetic(
     floating.verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants,
     lambda clocks, _: np.array([one.table for one in clocks], dtype=np.int64).reshape(-1, 7), formats,
-)  # fmt: skip
+)

@@ -8,4 +8,4 @@ from hystgen.effects.part import Part
 LAG = Part(
     "lag", "a lag", lambda effect: effect.name == "lag" and effect.time_constant > 0.0, compensator.numbers,
     compensator.ARITHMETIC, fixed.ARITHMETIC,
-)  # fmt: skip
+)

@@ -158,14 +158,14 @@ and never overshoots; the tests of overshoot hold it."""
 KIND = Kind(
     "lag", ("rate", "theta", "late", "inverse_rate"), ("high", "low", "wanted", "asked", "answer"),
     reading=("solve", "absorb"), own=("rest", "solve", "absorb"),
-)  # fmt: skip
+)
 BRAKED_KIND = Kind(
     "braked", KIND.table, (*KIND.state, "earlier"), reading=KIND.reading, own=KIND.own, like=KIND.name,
-)  # fmt: skip
+)
 EXACT_KIND = Kind(
     "lag_exact", ("rate", "early", "late", "inverse_late"), ("reached", "before"),
     reading=("solve", "absorb"), own=("rest", "solve", "absorb"),
-)  # fmt: skip
+)
 
 
 class LagTables(NamedTuple):
@@ -367,7 +367,7 @@ LED = Led(steady_state, steady_solve, steady_kept, steady_absorb, steady_missed,
 ARITHMETIC = Arithmetic(
     Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
     lambda blocks, about: tables(blocks, about.reals, about.braked),
-)  # fmt: skip
+)
 
 # ---------------------------------------------------------------- at steps of any length
 

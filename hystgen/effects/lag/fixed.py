@@ -298,4 +298,4 @@ LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, stead
 ARITHMETIC = Arithmetic(
     Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
     tables, formats,
-)  # fmt: skip
+)

@@ -9,4 +9,4 @@ MODE = Part(
     "mode", "resonance", lambda effect: effect.name == "resonance" and effect.block is None,
     lambda effect, seconds, _: compensator.numbers(effect, seconds),
     compensator.ARITHMETIC, fixed.ARITHMETIC, forward=True,
-)  # fmt: skip
+)

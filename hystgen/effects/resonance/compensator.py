@@ -107,7 +107,7 @@ KEEP, TURN, SWING, LEAD, PUSH = range(5)
 BEFORE, OFF, RATE = range(3)
 
 KIND = Kind("mode", ("keep", "turn", "swing", "lead", "push"), ("before", "off", "rate"),
-            reading=("absorb",), own=("rest", "absorb"))  # fmt: skip
+            reading=("absorb",), own=("rest", "absorb"))
 
 
 def constants(t: Reals) -> Iterator[Constants]:
@@ -145,4 +145,4 @@ def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
 ARITHMETIC = Arithmetic(
     Verbs(memory, mode_rest, mode_absorb), constants,
     lambda blocks, about: about.reals([one.table for one in blocks], "the modes").reshape(-1, 5),
-)  # fmt: skip
+)

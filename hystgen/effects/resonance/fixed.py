@@ -112,4 +112,4 @@ ARITHMETIC = Arithmetic(
     Verbs(compensator.memory, mode_rest, mode_absorb), constants,
     lambda modes, _: np.array([each.row for each in modes], dtype=np.int64).reshape(-1, 13),
     lambda one, about, given, _: Formats(one, row(one, given * 2.0**about.bits)),
-)  # fmt: skip
+)

@@ -37,7 +37,7 @@ KIND = Kind(
     ("per_degree", "offset_per_degree", "reference", "coldest", "hottest", "least", "largest"),
     ("gain", "inverse", "offset"),
     reading=(), own=("solve", "absorb"),
-)  # fmt: skip
+)
 
 
 def constants(t: Reals) -> Iterator[Constants]:
@@ -99,7 +99,7 @@ def numbers(effect: LoggedThermal, span: float) -> tuple[float, ...]:
         effect.gain_per_degree, effect.offset_per_degree, effect.reference,
         effect.reference + max(down, -largest), effect.reference + min(up, largest),
         LEAST_GAIN, LARGEST_GAIN, 1.0,
-    )  # fmt: skip
+    )
 
 
 def memory(t: Reals, dtype: Any) -> Reals:
@@ -159,7 +159,7 @@ def gain_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as 
 HEAT_KIND = Kind(
     "heat", ("rate", "per_amount", "per_degree", "offset_per_degree", "hottest"),
     ("high", "low", "gain", "inverse", "offset"), counts=("turns",), reading=(), own=("solve", "absorb"),
-)  # fmt: skip
+)
 
 HEAT_RATE, PER_AMOUNT, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, HEAT_ONE, HEAT_TWO = range(7)
 HIGH, LOW, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET, BEGUN, AT = range(7)
@@ -394,7 +394,7 @@ def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001
 
 FRICTION_KIND = Kind(
     "friction", (), (), Rows("play", ("threshold",), ("at",)), counts=("n",), flags=("begun",), reading=(), own=(),
-)  # fmt: skip
+)
 
 
 def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
@@ -433,8 +433,8 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
 ARITHMETIC = Arithmetic(
     Verbs(memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
     constants, tables,
-)  # fmt: skip
+)
 HEAT_ARITHMETIC = Arithmetic(
     Verbs(heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
     heat_constants, heat_tables,
-)  # fmt: skip
+)

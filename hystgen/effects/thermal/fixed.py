@@ -82,7 +82,7 @@ class Formats(Coded):
 def linear(
     effect: LoggedThermal | OwnHeat, size: float, at: Coding, wrong: float, at_once: float, least: float,
     largest: float, offset: float,
-) -> Gain:  # fmt: skip
+) -> Gain:
     """A gain linear in a temperature that is `wrong` and moves `at_once` by so many degrees."""
     degree = abs(effect.gain_per_degree) * size + abs(effect.offset_per_degree) / at.output_lsb
     there = wrong * degree + LINEAR_ERROR * size + FACTOR_ERROR * offset
@@ -177,7 +177,7 @@ AMOUNT_BITS = 50
 HEAT_KIND = Kind(
     "heat", counts=("turns", "coarse", "lift", "drop"), reading=(), own=("solve", "absorb"), letters="ffffw",
     memory="wiiw",
-)  # fmt: skip
+)
 
 RATE, PER_AMOUNT, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, COARSE, LIFT, DROP, BITS_BELOW = 0, 2, 4, 6, 8, 9, 10, 11, 12
 RISE, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET = range(4)
@@ -319,7 +319,7 @@ STATE_BITS = 31
 FRICTION_KIND = Kind(
     "friction", (), (), Rows("play", letters="w", memory="i"), counts=("n", "bits"), flags=("begun",),
     reading=(), own=(),
-)  # fmt: skip
+)
 
 
 def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
@@ -357,8 +357,8 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
 ARITHMETIC = Arithmetic(
     Verbs(floating.memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
     constants, made, formats,
-)  # fmt: skip
+)
 HEAT_ARITHMETIC = Arithmetic(
     Verbs(floating.heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
     heat_constants, heat_tables, heat_formats,
-)  # fmt: skip
+)

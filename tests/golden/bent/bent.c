@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 6cb4d1ec9dfb2afbd7efe05f3974da9b86e79f834a8f7e1b0413b4662c016c2b, without this line
+ * Text: sha256 63126d16ef9ebf34670b54373d303d0257caff9033dc2d4bc64fe0366be88a1d, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -226,9 +226,14 @@ static bent_real_t bent_inverse_clamp(bent_real_t u) {
     return (bent_real_t)(least > BENT_OUTPUT_MAX ? BENT_OUTPUT_MAX : least);
 }
 
+/* The actuator is at drive v. */
+static void bent_inverse_set_drive(bent_inverse_t *self, bent_real_t v) {
+    self->drive = v;
+}
+
 /* The actuator is at drive v. Returns the input of the plays. */
 static bent_real_t bent_inverse_arrive(bent_inverse_t *self, bent_real_t v) {
-    self->drive = v;
+    bent_inverse_set_drive(self, v);
     return bent_front_forward(v);
 }
 
@@ -270,6 +275,12 @@ static inline void bent_forward_played(bent_forward_t *self, bent_real_t v) {
     bent_loop_absorb(&bent_model_tables, self->play, bent_front_forward(v));
 }
 
+/* The part common to init and reset, once the plays are set: they rest at this drive. */
+static void bent_forward_begin(bent_forward_t *self) {
+    self->status = 0;
+    self->answer = bent_forward_displaced(bent_loop_output(&bent_model_tables, self->play));
+}
+
 /* Drive v has passed through the drive side and moved the plays. */
 static inline void bent_inverse_played(bent_inverse_t *self, bent_real_t v) {
     bent_loop_absorb(&bent_model_tables, self->play, bent_inverse_arrive(self, v));
@@ -293,12 +304,6 @@ static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t v) {
 }
 
 /* The part common to init and reset, once the plays are set: they rest at this drive. */
-static void bent_forward_begin(bent_forward_t *self) {
-    self->status = 0;
-    self->answer = bent_forward_displaced(bent_loop_output(&bent_model_tables, self->play));
-}
-
-/* The part common to init and reset, once the plays are set: they rest at this drive. */
 static void bent_inverse_begin(bent_inverse_t *self, bent_real_t drive) {
     self->pending = drive;
     self->answer = drive;
@@ -316,10 +321,10 @@ void bent_forward_init(bent_forward_t *self) {
     bent_forward_begin(self);
 }
 
-void bent_forward_reset(bent_forward_t *self, bent_real_t v) {
+void bent_forward_reset(bent_forward_t *self, bent_real_t x) {
     bent_loop_rest(&bent_model_tables, self->play, 0);
     bent_forward_begin(self);
-    (void)bent_forward_step(self, v);
+    (void)bent_forward_step(self, x);
 }
 
 void bent_inverse_init(bent_inverse_t *self) {
@@ -327,10 +332,10 @@ void bent_inverse_init(bent_inverse_t *self) {
     bent_inverse_begin(self, BENT_INVERSE_INIT_DRIVE);
 }
 
-void bent_inverse_reset(bent_inverse_t *self, bent_real_t u) {
+void bent_inverse_reset(bent_inverse_t *self, bent_real_t x) {
     bent_loop_rest(&bent_model_tables, self->play, 0);
     bent_inverse_begin(self, BENT_INVERSE_RESET_DRIVE);
-    (void)bent_inverse_step(self, u);
+    (void)bent_inverse_step(self, x);
 }
 
 bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {

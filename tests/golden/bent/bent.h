@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 630d14b6ea85eb8ceefa19138feba2422ed1a12878910aec1ab01799e5545c44, without this line
+ * Text: sha256 2d3f1b0b55a9cbd567b898af731c5c0de340d1ddc7c91c373e737069d0e63b16, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -19,6 +19,10 @@
  *     inverse instance  104 bytes of RAM
  *     forward step, worst case: 8 multiplications (2 + 1 n), 22 comparisons (10 + 2 n)
  *     inverse step, worst case: 23 multiplications (5 + 3 n), 38 comparisons (20 + 3 n)
+ *     forward step, dearest: about 8260 instructions and 216 bytes of stack on a Cortex-M0+, 4409
+ *         and 204 on a Cortex-M4F, as measured for such a model
+ *     inverse step, dearest: about 19054 instructions and 272 bytes of stack on a Cortex-M0+, 9478
+ *         and 272 on a Cortex-M4F, as measured for such a model
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
  * memory of the parameter file; reset starts again from plays at 0. Not for targets that flush
@@ -117,15 +121,15 @@ typedef struct {
 void bent_forward_init(bent_forward_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step to drive v.
+ * All plays 0, status cleared, then one ordinary step with x.
  *
  * @param self the instance
- * @param v drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: held
+ * @param x drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: held
  * @pre after init; at any time
  * @note Status bits: cleared, then those of the step
  * @note Cost: that of init and of a step
  */
-void bent_forward_reset(bent_forward_t *self, bent_real_t v);
+void bent_forward_reset(bent_forward_t *self, bent_real_t x);
 
 /**
  * One sample: drive v in, output out. Cannot fail.
@@ -161,15 +165,15 @@ unsigned int bent_forward_status(bent_forward_t *self);
 void bent_inverse_init(bent_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step to reference u.
+ * All plays 0, status cleared, then one ordinary step with x.
  *
  * @param self the instance
- * @param u reference, um; limited to BENT_OUTPUT_MIN .. MAX; NaN and infinite: held
+ * @param x reference, um; limited to BENT_OUTPUT_MIN .. MAX; NaN and infinite: held
  * @pre after init; at any time
  * @note Status bits: cleared, then those of the step
  * @note Cost: that of init and of a step
  */
-void bent_inverse_reset(bent_inverse_t *self, bent_real_t u);
+void bent_inverse_reset(bent_inverse_t *self, bent_real_t x);
 
 /**
  * One sample: reference u in, drive out, inside BENT_DRIVE_MIN .. MAX. Cannot fail.

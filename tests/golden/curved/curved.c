@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 10641de4d5e4ce37e8103e94c6118dcaf7fc28d476cf321a7cff2a602631520a, without this line
+ * Text: sha256 553e3ffacf5c6b3ddd11a410de4466e79504852f134f1374b9b972bae44cb5fc, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -369,7 +369,7 @@ static const curved_segment_t curved_model_segment[8] = {
 static const curved_curve_t curved_model_curve = {curved_model_segment, 0, {24326966, 26766226}, 6};
 static const int32_t curved_model_start[1] = {0};
 static const int32_t curved_model_zero[1] = {0};
-static const curved_drive_t curved_inverse_drive[2] = {{-2731, true}, {-2731, true}};
+static const curved_drive_t curved_inverse_first_drive[2] = {{-2731, true}, {-2731, true}};
 /* w = G[v] */
 static const int32_t curved_front_knot[42] = {
     -32767, -30719, -28671, -26623, -24575, -22527, -20479, -18431, -16383, -15359, -14335, -13311,
@@ -472,16 +472,21 @@ CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool *limited
     return (curved_reach_t)curved_nearest(v, CURVED_BELOW);
 }
 
+/* The actuator is at drive v. */
+static void curved_inverse_set_drive(curved_inverse_t *self, curved_real_t v) {
+    self->drive = v;
+}
+
+/* The actuator is at drive v. Returns the input of the plays. */
+static curved_play_t curved_inverse_arrive(curved_inverse_t *self, curved_real_t v) {
+    curved_inverse_set_drive(self, v);
+    return curved_front_forward(v);
+}
+
 /* Keeps the place for a commit to go back to. */
 CURVED_APART void curved_inverse_keep(curved_inverse_t *self) {
     curved_copy_place(&self->undo, &self->here);
     self->undo_drive = self->drive;
-}
-
-/* The actuator is at drive v; its move sets the direction. Returns the input of the plays. */
-CURVED_APART int32_t curved_inverse_arrive(curved_inverse_t *self, curved_real_t v) {
-    self->drive = v;
-    return curved_front_forward(v);
 }
 
 /* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
@@ -530,25 +535,33 @@ void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied) {
                          curved_inverse_arrive(self, v));
 }
 
-static void curved_inverse_begin(curved_inverse_t *self, const int32_t *play, unsigned int step,
-                                 const curved_drive_t *first) {
-    curved_start(&curved_model_curve, &self->here, self->corner, play, step);
-    self->drive = (curved_real_t)first->drive;
+/* The plays hold a start memory. */
+static void curved_inverse_rest(curved_inverse_t *self) {
     curved_inverse_keep(self);
     self->reference = 0;
     self->repeat = false;
     self->next = -CURVED_FAR;
     self->bits = 0;
+}
+
+/* The start memory of the parameter file (`which` 0) or all plays at 0 (1). */
+static void curved_inverse_begin(curved_inverse_t *self, unsigned int which) {
+    curved_start(&curved_model_curve, &self->here, self->corner,
+                 which > 0u ? curved_model_zero : curved_model_start,
+                 which > 0u ? 0u : CURVED_START_STEP);
+    const curved_drive_t *first = &curved_inverse_first_drive[which];
+    self->drive = (curved_real_t)first->drive;
     self->status = 0;
+    curved_inverse_rest(self);
 }
 
 void curved_inverse_init(curved_inverse_t *self) {
-    curved_inverse_begin(self, curved_model_start, CURVED_START_STEP, &curved_inverse_drive[0]);
+    curved_inverse_begin(self, 0);
 }
 
-void curved_inverse_reset(curved_inverse_t *self, curved_real_t u) {
-    curved_inverse_begin(self, curved_model_zero, 0, &curved_inverse_drive[1]);
-    (void)curved_inverse_step(self, u);
+void curved_inverse_reset(curved_inverse_t *self, curved_real_t x) {
+    curved_inverse_begin(self, 1);
+    (void)curved_inverse_step(self, x);
 }
 
 unsigned int curved_inverse_status(curved_inverse_t *self) {

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 72e4908b730194634e3673f2fcc965524a7e15023e7306ad42a094c5dd3d8863, without this line
+ * Text: sha256 88a4783c2033acc6108d45c91d580f49ce66390b0aa750be8ac492755b493173, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -412,24 +412,30 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied) {
     self->before = m->here.input;
 }
 
-PLAIN_APART void plain_inverse_begin(plain_inverse_t *self, const plain_start_t *start) {
-    plain_start(&plain_inverse_curve, &self->plays, self->corner, start);
+/* The plays hold a start memory: the drive rests within its range. */
+static void plain_inverse_rest(plain_inverse_t *self) {
     plain_move_to_output(&plain_inverse_curve, &self->plays, self->corner,
                          plain_clamp_drive(self->plays.here.output));
     plain_copy_place(&self->undo, &self->plays.here);
     self->before = self->plays.here.input;
     self->stepped = false;
     self->committed = false;
+}
+
+/* The start memory of the parameter file (`which` 0) or all plays at 0 (1). */
+PLAIN_APART void plain_inverse_begin(plain_inverse_t *self, unsigned int which) {
+    plain_start(&plain_inverse_curve, &self->plays, self->corner, &plain_inverse_start[which]);
     self->status = 0;
+    plain_inverse_rest(self);
 }
 
 void plain_inverse_init(plain_inverse_t *self) {
-    plain_inverse_begin(self, &plain_inverse_start[0]);
+    plain_inverse_begin(self, 0);
 }
 
-void plain_inverse_reset(plain_inverse_t *self, plain_real_t u) {
-    plain_inverse_begin(self, &plain_inverse_start[1]);
-    (void)plain_inverse_step(self, u);
+void plain_inverse_reset(plain_inverse_t *self, plain_real_t x) {
+    plain_inverse_begin(self, 1);
+    (void)plain_inverse_step(self, x);
 }
 
 unsigned int plain_inverse_status(plain_inverse_t *self) {

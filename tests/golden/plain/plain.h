@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 bedbfe6275ec37b3ac9113040d2bd445019303638672514c4d5d80cc54bbf2a0, without this line
+ * Text: sha256 a5a698b8f6e1c080ea8d5dcf0e5f0c5ed29345d84b21b6a193fbc6d6bb436723, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -16,6 +16,8 @@
  *     constant tables   212 bytes
  *     inverse instance  200 bytes of RAM
  *     inverse step, worst case: 17 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)
+ *     inverse step, dearest: about 2477 instructions and 248 bytes of stack on a Cortex-M0+, 272
+ *         and 112 on a Cortex-M4F, as measured for such a model
  * On an 8-bit AVR constants lie in RAM too: at most 384 bytes of RAM in all, 31 of them for each
  * play
  *
@@ -147,15 +149,15 @@ typedef struct {
 void plain_inverse_init(plain_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step to reference u.
+ * All plays 0, status cleared, then one ordinary step with x.
  *
  * @param self the instance
- * @param u reference, um; limited to PLAIN_OUTPUT_MIN .. MAX; NaN and infinite: held
+ * @param x reference, um; limited to PLAIN_OUTPUT_MIN .. MAX; NaN and infinite: held
  * @pre after init; at any time
  * @note Status bits: cleared, then those of the step
  * @note Cost: that of init and of a step
  */
-void plain_inverse_reset(plain_inverse_t *self, plain_real_t u);
+void plain_inverse_reset(plain_inverse_t *self, plain_real_t x);
 
 /**
  * One sample: reference u in, drive out, inside PLAIN_DRIVE_MIN .. MAX. Cannot fail.

@@ -1,0 +1,145 @@
+/* Between drives and inputs of the plays: with a memoryless part of one branch or two, and without
+   one. Called by the operators. */
+#ifndef HYSTGEN_DRIVE_C
+#define HYSTGEN_DRIVE_C
+#include "compensator/model.h"
+#include "front/front.c"
+#include "compensator/clamp.c"
+
+/* The actuator is at drive v. */
+static void hystgen_operator_set_drive(hystgen_operator_t *self, hystgen_fine_t v) {
+#ifdef HYSTGEN_HAS_TWO_BRANCHES
+    if (v > self->drive) { /* the direction of the move picks the branch */
+        self->ascending = true;
+    } else if (v < self->drive) {
+        self->ascending = false;
+    }
+#endif
+    self->drive = v;
+}
+
+/* The actuator is at drive v. Returns the input of the plays. */
+static hystgen_play_t hystgen_operator_arrive(hystgen_operator_t *self, hystgen_fine_t v) {
+    hystgen_operator_set_drive(self, v);
+#ifdef HYSTGEN_HAS_TWO_BRANCHES
+    return hystgen_front_forward(v, self->ascending);
+#elif defined(HYSTGEN_HAS_FRONT)
+    return hystgen_front_forward(v, true);
+#else
+    return hystgen_front_forward(v);
+#endif
+}
+
+#ifndef HYSTGEN_HAS_FRONT
+/* The drive that gives w. */
+static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_real_t level,
+                                             hystgen_reach_t w) {
+    (void)self;
+    (void)level;
+    return hystgen_front_inverse(w);
+}
+#elif defined(HYSTGEN_CHAIN) && defined(HYSTGEN_HAS_TWO_BRANCHES)
+#ifdef HYSTGEN_HAS_STEADY_LAG
+/* Whether a drive that should go back by `back` goes to the other branch, `way` from there: only if
+   holding misses more than what the lag misses of that way in the first sample of a turn. */
+static inline bool hystgen_turns(hystgen_signal_t back, hystgen_signal_t way) {
+    return back - HYSTGEN_HOLD > hystgen_inverse_missed(way < 0 ? -way : way);
+}
+#else
+/* Whether a drive that should go back by `back` goes to the other branch, `way` from there. */
+static inline bool hystgen_turns(hystgen_signal_t back, hystgen_signal_t way) {
+    (void)way;
+    return back > HYSTGEN_HOLD;
+}
+#endif
+
+/* The drive that gives w on the branch of its own move. Stays on the branch that it is on, where it
+   moves on or holds, and turns only for more than that is worth. Sets a status bit if no drive
+   gives w. */
+HYSTGEN_APART_BUT_IN_FLOAT_LOOP hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self,
+                                                                      hystgen_real_t level,
+                                                                      hystgen_reach_t w) {
+    bool limited;
+    const bool up = self->ascending;
+    hystgen_reach_t v = hystgen_front_inverse(w, up, &limited);
+    const hystgen_fine_t on = hystgen_clamp_fine(v);
+    (void)level;
+    if (up ? on < self->drive : on > self->drive) {
+        v = hystgen_front_inverse(w, !up, &limited);
+        const hystgen_fine_t over = hystgen_clamp_fine(v);
+        const hystgen_reach_t back = (hystgen_reach_t)on - self->drive;
+        const bool fits = up ? over < self->drive : over > self->drive;
+        if (!fits || !hystgen_turns(up ? -back : back, (hystgen_reach_t)over - on)) {
+            v = self->drive;
+        }
+    }
+    if (limited) {
+        self->bits |= HYSTGEN_STATUS_DOMAIN;
+    }
+    return v;
+}
+#else
+#ifdef HYSTGEN_HAS_TWO_BRANCHES
+/* Whether the move to v belongs to the branch that v was computed on. */
+static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t v, bool ascending) {
+    const hystgen_fine_t inside = hystgen_clamp_fine(v);
+    if (inside > self->drive) {
+        return ascending;
+    }
+    if (inside < self->drive) {
+        return !ascending;
+    }
+    return self->ascending == ascending;
+}
+
+/* The drive that gives w on the branch of its own move. Tries the branch of the reference's move,
+   then the other one; if neither fits, the drive holds. Sets `limited` if no drive gives w. */
+HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
+                                                                      hystgen_real_t level,
+                                                                      hystgen_reach_t w,
+                                                                      bool *limited) {
+    bool up = self->ascending;
+    if (level > self->last) {
+        up = true;
+    } else if (level < self->last) {
+        up = false;
+    }
+    hystgen_reach_t v = hystgen_front_inverse(w, up, limited);
+    if (!hystgen_inverse_fits(self, v, up)) {
+        const hystgen_reach_t back = (hystgen_reach_t)hystgen_clamp_fine(v) - self->drive;
+        if (up == self->ascending && back >= -HYSTGEN_HOLD && back <= HYSTGEN_HOLD) {
+            /* it moves back only by rounding */
+            v = self->drive;
+        } else {
+            v = hystgen_front_inverse(w, !up, limited);
+            v = hystgen_inverse_fits(self, v, !up) ? v : self->drive;
+        }
+    }
+    return v;
+}
+#else
+/* The drive that gives w; sets `limited` if there is none. */
+HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
+                                                                      hystgen_real_t level,
+                                                                      hystgen_reach_t w,
+                                                                      bool *limited) {
+    (void)self;
+    (void)level;
+    return hystgen_front_inverse(w, true, limited);
+}
+#endif
+
+/* The drive that gives w for the limited reference `level`. */
+static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_real_t level,
+                                             hystgen_reach_t w) {
+    bool limited;
+    const hystgen_reach_t v = hystgen_inverse_choose(self, level, w, &limited);
+    self->last = level;
+    if (limited) {
+        self->bits |= HYSTGEN_STATUS_DOMAIN;
+    }
+    return v;
+}
+#endif
+
+#endif
