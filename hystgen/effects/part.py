@@ -78,7 +78,7 @@ class Margin(NamedTuple):
     turning: bool = False
 
 
-class Response(NamedTuple):
+class Responses(NamedTuple):
     """What blocks of an inverse make of frequencies (N,): the lead, the share of what is wanted that arrives in front
     of the plays, the response behind them, what of that comes at once, and the gain at rest."""
 
@@ -170,7 +170,7 @@ class One:
         """Frequencies (k,) in rad a sample at which its inverse may ring."""
         return np.empty(0)
 
-    def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
+    def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
         """What it makes of frequencies, `z` (N,) the factor of a delay by a sample, behind other blocks."""
         return found
 
@@ -183,7 +183,7 @@ class One:
         return asked
 
 
-class Gain(NamedTuple):
+class CodedGain(NamedTuple):
     """A gain in fixed point: its ends, and in output codes what it adds to errors of its output and of its input that
     is solved for, beside the rounding of either, and the largest offset."""
 
@@ -241,7 +241,7 @@ class Coded:
         """The error of an output that the inverse makes of one of the sum of the plays."""
         return missed
 
-    def gain(self, size: float, speed: Speed, at: Coding) -> Gain | None:
+    def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain | None:
         """It as a gain, for inputs within a size."""
         return None
 
@@ -259,7 +259,7 @@ class Surroundings:
 
 
 @dataclass(frozen=True)
-class Floating(Surroundings):
+class FloatSurroundings(Surroundings):
     """The same in floating point: `reals` makes numbers, with a name, those of the arithmetic, which rounds by
     `roundoff`."""
 
@@ -268,7 +268,7 @@ class Floating(Surroundings):
 
 
 @dataclass(frozen=True)
-class Fixed(Surroundings):
+class FixedSurroundings(Surroundings):
     """The same in fixed point: units per code, `bits` of signals behind the plays below a code, those of a code and the
     largest one, fraction bits of a `temperature`, the largest `drive` in codes, and the span in signals, `farthest`."""
 
@@ -289,7 +289,7 @@ class Fixed(Surroundings):
 
 
 @dataclass(frozen=True)
-class Arithmetic:
+class Realized:
     """A kind of block in one arithmetic: its verbs, its constants from its tables, and tables of blocks; in fixed point
     of their `formats`, each of a block, surroundings, and the largest sizes of its input and of the output asked for.
     """
@@ -297,11 +297,11 @@ class Arithmetic:
     verbs: Verbs
     constants: Callable[[Any], Iterable[Constants]]
     tables: Callable[[Sequence[Any], Any], Any]
-    formats: Callable[[Any, Fixed, float, float], Any] = lambda one, *_: one
+    formats: Callable[[Any, FixedSurroundings, float, float], Any] = lambda one, *_: one
 
 
 @dataclass(frozen=True)
-class Part:
+class ChainPart:
     """One kind of block. `name`: as in C; `words`: in messages; `takes`: whether an effect is one; `one`: a block of an
     effect at a step length, where it may be `turning`; `calls`: of the interface that it answers; `forward`: only the
     forward operator has it; `joined`: all of them are one block."""
@@ -310,12 +310,12 @@ class Part:
     words: str
     takes: Callable[[Any], bool]
     one: Callable[[Any, float, bool], Any]
-    floating: Arithmetic
-    fixed: Arithmetic
+    floating: Realized
+    fixed: Realized
     calls: tuple[str, ...] = ()
     forward: bool = False
     joined: bool = False
 
-    def arithmetic(self, fixed: bool) -> Arithmetic:
+    def arithmetic(self, fixed: bool) -> Realized:
         """It in fixed point, or else in floating point."""
         return self.fixed if fixed else self.floating

@@ -11,7 +11,7 @@ from hystgen.effects.creep import compensator as creep
 from hystgen.effects.drift import compensator as drift
 from hystgen.effects.kinds import Constants
 from hystgen.effects.lag import compensator as lag
-from hystgen.effects.part import Part
+from hystgen.effects.part import ChainPart
 from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal import fixed as thermal_fixed
@@ -23,7 +23,7 @@ KINDS = (
 """The kinds of blocks in the catalogue, each with its C in the folder of its effect."""
 
 
-def of(t: ChainTables, parts: Sequence[Part], operator: str = "forward") -> list[Constants]:
+def of(t: ChainTables, parts: Sequence[ChainPart], operator: str = "forward") -> list[Constants]:
     """The blocks of an operator that some parts of the chain have."""
     every = parts_with(*t.own_blocks, t.own_effects) if isinstance(t, OwnChainTables) else PARTS
     pairs = [(every[k], t.blocks[k]) for k in map(PARTS.index, parts)]

@@ -12,7 +12,7 @@ from hystgen.effects.delay.block import DELAY
 from hystgen.effects.drift.block import CLOCK
 from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.lag.block import LAG
-from hystgen.effects.part import Part
+from hystgen.effects.part import ChainPart
 from hystgen.effects.resonance.block import MODE
 from hystgen.effects.thermal.block import GAIN, HEAT
 
@@ -39,7 +39,7 @@ LED = PARTS.index(AHEAD[0])
 
 def parts_with(
     ahead: Sequence[OwnBlock], behind: Sequence[OwnBlock], effects: Sequence[type[Effect]] = ()
-) -> list[Part]:
+) -> list[ChainPart]:
     """The parts of a model with blocks of the user's own; `effects`: the classes of all of these."""
     given = {
         OWN_AHEAD.name: own_fixed.part(OWN_AHEAD.name, Place.DRIVE, ahead, effects[: len(ahead)]),

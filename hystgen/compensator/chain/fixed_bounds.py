@@ -42,7 +42,7 @@ from hystgen.compensator.chain.moving import (
 )
 from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, upward
-from hystgen.effects.part import Coded, Coding, Gain, Sought, Speed
+from hystgen.effects.part import Coded, CodedGain, Coding, Sought, Speed
 from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 
@@ -152,14 +152,14 @@ class Bounds:
         """Blocks in front of the plays."""
         return ahead_of(self.formats)
 
-    def _behind(self, forward: bool) -> list[tuple[Coded, float, Gain | None]]:
+    def _behind(self, forward: bool) -> list[tuple[Coded, float, CodedGain | None]]:
         """Blocks behind the plays, with the size of their input, and as gains; those of the `forward` operator or of
         the inverse."""
         parts = [part.name for part in BEHIND if forward or not part.forward]
         speed = Speed(self.static.input_range, self.largest_step, self.seconds)
         lsb = float(self.inner.output_lsb)
         coding = Coding(float(self.inner.drive_lsb), lsb, (self.ends[1] - self.ends[0]) / lsb)
-        found: list[tuple[Coded, float, Gain | None]] = []
+        found: list[tuple[Coded, float, CodedGain | None]] = []
         reached = 0.0  # of gains one after the other, whose ends are nearer than those that signals have room for
         for name in parts:
             for each, size in zip(self.formats[name], self.sizes.given[name], strict=True):

@@ -66,7 +66,7 @@ from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.fixed_tables import TABLE_MAX, Builder, FixedCurve, lsbs, nearest
 from hystgen.effects import bend
 from hystgen.effects.lag.fixed import COARSE
-from hystgen.effects.part import Fixed, Margin, Part
+from hystgen.effects.part import ChainPart, FixedSurroundings, Margin
 from hystgen.effects.saturation.fixed import Saturations
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.front.tanh.model import TanhEnvelope
@@ -369,14 +369,14 @@ class _Builder:
     def _tables(self) -> tuple[Any, ...]:
         """Those of all parts, in their order; what is in front of the plays with as many bits as there is room for."""
         margin = Margin(1.0, turning=self.turning)
-        about = Fixed(
+        about = FixedSurroundings(
             self.seconds, self.static.input_range, self.high - self.low, self.reading.ahead(self.how.preview),
             braked(self.parts, self.ones), self.drive_lsb, self.output_lsb, self.bits, self.about.code_bits,
             self.about.code_max, TEMPERATURE_BITS[self.about.code_bits], max(map(abs, self.inner.drive)),
             self.signal(self.high - self.low), margin,
         )
 
-        def made(part: Part) -> Any:
+        def made(part: ChainPart) -> Any:
             pairs = zip(self.in_front.get(part.name) or self._behind(part), self.ones[part.name], strict=True)
             self.formats[part.name] = [part.fixed.formats(one, about, *sizes) for sizes, one in pairs]
             return part.fixed.tables(self.formats[part.name], about)
@@ -399,7 +399,7 @@ class _Builder:
                 found[part.name] = self._need(functools.partial(made, part), part.words or names)
         return tuple(found[name] for name in NAMES)
 
-    def _behind(self, part: Part) -> list[tuple[float, float]]:
+    def _behind(self, part: ChainPart) -> list[tuple[float, float]]:
         """Sizes of the input and of the output asked for of each block, in output codes."""
         if part not in BEHIND:
             return [(0.0, 0.0)] * len(self.ones[part.name])

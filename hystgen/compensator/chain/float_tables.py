@@ -36,7 +36,7 @@ from hystgen.compensator.chain.layout import (
 )
 from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.float_tables import build_float, inward
-from hystgen.effects.part import Floating
+from hystgen.effects.part import FloatSurroundings
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.front.tanh import kernels
 from hystgen.parameters.schema import Compensation
@@ -140,7 +140,7 @@ def build(
     dither = max(rounded * max(lead(leading), 1.0), drive_lsb or 0.0)
     if static.branches_differ:
         plays.limits[slots.HOLD] = hold(plays.limits[slots.HOLD], dither, turning)
-    about = Floating(
+    about = FloatSurroundings(
         seconds, static.input_range, span, ahead, braked(parts, ones), reals, float(np.finfo(dtype).eps) / 2
     )
     tables = ChainTables(

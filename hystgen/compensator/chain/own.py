@@ -21,7 +21,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects import own
 from hystgen.effects.base import Array, Effect, Place
 from hystgen.effects.kinds import Constants, OwnBlock
-from hystgen.effects.part import Arithmetic, Function, Margin, One, Response, Verbs
+from hystgen.effects.part import Function, Margin, One, Realized, Responses, Verbs
 from hystgen.plays.slots import Counts, Reals
 
 Glue = tuple[Function, Function, Function]
@@ -116,7 +116,7 @@ class System:
         return abs(self.d) + self.before()
 
     def response(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Response (N,) at `z` (N,), the factor z^-1 of a delay by one sample."""
+        """Responses (N,) at `z` (N,), the factor z^-1 of a delay by one sample."""
         states = np.linalg.solve(np.eye(len(self.b)) - z[:, None, None] * self.a, self.b[:, None])[:, :, 0]
         return np.asarray(self.d + z * (states @ self.c))
 
@@ -170,7 +170,7 @@ class Linear(One):
         """Frequencies (k,) in rad a sample at which its inverse may ring."""
         return np.asarray(np.abs(np.angle(np.linalg.eigvals(self.backward.a))))
 
-    def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
+    def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
         """What it makes of frequencies, behind other blocks."""
         found = found._replace(rest=found.rest * self.rest)
         if not self.exact:
@@ -407,7 +407,7 @@ def memory(t: OwnTables, dtype: Any) -> Reals:
 
 def arithmetic(
     blocks: Sequence[OwnBlock], effects: Sequence[type[Effect]], made: Glue, *tables: Callable[..., Any]
-) -> Arithmetic:
+) -> Realized:
     """Blocks on one side of the plays, one after the other, as one of the chain; `tables` and formats as it has."""
 
     def through(verb: str) -> Function:
@@ -417,7 +417,7 @@ def arithmetic(
     verbs = Verbs(memory)
     if blocks:
         verbs = Verbs(memory, through("rest"), through("absorb"), through("resting"), through("solve"))
-    return Arithmetic(verbs, lambda t: constants(t, effects), *tables)
+    return Realized(verbs, lambda t: constants(t, effects), *tables)
 
 
 def _both(first: Function, behind: Function) -> Function:

@@ -11,7 +11,7 @@ import numpy as np
 
 from hystgen.compensator.chain.catalogue import AHEAD, BEHIND, PARTS
 from hystgen.effects.base import Effect, Place
-from hystgen.effects.part import Part
+from hystgen.effects.part import ChainPart
 from hystgen.plays.slots import Counts
 
 
@@ -63,7 +63,7 @@ class Parts:
         most = [1 if part.joined else len(self.blocks[part.name]) for part in PARTS]
         return np.minimum(np.array(found, dtype=np.int64), most)
 
-    def ones(self, seconds: float, turning: bool = False, parts: Sequence[Part] = PARTS) -> dict[str, list[Any]]:
+    def ones(self, seconds: float, turning: bool = False, parts: Sequence[ChainPart] = PARTS) -> dict[str, list[Any]]:
         """The blocks of some parts at steps of `seconds`."""
         return {
             part.name: [part.one(effect, seconds, turning) for effect in self.blocks[part.name]] for part in parts

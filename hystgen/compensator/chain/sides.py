@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 from hystgen.basics.jit import jit
 from hystgen.compensator.chain.catalogue import AHEAD, BEHIND, PARTS, SENT
 from hystgen.compensator.chain.layout import ChainTables
-from hystgen.effects.part import Function, Part, Verbs
+from hystgen.effects.part import ChainPart, Function, Verbs
 
 
 class Blocks(NamedTuple):
     """The blocks of a chain in one arithmetic, and functions."""
 
-    verbs: Callable[[Part], Verbs]
+    verbs: Callable[[ChainPart], Verbs]
     bent: tuple[Function, Function]  # what saturates: forward, inverse
     target: Function  # of the preview's line
     front: tuple[Function, Function]  # forward, inverse
@@ -83,7 +83,7 @@ def _nothing(t: ChainTables, s: Any, x: Any) -> Any:  # noqa: ARG001  as of any 
 def sides_of(every: Sequence[Verbs]) -> Sides:
     """The sides of a chain, with the verbs of all its parts."""
 
-    def through(side: Sequence[Part], verb: str) -> Function:
+    def through(side: Sequence[ChainPart], verb: str) -> Function:
         back = verb in ("resting", "solve")
         places = [PARTS.index(part) for part in (reversed(side) if back else side)]
         found = [(k, function) for k in places if (function := every[k].verb(verb))]

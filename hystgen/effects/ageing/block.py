@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from hystgen.effects.ageing import compensator, fixed
-from hystgen.effects.part import Part
+from hystgen.effects.part import ChainPart
 
-AGEING = Part(
+AGEING = ChainPart(
     "ageing", "ageing", lambda effect: effect.name == "ageing", lambda effect, *_: compensator.Aged(effect),
     compensator.ARITHMETIC, fixed.ARITHMETIC, calls=("set_gain", "travel", "set_travel"),
 )

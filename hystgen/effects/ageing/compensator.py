@@ -14,7 +14,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Floating, Gained, Margin, One, Speed, Verbs
+from hystgen.effects.part import FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -152,7 +152,7 @@ class AgeingTables(NamedTuple):
     turns: Counts
 
 
-def tables(blocks: Sequence[Aged], about: Floating) -> AgeingTables:
+def tables(blocks: Sequence[Aged], about: FloatSurroundings) -> AgeingTables:
     """The tables of several blocks in floating point."""
     rows = [pieces(one.effect) for one in blocks]
     last = [float(each[-1, BEGIN] + 1.0 / each[-1, INVERSE_LENGTH]) for each in rows]
@@ -276,7 +276,7 @@ def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # no
     return s.block[j, GAIN] * x
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(
         memory, absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move, set_gain=ageing_set,
         set_travel=ageing_set_travel, travelled=ageing_travelled,

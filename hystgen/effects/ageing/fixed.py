@@ -24,7 +24,7 @@ from hystgen.effects.ageing.compensator import (
 )
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Coded, Coding, Fixed, Gain, Speed, Verbs
+from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
 from hystgen.effects.thermal.fixed import GAIN_BITS, LARGEST, LEAST, ONE, RECIPROCAL_ERROR, followed, reciprocal
 from hystgen.plays.slots import zero
@@ -83,28 +83,28 @@ def tables(rows: Sequence[tuple[Array, int]], lsb: float, bits: int) -> AgeingTa
 
 
 @dataclass(frozen=True)
-class Formats(Coded):
+class AgeingFormats(Coded):
     """A block: pieces of the gain, and Newton steps."""
 
     one: Aged
     pieces: Array
     turns: int
 
-    def gain(self, size: float, speed: Speed, at: Coding) -> Gain:
+    def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
         """It as a gain, for inputs within a size."""
         begun = 0.5 * at.drive_lsb * abs(floating.steepness(self.one.effect, 0.0))  # pieces begin at whole codes
         wrong = floating.TABLE_ERROR + begun + CUBIC_ERROR
         late = floating.most_at_once(self.one.effect, speed.step) + wrong / LEAST_GAIN + RECIPROCAL_ERROR
-        return Gain(LEAST_GAIN, LARGEST_GAIN, wrong * size, late * size)
+        return CodedGain(LEAST_GAIN, LARGEST_GAIN, wrong * size, late * size)
 
 
-def formats(one: Aged, about: Fixed, *_: float) -> Formats:
+def formats(one: Aged, about: FixedSurroundings, *_: float) -> AgeingFormats:
     """A block of a model."""
     turns = floating.turns(one.effect, about.ends[1] - about.ends[0], 2.0**-GAIN_BITS)
-    return Formats(one, floating.pieces(one.effect), turns)
+    return AgeingFormats(one, floating.pieces(one.effect), turns)
 
 
-def made(blocks: Sequence[Formats], about: Fixed) -> AgeingTables:
+def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> AgeingTables:
     """As `tables`."""
     rows = [(each.pieces, each.turns) for each in blocks]
     return tables(rows, float(about.drive_lsb), GAIN_BITS - (about.code_bits - 2))
@@ -198,7 +198,7 @@ def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # no
     return times(x, s.block[j, GAIN], GAIN_BITS)
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(
         floating.memory, absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
         set_gain=ageing_set, set_travel=ageing_set_travel, travelled=ageing_travelled,

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from hystgen.effects.creep import compensator, fixed
-from hystgen.effects.part import Part
+from hystgen.effects.part import ChainPart
 
-CREEP = Part(
+CREEP = ChainPart(
     "creep", "creep", lambda effect: effect.name == "creep",
     lambda effect, seconds, _: compensator.numbers(effect, seconds),
     compensator.ARITHMETIC, fixed.ARITHMETIC,

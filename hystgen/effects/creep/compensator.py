@@ -14,7 +14,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.base import Array, Block, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Margin, One, Response, Verbs
+from hystgen.effects.part import Margin, One, Realized, Responses, Verbs
 from hystgen.plays.slots import Counts, Reals, zero
 
 EFFECTS = (ExponentialCreep, LogarithmicCreep)
@@ -83,7 +83,7 @@ class CreepNumbers(One):
         """Factor by which states that see its input multiply an error of that."""
         return self.slope * self.backward
 
-    def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
+    def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
         """What it makes of frequencies, behind other blocks."""
         rate, early, late, _ = self.terms.T[:, :, None]
         states = np.sum((early * z + late) / (1.0 - (1.0 - rate) * z), axis=0)
@@ -216,7 +216,7 @@ def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     return y
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
     lambda blocks, about: tables(blocks, about.reals),
 )

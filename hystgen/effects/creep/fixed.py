@@ -20,7 +20,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.creep import compensator as floating
 from hystgen.effects.creep.compensator import AHEAD, BEFORE, HIGH, CreepNumbers, CreepState, CreepTables
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Coded, Fixed, Sought, Verbs
+from hystgen.effects.part import Coded, FixedSurroundings, Realized, Sought, Verbs
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import zero
 
@@ -51,7 +51,7 @@ def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
 
 
 @dataclass(frozen=True)
-class Formats(Coded):
+class CreepFormats(Coded):
     """A block: bits of its states below a signal's, and those dropped before a product."""
 
     one: CreepNumbers
@@ -87,12 +87,12 @@ class Formats(Coded):
         return missed * (self.one.slope * (1.0 / self.one.slope if same else self.one.backward))
 
 
-def formats(one: CreepNumbers, about: Fixed, given: float, _: float) -> Formats:
+def formats(one: CreepNumbers, about: FixedSurroundings, given: float, _: float) -> CreepFormats:
     """A block for inputs up to `given` output codes. Raises OverflowError where states have no room."""
-    return Formats(one, *guard(one, given * 2.0**about.bits, about.bits))
+    return CreepFormats(one, *guard(one, given * 2.0**about.bits, about.bits))
 
 
-def tables(blocks: Sequence[Formats], _: Fixed) -> CreepTables:
+def tables(blocks: Sequence[CreepFormats], _: FixedSurroundings) -> CreepTables:
     """All creep blocks of a model."""
     block: list[list[int]] = []
     term: list[list[int]] = []
@@ -161,7 +161,7 @@ def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     return direct + nearest(total, t.block[j, BITS])
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(floating.memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
     tables, formats,
 )

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from hystgen.effects.delay.compensator import ARITHMETIC, FIXED_ARITHMETIC, Wait
-from hystgen.effects.part import Part
+from hystgen.effects.part import ChainPart
 
-DELAY = Part(
+DELAY = ChainPart(
     "delay", "a delay", lambda effect: effect.name == "delay" and effect.time > 0.0,
     lambda effect, *_: Wait(effect.time), ARITHMETIC, FIXED_ARITHMETIC, forward=True, joined=True,
 )

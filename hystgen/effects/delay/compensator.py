@@ -14,7 +14,7 @@ import numpy as np
 
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
-from hystgen.effects.part import Arithmetic, Function, One, Surroundings, Verbs
+from hystgen.effects.part import Function, One, Realized, Surroundings, Verbs
 from hystgen.plays.slots import Counts, Reals
 
 MOST_SAMPLES = 2**15
@@ -122,11 +122,11 @@ def tables(waits: Sequence[Wait], about: Surroundings, share: Callable[[float], 
     return DelayTables(share(waited) if waiting else share(0.0)[:0], waiting)
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     verbs(delayed), lambda _: (),
     lambda blocks, about: tables(blocks, about, lambda share: about.reals([share], "the delay")),
 )
-FIXED_ARITHMETIC = Arithmetic(
+FIXED_ARITHMETIC = Realized(
     verbs(fixed_delayed), lambda _: (),
     lambda blocks, about: tables(blocks, about, lambda share: np.array(factor(share), dtype=np.int64)),
 )

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from hystgen.effects.drift import compensator, fixed
-from hystgen.effects.part import Part
+from hystgen.effects.part import ChainPart
 
-CLOCK = Part(
+CLOCK = ChainPart(
     "clock", "drift", lambda effect: effect.name == "drift", lambda effect, *_: effect,
     compensator.ARITHMETIC, fixed.ARITHMETIC,
 )

@@ -10,7 +10,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import Arithmetic, Floating, Function, Verbs
+from hystgen.effects.part import FloatSurroundings, Function, Realized, Verbs
 from hystgen.plays.slots import Reals, zero
 
 # ---------------------------------------------------------------- clock.c
@@ -98,11 +98,11 @@ def verbs(memory: Function, start: Function, tick: Function, drift: Function, on
     return Verbs(memory, reset=start, move=tick, added=added, lead=lead, ahead=ahead)
 
 
-def tables(effects: Sequence[LinearDrift | CurvedDrift], about: Floating) -> Reals:
+def tables(effects: Sequence[LinearDrift | CurvedDrift], about: FloatSurroundings) -> Reals:
     """The tables (k, 8) of the clock of a model."""
     rows = [numbers(each, about.seconds, about.span, about.ahead) for each in effects]
     found: Reals = about.reals(rows, "drift").reshape(-1, 8)
     return found
 
 
-ARITHMETIC = Arithmetic(verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants, tables)
+ARITHMETIC = Realized(verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants, tables)

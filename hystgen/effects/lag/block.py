@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from hystgen.effects.lag import compensator, fixed
-from hystgen.effects.part import Part
+from hystgen.effects.part import ChainPart
 
-LAG = Part(
+LAG = ChainPart(
     "lag", "a lag", lambda effect: effect.name == "lag" and effect.time_constant > 0.0, compensator.numbers,
     compensator.ARITHMETIC, fixed.ARITHMETIC,
 )

@@ -15,7 +15,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.base import Block, decays
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag.model import Lag
-from hystgen.effects.part import Arithmetic, Led, Margin, One, Response, Verbs
+from hystgen.effects.part import Led, Margin, One, Realized, Responses, Verbs
 from hystgen.plays.slots import Counts, Reals, zero
 
 LONG_STEP = 2.0
@@ -74,7 +74,7 @@ class LagNumbers(One):
         goal = before * error + farthest * states + 6.0 * u * drive
         return (goal + states) * (1.0 if same else 2.0 - rate) / rate + u * drive * (2.0 + 6.0 / rate)
 
-    def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
+    def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
         """What it makes of frequencies, behind other blocks."""
         rate, second, late, _ = self.row
         if self.exact:
@@ -91,12 +91,12 @@ class LagNumbers(One):
         """Largest input that it is solved for, by outputs within a size and after inputs `given`."""
         return self.sizes(given, asked, margin.turning).answer
 
-    def sizes(self, given: float, asked: float, turning: bool) -> Sizes:
+    def sizes(self, given: float, asked: float, turning: bool) -> LagSizes:
         """Those of its signals."""
-        return Sizes(self.exact, self.row[RATE], self.row[LATE], given, asked, turning)
+        return LagSizes(self.exact, self.row[RATE], self.row[LATE], given, asked, turning)
 
 
-class Sizes:
+class LagSizes:
     """Largest sizes of a lag's signals: its input, the output asked of it, its states, the answer of its inverse;
     `turning`: in front of two branches."""
 
@@ -364,7 +364,7 @@ def steady_state(s: Reals) -> Any:
 
 
 LED = Led(steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked, HALVES)
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
     lambda blocks, about: tables(blocks, about.reals, about.braked),
 )

@@ -19,8 +19,8 @@ from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag import compensator as floating
-from hystgen.effects.lag.compensator import HALVES, LagNumbers, LagTables, Sizes, shifted, steady_led
-from hystgen.effects.part import Arithmetic, Coded, Fixed, Led, Verbs
+from hystgen.effects.lag.compensator import HALVES, LagNumbers, LagSizes, LagTables, shifted, steady_led
+from hystgen.effects.part import Coded, FixedSurroundings, Led, Realized, Verbs
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
@@ -44,11 +44,11 @@ def memory(t: LagTables, dtype: Any) -> Reals:
 
 
 @dataclass(frozen=True)
-class Formats(Coded):
+class LagFormats(Coded):
     """A lag with the sizes of its signals: bits of its states below a signal's, and those dropped before a product."""
 
     one: LagNumbers
-    sizes: Sizes
+    sizes: LagSizes
     bits: int
     drop: int
 
@@ -89,7 +89,7 @@ class Formats(Coded):
         return ((2.0 - rate) * (error + kept) + answer * late + late * code) / (late - second)
 
 
-def formats(one: LagNumbers, about: Fixed, given: float, asked: float) -> Formats:
+def formats(one: LagNumbers, about: FixedSurroundings, given: float, asked: float) -> LagFormats:
     """A lag for signals up to these sizes. Raises OverflowError where states have no room."""
     sizes = one.sizes(given, asked, about.margin.turning)
     room = STATE_BITS - math.ceil(math.log2(sizes.state))
@@ -98,10 +98,10 @@ def formats(one: LagNumbers, about: Fixed, given: float, asked: float) -> Format
     if bits < (EXACT_BITS if one.exact else wanted - GUARD):
         raise OverflowError("no room")
     drop = max(0, math.ceil(math.log2(sizes.state)) + bits + 1 - (LARGEST.bit_length() - 1))
-    return Formats(one, sizes, bits, drop)
+    return LagFormats(one, sizes, bits, drop)
 
 
-def tables(blocks: Sequence[Formats], about: Fixed) -> LagTables:
+def tables(blocks: Sequence[LagFormats], about: FixedSurroundings) -> LagTables:
     """All lags of a model."""
     block: list[list[int]] = []
     for each in blocks:
@@ -295,7 +295,7 @@ def coarsely(t: LagTables, x: Any, drop: Any) -> Any:
 
 
 LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked)
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
     tables, formats,
 )

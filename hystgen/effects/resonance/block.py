@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from hystgen.effects.part import Part
+from hystgen.effects.part import ChainPart
 from hystgen.effects.resonance import compensator, fixed
 
-MODE = Part(
+MODE = ChainPart(
     "mode", "resonance", lambda effect: effect.name == "resonance" and effect.block is None,
     lambda effect, seconds, _: compensator.numbers(effect, seconds),
     compensator.ARITHMETIC, fixed.ARITHMETIC, forward=True,

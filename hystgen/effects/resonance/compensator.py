@@ -17,7 +17,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import Arithmetic, Margin, One, Verbs
+from hystgen.effects.part import Margin, One, Realized, Verbs
 from hystgen.effects.resonance.model import Resonance
 from hystgen.plays.slots import Reals, zero
 
@@ -142,7 +142,7 @@ def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
     return x + s[j, OFF]
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(memory, mode_rest, mode_absorb), constants,
     lambda blocks, about: about.reals([one.table for one in blocks], "the modes").reshape(-1, 5),
 )

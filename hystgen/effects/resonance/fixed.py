@@ -17,7 +17,7 @@ from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifte
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import Arithmetic, Coded, Verbs
+from hystgen.effects.part import Coded, Realized, Verbs
 from hystgen.effects.resonance import compensator
 from hystgen.effects.resonance.compensator import BEFORE, OFF, RATE, ModeNumbers
 from hystgen.plays.fixed import nearest
@@ -70,7 +70,7 @@ def rounding(one: ModeNumbers, table: Any, size: float) -> float:
 
 
 @dataclass(frozen=True)
-class Formats(Coded):
+class ModeFormats(Coded):
     """A mode by its numbers."""
 
     one: ModeNumbers
@@ -108,8 +108,8 @@ def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
     return x + nearest(s[j, OFF], t[j, BITS])
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(compensator.memory, mode_rest, mode_absorb), constants,
     lambda modes, _: np.array([each.row for each in modes], dtype=np.int64).reshape(-1, 13),
-    lambda one, about, given, _: Formats(one, row(one, given * 2.0**about.bits)),
+    lambda one, about, given, _: ModeFormats(one, row(one, given * 2.0**about.bits)),
 )

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from hystgen.effects.part import Part
+from hystgen.effects.part import ChainPart
 from hystgen.effects.thermal import compensator, fixed
 
-GAIN = Part(
+GAIN = ChainPart(
     "gain", "a temperature", lambda effect: effect.name == "thermal" and bool(effect.columns),
     lambda effect, *_: compensator.Warm(effect), compensator.ARITHMETIC, fixed.ARITHMETIC, calls=("set_temperature",),
 )
-HEAT = Part(
+HEAT = ChainPart(
     "heat", "own heat", lambda effect: effect.name == "thermal" and not effect.columns,
     lambda effect, *_: compensator.Warm(effect), compensator.HEAT_ARITHMETIC, fixed.HEAT_ARITHMETIC,
 )

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Floating, Gained, Margin, One, Speed, Verbs
+from hystgen.effects.part import FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -76,7 +76,7 @@ class Warm(One):
         return (asked + margin.span) / LEAST_GAIN
 
 
-def tables(blocks: Sequence[Warm], about: Floating) -> Any:
+def tables(blocks: Sequence[Warm], about: FloatSurroundings) -> Any:
     """The tables (k, 8) of several gains in floating point."""
     effects: list[Any] = [one.effect for one in blocks]
     return about.reals([numbers(each, about.span) for each in effects], "temperatures").reshape(-1, 8)
@@ -316,7 +316,7 @@ def heat_turns(effect: OwnHeat, ends: tuple[float, float], seconds: float, round
     return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
 
 
-def heat_tables(blocks: Sequence[Warm], about: Floating) -> HeatTables:
+def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
     """The tables of several blocks in floating point."""
     effects: list[Any] = [one.effect for one in blocks]
     ends, seconds = about.ends, about.seconds
@@ -430,11 +430,11 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
     return amount
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
     constants, tables,
 )
-HEAT_ARITHMETIC = Arithmetic(
+HEAT_ARITHMETIC = Realized(
     Verbs(heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
     heat_constants, heat_tables,
 )

@@ -1,4 +1,4 @@
-"""Gain and offset behind the plays in fixed point."""
+"""CodedGain and offset behind the plays in fixed point."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from hystgen.arithmetic.factors import MANTISSA_BITS, factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Coded, Coding, Fixed, Gain, Speed, Verbs
+from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
 from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
     AT,
@@ -68,13 +68,13 @@ def tables(rows: Sequence[tuple[float, ...]], level: float, bits: int, degrees: 
 
 
 @dataclass(frozen=True)
-class Formats(Coded):
+class GainFormats(Coded):
     """A gain by its numbers in floating point."""
 
     one: Warm
     numbers: tuple[float, ...]
 
-    def gain(self, size: float, speed: Speed, at: Coding) -> Gain:
+    def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
         """It as a gain, for inputs within a size."""
         return linear(self.one.effect, size, at, 2.0 ** -(TEMPERATURE_BITS + 1), 0.0, LEAST_GAIN, LARGEST_GAIN, at.span)
 
@@ -82,21 +82,21 @@ class Formats(Coded):
 def linear(
     effect: LoggedThermal | OwnHeat, size: float, at: Coding, wrong: float, at_once: float, least: float,
     largest: float, offset: float,
-) -> Gain:
+) -> CodedGain:
     """A gain linear in a temperature that is `wrong` and moves `at_once` by so many degrees."""
     degree = abs(effect.gain_per_degree) * size + abs(effect.offset_per_degree) / at.output_lsb
     there = wrong * degree + LINEAR_ERROR * size + FACTOR_ERROR * offset
     back = (wrong + at_once) * degree / least + RECIPROCAL_ERROR * size + FACTOR_ERROR * offset / least
-    return Gain(least, largest, there, back, offset)
+    return CodedGain(least, largest, there, back, offset)
 
 
-def formats(one: Warm, about: Fixed, *_: float) -> Formats:
+def formats(one: Warm, about: FixedSurroundings, *_: float) -> GainFormats:
     """A gain of a model."""
     effect: Any = one.effect
-    return Formats(one, floating.numbers(effect, about.span))
+    return GainFormats(one, floating.numbers(effect, about.span))
 
 
-def made(blocks: Sequence[Formats], about: Fixed) -> Reals:
+def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> Reals:
     """As `tables`."""
     degrees = about.code_max / 2.0**about.temperature
     return tables([each.numbers for each in blocks], about.level, TEMPERATURE_BITS - about.temperature, degrees)
@@ -195,7 +195,7 @@ class Heat(Coded):
     """Newton steps"""
     one: Warm | None = None
 
-    def gain(self, size: float, speed: Speed, at: Coding) -> Gain:
+    def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
         """It as a gain, for inputs within a size."""
         assert self.one is not None
         effect: Any = self.one.effect
@@ -236,7 +236,7 @@ def heat(
     return Heat((*factors, hot, coarse, lift, drop, bits), tuple(rows), error)
 
 
-def heat_formats(one: Warm, about: Fixed, *_: float) -> Heat:
+def heat_formats(one: Warm, about: FixedSurroundings, *_: float) -> Heat:
     """Own heat of a block."""
     effect: Any = one.effect
     numbers = floating.heat_numbers(effect, about.ends, about.span, about.seconds)
@@ -246,7 +246,7 @@ def heat_formats(one: Warm, about: Fixed, *_: float) -> Heat:
     return replace(found, turns=turns, one=one)
 
 
-def heat_tables(rows: Sequence[Heat], about: Fixed) -> HeatTables:  # noqa: ARG001  as of every block
+def heat_tables(rows: Sequence[Heat], about: FixedSurroundings) -> HeatTables:  # noqa: ARG001  as of every block
     """The tables of several blocks."""
     return HeatTables(
         np.array([one.table for one in rows], dtype=np.int64).reshape(-1, BITS_BELOW + 1),
@@ -354,11 +354,11 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
     return amount
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(floating.memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
     constants, made, formats,
 )
-HEAT_ARITHMETIC = Arithmetic(
+HEAT_ARITHMETIC = Realized(
     Verbs(floating.heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
     heat_constants, heat_tables, heat_formats,
 )
