@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.effects.base import Array
-from hystgen.effects.kinds import Constants
+from hystgen.effects.kinds import Constants, Kind
 
 Function = Callable[..., Any]
 
@@ -292,19 +292,21 @@ class FixedSurroundings(Surroundings):
 class Realized:
     """A kind of block in one arithmetic: its verbs, its constants from its tables, and tables of blocks; in fixed point
     of their `formats`, each of a block, surroundings, and the largest sizes of its input and of the output asked for.
+    `beside`: constants of what stands beside each block.
     """
 
     verbs: Verbs
     constants: Callable[[Any], Iterable[Constants]]
     tables: Callable[[Sequence[Any], Any], Any]
     formats: Callable[[Any, FixedSurroundings, float, float], Any] = lambda one, *_: one
+    beside: Callable[[Any], Iterable[Constants | None]] = lambda _: ()
 
 
 @dataclass(frozen=True)
 class ChainPart:
     """One kind of block. `name`: as in C; `words`: in messages; `takes`: whether an effect is one; `one`: a block of an
     effect at a step length, where it may be `turning`; `calls`: of the interface that it answers; `forward`: only the
-    forward operator has it; `joined`: all of them are one block."""
+    forward operator has it; `joined`: all of them are one block; `kinds`: of its C, in floating point."""
 
     name: str
     words: str
@@ -315,6 +317,7 @@ class ChainPart:
     calls: tuple[str, ...] = ()
     forward: bool = False
     joined: bool = False
+    kinds: tuple[Kind, ...] = ()
 
     def arithmetic(self, fixed: bool) -> Realized:
         """It in fixed point, or else in floating point."""

@@ -4,22 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hystgen.compensator.chain.catalogue import AHEAD, BEHIND, BESIDE, PARTS, parts_with
 from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
-from hystgen.effects.ageing import compensator as ageing
-from hystgen.effects.creep import compensator as creep
-from hystgen.effects.drift import compensator as drift
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, PARTS, parts_with
 from hystgen.effects.kinds import Constants
-from hystgen.effects.lag import compensator as lag
 from hystgen.effects.part import ChainPart
-from hystgen.effects.resonance import compensator as resonance
-from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal import fixed as thermal_fixed
 
-KINDS = (
-    creep.KIND, lag.KIND, lag.EXACT_KIND, lag.BRAKED_KIND, ageing.KIND, thermal.HEAT_KIND, thermal.KIND, resonance.KIND,
-    drift.KIND, thermal.FRICTION_KIND,
-)
+KINDS = tuple(kind for part in PARTS for kind in part.kinds)
 """The kinds of blocks in the catalogue, each with its C in the folder of its effect."""
 
 
@@ -45,7 +35,8 @@ def every(t: ChainTables, operator: str) -> list[Constants]:
 
 def rubbing(t: ChainTables) -> list[Constants | None]:
     """The plays whose friction warms, of each block of own heat; None where the drive's square does."""
-    return list((thermal_fixed if t.fixed else thermal).friction_constants(t.of("heat")))
+    pairs = zip(PARTS, t.blocks, strict=True)
+    return [each for part, tables in pairs for each in part.arithmetic(t.fixed).beside(tables)]
 
 
 def clocks(t: ChainTables) -> list[Constants]:

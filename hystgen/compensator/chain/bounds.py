@@ -29,9 +29,8 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, ErrorBounds, LoopRoundings, error_bounds, together
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.catalogue import SENT
 from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, ahead_of, crossing, lead
-from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.parts import SENT, Parts
 from hystgen.effects.part import Gained, Speed
 from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.saturation.model import TanhSaturation

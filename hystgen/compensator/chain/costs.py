@@ -6,8 +6,8 @@ from collections import Counter
 
 from hystgen.compensator import engines
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.catalogue import NAMES
 from hystgen.compensator.chain.layout import ChainTables
+from hystgen.compensator.chain.parts import NAMES
 from hystgen.plays import slots
 
 PARTS = (
@@ -30,7 +30,8 @@ def parts(t: ChainTables, operator: str) -> list[str]:
     exact = t.of("lag").exact.tolist()
     kinds = [int(kind) for kind in (t.behind.kind if t.fixed else t.behind.stage_kind)]
     found = Counter(dict(zip(NAMES, t.counts.tolist(), strict=True)) | {
-        "lag": exact.count(0), "lag_exact": exact.count(1), "friction": t.of("heat").plays.any(), "preview": len(t.tap),
+        "delay": t.number_of("wait"), "lag": exact.count(0), "lag_exact": exact.count(1),
+        "friction": t.of("heat").plays.any(), "preview": len(t.tap),
         "slew": t.slew, "braked": t.braked,
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),
         "relaxing": t.moving.scanned, "dilated": t.moving.used and not t.moving.scanned,

@@ -27,7 +27,6 @@ from hystgen.arithmetic.factors import error as missed
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, together
 from hystgen.compensator.chain.bounds import SAME, STILL
-from hystgen.compensator.chain.catalogue import BEHIND, LED, NAMES
 from hystgen.compensator.chain.layout import DITHER, ChainTables, ahead_of, largest_way
 from hystgen.compensator.chain.moving import (
     DASHPOT,
@@ -40,7 +39,7 @@ from hystgen.compensator.chain.moving import (
     steepest_bend,
     yield_error,
 )
-from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.parts import BEHIND, LED, NAMES, Parts
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, upward
 from hystgen.effects.part import Coded, CodedGain, Coding, Sought, Speed
 from hystgen.effects.rate_dependence import compensator as dashpot
@@ -282,7 +281,7 @@ class Bounds:
     def forward(self) -> float:
         """Bound of the forward operator, in output codes."""
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
-        waited = 0.5 * 2.0**self._fine * bool(self.tables.of("delay").samples and self.tables.of("delay").share[0])
+        waited = 0.5 * 2.0**self._fine * bool(self.tables.of("wait").samples and self.tables.of("wait").share[0])
         error = self._plays(self._arrival()[0] + short + waited + self.slewed * 2.0**self._fine)
         if self._ahead and self.static.branches_differ:  # the front may settle on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)

@@ -24,7 +24,6 @@ from hystgen.arithmetic.factors import LARGEST, factor
 from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.catalogue import AHEAD, BEHIND, LED, NAMES, PARTS
 from hystgen.compensator.chain.fixed_bounds import Bend, Bounds, Sizes
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
@@ -62,7 +61,7 @@ from hystgen.compensator.chain.layout import (
     too_slow,
 )
 from hystgen.compensator.chain.moving import Bumps
-from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, LED, NAMES, PARTS, Parts
 from hystgen.compensator.fixed_tables import TABLE_MAX, Builder, FixedCurve, lsbs, nearest
 from hystgen.effects import bend
 from hystgen.effects.lag.fixed import COARSE

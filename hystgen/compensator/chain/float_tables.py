@@ -14,7 +14,6 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.catalogue import BEHIND, LED, NAMES, PARTS
 from hystgen.compensator.chain.layout import (
     MOST_SLEWED,
     VERIFIED_SHARE,
@@ -34,7 +33,7 @@ from hystgen.compensator.chain.layout import (
     read,
     too_slow,
 )
-from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.parts import BEHIND, LED, NAMES, PARTS, Parts
 from hystgen.compensator.float_tables import build_float, inward
 from hystgen.effects.part import FloatSurroundings
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation

@@ -13,9 +13,8 @@ import numpy as np
 
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import noise, preview
-from hystgen.compensator.chain.catalogue import AHEAD, BEHIND, LED, NAMES, PARTS
 from hystgen.compensator.chain.noise import Smoothing
-from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, LED, NAMES, PARTS, Parts
 from hystgen.compensator.chain.preview import Shaped, Taps
 from hystgen.effects.base import Effect
 from hystgen.effects.kinds import OwnBlock
@@ -79,7 +78,7 @@ class ChainTables(NamedTuple):
     plays: Any  # `Tables` or `FixedTables`
     limits: Reals
     moving: Any  # `MovingTables` or `FixedMovingTables`
-    blocks: tuple[Any, ...]  # tables of each of `catalogue.PARTS`
+    blocks: tuple[Any, ...]  # tables of each of `parts.PARTS`
     counts: Counts  # of their blocks
     behind: Any  # `Stages`, or in fixed point `hystgen.effects.saturation.fixed.Saturations`
     tap: Reals  # (L,), in fixed point factors (L, 2); none without a preview

@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 from hystgen.basics.problems import UnsupportedEffectsError
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.catalogue import AHEAD, BEHIND
-from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, Parts
 from hystgen.compensator.chain.preview import Taps, averages, whole
 from hystgen.effects.base import decays
 from hystgen.effects.part import One, Responses

@@ -10,8 +10,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.chain.catalogue import AHEAD, BEHIND, PARTS, SENT
 from hystgen.compensator.chain.layout import ChainTables
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, PARTS, SENT
 from hystgen.effects.part import ChainPart, Function, Verbs
 
 

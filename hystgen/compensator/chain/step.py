@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.chain.catalogue import BESIDE, LED, PARTS, parts_with
 from hystgen.compensator.chain.layout import (
     DITHER,
     FALLING,
@@ -26,6 +25,7 @@ from hystgen.compensator.chain.layout import (
     ChainTables,
     OwnChainTables,
 )
+from hystgen.compensator.chain.parts import BESIDE, LED, PARTS, parts_with
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat
 from hystgen.compensator.chain.sides import Blocks, moves, resetting, sides_of, told
 from hystgen.compensator.layout import clamp_drive, inverse_clamp
@@ -86,7 +86,7 @@ class ChainState(NamedTuple):
     plays: State
     lost: Reals  # (n + 1,), what rounding took from each play that a nonlinear dashpot moves
     bent: Reals  # (n + 1,), what each play contributes, if an effect moves or bends them
-    blocks: tuple[Any, ...]  # memory of each of `catalogue.PARTS`
+    blocks: tuple[Any, ...]  # memory of each of `parts.PARTS`
     counts: Counts  # of their blocks in this operator
     line: Line
     real: Reals

@@ -11,7 +11,6 @@ from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_fixed
 from hystgen.compensator.chain import corners_fixed, moving_fixed
-from hystgen.compensator.chain.catalogue import LED, PARTS
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
     BRAKED_DROP,
@@ -28,6 +27,7 @@ from hystgen.compensator.chain.layout import (
     TRAVEL_BITS,
     ChainTables,
 )
+from hystgen.compensator.chain.parts import LED, PARTS
 from hystgen.compensator.chain.preview import Line
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import ChainState, Codes

@@ -7,8 +7,8 @@ from typing import Any
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_float
 from hystgen.compensator.chain import corners_float, moving_float
-from hystgen.compensator.chain.catalogue import LED, PARTS
 from hystgen.compensator.chain.layout import FALLING, RISING, ChainTables, Stages
+from hystgen.compensator.chain.parts import LED, PARTS
 from hystgen.compensator.chain.preview import preview_target
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import ChainState, Codes

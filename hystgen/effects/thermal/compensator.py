@@ -436,5 +436,5 @@ ARITHMETIC = Realized(
 )
 HEAT_ARITHMETIC = Realized(
     Verbs(heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
-    heat_constants, heat_tables,
+    heat_constants, heat_tables, beside=friction_constants,
 )
