@@ -134,7 +134,7 @@ def _blocks(one: Compensator) -> list[str]:
         return []
     t = one.compiled.tables
     missing = {
-        "delay/preview": not len(t.tap), "delay/delay": not t.number_of("delay"), "lag/quiet": not t.quiet,
+        "delay/preview": not len(t.tap), "delay/delay": not t.number_of("wait"), "lag/quiet": not t.quiet,
         "lag/steady": not t.turning,
     }  # fmt: skip
     left_out = tuple(f"effects/{name}" for name, absent in missing.items() if absent)

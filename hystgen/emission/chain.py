@@ -141,7 +141,7 @@ class Shape:
         """That of a model with effects."""
         return cls(
             form, True, t.plays.engine == slots.CORNERS, bool(t.slew), bool(t.braked), bool(t.quiet),
-            bool(t.turning), len(t.tap), t.of("delay").samples,
+            bool(t.turning), len(t.tap), t.of("wait").samples,
         )
 
 
@@ -183,8 +183,8 @@ def effects(
     numbers = dict(zip(NUMBERS, t.number, strict=False))
     constants = [(name, operand(value), NUMBERS[name]) for name, value in numbers.items()]
     constants += [("LEAD", operand(row[-1]), "samples that references come ahead") for row in t.of("clock")]
-    constants.append(("WAITING", f"{t.of('delay').samples}u", "samples of the drive that wait"))
-    if t.of("delay").samples:
+    constants.append(("WAITING", f"{t.of('wait').samples}u", "samples of the drive that wait"))
+    if t.of("wait").samples:
         waited, share = form.waited(t, writer)
         tables += waited * ("forward" in operators)
         constants += share

@@ -234,7 +234,7 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     envelopes = kinds.count(slots.TANH)
     stages = counts.factor * (len(kinds) - envelopes) + envelopes * envelope
     everything, inverse = blocks.every(t, "forward"), blocks.every(t, "inverse")
-    forward = sum(each.products[0] for each in everything) + counts.factor * bool(t.of("delay").samples)
+    forward = sum(each.products[0] for each in everything) + counts.factor * bool(t.of("wait").samples)
     both = sum(sum(each.products) for each in inverse)
     once, halving = counts.braked
     led = t.braked * (once + halving * lag.HALVES) + counts.factor * (t.turning + len(t.tap))

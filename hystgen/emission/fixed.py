@@ -223,7 +223,7 @@ class Fixed(Form):
         return _factors("tap", t.tap, writer)
 
     def waited(self, t: ChainTables, writer: Writer) -> tuple[list[Table], list[Macro]]:
-        return [writer.line("factor_t", "waited", _factor(t.of("delay").share))], []
+        return [writer.line("factor_t", "waited", _factor(t.of("wait").share))], []
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         return [

@@ -141,7 +141,7 @@ class Floating(Form):
         return writer.array("real_t", "tap", list(t.tap))
 
     def waited(self, t: ChainTables, writer: Writer) -> tuple[list[Table], list[Macro]]:
-        return [], [("WAITED", operand(t.of("delay").share[0]), "part of the step after the oldest that is over")]
+        return [], [("WAITED", operand(t.of("wait").share[0]), "part of the step after the oldest that is over")]
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         undo = [Field("place_t", "undo", "where the plays were before the solution")] * inverse

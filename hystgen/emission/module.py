@@ -81,7 +81,7 @@ def _variant(
     moves, bends = chain.plays(t)
     return dataclasses.replace(
         plain, chain=True, slew=bool(t.slew), braked=bool(t.braked), quiet=bool(t.quiet), turning=bool(t.turning),
-        waits=t.number_of("delay") > 0, ages="travel" in t.calls, moves=moves, bends=bends,
+        waits=t.number_of("wait") > 0, ages="travel" in t.calls, moves=moves, bends=bends,
     )
 
 
