@@ -11,7 +11,7 @@ from hystgen.basics.version import __version__
 from hystgen.emission import module, text
 from hystgen.parameters.files import Parameters, parameters_sha256
 from hystgen.planning.converter import Codes, Dac
-from hystgen.planning.session import PlayedSession
+from hystgen.planning.session import Session
 
 
 def file(parameters: Parameters) -> str:
@@ -26,7 +26,7 @@ def nodes(stretches: Sequence[tuple[int, int]]) -> Codes:
 
 def header(
     parameters: Parameters,
-    session: PlayedSession,
+    session: Session,
     dac: Dac,
     codes: Codes,
     stretches: Sequence[tuple[int, int]],

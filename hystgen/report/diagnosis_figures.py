@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from hystgen.diagnosis.search import acceptance
 from hystgen.report.fit_figures import binned
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from hystgen.diagnosis import Diagnosis, Signals
 
 Array = NDArray[np.float64]
@@ -47,7 +50,7 @@ def steps(found: Diagnosis) -> list[tuple[str, float]]:
     return stages + [(f"+ {effect.name}", effect.holdout_after) for effect in result.effects]
 
 
-def gap(found: Diagnosis, width: float) -> Any:
+def gap(found: Diagnosis, width: float) -> Figure:
     """How much each step removes from the held-out error, down to the noise."""
     stages, noise = steps(found), found.result.noise_floor
     names = [*(name for name, _ in stages), "noise"]
@@ -99,7 +102,7 @@ def worst(found: Diagnosis) -> list[Signals]:
     return sorted(held, key=lambda each: -_rms(each.before))[:SHOWN]
 
 
-def overlay(found: Diagnosis, width: float) -> Any:
+def overlay(found: Diagnosis, width: float) -> Figure:
     """Measured and predicted motion over time, and the error before and after."""
     shown, unit = worst(found), found.result.unit
     named = bool(found.result.effects)
@@ -128,7 +131,7 @@ def overlay(found: Diagnosis, width: float) -> Any:
     return drawn
 
 
-def records(found: Diagnosis, width: float) -> Any:
+def records(found: Diagnosis, width: float) -> Figure:
     """rms of every record before and after."""
     shown = [each for each in found.signals if np.isfinite(each.before).any()]
     drawn = drawing.figure(width, 1.3 + 0.34 * len(shown))
@@ -147,7 +150,7 @@ def records(found: Diagnosis, width: float) -> Any:
     return drawn
 
 
-def against(found: Diagnosis, width: float) -> Any:
+def against(found: Diagnosis, width: float) -> Figure:
     """Mean and scatter of the error of all records over the variables that it may depend on."""
     shown = [each for each in found.signals if np.isfinite(each.before).any()]
     units, unit = found.parameters.units, found.result.unit
@@ -180,7 +183,7 @@ def against(found: Diagnosis, width: float) -> Any:
     return drawn
 
 
-def _binned(axes: Any, x: Array, e: Array, colour: str, what: str, log: bool) -> None:
+def _binned(axes: Axes, x: Array, e: Array, colour: str, what: str, log: bool) -> None:
     known = np.isfinite(e) & np.isfinite(x)
     if np.count_nonzero(known) < 64 or np.ptp(x[known]) == 0.0:
         axes.text(0.5, 0.5, "not in these records", transform=axes.transAxes, ha="center", color=drawing.QUIET)
@@ -216,7 +219,7 @@ def _direction(each: Signals) -> Array:
     return np.asarray(found[moved[np.maximum(last, 0)]])
 
 
-def time(found: Diagnosis, width: float) -> Any:
+def time(found: Diagnosis, width: float) -> Figure:
     """rms of the error in stretches of the records along the session."""
     shown = sorted((s for s in found.signals if np.isfinite(s.before).any()), key=lambda each: float(each.t[0]))
     one_clock = all(a.t[-1] <= b.t[0] for a, b in itertools.pairwise(shown))
@@ -249,7 +252,7 @@ def time(found: Diagnosis, width: float) -> Any:
     return drawn
 
 
-def frequency(found: Diagnosis, width: float) -> Any:
+def frequency(found: Diagnosis, width: float) -> Figure:
     """Spectral density of the error of the worst held-out record."""
     from scipy.signal import welch
 
@@ -285,7 +288,7 @@ def _last(found: Diagnosis) -> str:
     return "with the effects" if found.result.effects else "refitted model"
 
 
-def _range(axes: Any, values: Sequence[float]) -> None:
+def _range(axes: Axes, values: Sequence[float]) -> None:
     """A horizontal axis from zero, or a logarithmic one if the values are far apart."""
     positive = [value for value in values if value > 0.0]
     if positive and max(positive) > FAR * min(positive):
@@ -294,7 +297,7 @@ def _range(axes: Any, values: Sequence[float]) -> None:
         axes.set_xlim(left=0.0)
 
 
-def _decades(axes: Any, which: str) -> None:
+def _decades(axes: Axes, which: str) -> None:
     """A logarithmic axis with few plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
