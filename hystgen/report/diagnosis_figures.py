@@ -137,14 +137,13 @@ def records(found: Diagnosis, width: float) -> Figure:
     drawn = drawing.figure(width, 1.3 + 0.34 * len(shown))
     axes = drawn.subplots()
     places = np.arange(len(shown), dtype=np.float64)
-    values = [[_rms(getattr(each, key)) for each in shown] for key in ("before", "after")]
-    if found.result.effects:
-        axes.plot(values[0], places, "o", color=BEFORE, markersize=6, label="refitted")
-    axes.plot(values[1], places, "o", color=AFTER, markersize=6, label=_last(found))
+    values = {key: [_rms(getattr(each, key)) for each in shown] for key in ("before", "after")}
+    for key, colour, what in _sides(found):
+        axes.plot(values[key], places, "o", color=colour, markersize=6, label=what)
     axes.axvline(found.result.noise_floor, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
     axes.set_yticks(places, [f"{each.name}{' (held out)' if each.held_out else ''}" for each in shown])
     axes.set_ylim(len(shown) - 0.5, -0.5)  # half a slot beyond the first and the last
-    _range(axes, [*values[0], *values[1], found.result.noise_floor])
+    _range(axes, [*values["before"], *values["after"], found.result.noise_floor], "x")
     axes.set(xlabel=label("rms error", found.result.unit))
     drawing.legend_above(axes, 3)
     return drawn
@@ -168,8 +167,7 @@ def against(found: Diagnosis, width: float) -> Figure:
     ]
     for axes, (name, of, log) in zip(grid, variables, strict=True):
         x = np.concatenate([of(each) for each in shown])
-        sides = [("before", BEFORE, "refitted")] if found.result.effects else []
-        for key, colour, what in (*sides, ("after", AFTER, _last(found))):
+        for key, colour, what in _sides(found):
             e = np.concatenate([getattr(each, key) * (_direction(each) if log else 1.0) for each in shown])
             _binned(axes, x, e, colour, f"{what}, mean \N{PLUS-MINUS SIGN} 1 sd", log)
         drawing.noise_lines(axes, found.result.noise_floor)
@@ -230,9 +228,7 @@ def time(found: Diagnosis, width: float) -> Figure:
         t = each.t if one_clock else each.t - each.t[0] + start
         start = float(t[-1]) + 0.02 * float(np.ptp(t))
         edges = np.linspace(0, len(t), WINDOWS + 1).astype(int)
-        for key, colour, what in (("before", BEFORE, "refitted"), ("after", AFTER, _last(found))):
-            if key == "before" and not found.result.effects:
-                continue
+        for key, colour, what in _sides(found):
             e = getattr(each, key)
             parts = [(0.5 * (t[a] + t[b - 1]), _rms(e[a:b])) for a, b in itertools.pairwise(edges) if b > a]
             parts = [(place, rms) for place, rms in parts if np.isfinite(rms)]
@@ -241,11 +237,7 @@ def time(found: Diagnosis, width: float) -> Figure:
                       label=None if number else what)
     noise = found.result.noise_floor
     axes.axhline(noise, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
-    positive = [value for value in values if value > 0.0]
-    if positive and max(positive) > FAR * min(positive):
-        _decades(axes, "y")
-    else:
-        axes.set_ylim(bottom=0.0)
+    _range(axes, values, "y")
     clock = "session time (s)" if one_clock else "time, one record after another (s)"
     axes.set(xlabel=clock, ylabel=label("rms error", found.result.unit))
     drawing.legend_above(axes, 3)
@@ -260,8 +252,7 @@ def frequency(found: Diagnosis, width: float) -> Figure:
     step = float(np.median(np.diff(each.t)))
     drawn = drawing.figure(width, 3.6)
     axes = drawn.subplots()
-    sides = [("before", BEFORE, "refitted")] if found.result.effects else []
-    for key, colour, what in (*sides, ("after", AFTER, _last(found))):
+    for key, colour, what in _sides(found):
         e = getattr(each, key)
         known = np.flatnonzero(np.isfinite(e))
         if len(known) < 64:
@@ -288,13 +279,21 @@ def _last(found: Diagnosis) -> str:
     return "with the effects" if found.result.effects else "refitted model"
 
 
-def _range(axes: Axes, values: Sequence[float]) -> None:
-    """A horizontal axis from zero, or a logarithmic one if the values are far apart."""
+def _sides(found: Diagnosis) -> list[tuple[str, str, str]]:
+    """The errors to draw: key, colour and name; those before only if there are effects."""
+    before = [("before", BEFORE, "refitted")] if found.result.effects else []
+    return [*before, ("after", AFTER, _last(found))]
+
+
+def _range(axes: Axes, values: Sequence[float], which: str) -> None:
+    """An axis from zero, or a logarithmic one if the values are far apart."""
     positive = [value for value in values if value > 0.0]
     if positive and max(positive) > FAR * min(positive):
-        _decades(axes, "x")
-    else:
+        _decades(axes, which)
+    elif which == "x":
         axes.set_xlim(left=0.0)
+    else:
+        axes.set_ylim(bottom=0.0)
 
 
 def _decades(axes: Axes, which: str) -> None:
