@@ -136,7 +136,7 @@ class Loop:
     plant.
     """
 
-    plant: Any
+    plant: object
     controller: object
     sample_time: float
     hysteresis: object = None
@@ -324,8 +324,9 @@ class _Operator:
     def reset(self) -> None:
         self._session.init()
 
-    def step(self, x: float, /) -> Any:
-        return self._session.run([x])[0].item()
+    def step(self, x: float, /) -> float:
+        answer: float = self._session.run([x])[0].item()
+        return answer
 
 
 class _InUnits:

@@ -26,6 +26,8 @@ from hystgen.parameters.files import Parameters, load_parameters
 from hystgen.plays import slots
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from hystgen.chain.chain import Chain
     from hystgen.chain.settling import Settling
     from hystgen.compensator.chain.layout import ChainTables
@@ -84,7 +86,7 @@ class Model:
     def _repr_html_(self) -> str:
         return display.block(repr(self), draw=self._figure)
 
-    def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
+    def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
         """A picture of loops, the initial loading curve and, if it exists, the inverse with its accuracy.
 
         Returns matplotlib's Figure, which a notebook shows; with `path`, a .png or .svg file, it is also written there.
@@ -92,7 +94,7 @@ class Model:
         """
         return drawing.picture(self._figure, path)
 
-    def _figure(self) -> Any:
+    def _figure(self) -> Figure:
         from hystgen import portrait
 
         shown = not self.cascade.inverse_problems() and not self.effects

@@ -9,7 +9,7 @@ import numpy as np
 from hystgen.emission import interface, runtime, text
 from hystgen.parameters.files import Parameters, parameters_sha256
 from hystgen.planning.converter import Codes, Dac
-from hystgen.planning.session import PlayedSession
+from hystgen.planning.session import Session
 
 
 def file(parameters: Parameters) -> str:
@@ -24,7 +24,7 @@ def nodes(stretches: Sequence[tuple[int, int]]) -> Codes:
 
 def header(
     parameters: Parameters,
-    session: PlayedSession,
+    session: Session,
     dac: Dac,
     codes: Codes,
     stretches: Sequence[tuple[int, int]],

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import decimal
 import math
-from typing import Any
 
 from hystgen.arithmetic import ARITHMETICS, FIXED, FLOATING
 from hystgen.basics.problems import EffectsError, FormatError, NotInvertibleError, counted, percent
@@ -85,7 +84,7 @@ def properties(model: Model, within: float = SETTLED) -> str:
     return "\n".join(lines)
 
 
-def facts(model: Model, within: float = SETTLED) -> dict[str, Any]:
+def facts(model: Model, within: float = SETTLED) -> dict[str, object]:
     """The same for programs, without error bounds and cost: `hystgen show --json`."""
     c, p = model.cascade, model.parameters
     problems = c.inverse_problems()
@@ -171,7 +170,7 @@ def _reading(model: Model) -> list[str]:
         return []
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     """The text of a number or a list; a long list is shortened."""
     if isinstance(value, tuple):
         return "[" + ", ".join(_shown(entry) for entry in value[:8]) + (", ..]" if len(value) > 8 else "]")
