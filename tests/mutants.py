@@ -428,7 +428,7 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
     ("viscous plays are solved for as plain ones", "effects/rate_dependence/relaxing_plays.c",
      "self->moving ? hystgen_relaxing_input(self->play, hystgen_asked(h))",
      "!self->moving ? hystgen_relaxing_input(self->play, hystgen_asked(h))", "relaxing", "float32"),
-    ("plays are solved for against their direction", "compensator/chain/plays_solve.c", "h >= level", "h < level",
+    ("plays are solved for against their direction", "plays/loop_solve.c", "output >= here", "output < here",
      "creeping", "float32"),
     ("plays rest where they are", "compensator/chain/moving_plays.c", "play[i], w, hystgen_model_tables",
      "play[i], play[0] + 0 * w, hystgen_model_tables", "dilated", "float32"),

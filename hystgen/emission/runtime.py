@@ -18,7 +18,7 @@ from types import MappingProxyType
 from hystgen.arithmetic import ARITHMETICS, Arithmetic
 from hystgen.emission import folding
 
-VERSION = 2  # of the interface between emitted models and a shared run time
+VERSION = 3  # of the interface between emitted models and a shared run time
 
 FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")
 """Macros that say what a model has. Conditions on them are decided when C is emitted; others are carried."""
