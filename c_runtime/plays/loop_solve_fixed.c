@@ -4,9 +4,9 @@
 #include "hystgen_runtime.h"
 
 /* The input of the plays whose output is d further than that of w, between `least` and `most`. */
-static hystgen_reach_t hystgen_going(const hystgen_tables_t *t, hystgen_reach_t w, hystgen_sum_t d,
-                                     unsigned int k, bool rising) {
-    const hystgen_sum_t step = hystgen_over_slope(d, t->reciprocal[k], t->shift[k]);
+static hystgen_reach_t hystgen_input_further(const hystgen_tables_t *t, hystgen_reach_t w,
+                                             hystgen_sum_t d, unsigned int k, bool rising) {
+    const hystgen_sum_t step = hystgen_divide_by_slope(d, t->reciprocal[k], t->shift[k]);
     if (rising) {
         return step > (hystgen_sum_t)t->most - w ? t->most : (hystgen_reach_t)(w + step);
     }
@@ -39,5 +39,5 @@ HYSTGEN_API hystgen_reach_t hystgen_loop_solve(const hystgen_tables_t *t,
         left = left - step;
         w = start;
     }
-    return hystgen_going(t, w, left, k, rising);
+    return hystgen_input_further(t, w, left, k, rising);
 }

@@ -233,7 +233,7 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
         ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
         ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
         ("LARGEST_INPUT", moving.LARGEST_INPUT, ""),
-        ("SEEN", moving.SEEN, "share of a step's way at which the input counts as standing still"),
+        ("STANDING_SHARE", moving.SEEN, "share of a step's way at which the input counts as standing still"),
     )  # fmt: skip
     constants = [(name, operand(t.number[place]), comment) for name, place, comment in words]
     counts = [("TERMS", f"{t.curve.shape[1]}u", "of a polynomial"), ("HALVES", f"{t.halves}u", "steps of the search"),
@@ -265,7 +265,7 @@ def _fixed_moving(t: FixedMovingTables, prefix: str, inverse: bool) -> tuple[lis
     if t.moves == moving.DASHPOT:
         rows = ",\n".join(f"    {{{_entries(row, 'rcrr')}}}" for row in t.yields)
         arrays.append(f"static const {prefix}_yield_t {prefix}_yields[{len(t.yields)}] = {{\n{rows},\n}};\n")
-        arrays.append(f"static const {factor_t}_seen_share = {{{_entries(t.seen, 'f')[1:-1]}}};\n")
+        arrays.append(f"static const {factor_t}_standing_share = {{{_entries(t.seen, 'f')[1:-1]}}};\n")
         numbers += [
             ("YIELDS", f"{len(t.yields)}u", "pieces of what a dashpot yields"),
             ("YIELD_BITS", f"{t.yield_bits}u", "of a yield below a step of the plays' input"),
@@ -552,7 +552,7 @@ def _functions(
                 "}",
                 f"return hystgen_steady_{'braked' if t.braked else 'solve'}(&self->steady, {block.table}, "
                 f"&self->{block.name}, a, rises,",
-                "    hystgen_entered_drive(self->applied), HYSTGEN_DITHER);",
+                "    hystgen_drive_signal(self->applied), HYSTGEN_DITHER);",
             ]
             head = f"HYSTGEN_APART hystgen_signal_t hystgen_inverse_drive_side_solve({self_t}, hystgen_signal_t a)"
             yield _function(f"{leads} The lag arrives from the side of its branch.", head, lines)
