@@ -131,14 +131,17 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
                           hystgen_front_forward(v));
 }
 
-/* The plays hold a start memory. */
-static void hystgen_operator_rest(hystgen_operator_t *self, unsigned int which) {
-    (void)which;
+/* The part common to init and reset. */
+static void hystgen_operator_begin(hystgen_operator_t *self, bool reset) {
+    hystgen_start(&hystgen_model_curve, &self->here, self->corner,
+                  reset ? hystgen_model_zero : hystgen_model_start,
+                  reset ? 0u : HYSTGEN_START_STEP);
     hystgen_copy_place(&self->undo, &self->here);
     hystgen_inverse_stay(self);
     self->before = 0;
     self->reference = 0;
     self->repeat = false;
     self->bits = 0;
+    self->status = 0;
 }
 #endif

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 511d1cb099a708dc99c8ac0b181f20ecf5f5fc80a87bed01238f78668ce06c7f, without this line
+ * Text: sha256 733618859add474504e2559c64574ac51d9954dc417cbfc277920a5e4df41869, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -933,11 +933,15 @@ void two_branches_inverse_commit(two_branches_inverse_t *self, two_branches_real
     two_branches_inverse_replace(self, v);
 }
 
-/* The plays hold a start memory: the drive rests within its range. */
-static void two_branches_inverse_rest(two_branches_inverse_t *self, unsigned int which) {
+/* The part common to init and reset: the drive rests within its range. */
+TWO_BRANCHES_APART void two_branches_inverse_begin(two_branches_inverse_t *self, bool reset) {
+    const two_branches_drive_t *first = &two_branches_inverse_first_drive[reset ? 1 : 0];
+    two_branches_start(&two_branches_inverse_curve, &self->plays, self->corner,
+                       &two_branches_inverse_start[reset ? 1 : 0]);
     self->last = self->plays.here.input + TWO_BRANCHES_OFFSET;
-    two_branches_move_to_output(&two_branches_inverse_curve, &self->plays, self->corner,
-                                two_branches_inverse_first_drive[which].w);
+    two_branches_move_to_output(&two_branches_inverse_curve, &self->plays, self->corner, first->w);
+    self->drive = first->drive;
+    self->ascending = first->ascending;
     two_branches_inverse_keep(self);
     self->returned = self->drive;
     self->reference = 0;
@@ -945,26 +949,15 @@ static void two_branches_inverse_rest(two_branches_inverse_t *self, unsigned int
     self->committed = false;
     self->repeat = false;
     self->bits = 0;
-}
-
-/* The start memory of the parameter file (`which` 0) or all plays at 0 (1). */
-TWO_BRANCHES_APART void two_branches_inverse_begin(two_branches_inverse_t *self,
-                                                   unsigned int which) {
-    two_branches_start(&two_branches_inverse_curve, &self->plays, self->corner,
-                       &two_branches_inverse_start[which]);
-    const two_branches_drive_t *first = &two_branches_inverse_first_drive[which];
-    self->drive = (two_branches_real_t)first->drive;
-    self->ascending = first->ascending;
     self->status = 0;
-    two_branches_inverse_rest(self, which);
 }
 
 void two_branches_inverse_init(two_branches_inverse_t *self) {
-    two_branches_inverse_begin(self, 0);
+    two_branches_inverse_begin(self, false);
 }
 
 void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_t x) {
-    two_branches_inverse_begin(self, 1);
+    two_branches_inverse_begin(self, true);
     (void)two_branches_inverse_step(self, x);
 }
 
