@@ -9,6 +9,9 @@ BLIND := single=260 pair=80 none=200 foreign=100 poor=65 snr=130
 BLIND_DIR := build/blind
 JOBS := 2
 
+# Modules are compiled once, not by each of some hundred processes that tests start
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo test check prove lint fuzz check-bounds blind track docs links clean
 
 # What the demo needs of the package, and a compiler in case there is none

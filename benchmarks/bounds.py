@@ -129,7 +129,9 @@ class Measured:
 
     def _extra(self, one: Compiled) -> dict[str, Array]:
         """A temperature in half degrees, which every arithmetic has."""
-        return {"temperature": 20.0 + 0.5 * np.round(4.0 * np.sin(30.0 * self.t))} if len(one.tables.gain) else {}
+        if "set_temperature" not in one.tables.calls:
+            return {}
+        return {"temperature": 20.0 + 0.5 * np.round(4.0 * np.sin(30.0 * self.t))}
 
     def forward(self, v: Array) -> float:
         """Error of the forward operator, output units."""

@@ -55,25 +55,28 @@ EFFECTS = {
     "tanh": "name: saturation, level: 1000",
     "dead_zone": "name: saturation, shape: stops, lower: -900, upper: 900, give: 0.1",
     "relaxing": "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3",
-    "dilated": "name: rate_dependence, betas: [1.0e-4, 0, 0, 0, 0, 0, 0, 0, 0, 0]",
+    "dilated": "name: rate_dependence, betas: [1.0e-4, OTHERS]",
     "dashpot": "name: rate_dependence, shape: relaxation, time_constant: 5.0e-3, exponent: 2",
-    "polynomial": "name: noncongruent, coefficients: [[0.02, 0.01], [0.02], [0.02], [0.02], [0.02], [0.02], [0.02], "
-    "[0.02], [0.02], [0.02]]",
+    "polynomial": "name: noncongruent, coefficients: [[0.02, 0.01], OTHERS]",
     "centre": "name: noncongruent, shape: centre, amplitude: 0.4, centre: 1, width: 2",
     "mode": "name: resonance, frequency: 30, damping: 0.05",
     "delay": "name: delay, time: 2.6e-3",
     "quiet": "name: lag, time_constant: 0.01",
 }
 """A model of one effect for each part that `hystgen.compensator.chain.costs` counts."""
+OTHERS = {"dilated": "0", "polynomial": "[0.02]"}
+"""What stands for each play but the first."""
 assert {"any", *EFFECTS} == set(PARTS)
 
 
 @functools.cache
-def model(effect: str) -> Model:
-    """Ten plays with one effect, or none."""
+def model(effect: str, plays: int = CODE_PLAYS) -> Model:
+    """So many plays with one effect, or none."""
     text = "hystgen: 1\nname: bench\ninput_range: [-10, 10]\nsample_time: 1.0e-3\nmodel:\n  pi:\n"
-    text += f"    thresholds: {[0.45 * k for k in range(CODE_PLAYS + 1)]}\n    weights: {[0.7] + [0.05] * CODE_PLAYS}\n"
-    text += f"  effects:\n    - {{{EFFECTS[effect]}}}\n" if effect else ""
+    text += f"    thresholds: {[0.45 * k for k in range(plays + 1)]}\n    weights: {[0.7] + [0.05] * plays}\n"
+    if effect:
+        others = "".join(f", {OTHERS.get(effect)}" for _ in range(plays - 1))
+        text += f"  effects:\n    - {{{EFFECTS[effect].replace(', OTHERS', others)}}}\n"
     how = f"compensate: [drift, self_heating], quiet: {str(effect == 'quiet').lower()}, noise_gain: 1.0e+9"
     text += f"emit: {{compensation: {{{how}}}}}\n"
     return Model(parse_parameters(text, "bench.yaml"))

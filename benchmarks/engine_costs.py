@@ -91,7 +91,7 @@ def means(folder: Path, n: int, kind: str, arithmetic: str, engine: str) -> dict
 
 def _program(files: sources.Sources, folder: Path, core: str, compiler: str) -> Path:
     entry = f"hystgen_harness_{files.operators[0]}"
-    return cross.find(targets.find(core), compiler).image(files, folder, compilers.STRICT, cross.Layout(), entry)
+    return cross.find(targets.find(core), compiler).image(files, folder, compilers.STRICT, cross.MemoryMap(), entry)
 
 
 def code(folder: Path, kind: str, operator: str, arithmetic: str, engine: str) -> dict[str, int]:

@@ -419,7 +419,7 @@ class Bench:
         compiler = cross.find(case.target, case.compiler)
         place = self._folder / f"build-{next(self._number)}"
         entry = f"hystgen_harness_{files.operators[0]}"
-        return emulator.Image.load(compiler.image(files, place, compilers.STRICT, cross.Layout(), entry))
+        return emulator.Image.load(compiler.image(files, place, compilers.STRICT, cross.MemoryMap(), entry))
 
     def _module(self, case: Case, engine: str) -> sources.Sources:
         about = (case.n, engine, case.arithmetic, case.middle)

@@ -53,7 +53,7 @@ Array = NDArray[np.float64]
 
 
 @runtime_checkable
-class Block(Protocol):
+class LoopPart(Protocol):
     """A part of the loop with a memory.
 
     A controller (error in, demand out), a compensator (demand in, drive out) or an actuator (drive in, displacement
@@ -128,7 +128,7 @@ class Loop:
     - a model (`Model`, `Cascade`, `PI`), in double precision and unlimited, or the `inverse()` of one: that of a
       `Model` or `Cascade` keeps the drive inside its `input_range`;
     - a `PIController`, or a discrete system of scipy.signal with dt = sample_time;
-    - a `Block`, such as `BitReference` and `CompiledC`, or any object with `step` and `reset`;
+    - a `LoopPart`, such as `BitReference` and `CompiledC`, or any object with `step` and `reset`;
     - a function of one number, without memory.
 
     Raises ValueError for a plant, gain or sample time that cannot be used and for one block in two places, TypeError
@@ -159,7 +159,7 @@ class Loop:
         return _sampled(self.plant, self.sample_time, "the plant")
 
     @cached_property
-    def _blocks(self) -> tuple[Block, Block, Block]:
+    def _blocks(self) -> tuple[LoopPart, LoopPart, LoopPart]:
         return (
             _block(self.controller, self.sample_time, "the controller"),
             _block(1.0 if self.compensator is None else self.compensator, self.sample_time, "the compensator"),
@@ -242,7 +242,7 @@ def _sampled(system: Any, sample_time: float, what: str) -> tuple[Array, Array, 
     return a, b[:, 0], c[0], float(d[0, 0])
 
 
-def _block(part: object, sample_time: float, what: str) -> Block:
+def _block(part: object, sample_time: float, what: str) -> LoopPart:
     from scipy import signal
 
     if isinstance(part, PIController):
@@ -266,7 +266,7 @@ def _block(part: object, sample_time: float, what: str) -> Block:
     if isinstance(part, signal.lti):
         discrete = f"to_discrete({sample_time:g})"
         raise TypeError(f"{what} is a continuous system; give a discrete one, for example the result of its {discrete}")
-    if isinstance(part, Block) and not isinstance(part, type):
+    if isinstance(part, LoopPart) and not isinstance(part, type):
         return part
     if callable(part) and not isinstance(part, type):
         return _Function(part)

@@ -206,15 +206,16 @@ def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") ->
 
     ends = [*t.plays.limits[[PLAY_MIN, PLAY_MAX]].tolist(), *t.plays.start.tolist()]
     drive = max(map(abs, t.plays.limits[:2].tolist())) * 2 ** int(t.number[ARRIVING_BITS])
+    led = most(t.of("lag").block.tolist(), lag.DROP, 50)
+    rubbed = int(t.limits[CODE_MAX]) * most(t.of("heat").number.tolist(), thermal.BITS_BELOW, 0)
     numbers = {
         "SIGNAL": codes.largest, "CODE": int(t.limits[CODE_MAX]),
         "DRIVE": drive,
-        "CREEP": most(t.creep.block.tolist(), creep.DROP, 50) - 1, "LAG": most(t.lag.block.tolist(), lag.DROP, 50),
-        "ASKED": most(t.lag.block.tolist(), lag.DROP, 50) // 3, "COARSE": lag.COARSE, "MOVED": 2 * drive + 2,
-        "MODE": most(t.mode.tolist(), resonance.DROP, 50), **(clock(t.clock[0].tolist()) if len(t.clock) else {}),
+        "CREEP": most(t.of("creep").block.tolist(), creep.DROP, 50) - 1, "LAG": led, "ASKED": led // 3,
+        "COARSE": lag.COARSE, "MOVED": 2 * drive + 2, "MODE": most(t.of("mode").tolist(), resonance.DROP, 50),
+        **(clock(t.of("clock")[0].tolist()) if t.number_of("clock") else {}),
         "RISE": 2 ** (thermal.RISE_BITS + 1), "INVERSE": 2 * thermal.ONE + 2, "PLAY": max(map(abs, ends)),
-        "RUBBED": int(t.limits[CODE_MAX]) * most(t.heat.number.tolist(), thermal.BITS_BELOW, 0),
-        "AMOUNT": 2 * int(t.limits[CODE_MAX]) * most(t.heat.number.tolist(), thermal.BITS_BELOW, 0) * FRICTION_PLAYS**2,
+        "RUBBED": rubbed, "AMOUNT": 2 * rubbed * FRICTION_PLAYS**2,
         "INPUT": int(t.moving.farthest), "LOST": 2 ** int(t.moving.yield_bits) // 2,
         "REST": 2**29, "DRAWN": max(int(t.moving.farthest), *map(abs, ends)),
     }  # fmt: skip

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from hystgen.diagnosis.data.items import Item
-from hystgen.diagnosis.findings.kinds import Finding, Structure
-from hystgen.diagnosis.findings.result import Errors, Gap, Inverse, NamedEffect, Result
+from hystgen.diagnosis.findings.kinds import Finding, Structured
+from hystgen.diagnosis.findings.result import FitErrors, Gap, Inverse, NamedEffect, Result
 from hystgen.diagnosis.search import screening, selection
 from hystgen.effects.base import Run
 
@@ -146,13 +146,13 @@ def result(
     rivals: Sequence[tuple[str, str]] = (),
 ) -> Result:
     """A result with a refitted error of 0.5 um and noise of 0.02 um."""
-    gap = Gap(Errors(0.5, 0.5), Errors(0.5, 0.5), Errors(after, after))
+    gap = Gap(FitErrors(0.5, 0.5), FitErrors(0.5, 0.5), FitErrors(after, after))
     effects = tuple(NamedEffect(name, {}, {}, 0.5, 0.5, after, 0.0, "") for name in names)
     inverse = Inverse(True, ())
     return Result(verdict, 0.02, 10.0, "um", gap, effects, tuple(unexplained), (), tuple(rivals), (), (), inverse)
 
 
-STRUCTURE = Structure(0.05, 2.5, None, {}, None, None, None, None, ())
+STRUCTURE = Structured(0.05, 2.5, None, {}, None, None, None, None, ())
 
 
 def sweep(*ends: float, seconds: float = 1.0, noise: float = 0.0) -> Item:

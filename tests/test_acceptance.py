@@ -275,7 +275,7 @@ def screened(monkeypatch: pytest.MonkeyPatch, *paths: Path) -> float:
     option: Any = SimpleNamespace(front=True, starts=range(len(paths)), grown=None, name="lag", alone=None)
     rough: Any = SimpleNamespace(errors=lambda _: [np.ones(10)], weights=None)
     searches = screening._Searches(None, rough, [], SimpleNamespace(thin=None))  # type: ignore[arg-type]
-    return searches._screen(option, screening._Task(0, 0))  # type: ignore[return-value]
+    return searches._screen(option, screening._Trial(0, 0))  # type: ignore[return-value]
 
 
 # Screening ---------------------------------------------------------------------------------------------------
@@ -299,7 +299,7 @@ def a_joint_search_that_falls_goes_on(factor: float, monkeypatch: pytest.MonkeyP
     """Creep of three states falls slowly, and far below where five steps end."""
     path = Path([factor ** (k / 5.0) for k in range(40)])
     monkeypatch.setattr(fits, "begun", lambda *_: path)
-    task = screening._Task(screening._JOIN, 0, np.zeros(0), np.zeros(0), 5)
+    task = screening._Trial(screening._JOIN, 0, np.zeros(0), np.zeros(0), 5)
     searches = screening._Searches(None, None, [], SimpleNamespace(quick=None))  # type: ignore[arg-type]
     searches._join(SimpleNamespace(structure=None), task)  # type: ignore[arg-type]
     return [steps for steps, _ in path.log]

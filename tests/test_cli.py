@@ -570,7 +570,9 @@ def test_messages_reach_the_shell(installed: str) -> None:
     command = [sys.executable, "-c", code, "emit", "stage.yaml", "-o", "fw"]
     loaded = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()[-1].split()
     assert "hystgen.emission.module" in loaded
-    assert not {"numba", "scipy", "matplotlib", "cffi", "rich"} & set(loaded), "emit starts fast"
+    assert not {"numba", "scipy", "matplotlib", "pandas", "cffi", "rich"} & set(loaded), "emit starts fast"
+    of_effects = [name for name in loaded if name.startswith(("hystgen.effects.", "hystgen.compensator.chain"))]
+    assert of_effects == [], "a plain model has no effect"
     file = ("--json", "no/such/folder/report.json", "--compiler", installed)
     assert "no/such/folder" in process("verify", "stage.yaml", *file, code=2).stderr
 

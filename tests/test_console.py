@@ -65,7 +65,7 @@ COMMANDS = (
 )
 
 
-@pytest.mark.slow(one_in=2)
+@pytest.mark.slow(one_in=3)
 @pytest.mark.thorough(but_one_in=4)
 @pytest.mark.parametrize("words", COMMANDS, ids=" ".join)
 @pytest.mark.parametrize("unbuffered", ["", "1"])
@@ -159,7 +159,7 @@ def litter(*folders: Path) -> list[Path]:
 @pytest.mark.parametrize(
     ("words", "sign"),
     [
-        (("verify", "stage.yaml"), "*.c"),
+        (("verify", "stage.yaml", "--compiler", "gcc"), "*.c"),
         (("identify", "--batch", "units", "-o", "params", "--jobs", "1"), "*.csv"),
         (("identify", "--batch", "units", "-o", "params", "--jobs", "2"), "*.csv"),
     ],

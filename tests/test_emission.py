@@ -231,6 +231,7 @@ def test_bits_equal_where_rounding_decides_on_a_limit(ends: tuple[float, float],
     assert made == [(build, 60_000, 0) for build, _ in host.BUILDS]
 
 
+@pytest.mark.slow(one_in=2)
 @pytest.mark.parametrize("layout", LAYOUTS[1:])
 @pytest.mark.parametrize("arithmetic", ["float32", "q31", "q15"])
 @pytest.mark.parametrize("name", ["listed", "mixed"])
@@ -706,7 +707,8 @@ def test_same_bytes_from_any_directory(tmp_path: Path, monkeypatch: pytest.Monke
     assert [p.split(" ")[1] for p in hystgen.differences("p.yaml", "b")] == ["is", "has"]
 
 
-@pytest.mark.thorough(but_one_in=3)
+@pytest.mark.slow(one_in=2)
+@pytest.mark.thorough(but_one_in=6)
 @pytest.mark.parametrize("arithmetic", ["float32", "float64"])
 @pytest.mark.parametrize("engine", ["corners", "loop"])
 @pytest.mark.parametrize("name", FILES)

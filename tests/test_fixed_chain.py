@@ -308,7 +308,7 @@ def test_answers_like_double_precision_that_saw_the_same_drives(name: str, arith
     ahead = numbers.ahead
     bits = int(numbers.tables.limits[slots.CODE_MAX]).bit_length()
     for k in range(N):
-        warm = len(numbers.tables.gain) > 0
+        warm = "set_temperature" in numbers.tables.calls
         degree = exact.extra["temperature"][k]
         rows = [(slots.OP_TEMPERATURE, degree * 2.0 ** TEMPERATURE_BITS[bits], degree)] * warm
         rows += [(slots.OP_PUSH if k < ahead else slots.OP_STEP, given.v[k], exact.v[k])]
@@ -457,8 +457,8 @@ def test_products_get_numbers_of_their_size(name: str, arithmetic: str, monkeypa
     numbers = one.tables(arithmetic, "loop")
     inverse = name in INVERSE_ALONE
     kinds = [slots.OP_STEP] * 6 + [slots.OP_RESET, slots.OP_SETTLE, slots.OP_OFFSET]
-    kinds += [slots.OP_TEMPERATURE] * (len(numbers.gain) > 0)
-    kinds += [slots.OP_GAIN, slots.OP_TRAVEL] * (len(numbers.ageing.turns) > 0)
+    kinds += [slots.OP_TEMPERATURE] * ("set_temperature" in numbers.calls)
+    kinds += [slots.OP_GAIN, slots.OP_TRAVEL] * ("travel" in numbers.calls)
     call, x = wild(np.random.default_rng(8), kinds, ARITHMETICS[arithmetic].number, 4000)
     plain = factors.times.py_func
     largest = 0
@@ -543,7 +543,7 @@ def test_a_drift_is_counted_without_rounding() -> None:
         state = np.zeros((1, 5), dtype=np.int64)
         with jit.plain():
             for _ in range(20):
-                drift.clock_tick(np.array([one.table]), state, 0)
+                drift.clock_tick(np.array([one.table]), state, 0, 0, 0)
         counted = min(20, samples)
         total = slope * counted + twice * (counted * (counted - 1) // 2)
         assert int(state[0, drift.WHOLE]) * 2**bits + int(state[0, drift.PART]) == total

@@ -7,6 +7,7 @@ import functools
 import inspect
 import os
 import pydoc
+import re
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping, Sequence
@@ -229,3 +230,83 @@ def test_walks_stay_short(walk: str, most: int) -> None:
     run = subprocess.run([sys.executable, script, "--one", walk], capture_output=True, text=True, check=True, env=plain)
     files = int(run.stdout.removeprefix(walk).split()[0])
     assert 3 < files <= most, "python benchmarks/walks.py -v lists them"
+
+
+# Size
+
+
+C_RUNTIME = PACKAGE.parent / "c_runtime"
+
+BOUNDS = {
+    "lines of hystgen/": (52_730, 38_000),
+    "lines that ask `.fixed`": (116, 10),
+    "lines with `Any`": (958, 300),
+    "`fmt: skip`": (102, 30),
+    "files that name an effect outside its folder": (40, 0),
+    "files of C": (99, 120),
+    "lines of C": (6_861, 5_000),
+}
+"""Largest number of each today, and the target. A change that gets below the first lowers it; nothing raises it."""
+
+
+def texts(folder: Path, endings: Sequence[str]) -> dict[Path, str]:
+    """Files of a folder with these endings, and their text."""
+    return {path: path.read_text(encoding="utf-8") for end in endings for path in sorted(folder.rglob(f"*{end}"))}
+
+
+def lines(files: Mapping[Path, str], pattern: str) -> int:
+    """Lines in which a pattern occurs."""
+    return sum(bool(re.search(pattern, line)) for text in files.values() for line in text.splitlines())
+
+
+def named_outside(files: Mapping[Path, str], effects: Path, names: Sequence[str]) -> set[Path]:
+    """Files that import from the folder of an effect, or test for its name, and lie in another one."""
+    return {
+        path
+        for path, text in files.items()
+        for name in names
+        if effects / name not in path.parents and path != effects / "__init__.py"  # the catalogue
+        and re.search(rf"\beffects(\.|/| import ){name}\b|[\"']{name}[\"']", text)
+    }
+
+
+def counted() -> dict[str, int]:
+    """What `BOUNDS` bounds, of this package."""
+    from hystgen.effects import CATALOGUE
+
+    python, c = texts(PACKAGE, [".py"]), texts(PACKAGE, [".c", ".h"]) | texts(C_RUNTIME, [".c", ".h"])
+    outside = named_outside(python | c, PACKAGE / "effects", [*CATALOGUE])
+    return {
+        "lines of hystgen/": lines(python, ""),
+        "lines that ask `.fixed`": lines(python, r"\.fixed\b(?!\.| import)"),
+        "lines with `Any`": lines(python, r"\bAny\b"),
+        "`fmt: skip`": lines(python, "# fmt: skip"),
+        "files that name an effect outside its folder": len(outside),
+        "files of C": len(c),
+        "lines of C": lines(c, ""),
+    }
+
+
+def test_what_grows_stays_within_its_bound() -> None:
+    found = counted()
+    assert found.keys() == BOUNDS.keys()
+    assert {what: number for what, number in found.items() if number > BOUNDS[what][0]} == {}
+
+
+def test_what_the_counts_see(tmp_path: Path) -> None:
+    """Of an invented package."""
+    effects = tmp_path / "effects"
+    for path, text in {
+        "effects/creep/model.py": 'name = "creep"\n',
+        "effects/lag/model.py": "from hystgen.effects.creep import model\n",
+        "chain/blocks.py": "from hystgen.effects.creep import model\nif t.fixed: x: Any = 1  # fmt: skip\n",
+        "chain/kinds.py": "called('creep')  # and what creeps\n",
+        "chain/steps.c": '#include "effects/lag/lag.c"\n',
+    }.items():
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(text)
+    files = texts(tmp_path, [".py", ".c"])
+    found = named_outside(files, effects, ["creep", "lag"])
+    assert {path.name for path in found} == {"model.py", "blocks.py", "kinds.py", "steps.c"}
+    assert effects / "creep" / "model.py" not in found
+    assert [lines(files, each) for each in (r"\.fixed\b", r"\bAny\b", "fmt: skip", "")] == [1, 1, 1, 6]

@@ -19,6 +19,7 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import extras
 from hystgen.basics import jit as jitting
 from hystgen.basics.jit import Jit, jit, plain
+from hystgen.compensator.chain import tables as chain_tables
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.verification.comparison import expected_records
@@ -28,6 +29,9 @@ pytestmark = pytest.mark.thorough
 LARGE = 2**70  # no number of a compiled function
 
 FACTOR = 3
+
+EFFECTS = {"loop": ("everything", "soft_dashpot", "bumpy", "dilated"), "corners": ("creeping", "worn")}
+"""Models with effects by engine: with plays as they are, of each way in which effects move and bend them."""
 
 
 @jit
@@ -63,14 +67,29 @@ def test_without_numba_everything_is_python_and_that_is_said_once(monkeypatch: p
     assert extras.install("fit") in text
 
 
-@pytest.mark.parametrize(("name", "arithmetic", "engine"), [
-    ("mixed", "float32", "corners"), ("mixed", "q15", "corners"), ("everything", "float32", "loop"),
-])  # fmt: skip
+@pytest.mark.parametrize("arithmetic", ["float32", "q15"])
 def test_without_numba_the_bit_reference_gives_the_same_bits(
-    name: str, arithmetic: str, engine: str, monkeypatch: pytest.MonkeyPatch
+    arithmetic: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Over the records of `verify`, and without a warning of numpy."""
-    tables = Model(parse_parameters({**FILES, **CHAINS}[name])).tables(arithmetic, engine)
+    """Of a model without effects, which `test_emission.py` compiles in every arithmetic and engine."""
+    same_bits(Model(parse_parameters(FILES["mixed"])).tables(arithmetic, "corners"), arithmetic, monkeypatch)
+
+
+@pytest.mark.slow(one_in=4)
+@pytest.mark.parametrize("engine", EFFECTS)
+@pytest.mark.parametrize("arithmetic", ["float32", "q31", "float64", "q15"])
+def test_without_numba_effects_give_the_same_bits(
+    engine: str, arithmetic: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever the model's effects are, the functions of an engine and an arithmetic are the same and compiled once."""
+    for name in EFFECTS[engine]:
+        chain = Model(parse_parameters(CHAINS[name])).chain
+        same_bits(chain_tables.build(chain, arithmetic, 1e-3, engine=engine).tables, arithmetic, monkeypatch)
+
+
+def same_bits(tables: Any, arithmetic: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The bit reference answers alike compiled and as Python, over the records of `verify`, and without a warning of
+    numpy."""
     found = []
     monkeypatch.setattr(jitting, "SHORT", 0)
     for has_numba in (True, False):

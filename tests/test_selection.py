@@ -672,9 +672,9 @@ def test_a_front_that_misleads_held_out_records_is_left_out(
         return run._Done(None, None, None, outcome)  # type: ignore[arg-type]
 
     begun = ready, lambda _: refits["front"], lambda _: refits["none"]
-    monkeypatch.setattr(run._Task, "_begun", lambda *_: begun)
-    monkeypatch.setattr(run._Task, "_thorough", thorough)
-    task: Any = object.__new__(run._Task)
+    monkeypatch.setattr(run._Case, "_begun", lambda *_: begun)
+    monkeypatch.setattr(run._Case, "_thorough", thorough)
+    task: Any = object.__new__(run._Case)
     done = task._searched(None)
     assert done.found.fitted is ends["none" if without else "front"]
     assert done.notes == ((run.NO_FRONT,) if without else ())

@@ -23,6 +23,7 @@ import hystgen
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import extras
 from hystgen.cli import main
+from hystgen.compensator import engines
 from hystgen.emission import cost, module
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.emission.options import LAYOUTS
@@ -39,7 +40,7 @@ REQUIRED = bool(os.environ.get("CI"))  # CI installs the second compiler and emu
 
 
 def model(name: str) -> Model:
-    return Model(parse_parameters(FILES[name], f"{name}.yaml"))
+    return Model(parse_parameters({**CHAINS, **FILES}[name], f"{name}.yaml"))
 
 
 @pytest.fixture
@@ -524,7 +525,7 @@ def test_a_step_of_four_instructions_counts_four(target: targets.Target, tmp_pat
     files = sources.Sources("naked", ("forward",), (tmp_path / "naked.c",), tmp_path / "harness.c")
     flags = [*compilers.STRICT, "-Wno-error"]
     image = emulator.Image.load(
-        cross.find(target, "zig").image(files, tmp_path / "build", flags, cross.Layout(), "hystgen_harness_forward")
+        cross.find(target, "zig").image(files, tmp_path / "build", flags, cross.MemoryMap(), "hystgen_harness_forward")
     )
     core = emulator.Core(target, image)
     call = np.array([slots.OP_STEP, slots.OP_RESET, slots.OP_INIT, slots.OP_STEP] * 5, dtype=np.uint8)
@@ -679,6 +680,43 @@ def test_memory_in_the_header_is_what_a_core_needs(name: str, arithmetic: str, e
         gcc = shutil.which(targets.find(core).gcc)
         assert taken <= 1.2 * most
         assert taken >= 0.8 * most or not gcc, "of both compilers the larger one"
+
+
+@pytest.mark.slow(one_in=4)
+@pytest.mark.parametrize("arithmetic", ["float32", "q31"])
+@pytest.mark.parametrize(
+    ("name", "engine"),
+    [
+        ("plain", "corners"),
+        ("two_branches", "corners"),
+        ("mixed", "loop"),
+        ("creeping", "loop"),
+        ("everything", "loop"),
+    ],
+)
+def test_the_dearest_sample_in_the_header_is_about_what_a_core_takes(name: str, engine: str, arithmetic: str) -> None:
+    """The banner adds up what each part takes at its dearest, measured with six states of creep, for instance.
+
+    Its stack is the largest of such parts alone; together they take up to 80 bytes more or less.
+    """
+    one = model(name)
+    options = {"operator": "both", "arithmetic": arithmetic, "engine": engine}
+    header = " ".join(emitted_files(one, **options)[f"{name}.h"].replace("\n *", "\n").split())
+    report = hystgen.verify(one, targets=list(engines.CORES), target_length=300, **options)
+    assert report.ok, report.table()
+    for operator in ("forward", "inverse"):
+        found = re.search(
+            rf"{operator} step, dearest: about (\d+) instructions and (\d+) bytes of stack on a Cortex-M0\+, "
+            r"(\d+) and (\d+) on a Cortex-M4F",
+            header,
+        )
+        assert found
+        figures = [int(figure) for figure in found.groups()]
+        for core, instructions, stack in zip(engines.CORES, figures[::2], figures[1::2], strict=True):
+            rows = [row for row in report.rows if (row.operator, row.target) == (operator, core)]
+            most = max(row.max_instructions or 0 for row in rows)
+            assert 0.85 * most <= instructions <= 1.7 * most
+            assert abs(max(row.stack or 0 for row in rows) - stack) <= 80
 
 
 def test_reports_hold_the_figures(tmp_path: Path) -> None:

@@ -135,7 +135,7 @@ def _blocks(values: SimpleNamespace) -> list[str]:
     blocks = runtime.FIXED_CHAIN_BLOCKS if values.fixed else runtime.CHAIN_BLOCKS
     t = values.numbers
     missing = {
-        "delay/preview": not len(t.tap), "delay/delay": not t.delay.samples, "lag/quiet": not t.quiet,
+        "delay/preview": not len(t.tap), "delay/delay": not t.number_of("delay"), "lag/quiet": not t.quiet,
         "lag/steady": not t.turning,
     }  # fmt: skip
     left_out = tuple(f"effects/{name}" for name, absent in missing.items() if absent)

@@ -177,7 +177,7 @@ def legend_above(axes: Any, columns: int = 3) -> None:
     axes.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, handlelength=1.4,
         columnspacing=1.2,
-    )  # fmt: skip
+    )
 
 
 def kept(start: int, stop: int, *signals: Array) -> NDArray[np.intp]:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import importlib.util
 import json
 import shlex
 import shutil
 import sys
-import urllib.parse
-import urllib.request
 from pathlib import Path
 
 FIT = ("scipy", "numba", "joblib", "threadpoolctl", "rich")
@@ -52,6 +49,10 @@ def _requirement(extra: str) -> list[str]:
     checkout = Path(__file__).resolve().parents[2]
     if (checkout / "pyproject.toml").is_file():  # an editable install, or not installed at all
         return ["-e", f"{checkout}[{extra}]"]
+    import importlib.metadata
+    import urllib.parse
+    import urllib.request
+
     try:
         text = importlib.metadata.distribution("hystgen").read_text("direct_url.json")
         known = json.loads(text or "{}")

@@ -65,11 +65,11 @@ def each(
 
 
 @dataclass(eq=False)
-class _Task(Generic[T, R]):
+class _Job(Generic[T, R]):
     item: T
     done: list[R] = field(default_factory=list)
     """the task's result, once available"""
-    after: list[_Task[T, R]] = field(default_factory=list)
+    after: list[_Job[T, R]] = field(default_factory=list)
 
 
 class Pool(Generic[T, R]):
@@ -104,11 +104,11 @@ class Pool(Generic[T, R]):
         `then`: further tasks that follow from a result; they go first. An item that fails or kills its worker is rerun
         in this process: an exception is raised as in a plain loop.
         """
-        tasks = [_Task[T, R](item) for item in items]
+        tasks = [_Job[T, R](item) for item in items]
 
-        def finish(task: _Task[T, R], result: R) -> list[_Task[T, R]]:
+        def finish(task: _Job[T, R], result: R) -> list[_Job[T, R]]:
             task.done.append(result)
-            task.after.extend(_Task(item) for item in then(task.item, result))
+            task.after.extend(_Job(item) for item in then(task.item, result))
             tick()
             return task.after
 
@@ -122,13 +122,13 @@ class Pool(Generic[T, R]):
             found.append((task.item, task.done[0]))
         return found
 
-    def _elsewhere(self, waiting: deque[_Task[T, R]], finish: Callable[[_Task[T, R], R], list[_Task[T, R]]]) -> None:
+    def _elsewhere(self, waiting: deque[_Job[T, R]], finish: Callable[[_Job[T, R], R], list[_Job[T, R]]]) -> None:
         """Let the processes do the tasks; those after a failure may remain undone."""
         from multiprocessing import connection
 
         self._gather(len(waiting))
         free = list(self._workers)
-        busy: dict[Connection, _Task[T, R]] = {}
+        busy: dict[Connection, _Job[T, R]] = {}
         failed = False
         while True:
             while free and waiting and not failed:

@@ -41,14 +41,14 @@ def in_order(effects: Sequence[Effect]) -> tuple[Effect, ...]:
 
 
 @dataclass(frozen=True)
-class Session:
+class JoinedRuns:
     """Records that follow one another as one run, with the slice of it that each record is."""
 
     run: Run
     parts: tuple[slice, ...]
 
 
-def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> Session:
+def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> JoinedRuns:
     """The runs of a session on one time axis.
 
     A record whose times come after those of the record before keeps them (session time), unless a rest would not fit in
@@ -97,7 +97,7 @@ def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> Session
         parts.append(slice(count, count + len(times)))
         put(times, run.v, {name: run.extra[name] for name in names})
     whole = Run(np.concatenate(t), np.concatenate(v), {name: np.concatenate(extra[name]) for name in names})
-    return Session(whole, tuple(parts))
+    return JoinedRuns(whole, tuple(parts))
 
 
 NO_MOVE = 1e-12

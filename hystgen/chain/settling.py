@@ -130,7 +130,7 @@ def settling(chain: Chain, within: float) -> Settling:
     return Settling(
         within, within * max(up.size, down.size), up.seconds, down.seconds, min(up.followed, down.followed), because,
         left_out,
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)

@@ -123,11 +123,11 @@ partial_option = click.option(
 layout_option = click.option(
     "--layout", type=click.Choice(["self-contained", "shared-runtime", "single-header"]), default="self-contained",
     show_default=True,
-)  # fmt: skip
+)
 skip_option = click.option(
     "--skip", type=float, callback=seconds, default=0.0,
     help="seconds at the start of every record that are not compared, although their drive counts",
-)  # fmt: skip
+)
 T = TypeVar("T")
 U = TypeVar("U")
 

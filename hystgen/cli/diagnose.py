@@ -62,7 +62,7 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
 @click.option(
     "--holdout", multiple=True, type=click.Path(), callback=matched,
     help="record to judge by, not used in the fits; or a pattern in quotes, 'held/*.csv'",
-)  # fmt: skip
+)
 @click.option("--plan", is_flag=True, help="write the drive records to measure, and a page that explains them")
 @click.option("--max-rate", type=float, help="with --plan: fastest change of the drive, input units per second")
 @click.option("--rate", type=float, metavar="HZ", help="with --plan: all drives in order, at a converter's rate")
@@ -102,7 +102,7 @@ def diagnose(
         unused = {
             "DATA": data, "--holdout": holdout, "--history": history, "--rest": rest, "--skip": skip,
             "--session": session,
-        }  # fmt: skip
+        }
         unused |= {f"--{option}": reading[option] for option in ("columns", "delimiter")}
         given = [option for option, value in unused.items() if value]
         if given:
@@ -131,7 +131,7 @@ def diagnose(
     from hystgen import diagnosis, records
     from hystgen.basics import drawing, extras, writing
     from hystgen.effects import load_user_effects
-    from hystgen.planning.session import Session
+    from hystgen.planning.session import PlayedSession
     from hystgen.report import diagnosis as report
 
     model = load_model(params, effects)
@@ -147,7 +147,7 @@ def diagnose(
         own = [kind for path in effects for kind in load_user_effects(path)]
         to_fit: list[Any] = list(data)
         if session is not None:
-            played = Session.read(session)
+            played = PlayedSession.read(session)
             read = records.read_records(to_fit, **read_as)
             (recording,) = records.in_units(read, model.parameters.units, sources=to_fit)
             to_fit, held = played.cut(recording)

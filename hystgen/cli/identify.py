@@ -48,14 +48,14 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
     "--holdout", multiple=True, type=click.Path(), callback=matched,
     help="record not used in the fit; or a pattern in quotes, 'held/*.csv'; with --batch for example "
     "'holdout/{unit}.csv'",
-)  # fmt: skip
+)
 @skip_option
 @click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, rising from 0")
 @click.option("--name", help="C identifier of the model; default: from the output file")
 @click.option(
     "--units", metavar="V,um", callback=_units,
     help="units of drive and output, to which records are converted; default: the records'",
-)  # fmt: skip
+)
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
 @click.option("--report", type=click.Path(file_okay=False), help="folder for report.html and its pictures")
 @record_options
@@ -95,7 +95,7 @@ def identify(
         _identify_batch(
             (*batch, *data), output, holdout=holdout, emit=emit is not False, jobs=jobs, scheduler=scheduler,
             **options, **how,
-        )  # fmt: skip
+        )
         return
     for option, given in only_batch.items():
         if given is not None:

@@ -36,6 +36,9 @@ from hystgen.front.stage import Stage
 from hystgen.front.tanh import kernels
 from hystgen.front.tanh.model import TanhEnvelope
 
+UNSLEWED = "no slew limit acts"
+"""A condition of a bound, in words."""
+
 SECOND_ORDER = 1.01  # products of roundoffs, and the rounding of this computation itself
 
 
@@ -49,6 +52,12 @@ class ErrorBounds:
     forward: float
     inverse: float
     rounding: float
+
+
+def together(*conditions: str) -> str:
+    """Conditions that all have to hold, in words; empty ones are left out."""
+    *others, last = [each for each in conditions if each] or [""]
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def largest_sum(cascade: StaticModel) -> float:

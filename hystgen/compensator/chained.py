@@ -52,7 +52,7 @@ STANDARD = Compensation()
 TAKEN_IN = frozenset({
     "creep", "rate_dependence", "resonance", "lag", "delay", "slew_limit", "saturation", "thermal", "ageing",
     "sensor_nonlinearity", "noncongruent",
-})  # fmt: skip
+})
 
 
 @functools.cache

@@ -2,7 +2,8 @@
 
 `benchmarks/engine_costs.py` makes two tables. `engine_costs.csv` has the instructions per sample, as a mean over a
 decaying multisine; `code_sizes.csv` the bytes of code of a module, the larger figure of two compilers. What effects add
-to the code is in `effect_sizes.csv`, made by `benchmarks/effect_costs.py`.
+to the code is in `effect_sizes.csv`, made by `benchmarks/effect_costs.py`; the dearest sample and its stack in
+`step_costs.csv`, made by `benchmarks/step_costs.py`.
 """
 
 from __future__ import annotations
@@ -10,8 +11,9 @@ from __future__ import annotations
 import csv
 import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.chain.static import StaticModel
@@ -62,6 +64,46 @@ def kind(cascade: StaticModel, arithmetic: str) -> str:
     tanh = [isinstance(stage, TanhEnvelope) for stage in cascade.stages]
     front = "dead_zone" if ARITHMETICS[arithmetic].fixed or not any(tanh) else "tanh" if all(tanh) else "mixed"
     return f"{front}_branches" if cascade.branches_differ else front
+
+
+class Dearest(NamedTuple):
+    """The dearest sample: its instructions, and the bytes of stack of the deepest call."""
+
+    instructions: int
+    stack: int
+
+
+def dearest(
+    cascade: StaticModel, operator: str, arithmetic: str, engine: str, parts: Iterable[str] | None = None
+) -> dict[str, Dearest]:
+    """The dearest sample of an operator on each of `CORES`, from those of such models: its plays, what its memoryless
+    part and each of the `parts` of effects take beyond, and the largest stack of these. `parts`: None without effects.
+    """
+    front = kind(cascade, arithmetic)
+    more = [] if front == "pi" else [(front, engine)]
+    more += [(part, "loop") for part in parts or () if (part, arithmetic, "loop", operator) in _steps()]
+    found = {}
+    for core in CORES:
+        base, *others = (
+            _between(_steps()[part, arithmetic, which, operator], cascade.pi.n, core)
+            for part, which in [("plays" if parts is None else "effects", engine), *more]
+        )
+        instructions = base.instructions + sum(each.instructions for each in others)
+        found[core] = Dearest(instructions, max(base.stack, *(each.stack for each in others), 0))
+    return found
+
+
+def _between(measured: Mapping[int, Mapping[str, Dearest]], n: int, core: str) -> Dearest:
+    """The figures for `n` plays, on the straight line through the rows beside it."""
+    rows = sorted(measured)
+    if len(rows) == 1:
+        return measured[rows[0]][core]
+    above = next((at for at in rows[1:] if at >= n), rows[-1])
+    below = rows[rows.index(above) - 1]
+    low, high = measured[below][core], measured[above][core]
+    share = (n - below) / (above - below)
+    instructions = round(low.instructions + share * (high.instructions - low.instructions))
+    return Dearest(instructions, max(low.stack, high.stack))
 
 
 def effect_bytes(arithmetic: str, engine: str) -> Mapping[str, int]:
@@ -115,6 +157,17 @@ def _code_sizes() -> dict[tuple[str, str, str, str], dict[str, int]]:
         (row["operator"], row["arithmetic"], row["kind"], row["engine"]): {core: int(row[core]) for core in CORES}
         for row in _rows("code_sizes.csv")
     }
+
+
+@functools.cache
+def _steps() -> dict[tuple[str, str, str, str], dict[int, dict[str, Dearest]]]:
+    """By part, arithmetic, engine and operator: the dearest sample on each core, by number of plays."""
+    found: dict[tuple[str, str, str, str], dict[int, dict[str, Dearest]]] = {}
+    for row in _rows("step_costs.csv"):
+        about = (row["part"], row["arithmetic"], row["engine"], row["operator"])
+        figures = {core: Dearest(int(row[core]), int(row[f"{core} stack"])) for core in CORES}
+        found.setdefault(about, {})[int(row["n"])] = figures
+    return found
 
 
 def _rows(name: str) -> list[dict[str, str]]:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,10 +16,6 @@ from hystgen.basics import arguments, jit
 from hystgen.basics.problems import NotInvertibleError
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import step, step_fixed, step_float, tables
-from hystgen.compensator.chain import step as chain_step
-from hystgen.compensator.chain import step_fixed as chain_step_fixed
-from hystgen.compensator.chain import step_float as chain_step_float
-from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.compensator.corners import (
     forward,
     forward_fixed,
@@ -31,7 +27,6 @@ from hystgen.compensator.corners import (
 )
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.compensator.step import Operations
-from hystgen.effects.kinds import OwnBlock
 from hystgen.front import compensator, curve
 from hystgen.plays import loop
 from hystgen.plays.corners.corners_fixed import new_fixed_memory
@@ -52,13 +47,19 @@ from hystgen.plays.slots import (
     read,
 )
 
+if TYPE_CHECKING:
+    from hystgen.compensator.chain.layout import ChainTables
+    from hystgen.effects.kinds import OwnBlock
+
 
 def operations(t: Tables | FixedTables | ChainTables) -> Operations:
     """The functions of the bit reference for the arithmetic and the engine of these tables."""
-    if isinstance(t, ChainTables):
-        drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
-        return _chain_operations(t.fixed, t.plays.engine == LOOP, drives, outputs)
-    return _operations(t.engine == LOOP, t.fixed, t.has_front)
+    if isinstance(t, Tables | FixedTables):
+        return _operations(t.engine == LOOP, t.fixed, t.has_front)
+    from hystgen.compensator.chain.layout import OwnChainTables
+
+    drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
+    return _chain_operations(t.fixed, t.plays.engine == LOOP, drives, outputs)
 
 
 @functools.cache
@@ -77,7 +78,10 @@ def _operations(loops: bool, fixed: bool, front: bool) -> Operations:
 def _chain_operations(
     fixed: bool, loops: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
 ) -> Operations:
-    own = chain_step_fixed if fixed else chain_step_float
+    from hystgen.compensator.chain import step as chain_step
+    from hystgen.compensator.chain import step_fixed, step_float
+
+    own = step_fixed if fixed else step_float
     return chain_step.made_of(own.BLOCKS if loops else own.CORNERS, own.CODES, drives, outputs)
 
 
@@ -133,7 +137,9 @@ def _corner_operations(
 
 def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
     """Memory for one instance of an operator; `init` of its operations sets it."""
-    if isinstance(t, ChainTables):
+    if not isinstance(t, Tables | FixedTables):
+        from hystgen.compensator.chain import step as chain_step
+
         return chain_step.new_state(t, inverse)
     if t.engine == LOOP:
         return loop.new_state(t)

@@ -18,7 +18,7 @@ from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, noise_floor
 from hystgen.diagnosis.findings.content import result_of
 from hystgen.diagnosis.findings.kinds import NotAPlaySum, OtherHistory, WildInverse
-from hystgen.diagnosis.findings.result import WRITTEN, Diagnosis, Errors, Inverse, Signals
+from hystgen.diagnosis.findings.result import WRITTEN, Diagnosis, FitErrors, Inverse, Signals
 from hystgen.diagnosis.search import acceptance, fits, forgetting, harm, hypothesis, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.forgetting import Forgets
@@ -105,7 +105,7 @@ def diagnose(
             [record for record in group if record is not None]
             for group in (usable[: len(fitted)], usable[len(fitted) :])
         )
-        task = _Task(
+        task = _Case(
             model.cascade, given, to_fit or read[: len(fitted)], to_hold, rest, skip, effects, lambda: bar.tick(1)
         )
         done, wrong = task.with_history(before, unit)
@@ -120,7 +120,7 @@ def diagnose(
             ready,
             done.noise,
             found,
-            Errors(*(rms(first.errors(group)) for group in (ready.to_fit, ready.held))),
+            FitErrors(*(rms(first.errors(group)) for group in (ready.to_fit, ready.held))),
             [*_of_another_kind(done.forgets), *wild, *odd, *([] if wrong is None else [wrong]), *done.cleaned.lines],
             done.records.one_loop,
             _inverse(extended, made),
@@ -157,7 +157,7 @@ class _Done:
 
 
 @dataclass(frozen=True)
-class _Task:
+class _Case:
     """The records and the nominal model of a diagnosis, to be searched with a history or without one."""
 
     cascade: Cascade

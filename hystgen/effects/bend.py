@@ -14,7 +14,7 @@ from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals
 
 
-class Piece(Protocol):
+class BendPiece(Protocol):
     """A piece of a curve, as of `hystgen.compensator.fixed_tables.FixedCurve`."""
 
     @property
@@ -39,7 +39,7 @@ class Bends(NamedTuple):
 
 
 def bends(
-    pieces: Sequence[Sequence[Piece]], domain: Sequence[Any], scaled: Sequence[Any], degree: int
+    pieces: Sequence[Sequence[BendPiece]], domain: Sequence[Any], scaled: Sequence[Any], degree: int
 ) -> Bends:
     """The tables of curves; none has pieces that are not called for."""
     flat = list(itertools.chain.from_iterable(pieces))
@@ -53,7 +53,7 @@ def bends(
         whole([one.knot for one in flat]), whole([one.coefficients for one in flat], degree + 1),
         whole([one.scale for one in flat]), whole(first), whole([len(each) for each in pieces]),
         whole(domain, 2), whole(scaled, 2),
-    )  # fmt: skip
+    )
 
 
 @jit

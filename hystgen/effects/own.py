@@ -150,7 +150,7 @@ def check(effect: type[Effect]) -> None:
 ALLOWED = (
     ast.FunctionDef, ast.arguments, ast.arg, ast.Assign, ast.Return, ast.Expr, ast.BinOp, ast.UnaryOp, ast.USub,
     ast.Name, ast.Load, ast.Store, ast.Subscript, ast.For, ast.Call, ast.Constant,
-)  # fmt: skip
+)
 """Names and operations that the functions may use."""
 
 

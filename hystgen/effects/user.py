@@ -58,7 +58,7 @@ def load_user_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
         for value in vars(sys.modules[name]).values()
         if isinstance(value, type) and issubclass(value, Effect) and value.__module__ == name
         and not value.__name__.startswith("_")
-    ]  # fmt: skip
+    ]
     if not found:
         raise EffectsError(f"{file}: defines no effect; write a class of hystgen.effects.Effect")
     for effect in found:

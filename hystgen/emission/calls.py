@@ -13,9 +13,7 @@ from hystgen.basics import arguments, writing
 from hystgen.basics.problems import FormatError, NotInvertibleError
 from hystgen.basics.problems import Path as Key
 from hystgen.compensator import engines
-from hystgen.compensator.chain.bounds import swing
-from hystgen.compensator.chain.parts import Parts
-from hystgen.emission import module, worth
+from hystgen.emission import module
 from hystgen.emission.options import LAYOUTS, OPERATORS, Options
 from hystgen.model import Model, ModelSource, as_model, check_arithmetic
 from hystgen.parameters.files import parameters_sha256
@@ -55,6 +53,8 @@ def emit_options(
     arguments.choice("layout", layout, LAYOUTS)
     left_out: tuple[str, ...] = ()
     if allow_partial and (refused := model.refusals(operator, arithmetic)):
+        from hystgen.emission import worth
+
         left_out = tuple(worth.sentence(model, effect, reason) for effect, reason in refused)
         model = model.without([effect for effect, _ in refused])
     _check_codes(model, arithmetic, operator)
@@ -119,14 +119,22 @@ def doubts(model: Model) -> list[str]:
             "the sensor was diagnosed as curved, and the records could not tell that from an asymmetry of the stage; "
             f"if it is the stage's, the inverse leaves it as it is. {advice}, and diagnose again"
         )
-    seconds = model.parameters.sample_time
-    if seconds and (reach := swing(model.cascade, Parts.of(model.effects), seconds)):
+    if model.effects and (reach := _swing(model)):
         found.append(
             "an effect of your own leads the drive in front of two branches of the memoryless part, between which it "
             f"may then go to and fro at rest, by up to {reach:.3g} {model.parameters.units.input}".rstrip()
             + "; make the effect a lag, or give both branches the same numbers"
         )
     return found
+
+
+def _swing(model: Model) -> float:
+    """How far the drive of a model with effects may go to and fro at rest, in drive units."""
+    from hystgen.compensator.chain.bounds import swing
+    from hystgen.compensator.chain.parts import Parts
+
+    seconds = model.parameters.sample_time
+    return swing(model.cascade, Parts.of(model.effects), seconds) if seconds else 0.0
 
 
 def check_names(models: Sequence[Model]) -> None:

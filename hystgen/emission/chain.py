@@ -8,30 +8,16 @@ import textwrap
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from hystgen.compensator.chain import blocks, moving
-from hystgen.compensator.chain.layout import (
-    ARRIVING_BITS,
-    BRAKED_DROP,
-    DITHER,
-    DRIVE_BITS,
-    LARGEST_LEVEL,
-    LEAST_CODE,
-    LEVEL_BITS,
-    LEVEL_DROP,
-    MOST_CODE,
-    SHARE_BITS,
-    ChainTables,
-    Compiled,
-)
-from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
-from hystgen.effects.bend import Bends
-from hystgen.effects.drift import compensator as drift
-from hystgen.effects.drift import fixed as drift_fixed
-from hystgen.effects.kinds import Constants, Kind
 from hystgen.emission.text import WIDTH, constant, literal, operand, structure, table
 from hystgen.plays import slots
+
+if TYPE_CHECKING:
+    from hystgen.compensator.chain.layout import ChainTables, Compiled
+    from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
+    from hystgen.effects.bend import Bends
+    from hystgen.effects.kinds import Constants, Kind
 
 
 @dataclass(frozen=True)
@@ -119,6 +105,8 @@ def _table(declared: str, entries: Sequence[str]) -> str:
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
     """The blocks of an operator in front of the plays, starting from the drive, and those behind them."""
+    from hystgen.compensator.chain import blocks
+
     found: list[list[Block]] = []
     for side in blocks.sides(t, operator):
         counts: Counter[str] = Counter()
@@ -207,6 +195,8 @@ def plays(t: ChainTables) -> tuple[str, str]:
 
 def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, str, str]]]:
     """Tables and numbers of plays that an effect moves or bends."""
+    from hystgen.compensator.chain import moving
+
     real_t = f"{prefix}_real_t"
     arrays: list[str] = []
     if t.scanned:
@@ -243,6 +233,8 @@ def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, st
 
 def _fixed_moving(t: FixedMovingTables, prefix: str, inverse: bool) -> tuple[list[str], list[tuple[str, str, str]]]:
     """Tables and numbers of plays that an effect moves or bends in fixed point."""
+    from hystgen.compensator.chain import moving
+
     factor_t = f"{prefix}_factor_t {prefix}"
     numbers = [("LARGEST_INPUT", operand(t.farthest), "of the plays, for a search")]
     if t.scanned:
@@ -307,7 +299,7 @@ class Shape:
         """That of a model with effects."""
         return cls(
             t.fixed, True, t.plays.engine == slots.CORNERS, bool(t.slew), bool(t.braked), bool(t.quiet),
-            bool(t.turning), len(t.tap), t.delay.samples,
+            bool(t.turning), len(t.tap), t.of("delay").samples,
         )  # fmt: skip
 
 
@@ -327,6 +319,9 @@ class Glue:
 
 def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, Any]]) -> Glue:
     """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
+    from hystgen.compensator.chain import blocks, moving
+    from hystgen.compensator.chain.layout import DITHER
+
     t = compiled.tables
     shape = Shape.of(t)
     named = {op: sides(t, op) for op in operators}
@@ -338,8 +333,8 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     functions = [
         line for op in operators for line in _functions(op, shape, *named[op], behind, clocks, rubbing)
     ]
-    heated = ["set_temperature"] * (len(t.gain) > 0)
-    aged = ["set_gain", "travel", "set_travel"] * (len(t.ageing.turns) > 0)
+    heated = ["set_temperature"] * ("set_temperature" in t.calls)
+    aged = ["set_gain", "travel", "set_travel"] * ("travel" in t.calls)
     every = ["settle", "set_offset", *heated, *aged]
     calls = {
         "forward": every,
@@ -349,8 +344,9 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     own = {op: [*before, *after, *beside] for op, (before, after) in named.items()}
     largest = max(own.values(), key=len)  # the forward operator has what the inverse has, and modes
     arrays = [text for block in largest for text in block.arrays(prefix)]
-    if "forward" in operators and t.delay.samples and t.fixed:
-        arrays.append(f"static const {prefix}_factor_t {prefix}_waited = {{{_entries(t.delay.share, 'f')[1:-1]}}};\n")
+    if "forward" in operators and t.of("delay").samples and t.fixed:
+        share = _entries(t.of("delay").share, "f")[1:-1]
+        arrays.append(f"static const {prefix}_factor_t {prefix}_waited = {{{share}}};\n")
     if "inverse" in operators and len(t.tap):
         arrays.append(
             constant(f"{prefix}_factor_t {prefix}_tap[{len(t.tap)}]", [f"    {_entries(row, 'f')}," for row in t.tap])
@@ -367,11 +363,11 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
         "SLEW_FALLING_REST": "",
     }
     constants = [(name, operand(value), words[name]) for name, value in number.items()]
-    farthest = (drift_fixed if t.fixed else drift).MOST_AHEAD
-    constants += [("LEAD", operand(row[farthest]), "samples that references come ahead") for row in t.clock]
-    constants.append(("WAITING", f"{t.delay.samples}u", "samples of the drive that wait"))
-    if t.delay.samples and not t.fixed:
-        constants.append(("WAITED", operand(t.delay.share[0]), "part of the step after the oldest that is over"))
+    constants += [("LEAD", operand(row[-1]), "samples that references come ahead") for row in t.of("clock")]
+    waited = t.of("delay")
+    constants.append(("WAITING", f"{waited.samples}u", "samples of the drive that wait"))
+    if waited.samples and not t.fixed:
+        constants.append(("WAITED", operand(waited.share[0]), "part of the step after the oldest that is over"))
     constants.append(("QUIET", f"{t.quiet}u", "equal references after which the drive stands still"))
     constants.append(("DITHER", operand(t.number[DITHER]), "signal by which a drive at rest goes to and fro"))
     constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
@@ -379,7 +375,7 @@ def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequ
     if t.moving.used:
         more, numbers = (
             _fixed_moving(t.moving, prefix, "inverse" in operators)
-            if isinstance(t.moving, FixedMovingTables) else _moving(t.moving, prefix)
+            if isinstance(t.moving, moving.FixedMovingTables) else _moving(t.moving, prefix)
         )  # fmt: skip
         arrays, constants = arrays + more, constants + numbers
     searched = t.moving.used and not t.moving.scanned
@@ -409,6 +405,18 @@ def with_fields(made: Glue, named: Mapping[str, Collection[str]]) -> Glue:
 
 def _fixed_constants(t: ChainTables) -> list[tuple[str, str, str]]:
     """Numbers that functions name in fixed point alone."""
+    from hystgen.compensator.chain.layout import (
+        ARRIVING_BITS,
+        BRAKED_DROP,
+        DRIVE_BITS,
+        LARGEST_LEVEL,
+        LEAST_CODE,
+        LEVEL_BITS,
+        LEVEL_DROP,
+        MOST_CODE,
+        SHARE_BITS,
+    )
+
     low, high = t.plays.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
     return [
         ("FINE_MIN", operand(low), "what the ends of the drive's range are in front of the plays"),

@@ -6,19 +6,20 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from hystgen.arithmetic import ARITHMETICS, Arithmetic
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
-from hystgen.compensator.chain import blocks, costs, moving
-from hystgen.compensator.chain.layout import ARRIVING_BITS, ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
-from hystgen.effects.kinds import Kind, Rows
-from hystgen.effects.lag import compensator as lag
 from hystgen.emission.chain import Field
 from hystgen.emission.options import Options
 from hystgen.emission.runtime import Piece
 from hystgen.plays import slots
+
+if TYPE_CHECKING:
+    from hystgen.compensator.chain.layout import ChainTables
+    from hystgen.effects.kinds import Kind, Rows
 
 
 @dataclass(frozen=True)
@@ -61,19 +62,28 @@ class Memory:
 @dataclass(frozen=True)
 class Cost:
     """Code of the module by core (`hystgen.compensator.engines`), memory on a 32-bit target and on an 8-bit AVR, where
-    tables lie in RAM too (None in float64, which it lacks), and worst-case operations of a step in words, for each
-    operator."""
+    tables lie in RAM too (None in float64, which it lacks), and for each operator worst-case operations of a step in
+    words, and the dearest sample of such models on each core."""
 
     code: Mapping[str, int]
     memory: Memory
     avr: Memory | None
     worst_case: list[tuple[str, str]]
+    dearest: dict[str, dict[str, engines.Dearest]]
 
     @property
     def code_words(self) -> str:
         """The code in words."""
         small, large = (self.code[core] for core in engines.CORES)
         return f"{small} bytes on a Cortex-M0+, {large} on a Cortex-M4F"
+
+    def dearest_words(self, operator: str) -> str:
+        """The dearest sample of an operator in words."""
+        small, large = (self.dearest[operator][core] for core in engines.CORES)
+        return (
+            f"{small.instructions} instructions and {small.stack} bytes of stack on a Cortex-M0+, "
+            f"{large.instructions} and {large.stack} on a Cortex-M4F"
+        )
 
 
 _SIZES = {"float": 4, "double": 8, "real_t": 0, "int32_t": 4, "uint32_t": 4, "uint16_t": 2, "uint8_t": 1, "int64_t": 8,
@@ -205,17 +215,24 @@ def estimate(
     worst = [
         (op, worst_case(cascade.pi.n, op, corners, numbers)) for op in ("forward", "inverse") if getattr(options, op)
     ]
-    if isinstance(numbers, ChainTables):
+    code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))
+    kinds: list[Kind] = []
+    parts: dict[str, list[str]] = {}
+    if not isinstance(numbers, Tables | FixedTables):
+        from hystgen.compensator.chain import blocks, costs
+
         products = chain_products(numbers)
         worst = [(op, f"{words}; effects: {products[op]} multiplications") for op, words in worst]
-    kinds = [each.kind for each in blocks.every(numbers, "forward")] if isinstance(numbers, ChainTables) else []
-    memory, avr = (_memory(cascade, options, text, plays, layout, types, fields, kinds) for layout in (CORE_32, AVR))
-    code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))
-    if isinstance(numbers, ChainTables):
+        kinds = [each.kind for each in blocks.every(numbers, "forward")]
+        parts = {op: costs.parts(numbers, op) for op, _ in worst}
         for op, _ in worst:
             more = costs.code_bytes(numbers, options.arithmetic, op)
             code = {core: size + more[core] for core, size in code.items()}
-    return Cost(code, memory, avr if known else None, worst)
+    dearest = {
+        op: engines.dearest(cascade, op, options.arithmetic, options.engine, parts.get(op)) for op, _ in worst
+    }
+    memory, avr = (_memory(cascade, options, text, plays, layout, types, fields, kinds) for layout in (CORE_32, AVR))
+    return Cost(code, memory, avr if known else None, worst, dearest)
 
 
 def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layout) -> tuple[int, int]:
@@ -228,10 +245,13 @@ def selftest_bytes(options: Options, memory: Memory, samples: int, layout: Layou
 def chain_products(t: ChainTables) -> dict[str, int]:
     """Multiplications of the blocks in front of the plays and behind them in one step, of each operator; in fixed point
     a product of a signal takes two."""
+    from hystgen.compensator.chain import blocks
+    from hystgen.effects.lag import compensator as lag
+
     kinds = list(map(int, t.behind.kind if t.fixed else t.behind.stage_kind))
     envelopes = kinds.count(slots.TANH)
     everything, inverse = blocks.every(t, "forward"), blocks.every(t, "inverse")
-    forward = sum(each.products[0] for each in everything) + (1 + t.fixed) * bool(t.delay.samples)
+    forward = sum(each.products[0] for each in everything) + (1 + t.fixed) * t.number_of("delay")
     absorbed, solved = (sum(each.products[way] for each in inverse) for way in (0, 1))
     if t.fixed:
         stages = 2 * (len(kinds) - envelopes) + envelopes * t.behind.bends.coefficient.shape[1]
@@ -285,7 +305,7 @@ def _field(
 def worst_case(n: int, op: str, corners: bool, tables: Tables | FixedTables | ChainTables) -> str:
     """The largest numbers of multiplications and comparisons in one step as functions of n, without those of tanh and
     atanh, and of effects; b are the bits of n."""
-    numbers: Tables | FixedTables = tables.plays if isinstance(tables, ChainTables) else tables
+    numbers, chain = (tables, None) if isinstance(tables, Tables | FixedTables) else (tables.plays, tables)
     stages: list[tuple[int, int]] = []
     fixed = isinstance(numbers, FixedTables)
     if isinstance(numbers, FixedTables):
@@ -294,15 +314,17 @@ def worst_case(n: int, op: str, corners: bool, tables: Tables | FixedTables | Ch
         stages = [(int(kind), int(size)) for kind, size in zip(numbers.stage_kind, numbers.stage_size, strict=True)]
         fronts = bool(stages)
     products, compares, per_play, per_bit = _worst_of_plays(op, corners, fixed, corners and not fronts)
-    if corners and op == "inverse" and isinstance(tables, ChainTables):
+    if corners and op == "inverse" and chain is not None:
+        from hystgen.compensator.chain.layout import ARRIVING_BITS
+
         # plays follow what was applied, which may be elsewhere than what was solved for: two searches
         products, compares, per_bit = (7, 25, 4) if fixed else (30, 26, 4)
-        if fixed and tables.number[ARRIVING_BITS]:  # and a third one for the remainder of a solution
+        if fixed and chain.number[ARRIVING_BITS]:  # and a third one for the remainder of a solution
             products, compares, per_bit = products + 2, compares + 10, per_bit + 2
     per_play_products = 0 if corners else 1 if op == "forward" else 2 if fixed else 3
     curves = 0
-    if not corners and isinstance(tables, ChainTables):
-        products, per_play_products, compares, per_play, curves = _worst_of_chain(op, tables)
+    if not corners and chain is not None:
+        products, per_play_products, compares, per_play, curves = _worst_of_chain(op, chain)
     passes = 1 if op == "forward" else 2 + int(numbers.branches)
     compares += (2 if op == "forward" else 16) * int(bool(numbers.branches))
     kernels = ""
@@ -340,6 +362,9 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
     are searched for: all of them are summed up once for each bisection. Counted in the bit reference
     (`tests/test_cost.py`).
     """
+    from hystgen.compensator.chain import moving
+    from hystgen.compensator.chain.layout import ARRIVING_BITS
+
     m, share = t.moving, 1 + t.fixed  # a product with a factor takes two
     inverse = op == "inverse"
     finer = inverse and t.fixed and bool(t.number[ARRIVING_BITS])

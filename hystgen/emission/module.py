@@ -5,35 +5,26 @@ from __future__ import annotations
 import dataclasses
 import functools
 import re
-import shlex
 import textwrap
 from collections.abc import Sequence
 from types import SimpleNamespace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jinja2
 import numpy as np
 
 from hystgen.basics.version import __version__
-from hystgen.chain.chain import Chain
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.chain import tables as chain_tables
-from hystgen.compensator.chain.bounds import UNSLEWED, kept_branch, together
-from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
-from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, LEAST_LATE, SHARE_BITS, Compiled
-from hystgen.effects import own as own_effects
-from hystgen.effects.base import USER
-from hystgen.emission import chain, cost, doubts, interface, numbers, own, runtime, selftest, words
+from hystgen.compensator.bounds import UNSLEWED, together
+from hystgen.emission import chain, cost, interface, numbers, runtime, selftest, words
 from hystgen.emission.options import OPTIONS, Options, seal
 from hystgen.emission.text import WIDTH, comment_text, define, fit, literal
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters, parameters_sha256
 from hystgen.plays import slots
 
-PERIODS = (50, 200)
-"""[samples] Periods for which the header states what is lost of a sine: a fast one, as long as the fastest sweep for
-which bounds are stated, and a slow one."""
-
+if TYPE_CHECKING:
+    from hystgen.compensator.chain.layout import Compiled
 
 @functools.cache
 def _environment() -> jinja2.Environment:
@@ -192,19 +183,6 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
     }
 
 
-def compiled_of(parameters: Parameters, cascade: StaticModel, options: Options) -> Compiled | None:
-    """The numbers of a model with effects; None for a model without effects."""
-    effects = parameters.model.effects
-    if not effects:
-        return None
-    assert parameters.sample_time is not None, "emit_options asks for it"
-    how = parameters.emit.compensation
-    lsb = (parameters.emit.drive_lsb, parameters.emit.output_lsb)
-    return chain_tables.build(
-        Chain(cascade, effects), options.arithmetic, parameters.sample_time, how, lsb, options.engine
-    )
-
-
 def values_of(parameters: Parameters, cascade: StaticModel, options: Options) -> SimpleNamespace:
     """Values for the templates, from which the cost is counted too."""
     name = parameters.name
@@ -213,7 +191,11 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
     prefix = "hystgen_" + about["family"].bits if shared else name
     corners = options.engine == "corners"
     n = cascade.pi.n
-    compiled = compiled_of(parameters, cascade, options)
+    compiled: Compiled | None = None
+    if parameters.model.effects:
+        from hystgen.emission import doubts, effects, own
+
+        compiled = effects.compiled(parameters, cascade, options)
     about["family"] = dataclasses.replace(
         about["family"], chain=compiled is not None, loop=compiled is None and options.engine == "loop"
     )
@@ -243,21 +225,27 @@ def values_of(parameters: Parameters, cascade: StaticModel, options: Options) ->
         compiled is not None, compiled is not None and bool(compiled.tables.slew),
         compiled is not None and bool(compiled.tables.braked), compiled is not None and bool(compiled.tables.quiet),
         compiled is not None and bool(compiled.tables.turning),
-        compiled is not None and compiled.tables.delay.samples > 0,
-        compiled is not None and bool(compiled.parts.ageing), *(chain.plays(compiled.tables) if compiled else ()),
+        compiled is not None and compiled.tables.number_of("delay") > 0,
+        compiled is not None and "travel" in compiled.tables.calls, *(chain.plays(compiled.tables) if compiled else ()),
     )  # fmt: skip
     glue: chain.Glue | None = getattr(values, "glue", None)
-    values.timing = _timing(parameters, compiled, about["family"])
-    reading = [*_reading(compiled), *_branches(compiled, parameters), *_quiet(values)] if compiled else []
-    values.reading = reading if options.inverse else []
-    dynamic = doubts.found(parameters, compiled) if compiled and options.inverse else []
-    values.doubts = [*dynamic, *(_unbounded(values) if options.inverse else [])]
+    kind = np.float64 if values.fixed else np.dtype(values.family.arithmetic.number).type
+    values.timing = _timing(parameters, kind)
+    values.reading, values.doubts = [], []
+    own_types: list[runtime.Piece] = []
+    own_functions: list[runtime.Piece] = []
+    if compiled:
+        values.timing += effects.times(compiled, kind)
+        own_types, own_functions = own.pieces(compiled.tables)
+        if options.inverse:
+            values.reading = effects.reading(compiled, parameters.units, values.units.drive.replace(",", ""))
+            values.doubts = doubts.found(parameters, compiled)
+    values.doubts += _unbounded(values) if options.inverse else []
     operators = [op for op in ("forward", "inverse") if getattr(options, op)]
     values.corners = (max(n, 1) if values.fixed else n + 1) if corners else 0
     front = render("front.c.j2", values) if values.stages else ""
     values.functions = front + "\n" + glue.functions if glue else front
     values.calls = calls = glue.calls if glue else {}
-    own_types, own_functions = own.pieces(compiled.tables) if compiled else ([], [])
     pieces = runtime.operator_pieces(values.variant, family, operators, values.functions, calls, own_functions)
     kernels = runtime.needed(
         [*runtime.table_pieces(family), *runtime.kernel_pieces(family)], sorted(runtime.used(pieces))
@@ -378,71 +366,10 @@ def _version_number() -> int:
     return 10000 * major + 100 * minor + patch
 
 
-def _timing(
-    parameters: Parameters, compiled: Compiled | None, family: runtime.Family
-) -> list[tuple[str, str, str]]:
-    """Macros about time: its sample time, and of a model with effects what follows from it."""
-    kind = np.float64 if family.fixed else np.dtype(family.arithmetic.number).type
+def _timing(parameters: Parameters, kind: type[np.floating[Any]]) -> list[tuple[str, str, str]]:
+    """The macro of the sample time, if there is one."""
     period = parameters.sample_time
-    found = [] if period is None else [("SAMPLE_TIME", literal(kind(period)), "s, from step to step")]
-    return [*found, *_times(compiled, kind)] if compiled else found
-
-
-def _times(compiled: Compiled, kind: type[np.floating[Any]]) -> list[tuple[str, str, str]]:
-    """Macros of a model with effects about time."""
-    ahead = "samples that the argument of step is ahead of the motion"
-    if compiled.late > LEAST_LATE:
-        ahead += f", which is {compiled.late:.4g} late"
-    return [
-        ("PREVIEW", str(compiled.ahead), ahead),
-        ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest gain from reference to drive over that at rest"),
-        ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, a second, for which the errors below hold"),
-        *_settings(compiled),
-    ]
-
-
-def _reading(compiled: Compiled) -> list[str]:
-    """What holds the noise gain, what keeps modes from ringing, and what both cost."""
-    found = []
-    if (one := compiled.smoothing) is not None:
-        often = {1: "once", 2: "twice"}.get(one.times, f"{one.times} times")
-        losses = " and ".join(f"{100.0 * one.loss(period):.2g} % with {period} samples a period" for period in PERIODS)
-        late = f", and the motion is {one.late:.3g} samples later" if one.late > LEAST_LATE else ""
-        found.append(
-            f"Noise: references are averaged {often} over {one.width:.4g} samples, so that the noise gain is "
-            f"{compiled.noise_gain:.4g} instead of {one.without:.4g}; a sine loses {losses}{late}"
-        )
-    if (kept := compiled.shaped) is not None:
-        missed = 100.0 * kept.missed(PERIODS[-1])
-        found.append(
-            f"Resonance: after a step of the reference the stage does not ring ({kept.by}). Not for tracking: it makes "
-            f"the motion {kept.late:.3g} samples late, and a sine with {PERIODS[-1]} samples a period is missed by "
-            f"{missed:.2g} % of its size"
-        )
-    return found
-
-
-def _branches(compiled: Compiled, parameters: Parameters) -> list[str]:
-    """What a drive that comes to rest in front of two branches leaves."""
-    if not compiled.tables.turning:
-        return []
-    most = f"{kept_branch(compiled):.3g} {comment_text(parameters.units.output)}".rstrip()
-    return [
-        "Branches: the drive turns to the other branch only if staying on its own would miss more than a turn does at "
-        f"first; that leaves at most {most} of a reference at rest"
-    ]
-
-
-def _settings(compiled: Compiled) -> list[tuple[str, str, str]]:
-    """In fixed point, the size of a code that sets a temperature or a gain."""
-    if not compiled.tables.fixed:
-        return []
-    bits = int(31 - compiled.tables.number[SHARE_BITS])
-    kept = TEMPERATURE_BITS[bits]
-    degree = ("TEMPERATURE_LSB", repr(2.0**-kept), "degC a code of set_temperature")
-    gain = ("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")
-    t = compiled.tables
-    return [*([degree] if len(t.gain) else []), *([gain] if len(t.ageing.turns) else [])]
+    return [] if period is None else [("SAMPLE_TIME", literal(kind(period)), "s, from step to step")]
 
 
 def _status(values: SimpleNamespace) -> list[str]:
@@ -472,10 +399,11 @@ def _macros(values: SimpleNamespace) -> list[str]:
 
 
 def _command(parameters: Parameters, options: Options) -> str:
-    origins = dict.fromkeys(
-        own_effects.origin(type(effect)) for effect in parameters.model.effects if effect.name.startswith(USER)
-    )
-    more = " --allow-partial" * bool(options.left_out) + "".join(f" --effects {shlex.quote(each)}" for each in origins)
+    more = " --allow-partial" * bool(options.left_out)
+    if parameters.model.effects:
+        from hystgen.emission import effects
+
+        more += effects.sources(parameters)
     chosen = " ".join(f"--{key} {getattr(options, key)}" for key in OPTIONS)
     return f"hystgen emit {parameters.name}.yaml {chosen}{more}"
 
@@ -515,20 +443,6 @@ def _cost(
     glue: chain.Glue | None = getattr(values, "glue", None)
     fields = glue.fields if glue else {}
     return cost.estimate(cascade, options, values.numbers, text, "".join(values.arrays), types, fields)
-
-
-def _quiet(values: SimpleNamespace) -> list[str]:
-    """When and how far a drive is kept at rest."""
-    t = values.numbers
-    if not values.variant.quiet:
-        return []
-    kept, unit = float(t.number[DITHER]), values.units.drive.replace(",", "")
-    if values.fixed:
-        kept, unit = kept / 2.0 ** int(t.number[DRIVE_BITS]), " drive codes"
-    return [
-        f"Quiet: after {t.quiet} equal references the drive stands still as long as it is within {kept:.4g}{unit} of "
-        "the drive that is needed at rest; the input of the plays is then within twice that of the one sought"
-    ]
 
 
 def _selftest_cost(options: Options, found: cost.Cost, samples: int) -> list[str]:
@@ -581,6 +495,8 @@ def _details(parameters: Parameters, cascade: StaticModel, options: Options, val
         f"    constant tables   {estimate.memory.tables} bytes",
         *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.memory.instances),
         *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),
+        *(f"    {op} step, dearest: about {estimate.dearest_words(op)}, as measured for such a model{uncounted}"
+          for op, _ in estimate.worst_case),
         *avr,
         "",
         use,

@@ -6,7 +6,7 @@ import dataclasses
 import math
 import textwrap
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,8 +14,6 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables, float_tables
 from hystgen.compensator.bounds import error_bounds
-from hystgen.compensator.chain.bounds import chain_bounds, condition
-from hystgen.compensator.chain.layout import ARRIVING_BITS, LEVEL_BITS, Compiled
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import chain
 from hystgen.emission.options import Options
@@ -26,6 +24,9 @@ from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters
 from hystgen.plays import slots
 from hystgen.plays.corners.corners_float import Curve, Start
+
+if TYPE_CHECKING:
+    from hystgen.compensator.chain.layout import Compiled
 
 
 def fields(parameters: Parameters, cascade: StaticModel, options: Options, prefix: str) -> dict[str, Any]:
@@ -72,6 +73,8 @@ def chain_fields(
     """The same of a model with effects, `glue` with its blocks."""
     if compiled.tables.fixed:
         return _fixed_chain_fields(parameters, compiled, options, prefix)
+    from hystgen.compensator.chain.bounds import chain_bounds, condition
+
     name, tables = parameters.name, compiled.tables
     static = dataclasses.replace(compiled.static, output_offset=0.0)
     behind = [
@@ -100,6 +103,8 @@ def chain_fields(
 
 
 def _fixed_chain_fields(parameters: Parameters, compiled: Compiled, options: Options, prefix: str) -> dict[str, Any]:
+    from hystgen.compensator.chain.layout import ARRIVING_BITS, LEVEL_BITS
+
     name, tables, codes = parameters.name, compiled.tables, compiled.codes
     plays = tables.plays
     assert isinstance(plays, FixedTables) and codes is not None  # noqa: PT018

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hystgen.compensator import reference
-from hystgen.compensator.chain.fixed_tables import setting_codes
-from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.layout import FixedTables, Tables
-from hystgen.effects.ageing import compensator as ageing
-from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal import fixed
 from hystgen.emission.chain import SETTINGS
 from hystgen.emission.options import Options
 from hystgen.emission.text import literal
 from hystgen.plays import slots
+
+if TYPE_CHECKING:
+    from hystgen.compensator.chain.layout import ChainTables
 
 CALLS = {slots.OP_STEP: "s", slots.OP_COMMIT: "c", slots.OP_RESET: "r"}
 """Letters of the calls that every model has."""
@@ -69,6 +67,11 @@ def operators(
 def _setting(numbers: ChainTables, call: str, turn: int) -> float:
     """An argument of a setting, in fixed point before it is rounded to a code; every third one is beyond its limits,
     where there are any."""
+    from hystgen.compensator.chain.fixed_tables import setting_codes
+    from hystgen.effects.ageing import compensator as ageing
+    from hystgen.effects.thermal import compensator as thermal
+    from hystgen.effects.thermal import fixed
+
     degree, one = setting_codes(numbers) if numbers.fixed else (1.0, 1.0)
     drive_low, drive_high, low, high = (float(end) for end in numbers.limits[: slots.OUTPUT_MAX + 1])
     way = (1.0, -1.0, 50.0)[turn % 3] * SHARE
@@ -78,11 +81,11 @@ def _setting(numbers: ChainTables, call: str, turn: int) -> float:
         return way * (high - low)
     if call == "set_temperature":
         place, bits = (fixed.REFERENCE, fixed.TEMPERATURE_BITS) if numbers.fixed else (thermal.REFERENCE, 0)
-        return degree * (float(numbers.gain[0, place]) / 2.0**bits + 40.0 * way)
+        return degree * (float(numbers.of("gain")[0, place]) / 2.0**bits + 40.0 * way)
     if call == "set_gain":
         return one * (1.0 + way)
     if call == "set_travel":
-        return abs(way) * float(numbers.ageing.number[0, ageing.LAST])
+        return abs(way) * float(numbers.of("ageing").number[0, ageing.LAST])
     return low + (0.5 + way) * (high - low)
 
 
@@ -114,7 +117,7 @@ def _samples(
         if i == 120:
             calls.append(slots.OP_RESET)
             arguments.append(at(low, high, 0.25))
-        if isinstance(numbers, ChainTables) and settings and i % 11 == 5:
+        if settings and not isinstance(numbers, Tables | FixedTables) and i % 11 == 5:
             call = settings[i // 11 % len(settings)]
             calls.append(SETTINGS[call])
             argument = _setting(numbers, call, i // 11 // len(settings))

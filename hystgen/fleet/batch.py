@@ -45,7 +45,7 @@ KEPT_IN = ".hystgen"
 FIGURES = (
     "kind", "plays", "p_0", "width", "gain", "output_low", "output_high", "fit_rms", "fit_rms_percent",
     "held_out_rms", "held_out_rms_percent", "warnings",
-)  # fmt: skip
+)
 COLUMNS = ("unit", "file", "status", "message", *FIGURES, "outlier", "outlier_in", "sha256")
 
 

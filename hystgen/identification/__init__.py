@@ -25,7 +25,7 @@ from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.identification import gpi, pi, prepared, quality, reduction
 from hystgen.identification.fit import HELD_OUT, Fit, Used, used_of, visited
-from hystgen.identification.gpi import Fitted
+from hystgen.identification.gpi import FittedModel
 from hystgen.identification.pi import IdentificationError, rounded
 from hystgen.identification.quality import Row
 from hystgen.identification.reduction import Course
@@ -227,7 +227,7 @@ class _How:
 class _Tried:
     """A model of one kind, the courses it was fitted to, the held-out courses, and its errors on them."""
 
-    fitted: Fitted
+    fitted: FittedModel
     compared: list[Course]
     held: list[Course]
     errors: list[pi.Errors]
@@ -238,7 +238,7 @@ class _Tried:
         return replace(self.held_out, part="candidate", model=self.fitted.front.name)
 
 
-def auto(courses: Sequence[Course], held: Sequence[Course]) -> Fitted:
+def auto(courses: Sequence[Course], held: Sequence[Course]) -> FittedModel:
     """The model that `identify` chooses among all kinds by held-out courses. Raises IdentificationError."""
     tried = [_best(courses, held, kind, _How(None, None, P0_FLOOR)) for kind in gpi.KINDS]
     return tried[_choose(tried)].fitted
@@ -261,7 +261,7 @@ def _try(courses: Sequence[Course], ends: Sequence[Course], kind: str, how: _How
     return _compared(fitted, compared, begun)
 
 
-def _compared(fitted: Fitted, compared: list[Course], begun: Sequence[Course]) -> _Tried:
+def _compared(fitted: FittedModel, compared: list[Course], begun: Sequence[Course]) -> _Tried:
     """A fit with its errors on held-out courses."""
     largest = float(fitted.solution.thresholds[-1])
     settled = [replace(item, first=fitted.inner(item).resettled(largest).first) for item in begun]
@@ -308,7 +308,7 @@ def _drive(courses: Sequence[Course]) -> tuple[float, float]:
     return min(low for low, _ in ranges), max(high for _, high in ranges)
 
 
-def _compare(item: Course, fitted: Fitted) -> pi.Errors:
+def _compare(item: Course, fitted: FittedModel) -> pi.Errors:
     return pi.compare(fitted.inner(item), fitted.solution.thresholds, fitted.solution.weights)
 
 
@@ -421,7 +421,7 @@ def _parameters(
     name: str,
     units: Mapping[str, str] | None,
     drive: tuple[float, float],
-    fitted: Fitted,
+    fitted: FittedModel,
     offset: float,
     first: Course,
 ) -> Parameters:

@@ -296,7 +296,7 @@ def bridged(v: Array, wrong: Flags) -> Array:
 
 
 @dataclass(frozen=True)
-class Piece:
+class Segment:
     """A part of a record without a gap, which begins at sample `first`. `after_gap`: its start memory is unknown."""
 
     record: Record
@@ -304,14 +304,14 @@ class Piece:
     after_gap: bool
 
 
-def between_gaps(record: Record) -> list[Piece]:
+def between_gaps(record: Record) -> list[Segment]:
     """The record, cut at gaps so long that the drive in between is unknown."""
     steps = np.diff(record.t)
     cuts = [0, *(np.flatnonzero(steps > LONG_GAP * record.sample_time) + 1).tolist(), len(record)]
     if len(cuts) == 2:
-        return [Piece(record, 0, False)]
+        return [Segment(record, 0, False)]
     return [
-        Piece(record.section(a, b, f"{record.name} from t = {record.t[a]:.6g} s"), a, a > 0)
+        Segment(record.section(a, b, f"{record.name} from t = {record.t[a]:.6g} s"), a, a > 0)
         for a, b in itertools.pairwise(cuts)
     ]
 

@@ -17,7 +17,7 @@ from hystgen.basics import arguments, display, drawing
 from hystgen.basics.problems import counted
 from hystgen.identification import faults, joint, quality, reduction
 from hystgen.identification.quality import Intervals, Row, table
-from hystgen.identification.reduction import Course, Start
+from hystgen.identification.reduction import Course, StartMemory
 from hystgen.records import Record, Source, in_units, read_record, write_atomically
 
 if TYPE_CHECKING:
@@ -224,7 +224,7 @@ class Used:
     held_out: bool
     samples: int
     parts: tuple[tuple[int, int], ...]
-    starts: tuple[Start | None, ...] = field(repr=False)
+    starts: tuple[StartMemory | None, ...] = field(repr=False)
     skipped: Indices = field(repr=False, compare=False)
     ignored: Indices = field(repr=False, compare=False)
     outliers: Indices = field(repr=False, compare=False)

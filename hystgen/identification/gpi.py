@@ -40,7 +40,7 @@ LEAST_SLOPE = 0.1
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedModel:
     """A front, its shape and the play sum behind it."""
 
     front: Front
@@ -68,7 +68,7 @@ def solve(
     breaks: int | tuple[float, ...] | None,
     floor: float,
     tick: Tick = None,
-) -> tuple[Fitted, list[Course]]:
+) -> tuple[FittedModel, list[Course]]:
     """Fit a model of one kind; also returns the courses, with the measured drive, over the compared samples.
 
     Of several fronts of a kind, it takes the one with the fewest shape numbers whose prediction of blocks left out of
@@ -84,7 +84,7 @@ def to_judge(
     breaks: int | tuple[float, ...] | None,
     floor: float,
     tick: Tick = None,
-) -> list[tuple[Fitted, list[Course]]]:
+) -> list[tuple[FittedModel, list[Course]]]:
     """The fits of one kind from which held-out records choose, the simplest first; otherwise the same as `solve`.
 
     Tanh envelopes with one branch and with two: two branches form a loop of their own, as wide in a small swing as in a
@@ -124,13 +124,13 @@ def _solved(
     floor: float,
     tick: Tick,
     choose: Callable[[Sequence[_Found]], Sequence[_Found]],
-) -> list[tuple[Fitted, list[Course]]]:
+) -> list[tuple[FittedModel, list[Course]]]:
     """The fits with the fronts that `choose` selects."""
     # a start memory found without the front is not exact behind it, but better than too few samples to compare
     courses = start.needed(courses, (), wanted if kind == "pi" else None)
     plain, compared = pi.solve(courses, wanted, floor, tick)
     if kind == "pi":
-        return [(Fitted(Kept(), np.empty(0), plain), compared)]
+        return [(FittedModel(Kept(), np.empty(0), plain), compared)]
     # the missing front distorts the choice of a plain play sum: search the shape with a dense list of plays
     fine = plain.thresholds
     if not isinstance(wanted, tuple) and plain.reach > 0.0:
@@ -150,7 +150,7 @@ def _finished(
     wanted: int | tuple[float, ...] | None,
     floor: float,
     tick: Tick,
-) -> tuple[Fitted, list[Course]]:
+) -> tuple[FittedModel, list[Course]]:
     """The fit with a front: plays placed behind it, and its shape refitted for them."""
     front, shape = found.front, found.shape
     courses = start.needed(courses, front.stages(shape, DIGITS), wanted)
@@ -174,10 +174,10 @@ def _solve_behind(
     wanted: int | tuple[float, ...] | None,
     floor: float,
     tick: Tick,
-) -> Fitted:
+) -> FittedModel:
     stages = front.stages(shape, DIGITS)
     solution, _ = pi.solve([joint.through_front(item, stages) for item in courses], wanted, floor, tick)
-    return Fitted(front, shape, solution)
+    return FittedModel(front, shape, solution)
 
 
 def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, ...] | None) -> list[Front]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.problems import counted
 from hystgen.identification import joint, pi, reduction
-from hystgen.identification.gpi import Fitted
+from hystgen.identification.gpi import FittedModel
 from hystgen.identification.pi import Errors, Solution, Weights
 from hystgen.identification.reduction import Course
 from hystgen.identification.start import STARTS, UNLIKE
@@ -160,7 +160,9 @@ class Intervals:
         return low, high
 
 
-def intervals(fitted: Fitted, courses: Sequence[Course], errors: Sequence[Errors], held: Sequence[Errors]) -> Intervals:
+def intervals(
+    fitted: FittedModel, courses: Sequence[Course], errors: Sequence[Errors], held: Sequence[Errors]
+) -> Intervals:
     """Intervals of a fit to `courses` (drive as measured) with those `errors`; `held`: errors of held-out records.
 
     The residuals of a hysteresis model are coloured: model errors come back at every reversal. They are therefore not
@@ -208,7 +210,7 @@ def intervals(fitted: Fitted, courses: Sequence[Course], errors: Sequence[Errors
     )
 
 
-def _weights(fitted: Fitted, triangle: Array, target: Array) -> Array:
+def _weights(fitted: FittedModel, triangle: Array, target: Array) -> Array:
     """Weights that fit a redrawn system best, with a free shape."""
     k = len(fitted.solution.weights)
     if not len(fitted.shape):

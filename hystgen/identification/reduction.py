@@ -40,7 +40,7 @@ FOLDS = 4
 
 
 @dataclass(frozen=True)
-class Start:
+class StartMemory:
     """A start memory found by a fit (`start`).
 
     `turns`: drive values that lead virgin plays to it; `uncertainty`: half the width of the 95 % interval of its
@@ -73,7 +73,7 @@ class Course:
     begin: int = 0
     origin: tuple[int, int] = (0, 0)
     stretches: NDArray[np.bool_] | None = None
-    start: Start | None = None
+    start: StartMemory | None = None
 
     @property
     def visited(self) -> tuple[float, ...] | None:

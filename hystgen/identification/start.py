@@ -6,8 +6,8 @@ adds the constant `p_i s_i` to the output; after that it no longer depends on th
 piecewise linear in the `d` of every record, which join the weights as further unknowns under bounds (`joint` has the
 search). A prior as wide as the bounds allow keeps slopes that no sample determines at `d = 0`.
 
-The result is a course's `Start`: drive values that would have left that memory. Like a known history, they mean the
-same behind any front and with any thresholds.
+The result is a course's `StartMemory`: drive values that would have left that memory. Like a known history, they mean
+the same behind any front and with any thresholds.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from hystgen.front.stage import Stage
 from hystgen.identification import joint, pi, reduction
 from hystgen.identification.joint import Shaped
-from hystgen.identification.reduction import Course, Reduced, Start
+from hystgen.identification.reduction import Course, Reduced, StartMemory
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
@@ -130,7 +130,7 @@ def of_model(
     `least`, `largest`: as in `needed`.
     """
     if len(thresholds) == 1:  # without plays there is nothing to estimate
-        return [replace(item, start=Start((), 0.0), first=item.begin) for item in courses]
+        return [replace(item, start=StartMemory((), 0.0), first=item.begin) for item in courses]
     begun = [_enough(item, least, largest) for item in courses]
     places = [k for k, item in enumerate(begun) if lacking(item, least)]
     if places:
@@ -189,9 +189,9 @@ def _started(
     for item, seen, (slopes, uncertainty) in zip(courses, inner, search.parted(found), strict=True):
         if item.history is None:
             turns = turns_of(r, float(seen.v[0]) + memory_of(slopes, r))
-            whole = replace(seen, start=Start(turns, uncertainty), first=item.begin)
+            whole = replace(seen, start=StartMemory(turns, uncertainty), first=item.begin)
             if not _transient(whole, item.first, r, found.best):
-                given = Start(in_front(turns, stages), uncertainty, moved)
+                given = StartMemory(in_front(turns, stages), uncertainty, moved)
                 item = replace(item, start=given, first=item.begin)
         begun.append(item)
     return begun

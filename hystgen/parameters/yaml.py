@@ -88,7 +88,7 @@ _UNUSABLE = _Unusable()
 
 
 @dataclass
-class _Level:
+class _OpenNode:
     """A mapping or list still being read."""
 
     path: Path
@@ -126,7 +126,7 @@ def read(text: str) -> Document:
         position = _position(text, directive.start("line"))
         document.refuse((), position, "directives are not accepted; remove the line that starts with %")
         return document
-    builder = _Builder(document)
+    builder = _TreeBuilder(document)
     events = YAML(typ="safe", pure=True).parse(text)
     try:
         while (event := _next(events, text, builder)) is not None:
@@ -142,7 +142,7 @@ def read(text: str) -> Document:
     return document
 
 
-def _next(events: Iterator[Any], text: str, builder: _Builder) -> Any:
+def _next(events: Iterator[Any], text: str, builder: _TreeBuilder) -> Any:
     """The parser's next event, None at the end; a text that is not YAML is refused."""
     try:
         return next(events, None)
@@ -206,11 +206,11 @@ def _value(event: Any) -> str | int | float | bool | None:
     return resolve(event.value) if event.style is None else str(event.value)
 
 
-class _Builder:
+class _TreeBuilder:
     def __init__(self, document: Document) -> None:
         self.document = document
         self.position: Position = (1, 1)
-        self.levels: list[_Level] = []
+        self.levels: list[_OpenNode] = []
         self.count = 0
         self.documents = 0
 
@@ -254,7 +254,7 @@ class _Builder:
                 document.refuse((), position, f"nested more than {MAX_DEPTH} deep; remove the extra nesting")
                 raise _LimitError
             entries: dict[str, Any] | list[Any] = {} if isinstance(event, MappingStartEvent) else []
-            self.levels.append(_Level(path, live and not is_key, entries, is_key))
+            self.levels.append(_OpenNode(path, live and not is_key, entries, is_key))
         elif not is_key:
             self._put(_value(event) if accepted else None, path)
         elif isinstance(event, ScalarEvent):
@@ -272,7 +272,7 @@ class _Builder:
         return event.tag is None
 
     @staticmethod
-    def _path(level: _Level | None) -> Path:
+    def _path(level: _OpenNode | None) -> Path:
         if level is None:
             return ()
         if isinstance(level.entries, list):

@@ -11,7 +11,7 @@ from hystgen.basics.version import __version__
 from hystgen.emission import module, text
 from hystgen.parameters.files import Parameters, parameters_sha256
 from hystgen.planning.converter import Codes, Dac
-from hystgen.planning.session import Session
+from hystgen.planning.session import PlayedSession
 
 
 def file(parameters: Parameters) -> str:
@@ -25,7 +25,12 @@ def nodes(stretches: Sequence[tuple[int, int]]) -> Codes:
 
 
 def header(
-    parameters: Parameters, session: Session, dac: Dac, codes: Codes, stretches: Sequence[tuple[int, int]], words: str
+    parameters: Parameters,
+    session: PlayedSession,
+    dac: Dac,
+    codes: Codes,
+    stretches: Sequence[tuple[int, int]],
+    words: str,
 ) -> str:
     """`NAME_session.h`: the codes between which the drive is straight, and how many samples lie between them.
 
@@ -43,7 +48,7 @@ def header(
             [f"    {{ {steps}u, {every}u }}," for steps, every in stretches],
         ),
         codes=text.table(kind, f"{name}_session_codes", codes[nodes(stretches)].tolist()),
-    )  # fmt: skip
+    )
     top, bottom = session.history
     details = [dac.sentence(f" {unit}" if unit else "", top - bottom)]
     banner = module.banner_of(values, file(parameters), f"drives of a diagnosis of {name}", details)

@@ -22,7 +22,7 @@ from hystgen.basics.problems import PlanError
 from hystgen.planning import converter, header, session
 from hystgen.planning.converter import Codes, Dac
 from hystgen.planning.grid import FULL_SCALE, SLOW_SAMPLES, Grid, Tempo
-from hystgen.planning.session import Part, Session
+from hystgen.planning.session import Part, PlayedSession
 from hystgen.planning.waveforms import RECORDS, lead_in, written
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Plan:
+class PlannedDrives:
     """Drive records of one session, in recording order.
 
     `source`, `effects`: files of the model and of the user's own effects; `history`: drive values visited before every
@@ -86,7 +86,7 @@ class Plan:
     max_rate: float
     sample_time: float
     defaults: tuple[str, ...]
-    session: Session | None = None
+    session: PlayedSession | None = None
     whole: Drive | None = None
     dac: Dac | None = None
     stretches: tuple[tuple[int, int], ...] = ()
@@ -183,7 +183,7 @@ def plan(
     dac_range: Sequence[float] | None = None,
     dac_coding: str = converter.CODINGS[0],
     effects: Sequence[str | os.PathLike[str]] = (),
-) -> Plan:
+) -> PlannedDrives:
     """The drive records that make all effects of the catalogue separable.
 
     `source`: a `Model` or a parameter file; `effects`: files with effects of the user's own; `max_rate`: the fastest
@@ -256,10 +256,10 @@ def plan(
                 f"{number:02d}_{record.name}.csv", record.purpose, record.shows, record.held_out,
                 tempo.seconds(step), tempo.seconds(every), np.array([tempo.seconds(k) for k in ticks]), v, codes,
             )
-        )  # fmt: skip
+        )
     rest = tempo.seconds(tempo.rest)
     own = tuple(os.fspath(path) for path in effects)
-    made = Plan(file, named, own, tuple(drives), (top, bottom), rest, max_rate, sample_time, tuple(defaults))
+    made = PlannedDrives(file, named, own, tuple(drives), (top, bottom), rest, max_rate, sample_time, tuple(defaults))
     return made if player is None else player.session(made)
 
 
@@ -327,7 +327,7 @@ class _Player:
         codes = converter.filled(self.dac.codes(self.grid.values(nodes)), every)
         return self.dac.drives(codes), codes
 
-    def session(self, plan: Plan) -> Plan:
+    def session(self, plan: PlannedDrives) -> PlannedDrives:
         """The plan with its drives joined into one."""
         parts, at, stretches = [], self.first, [(len(self.nodes) - 1, self.every)]
         lead = self.played(self.nodes, self.every)
@@ -348,7 +348,7 @@ class _Player:
         rise = session.crossing(t, v, 0.5 * (top + bottom))
         assert rise is not None
         dac = None if self.dac is None else asdict(self.dac)
-        where = Session(self.rate, len(v), (top, bottom), plan.rest, rise, tuple(parts), dac)
+        where = PlayedSession(self.rate, len(v), (top, bottom), plan.rest, rise, tuple(parts), dac)
         whole = Drive(WHOLE, "", (), False, plan.sample_time, plan.sample_time, t, v, codes)
         return replace(
             plan, history=(top, bottom), session=where, whole=whole, dac=self.dac, stretches=tuple(stretches)

@@ -35,7 +35,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Session:
+class PlayedSession:
     """The signal played: `samples` at `rate`, Hz, containing `records`.
 
     `history`: drives visited before the first record and at the end of each, the highest and the lowest of all; `rest`:
@@ -56,7 +56,7 @@ class Session:
         return json.dumps({"hystgen": 1, **asdict(self)}, indent=2, allow_nan=False) + "\n"
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str]) -> Session:
+    def read(cls, path: str | os.PathLike[str]) -> PlayedSession:
         """Read the session from a file written by `--plan`. Raises ParameterError with every problem in it, OSError."""
         file = os.fspath(path)
         with open(file, "rb") as stream:

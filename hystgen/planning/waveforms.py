@@ -186,7 +186,7 @@ def _staircase(course: Course) -> None:
     course.hold(2 * course.pace)
     for level, slower in (
         (0.35, 0), (0.8, 2), (0.55, 0), (1.0, 0), (0.0, 0), (0.9, 0), (0.45, 4), (0.65, 0), (0.2, 0)
-    ):  # fmt: skip
+    ):
         course.go(level, slower * course.pace)
         course.hold(70)
 
@@ -203,7 +203,7 @@ def _reversals(course: Course, seed: int, turns: int, slowest: float) -> None:
 
 
 @dataclass(frozen=True)
-class Kind:
+class RecordKind:
     """A record: file name, purpose, the effects it shows, waveform and time between samples."""
 
     name: str
@@ -230,74 +230,74 @@ FULL_STEPS = (1.0, 0.0, 0.5, 1.0, 0.25, 0.75, 0.0)
 LONG_HOLDS = (1.0, 0.0, 0.5, 1.0, 0.5, 0.0)
 
 RECORDS = (
-    Kind(
+    RecordKind(
         "slow", "One slow full loop, then nested ones: the hysteresis itself, and its bends at every amplitude.",
         ("asymmetry", "saturation", "sensor_nonlinearity"), _slow, _lasting(1.0),
     ),
-    Kind(
+    RecordKind(
         "fast_triangles", "The same loops at the rate limit and two and four times slower: how they widen with rate.",
         ("rate_dependence", "lag", "delay", "slew_limit"), _triangles, _fast,
     ),
-    Kind(
+    RecordKind(
         "fast_steps", "Full-scale and smaller steps with resolved edges: a tail is a lag, a shift a delay, a straight "
         "slope a slew limit, ringing a resonance.",
         ("lag", "delay", "slew_limit", "resonance"), partial(_steps, hold=130, levels=FULL_STEPS), _fast,
     ),
-    Kind(
+    RecordKind(
         "holds", "Long holds after moves both ways: creep follows the last move, drift does not.",
         ("creep", "drift", "thermal"), partial(_steps, hold=100, levels=LONG_HOLDS), _lasting(4.0, 700),
     ),
-    Kind(
+    RecordKind(
         "staircase", "Steps of other sizes and speeds, to judge the findings of the fast records.",
         ("lag", "delay", "slew_limit", "resonance"), _staircase, _fast, True,
     ),
-    Kind(
+    RecordKind(
         "slow_minor", "Equal small loops at three biases, reached from both sides: congruent or not.",
         ("noncongruent", "asymmetry", "sensor_nonlinearity"), _slow_minor, _lasting(1.0),
     ),
-    Kind(
+    RecordKind(
         "fast_minor", "Small loops at high rate with many reversals: a lag opens the smallest ones, plays do not.",
         ("rate_dependence", "lag", "noncongruent"), _fast_minor, _fast,
     ),
-    Kind(
+    RecordKind(
         "slow_reversals", "Random turning points with pauses, to judge the findings of the slow records.",
         ("creep", "asymmetry", "saturation", "sensor_nonlinearity", "noncongruent"),
         partial(_reversals, seed=2, turns=14, slowest=3.0), _lasting(1.25, 600), True,
     ),
-    Kind(
+    RecordKind(
         "sweep", "A sine from slow to an eighth of the sampling rate: the peak of a resonance, the phase of a lag.",
         ("resonance", "lag", "delay"), _sweep, _fast,
     ),
-    Kind(
+    RecordKind(
         "cycles", "Many equal full loops: they accumulate travel and heat; later ones differ from earlier ones.",
         ("ageing", "thermal"), _cycles, _lasting(1.0, 720),
     ),
-    Kind(
+    RecordKind(
         "settling", "Nested loops and short holds at a medium pace, while it cools: creep and rate in between.",
         ("creep", "rate_dependence", "thermal"), _settling, _middle,
     ),
-    Kind(
+    RecordKind(
         "fast_reversals", "Random turning points at random speeds near the limit, to judge.",
         ("rate_dependence", "lag", "delay", "slew_limit"), partial(_reversals, seed=3, turns=40, slowest=4.0), _fast,
         True,
     ),
-    Kind(
+    RecordKind(
         "multisine", "Equal periods of an odd multisine with random phases: noise without a model, even nonlinearity.",
         ("asymmetry", "sensor_nonlinearity", "resonance"), _multisine, _fast,
     ),
-    Kind(
+    RecordKind(
         "reversals", "Random turning points at a medium pace, to judge what lies between slow and fast.",
         ("creep", "rate_dependence", "noncongruent"), partial(_reversals, seed=5, turns=25, slowest=3.0), _middle, True,
     ),
-    Kind(
+    RecordKind(
         "slow_again", "The first record once more: changes in the session due to neither rate nor amplitude.",
         ("drift", "ageing", "thermal"), _slow, _lasting(1.0),
     ),
-)  # fmt: skip
+)
 """The records of a session, in order."""
 
 
-def written(record: Kind, grid: Grid, tempo: Tempo, every: int) -> list[int]:
+def written(record: RecordKind, grid: Grid, tempo: Tempo, every: int) -> list[int]:
     """The codes of a record, which ends with moves to the top and the bottom: the history of the next."""
     pace = tempo.move if every == tempo.fast else 2 * MOVE
     course = Course(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), pace)

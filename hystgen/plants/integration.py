@@ -48,7 +48,7 @@ def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: floa
                 found, details = odeint(
                     slope, y[first], places, tfirst=True, rtol=RTOL, atol=ATOL * scale, mxstep=MOST_STEPS,
                     tcrit=places[-1:], full_output=True,
-                )  # fmt: skip
+                )
             # with tcrit LSODA does not report that its steps became too small to move on
             done = places[-1] == places[0] or np.isclose(details["tcur"][-1], places[-1], rtol=0.0, atol=1e-12 * reach)
         except (ODEintWarning, OverflowError):

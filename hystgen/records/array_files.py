@@ -61,7 +61,7 @@ def _npy_shape(archive: Any, file: str) -> tuple[int, ...]:
     with archive.zip.open(file) as member:
         header: Mapping[tuple[int, int], Callable[..., Any]] = {
             (1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0,
-        }  # fmt: skip
+        }
         if member.read(len(npy.MAGIC_PREFIX)) != npy.MAGIC_PREFIX:
             return (0,)
         member.seek(0)

@@ -107,7 +107,7 @@ def _offset(zone: str | None) -> int:
 MISSING = frozenset(
     ("", "nan", "na", "n/a", "null", "none", "inf", "+inf", "-inf", "infinity", "-infinity", "\N{INFINITY}",
      "+\N{INFINITY}", "-\N{INFINITY}")
-)  # fmt: skip
+)
 """Cells, in lower case, that stand for a missing value."""
 
 BLANKS = " "

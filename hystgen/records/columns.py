@@ -141,7 +141,7 @@ RATES = {
     "mHz": 1e-3, "Hz": 1.0, "kHz": 1e3, "KHz": 1e3, "MHz": 1e6, "GHz": 1e9, "hz": 1.0, "1/s": 1.0, "samples/s": 1.0,
     "S/s": 1.0, "kS/s": 1e3, "MS/s": 1e6, "GS/s": 1e9, "Sa/s": 1.0, "kSa/s": 1e3, "MSa/s": 1e6, "GSa/s": 1e9,
     "sps": 1.0, "SPS": 1.0, "ksps": 1e3, "kSPS": 1e3, "MSPS": 1e6,
-}  # fmt: skip
+}
 """Units of sample rates in Hz; m and M differ, so case matters."""
 
 _RATE = r"(?i:sampl(?:e|ing)[ _-]?(?:rate|freq(?:uency)?)|f_?s(?:ample)?|srate|abtast(?:rate|frequenz))"
@@ -244,7 +244,7 @@ MEANINGS = {
         ("y", "displacement", "disp", "position", "pos", "output", "deflection", "elongation", "stroke", "weg",
          "auslenkung", "déplacement", "deplacement", "desplazamiento")
     ),
-}  # fmt: skip
+}
 """Words in column names that suggest one of our columns if none has our name."""
 
 DECIDE = {
@@ -256,7 +256,7 @@ DECIDE = {
 OTHERWISE = frozenset(
     ("error", "err", "deviation", "std", "sigma", "noise", "velocity", "speed", "rate", "limit", "min", "max", "status",
      "state", "offset", "gain", "scale", "constant", "range")
-)  # fmt: skip
+)
 """Words for things other than the quantity itself."""
 
 COUNTING = frozenset(("index", "scan", "sample", "chunk", "no", "nr", "number", "row", "point", "count", "segment"))

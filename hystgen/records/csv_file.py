@@ -22,7 +22,7 @@ from hystgen.basics.problems import counted, printable
 from hystgen.records import layout
 from hystgen.records.cells import BLANKS, COMMENT, MISSING, Clock, Dialect, is_comment, shape
 from hystgen.records.columns import LISTED, Column, column
-from hystgen.records.layout import Layout
+from hystgen.records.layout import TableLayout
 from hystgen.records.reading import Lines, Reading, Table
 from hystgen.records.record import Array
 
@@ -151,7 +151,7 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
     return body.table(columns, chosen)
 
 
-def _layout(reading: Reading, sample: str) -> Layout:
+def _layout(reading: Reading, sample: str) -> TableLayout:
     """The layout of the first lines; notes how the file was interpreted."""
     fewest = len("\n".join(sample.split("\n", SAMPLE_LINES)[:SAMPLE_LINES]))
     start = sample[: sample.find("\n", max(SAMPLE, fewest)) + 1]
@@ -177,7 +177,7 @@ def _layout(reading: Reading, sample: str) -> Layout:
     return found
 
 
-def _refuse_wrong_delimiter(reading: Reading, found: Layout, lines: Sequence[str]) -> None:
+def _refuse_wrong_delimiter(reading: Reading, found: TableLayout, lines: Sequence[str]) -> None:
     """Raise RecordError if the given delimiter yields a single column where another one would yield a table."""
     if reading.delimiter is None or len(found.names) != 1 or not found.header:
         return
@@ -226,7 +226,7 @@ class _Fault:
 class _Body:
     """The rows below the header, read block by block."""
 
-    def __init__(self, reading: Reading, layout: Layout, wanted: Mapping[str, int], size: int) -> None:
+    def __init__(self, reading: Reading, layout: TableLayout, wanted: Mapping[str, int], size: int) -> None:
         self.reading = reading
         self.layout = layout
         self.names = layout.names
@@ -379,7 +379,7 @@ class _Body:
                     io.StringIO(text), delimiter=None if dialect.delimiter == BLANKS else dialect.delimiter,
                     comments=None, ndmin=2, quotechar='"', encoding=None, usecols=None if everything else stored,
                     converters=None if self.clock_column is None else {self.clock_column: clock.seconds},
-                )  # fmt: skip
+                )
         except (ValueError, UserWarning):
             return None
         if cells.shape != (lines, len(stored)):

@@ -34,7 +34,7 @@ EXAMPLE = "1,2,3"
 
 
 @dataclass
-class Layout:
+class TableLayout:
     """A text table: `names` and `units` of its columns; lines count from 1.
 
     `also`: second names of columns; `header`: line of the names, None if there is none; `first`: first line of the
@@ -75,7 +75,7 @@ class _View:
     start: int
 
 
-def find(reading: Reading, lines: Sequence[str]) -> Layout:
+def find(reading: Reading, lines: Sequence[str]) -> TableLayout:
     """The layout of a table: from its header if an instrument wrote it, else from the numbers.
 
     Raises RecordError if nothing fits, or more than one layout does.
@@ -84,7 +84,7 @@ def find(reading: Reading, lines: Sequence[str]) -> Layout:
     return next((layout for layout in said if layout is not None), None) or _shown(reading, lines)
 
 
-def _shown(reading: Reading, lines: Sequence[str]) -> Layout:
+def _shown(reading: Reading, lines: Sequence[str]) -> TableLayout:
     """The layout inferred from the numbers."""
     seen = [
         _Line(number, text, is_comment(text))
@@ -95,7 +95,7 @@ def _shown(reading: Reading, lines: Sequence[str]) -> Layout:
     views = [view for dialect in dialects if (view := _view(dialect, seen)) is not None]
     if not views:
         return _without_numbers(reading, seen, dialects)
-    best: tuple[_View, Layout | None] | None = None
+    best: tuple[_View, TableLayout | None] | None = None
     for view in sorted(views, key=lambda each: (each.width < 2, -each.score)):
         layout = _with_header(reading, view, seen)
         if best is None or (best[1] is None and layout is not None):
@@ -144,13 +144,13 @@ def _view(dialect: Dialect, lines: Sequence[_Line]) -> _View | None:
     return _View(dialect, width, score, numeric, clean[0])
 
 
-def _with_header(reading: Reading, view: _View, lines: Sequence[_Line]) -> Layout | None:
+def _with_header(reading: Reading, view: _View, lines: Sequence[_Line]) -> TableLayout | None:
     """The layout with the header in plain text, or the one in a comment right above the numbers if that says more."""
     plain, comment = _plain_header(view, lines), _comment_header(view, lines)
     if plain is None or comment is None:
         return plain or comment
 
-    def known(found: Layout) -> int:
+    def known(found: TableLayout) -> int:
         columns = [column(name, unit=unit) for name, unit in zip(found.names, found.units, strict=True)]
         asked = {*STANDARD, "u", *reading.columns.values()}
         return sum(bool({c.name, c.label} & asked or meaning(c)) for c in columns)
@@ -158,7 +158,7 @@ def _with_header(reading: Reading, view: _View, lines: Sequence[_Line]) -> Layou
     return comment if known(comment) > known(plain) else plain
 
 
-def _plain_header(view: _View, lines: Sequence[_Line]) -> Layout | None:
+def _plain_header(view: _View, lines: Sequence[_Line]) -> TableLayout | None:
     """The layout with a header that is not a comment; None if there is no such header."""
     block = []
     for k in range(view.start - 1, -1, -1):
@@ -192,9 +192,9 @@ def _next(lines: Sequence[_Line], above: _Line) -> int:
     return next(line.number for line in lines if line.number > above.number)
 
 
-def _made(view: _View, names: list[str], header: int, first: int, units: Sequence[str] = ()) -> Layout:
+def _made(view: _View, names: list[str], header: int, first: int, units: Sequence[str] = ()) -> TableLayout:
     of = [unit_alone(unit) or "" for unit in units] or [""] * len(names)
-    return Layout(view.dialect, names, first, header, of)
+    return TableLayout(view.dialect, names, first, header, of)
 
 
 def _names(view: _View, text: str) -> list[str] | None:
@@ -215,7 +215,7 @@ def _names(view: _View, text: str) -> list[str] | None:
     return names if len(names) == view.width else None
 
 
-def _comment_header(view: _View, lines: Sequence[_Line]) -> Layout | None:
+def _comment_header(view: _View, lines: Sequence[_Line]) -> TableLayout | None:
     """The header found in the comments right above the numbers."""
     comments: list[_Line] = []
     for line in reversed(lines[: view.start]):
@@ -242,7 +242,7 @@ def _comment_header(view: _View, lines: Sequence[_Line]) -> Layout | None:
     return _made(view, names, line.number, first)
 
 
-def _headerless(reading: Reading, view: _View, lines: Sequence[_Line]) -> Layout:
+def _headerless(reading: Reading, view: _View, lines: Sequence[_Line]) -> TableLayout:
     """The layout of a table whose columns are named by number. Raises RecordError if they are not."""
     start = view.start
     while start and not lines[start - 1].comment and len(view.dialect.cells(lines[start - 1].text)) == view.width:
@@ -264,10 +264,10 @@ def _headerless(reading: Reading, view: _View, lines: Sequence[_Line]) -> Layout
             f"{EXAMPLES.get(view.width, EXAMPLE)} ({of}), or put a header such as t,v,y above them",
             first,
         )
-    return Layout(view.dialect, [str(k + 1) for k in range(view.width)], first)
+    return TableLayout(view.dialect, [str(k + 1) for k in range(view.width)], first)
 
 
-def _without_numbers(reading: Reading, lines: Sequence[_Line], dialects: Sequence[Dialect]) -> Layout:
+def _without_numbers(reading: Reading, lines: Sequence[_Line], dialects: Sequence[Dialect]) -> TableLayout:
     """The layout of a file without a row of numbers: its first line is the header."""
     header = next((line for line in lines if not line.comment), None)
     if header is None:
@@ -280,7 +280,7 @@ def _without_numbers(reading: Reading, lines: Sequence[_Line], dialects: Sequenc
     if reading.delimiter is None and len(Dialect().cells(header.text)) > 1:
         dialect = Dialect()
     names = [cell.strip() for _, cell in dialect.cells(header.text)]
-    return Layout(dialect, names, header.number + 1, header.number)
+    return TableLayout(dialect, names, header.number + 1, header.number)
 
 
 def _decided(reading: Reading, view: _View, lines: Sequence[_Line]) -> None:
@@ -345,7 +345,7 @@ _OWN_TIMES = "its channels have separate times (X0, Delta_X); export them with a
 _SPECIAL = ("***Start_Special***", "***End_Special***")
 
 
-def labview(reading: Reading, lines: Sequence[str]) -> Layout | None:
+def labview(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
     """The layout given by the tags, according to NI's "Specification for the LabVIEW Measurement File (.lvm)".
 
     Tags of the file, then tags of a segment, each up to `***End_of_Header***`, then names and rows. Further segments
@@ -374,8 +374,8 @@ def _of_segment(
     segment: dict[str, list[str]],
     names: list[str],
     header: int,
-) -> Layout:
-    found = Layout(dialect, names, header + 1, header, kind="LabVIEW measurement file", another=END)
+) -> TableLayout:
+    found = TableLayout(dialect, names, header + 1, header, kind="LabVIEW measurement file", another=END)
     written = names.copy()
     # The comment at the end of a row is not a channel, and may be missing
     if names[-1] in ("Comment", ""):
@@ -508,7 +508,7 @@ LARGEST_CODE = 1 << 16
 _ENTRY = re.compile(r"\s*#\s*(\w+)\s*(?:=\s*(.*?))?\s*")
 
 
-def pi_gcs(reading: Reading, lines: Sequence[str]) -> Layout | None:
+def pi_gcs(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
     """The layout given by the header of a GCS array, as controllers send it (`DRR?`) and PIMikroMove saves it.
 
     `# KEY = VALUE` up to `# END_HEADER`: SEPARATOR is the code of a character, SAMPLE_TIME is in seconds, NAME0 and so
@@ -529,8 +529,8 @@ def pi_gcs(reading: Reading, lines: Sequence[str]) -> Layout | None:
     separator = chr(_whole(reading, entries, "SEPARATOR"))
     names = [entries.get(f"NAME{k}", (0, ""))[1] or str(k + 1) for k in range(width)]
     header = entries.get("NAME0", entries["END_HEADER"])[0]
-    found = Layout(Dialect(BLANKS if separator.isspace() and separator != "\t" else separator), names,
-                   entries["END_HEADER"][0] + 1, header, kind="PI GCS array", another="END_HEADER")  # fmt: skip
+    found = TableLayout(Dialect(BLANKS if separator.isspace() and separator != "\t" else separator), names,
+                   entries["END_HEADER"][0] + 1, header, kind="PI GCS array", another="END_HEADER")
     if "NDATA" in entries:
         found.rows = _whole(reading, entries, "NDATA")
     if "SAMPLE_TIME" in entries:
@@ -559,7 +559,7 @@ _SETTINGS = ("Sample Interval", "Record Length", "Vertical Units")
 """Settings that distinguish these files from others with a column TIME."""
 
 
-def tektronix(reading: Reading, lines: Sequence[str]) -> Layout | None:
+def tektronix(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
     """The layout given by the settings: one per line and one cell per channel, then `TIME,CH1,CH2` and the rows.
 
     They hold what the header lacks: units of time and of each channel, and the label that a user gave it.
@@ -580,7 +580,7 @@ def tektronix(reading: Reading, lines: Sequence[str]) -> Layout | None:
     labels = (settings.get("Label") or [])[:channels]
     labelled = len(labels) == channels and all(labels) and len(set(labels)) == channels
     units = [*settings["Vertical Units"], *[""] * channels][:channels]
-    return Layout(
+    return TableLayout(
         dialect,
         ["TIME", *(labels if labelled else values)],
         header + 1,
@@ -603,7 +603,7 @@ _RIGOL_NEW = re.compile(r"(?P<names>.*?),\s*t0\s*=\s*(?P<start>[^,]*?)\s*,\s*tIn
 _RIGOL_CHANNEL = re.compile(r"(CH\d+|MATH\d*)(V|A|W)")
 
 
-def rigol(reading: Reading, lines: Sequence[str]) -> Layout | None:
+def rigol(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
     """The layout of a table without time, whose first lines give its start and increment instead.
 
     `X,CH1,CH2,Start,Increment` above `Sequence,Volt,Volt,-0.2,0.001`, newer ones `CH1V,CH2V,t0 = -0.2, tInc = 0.001`.
@@ -625,14 +625,14 @@ def rigol(reading: Reading, lines: Sequence[str]) -> Layout | None:
         return None
     seconds = _number(reading, Dialect(), step, tag, line)
     blank = [""] * (len(cells) - len(names))
-    return Layout(Dialect(), [*names, *blank], line + 1, 1, [*units, *blank], kind="Rigol CSV",
-                  steps=[Step(seconds, f"{tag} {seconds:g} s (line {line})")] if seconds > 0.0 else [])  # fmt: skip
+    return TableLayout(Dialect(), [*names, *blank], line + 1, 1, [*units, *blank], kind="Rigol CSV",
+                  steps=[Step(seconds, f"{tag} {seconds:g} s (line {line})")] if seconds > 0.0 else [])
 
 
 # CSV of Yokogawa's ScopeCorders and oscilloscopes -------------------------------------------------------------
 
 
-def yokogawa(reading: Reading, lines: Sequence[str]) -> Layout | None:
+def yokogawa(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
     """The layout given by the settings, one per line and one cell per channel; rows begin with an empty cell.
 
     There is no time column. `"TraceName","CH1","CH2"` has the names, `VUnit` the units, `HResolution` the time between
@@ -652,10 +652,10 @@ def yokogawa(reading: Reading, lines: Sequence[str]) -> Layout | None:
     header, names = settings["TraceName"]
     place, steps = settings["HResolution"]
     blank = [""] * len(names)
-    found = Layout(
+    found = TableLayout(
         dialect, ["", *names], first, header, ["", *(settings.get("VUnit", (0, []))[1] + blank)[: len(names)]],
         kind="Yokogawa CSV",
-    )  # fmt: skip
+    )
     seconds = {_number(reading, dialect, step, "HResolution", place) for step in steps if step}
     if len(seconds) > 1:
         raise reading.refuse("its channels have different sample rates; export them with one rate", place)

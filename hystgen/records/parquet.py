@@ -50,7 +50,7 @@ def _is_number(kind: Any) -> bool:
             types.is_integer, types.is_floating, types.is_decimal, types.is_boolean, types.is_timestamp,
             types.is_duration,
         )
-    )  # fmt: skip
+    )
 
 
 def _unit(field: Any) -> str:

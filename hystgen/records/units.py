@@ -38,7 +38,7 @@ SYMBOLS: dict[str, tuple[str, Fraction]] = {
     "deg": ("rad", _DEGREE),
     "\u2126": ("Ohm", Fraction(1)), "\u03a9": ("Ohm", Fraction(1)), "bar": ("Pa", Fraction(10**5)),
     "Oe": ("A/m", _OERSTED),
-}  # fmt: skip
+}
 """Symbols that take a prefix, each with its quantity and its size in the unit that names the quantity."""
 
 ALONE: dict[str, tuple[str, Fraction]] = {
@@ -47,13 +47,13 @@ ALONE: dict[str, tuple[str, Fraction]] = {
     "microns": ("m", Fraction(1, 10**6)), "\u00c5": ("m", Fraction(1, 10**10)), "\u212b": ("m", Fraction(1, 10**10)),
     "gauss": ("T", Fraction(1, 10**4)),
     **{unit: ("s", Fraction(factor) / Fraction(divisor)) for unit, (factor, divisor) in TIMES.items()},
-}  # fmt: skip
+}
 """Units without a prefix, in lower case wherever they are words."""
 
 NAMES = {
     "volt": "V", "ampere": "A", "amp": "A", "meter": "m", "metre": "m", "newton": "N", "radian": "rad", "tesla": "T",
     "pascal": "Pa", "hertz": "Hz", "kelvin": "K", "oersted": "Oe",
-}  # fmt: skip
+}
 """Whole words and their symbols, in the singular."""
 
 _ZERO = Fraction("273.15")

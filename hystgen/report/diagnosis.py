@@ -14,11 +14,11 @@ from hystgen.basics.drawing import label
 from hystgen.basics.problems import percent
 from hystgen.basics.version import __version__
 from hystgen.diagnosis.findings.content import ONE_LOOP
-from hystgen.diagnosis.findings.kinds import VARIABLE_NAMES, Fault, Structure, times_noise
+from hystgen.diagnosis.findings.kinds import VARIABLE_NAMES, Fault, Structured, times_noise
 from hystgen.diagnosis.findings.result import Diagnosis, NamedEffect, Result
 from hystgen.diagnosis.search.acceptance import is_noise
 from hystgen.report.diagnosis_figures import ALTERNATIVES, CAPTIONS, FIGURES, NARROW, WIDE
-from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, page
+from hystgen.report.html import Details, Figure, HtmlTable, Listing, Section, Text, page
 from hystgen.report.properties import settling
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def _noise(result: Result) -> Text:
     return Text(f"The {floor}, from {NOISE_FROM[result.noise_from]}.")
 
 
-def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Text | Table]:
+def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Text | HtmlTable]:
     """`not_emitted`: why the compensators in the table cannot be emitted as C; empty if they can."""
     if not result.effects:
         return [Text("No effect in the catalogue removes enough of the held-out error to be named.")]
@@ -145,16 +145,16 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
             several = _numbers(value, effect.intervals.get(key), key.replace("_", " "))
             numbers += [[effect.name, *row, said.get(key, "")] for row in several]
     return [
-        Table(rows, (0,)),
+        HtmlTable(rows, (0,)),
         Text("What they mean for a compensator:"),
-        Table(means, (0, 1, 2)),
+        HtmlTable(means, (0, 1, 2)),
         Text(f"They cannot be emitted as C yet: {not_emitted}.") if not_emitted
         else Text("Error that the compensator would leave in the motion:", "hystgen track params.yaml RECORDS"),
         Text(
             "Their numbers. The intervals include the correlation of the residuals and the freedom of the weights, but "
             "not that another shape may fit as well:"
         ),
-        Table(numbers, (0, 1, 5)),
+        HtmlTable(numbers, (0, 1, 5)),
     ]
 
 
@@ -172,7 +172,7 @@ def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
         return [
             row for key, each in value.items()
             for row in _numbers(each, known.get(key), f"{name} {key.replace('_', ' ')}".strip())
-        ]  # fmt: skip
+        ]
     if isinstance(value, tuple):
         alike = len(value) > 1 and isinstance(value[0], tuple) and all(each == value[0] for each in value)
         chosen = value[:1] if alike else value
@@ -180,7 +180,7 @@ def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
             row for k, each in enumerate(chosen)
             for row in _numbers(each, sure[k] if sure else None,
                                 f"{name} of each play" if alike else f"{name} {k + 1}" if len(value) > 1 else name)
-        ]  # fmt: skip
+        ]
     if isinstance(value, bool | str):
         return [[name, str(value), "", ""]]
     return [[name, f"{value:.4g}", *_pair(sure)]]
@@ -190,7 +190,7 @@ def _pair(known: Sequence[float] | None) -> list[str]:
     return [f"{x:.4g}" for x in known] if known and known[0] < known[1] else ["fixed", ""]
 
 
-def _left(result: Result) -> list[Text | Listing | Table]:
+def _left(result: Result) -> list[Text | Listing | HtmlTable]:
     seen = [each for each in result.unexplained if not isinstance(each, Fault)]
     if not seen:
         after, noise = result.gap.after.holdout, result.noise_floor
@@ -199,13 +199,13 @@ def _left(result: Result) -> list[Text | Listing | Table]:
         times = f"The remaining error is {times_noise(after / noise)}"
         return [Text(f"{times}, but nothing in it stands out: noise that is not white looks like this too.")]
     sentences = [each.sentence(result.unit) for each in seen]
-    blocks: list[Text | Listing | Table] = [Listing(sentences)]
+    blocks: list[Text | Listing | HtmlTable] = [Listing(sentences)]
     for each in seen:
-        if isinstance(each, Structure) and each.share_by_variable:
+        if isinstance(each, Structured) and each.share_by_variable:
             rows = [["the remaining error depends on", "share of its variance"]]
             shares = each.share_by_variable.items()
             rows += [[VARIABLE_NAMES[name], f"{100.0 * share:.0f} %"] for name, share in shares]
-            blocks += [Table(rows, (0,)), Text("Each variable alone, judged on samples that it has not seen.")]
+            blocks += [HtmlTable(rows, (0,)), Text("Each variable alone, judged on samples that it has not seen.")]
     more = [text for each in seen for text in each.advice()]
     return [*blocks, Text("To learn more:"), Listing(more)] if more else blocks
 
@@ -220,10 +220,10 @@ WHAT = {
 }
 
 
-def _faults(result: Result) -> list[Text | Table]:
+def _faults(result: Result) -> list[Text | HtmlTable]:
     seen = [each.entry() for each in result.unexplained if isinstance(each, Fault)]
     if not seen:
-        disturbed = any(not isinstance(each, Structure) for each in result.unexplained)
+        disturbed = any(not isinstance(each, Structured) for each in result.unexplained)
         return [Text("None in single samples; disturbances are listed above." if disturbed else "None were seen.")]
     rows = [["record", "what", "times", "samples", "first at (s)", label("level", result.unit), "done"]]
     for each in sorted(seen, key=lambda one: (str(one["record"]), str(one["kind"]))):
@@ -231,7 +231,7 @@ def _faults(result: Result) -> list[Text | Table]:
         samples = each.get("count") if single else each.get("samples")
         done = "put right" if each["kind"] == "swapped_channels" else (
             "bridged" if each.get("channel") == "v" else "not compared"
-        )  # fmt: skip
+        )
         rows.append(
             [
                 each["record"],
@@ -243,7 +243,7 @@ def _faults(result: Result) -> list[Text | Table]:
                 done,
             ]
         )
-    return [Table(rows, (0, 1, 6))]
+    return [HtmlTable(rows, (0, 1, 6))]
 
 
 def _rivals(result: Result) -> list[Text | Listing]:
@@ -255,7 +255,7 @@ def _rivals(result: Result) -> list[Text | Listing]:
     return [Listing([f"{pair}: {text}" for pair, text in zip(pairs, advice, strict=False)]), *more]
 
 
-def _where(result: Result) -> list[Text | Table]:
+def _where(result: Result) -> list[Text | HtmlTable]:
     if not result.where:
         return [Text("No stretch of a record has an error of the refitted model far above the noise.")]
     rows = [["record", "what happens there", "from (s)", "to (s)", label("rms", result.unit)]]
@@ -263,11 +263,11 @@ def _where(result: Result) -> list[Text | Table]:
         [each.record, each.kind.replace("_", " "), *(f"{x:.6g}" for x in each.interval), f"{each.rms:.3g}"]
         for each in result.where
     ]
-    return [Text("The stretches with the largest error of the refitted model:"), Table(rows, (0, 1))]
+    return [Text("The stretches with the largest error of the refitted model:"), HtmlTable(rows, (0, 1))]
 
 
-def _ranking(result: Result) -> list[Text | Table]:
-    blocks: list[Text | Table] = []
+def _ranking(result: Result) -> list[Text | HtmlTable]:
+    blocks: list[Text | HtmlTable] = []
     unit = result.unit
     for k, tried in enumerate(result.ranking):
         best = min((each.holdout for each in tried), default=0.0)
@@ -279,5 +279,5 @@ def _ranking(result: Result) -> list[Text | Table]:
             errors = f"{each.fit:.4g}", f"{each.holdout:.4g}"
             rows.append([each.name, each.shape, *errors, margin, each.refused or "accepted"])
         after = "" if k < len(result.effects) else ", none of which removes enough to be named"
-        blocks += [Text(f"Round {k + 1}, the shapes that were fully fitted{after}:"), Table(rows, (0, 1, 5))]
+        blocks += [Text(f"Round {k + 1}, the shapes that were fully fitted{after}:"), HtmlTable(rows, (0, 1, 5))]
     return blocks or [Text("None: the refitted model leaves only noise.")]

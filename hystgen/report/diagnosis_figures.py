@@ -69,7 +69,7 @@ def gap(found: Diagnosis, width: float) -> Any:
             axes.barh(place, value, height=0.6, color=colour)
             if removed:
                 axes.barh(place, before - value, left=value, height=0.6, facecolor="none", edgecolor=BEFORE,
-                          linestyle=":", linewidth=1.0)  # fmt: skip
+                          linestyle=":", linewidth=1.0)
         said = f"{value:.3g}"
         if 0 < place < len(values) - 1 and before > 0.0:
             change = value / before - 1.0
@@ -162,7 +162,7 @@ def against(found: Diagnosis, width: float) -> Any:
         (label("loop centre", units.input), lambda each: loop_centre(each.v), False),
         ("session time (s)", lambda each: each.t, False),
         ("time since the drive stopped (s)", _since_stop, True),
-    ]  # fmt: skip
+    ]
     for axes, (name, of, log) in zip(grid, variables, strict=True):
         x = np.concatenate([of(each) for each in shown])
         sides = [("before", BEFORE, "refitted")] if found.result.effects else []
@@ -235,7 +235,7 @@ def time(found: Diagnosis, width: float) -> Any:
             parts = [(place, rms) for place, rms in parts if np.isfinite(rms)]
             values += [rms for _, rms in parts]
             axes.plot(*zip(*parts, strict=True), "-o", color=colour, markersize=2.5, linewidth=1.1,
-                      label=None if number else what)  # fmt: skip
+                      label=None if number else what)
     noise = found.result.noise_floor
     axes.axhline(noise, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
     positive = [value for value in values if value > 0.0]
@@ -272,7 +272,7 @@ def frequency(found: Diagnosis, width: float) -> Any:
         if line.frequency < 0.5 / step:
             axes.axvline(line.frequency, color=drawing.OTHER, linestyle=":", linewidth=1.0)
             axes.annotate(f"{line.frequency:.4g} Hz", (line.frequency, 1.0), xycoords=("data", "axes fraction"),
-                          xytext=(3, -10), textcoords="offset points", fontsize=8, color=drawing.OTHER)  # fmt: skip
+                          xytext=(3, -10), textcoords="offset points", fontsize=8, color=drawing.OTHER)
     _decades(axes, "x")
     _decades(axes, "y")
     axes.set(xlabel="frequency (Hz)", ylabel=label("error density", f"{unit}/\N{SQUARE ROOT}Hz" if unit else None))
@@ -314,7 +314,7 @@ def _rms(e: Array) -> float:
 
 FIGURES = {
     "gap": gap, "overlay": overlay, "records": records, "time": time, "against": against, "frequency": frequency,
-}  # fmt: skip
+}
 
 CAPTIONS = {
     "gap": "rms error on the held-out records: of the model as given, refitted, and with one effect after another; "

@@ -120,7 +120,7 @@ def role(each: Shown) -> str:
 
 
 @dataclass(frozen=True)
-class Units:
+class AxisUnits:
     """Units of drive and output, empty if unknown."""
 
     drive: str
@@ -132,16 +132,16 @@ class Units:
         return f"{self.output}/{self.drive}" if self.drive and self.output else ""
 
 
-def units_of(fit: Fit) -> Units:
+def units_of(fit: Fit) -> AxisUnits:
     """The units of a fit's parameters."""
     units = fit.parameters.units
-    return Units(units.input or "", units.output or "")
+    return AxisUnits(units.input or "", units.output or "")
 
 
 # Panels: one pair of axes each ---------------------------------------------------------------
 
 
-def loop_panel(axes: Any, each: Shown, units: Units) -> None:
+def loop_panel(axes: Any, each: Shown, units: AxisUnits) -> None:
     """Measured loop and model over the compared samples."""
     for k, (start, stop) in enumerate(each.used.parts):
         here = slice(start, stop)
@@ -150,7 +150,7 @@ def loop_panel(axes: Any, each: Shown, units: Units) -> None:
             axes.plot(
                 each.drive[here], np.where(known, values[here], np.nan), **drawing.LINES[name],
                 label=None if k else name, rasterized=stop - start > drawing.MOST_POINTS,
-            )  # fmt: skip
+            )
     axes.set(xlabel=label("drive", units.drive), ylabel=label("displacement", units.output))
     axes.set_title(f"{each.record.name} ({role(each)})", pad=20)
     drawing.legend_above(axes)
@@ -168,15 +168,15 @@ def _shade(axes: Any, each: Shown, named: bool) -> None:
         axes.axvspan(
             t[a], t[b - 1] + step, color=drawing.IGNORED, alpha=0.25, linewidth=0,
             label="ignored" if named and not k else None,
-        )  # fmt: skip
+        )
     for k, g in enumerate(each.used.gaps):
         axes.axvspan(
             t[g - 1], t[g], color=drawing.GAP, alpha=0.3, linewidth=0,
             label="gap" if named and not k else None,
-        )  # fmt: skip
+        )
 
 
-def overlay_panel(axes: Any, each: Shown, units: Units) -> None:
+def overlay_panel(axes: Any, each: Shown, units: AxisUnits) -> None:
     """Measured and model over time; samples that were not compared are shaded or marked."""
     _shade(axes, each, True)
     good = each.measured[np.isfinite(each.measured)]
@@ -201,14 +201,14 @@ def overlay_panel(axes: Any, each: Shown, units: Units) -> None:
     drawing.legend_above(axes, 3)
 
 
-def residual_panel(axes: Any, each: Shown, units: Units, colour: str = drawing.RESIDUAL) -> None:
+def residual_panel(axes: Any, each: Shown, units: AxisUnits, colour: str = drawing.RESIDUAL) -> None:
     """The residual over time."""
     for k, (start, stop) in enumerate(each.used.parts):
         chosen = drawing.kept(start, stop, each.residual)
         axes.plot(
             each.time[chosen], each.residual[chosen], color=colour, linewidth=0.8,
             label=None if k else f"{each.record.name} ({role(each)})",
-        )  # fmt: skip
+        )
     axes.axhline(0.0, color=drawing.QUIET, linewidth=0.6)
     axes.set(xlabel="time (s)", ylabel=label("residual", units.output))
 
@@ -219,13 +219,13 @@ def _against_panel(axes: Any, x: Array, residual: Array, noise: float | None) ->
     x, residual = x[known], residual[known]
     chosen = drawing.sampled(len(x))
     axes.plot(x[chosen], residual[chosen], ".", color=drawing.RESIDUAL, alpha=0.5, markersize=3.0,
-              markeredgewidth=0, rasterized=True, label="samples")  # fmt: skip
+              markeredgewidth=0, rasterized=True, label="samples")
     low, high = _limits(x)
     middle, mean, spread = binned(x, residual, low, high)
     axes.fill_between(
         middle, mean - spread, mean + spread, color=drawing.RESIDUAL, alpha=0.25, linewidth=0,
         label="mean \N{PLUS-MINUS SIGN} 1 sd in bins",
-    )  # fmt: skip
+    )
     axes.plot(middle, mean, color="#14532d", linewidth=1.6, label="mean in bins", marker="o", markersize=2.2)
     axes.axhline(0.0, color=drawing.QUIET, linewidth=0.6)
     drawing.noise_lines(axes, noise)
@@ -254,7 +254,7 @@ def _limits(x: Array) -> tuple[float, float]:
     return (inner_low, inner_high) if high - low > FAR * (inner_high - inner_low) > 0.0 else (low, high)
 
 
-def weight_panel(axes: Any, fit: Fit, units: Units, places: Sequence[int]) -> None:
+def weight_panel(axes: Any, fit: Fit, units: AxisUnits, places: Sequence[int]) -> None:
     """Some of the weights as bars, named by their thresholds, with their intervals."""
     part = fit.parameters.model.pi
     at = np.arange(len(places))
@@ -383,7 +383,7 @@ def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
                 ax.plot(v, cascade.front(v, up) - straight * v, color=colour, linewidth=1.4, label=name)
             ax.plot(v, (1.0 - straight) * v, color=drawing.QUIET, linewidth=0.9, linestyle="--", label="straight line")
             ax.set(xlabel=label("drive", units.drive), ylabel=label("front" if not straight else "front - line",
-                                                                    units.drive))  # fmt: skip
+                                                                    units.drive))
             ax.set_title(title, pad=20)
         drawing.legend_above(front[0])
     return figure
@@ -408,5 +408,5 @@ def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
 
 FIGURES: dict[str, Callable[[Fit, Sequence[Shown], bool], Any]] = {
     "loop": loop, "time": time, "residual": residual, "loading": loading, "weights": weights,
-}  # fmt: skip
+}
 """All figures by the name of their file."""

@@ -31,7 +31,7 @@ class Listing:
 
 
 @dataclass(frozen=True)
-class Table:
+class HtmlTable:
     """`rows[0]` is the head; columns in `words` hold text, the others numbers; row `marked` is highlighted."""
 
     rows: Sequence[Sequence[str]]
@@ -66,7 +66,7 @@ class Section:
     """A heading and its content."""
 
     title: str
-    blocks: Sequence[Text | Listing | Table | Figure | Details]
+    blocks: Sequence[Text | Listing | HtmlTable | Figure | Details]
 
 
 def page(title: str, lead: Sequence[Text], sections: Sequence[Section]) -> str:

@@ -25,7 +25,7 @@ from hystgen.parameters.files import parameters_sha256
 from hystgen.records import Record, Source, in_units, read_records, several
 from hystgen.report import fit_figures, plots, properties
 from hystgen.report.fit_figures import Shown
-from hystgen.report.html import Details, Figure, Listing, Section, Table, Text, page
+from hystgen.report.html import Details, Figure, HtmlTable, Listing, Section, Text, page
 
 if TYPE_CHECKING:
     from hystgen.identification import Row
@@ -105,7 +105,7 @@ def write(
             figures[name] = Figure(
                 name, svg, drawing.content(draw(fit, shown, False), "svg"), CAPTIONS[name](fit, shown),
                 ALTERNATIVES[name](fit, shown),
-            )  # fmt: skip
+            )
     text = page(
         f"{fit.parameters.name}: identification report",
         _verdict(fit, parameter_file or f"{fit.parameters.name}.yaml"),
@@ -193,10 +193,10 @@ def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Figure]) -> l
     ]
 
 
-def _table(fit: Fit) -> list[Text | Table | Listing]:
+def _table(fit: Fit) -> list[Text | HtmlTable | Listing]:
     row = held_out_row(fit)
     marked = next((k for k, each in enumerate(fit.rows) if each is row), len(fit.rows) - 1)
-    blocks: list[Text | Table | Listing] = [Table(cells(fit.rows, fit.unit), WORD_COLUMNS, marked)]
+    blocks: list[Text | HtmlTable | Listing] = [HtmlTable(cells(fit.rows, fit.unit), WORD_COLUMNS, marked)]
     candidates = [each for each in fit.rows if each.part == "candidate"]
     if candidates and row is not None:
         best = min(each.rms for each in candidates)
@@ -211,11 +211,11 @@ def _table(fit: Fit) -> list[Text | Table | Listing]:
     return [*blocks, Listing(fit.remarks)]
 
 
-def _data(shown: Sequence[Shown]) -> list[Text | Table | Listing]:
+def _data(shown: Sequence[Shown]) -> list[Text | HtmlTable | Listing]:
     head = (
         "record", "part", "samples", "compared", "start, as asked", "start, memory unknown", "outliers of y",
         "faulty stretches of y", "v bridged", "gaps", "left out between gaps",
-    )  # fmt: skip
+    )
     rows = [
         (
             each.used.name,
@@ -232,8 +232,8 @@ def _data(shown: Sequence[Shown]) -> list[Text | Table | Listing]:
         for each in shown
     ]
     notes = [f"{each.used.name}: {note}" for each in shown for note in each.record.notes]
-    blocks: list[Text | Table | Listing] = [
-        Table([head, *rows], (0, 1)),
+    blocks: list[Text | HtmlTable | Listing] = [
+        HtmlTable([head, *rows], (0, 1)),
         Text(
             "Three kinds of samples are not compared: those at the start, before the drive has wiped an unknown "
             "memory; outliers of y, which are isolated samples far from their neighbours; and faulty stretches, which "
@@ -252,7 +252,7 @@ def _masks(each: Shown) -> tuple[Sequence[int], ...]:
     return tuple(found.tolist() for found in (*outputs, used.bridged, used.gaps, used.left_out))
 
 
-def _range(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
+def _range(fit: Fit, shown: Sequence[Shown]) -> list[Text | HtmlTable]:
     low, high = fit.parameters.input_range
     unit = f" {fit.parameters.units.input}" if fit.parameters.units.input else ""
     rows, beyond = [], 0
@@ -266,7 +266,7 @@ def _range(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
                 each.used.name, fit_figures.role(each), f"{drive.min():.6g}", f"{drive.max():.6g}", str(outside),
                 f"{far:.4g}" if outside else "0", percent(far / (high - low)),
             )
-        )  # fmt: skip
+        )
     said = (
         f"The model was fitted on drives from {low:.6g} to {high:.6g}{unit}, and the emitted code keeps its drive "
         "inside this range. "
@@ -279,24 +279,24 @@ def _range(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
     head = (
         "record", "part", f"least{unit and f' [{unit.strip()}]'}", f"largest{unit and f' [{unit.strip()}]'}",
         "samples outside", f"farthest outside{unit and f' [{unit.strip()}]'}", "of the range",
-    )  # fmt: skip
-    return [Text(said), Table([head, *rows], (0, 1))]
+    )
+    return [Text(said), HtmlTable([head, *rows], (0, 1))]
 
 
-def _provenance(fit: Fit, shown: Sequence[Shown]) -> list[Text | Table]:
+def _provenance(fit: Fit, shown: Sequence[Shown]) -> list[Text | HtmlTable]:
     rows = [
         (
             each.used.name, fit_figures.role(each), str(each.used.samples), f"{each.record.sample_time:.4g}",
             f"{each.time[-1]:.4g}", _fingerprint(each.record),
         )
         for each in shown
-    ]  # fmt: skip
+    ]
     head = ("record", "part", "samples", "sample time [s]", "duration [s]", "SHA-256 of t, v, y")
     made = (
         f"Made by hystgen {__version__}. SHA-256 of the parameters: {parameters_sha256(fit.parameters)[:16]}. The same "
         "records and options give the same page, byte for byte."
     )
-    return [Text(made), Table([head, *rows], (0, 1, 5))]
+    return [Text(made), HtmlTable([head, *rows], (0, 1, 5))]
 
 
 def _fingerprint(record: Record) -> str:
@@ -433,7 +433,7 @@ def _weights_alt(fit: Fit, _shown: Sequence[Shown]) -> str:
 CAPTIONS = {
     "loop": _loop_caption, "time": _time_caption, "residual": _residual_caption, "loading": _loading_caption,
     "weights": _weights_caption,
-}  # fmt: skip
+}
 ALTERNATIVES = {
     "loop": _loop_alt, "time": _time_alt, "residual": _residual_alt, "loading": _loading_alt, "weights": _weights_alt,
-}  # fmt: skip
+}

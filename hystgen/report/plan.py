@@ -17,7 +17,7 @@ from hystgen.planning import plan as planning
 from hystgen.planning.plan import CODES, MEASURED, RECORDING, WHOLE, Drive, lasting
 from hystgen.planning.session import FILE as SESSION
 from hystgen.planning.waveforms import EDGE
-from hystgen.report.html import Figure, Listing, Section, Table, Text, page
+from hystgen.report.html import Figure, HtmlTable, Listing, Section, Text, page
 
 WIDE, NARROW = (9.0, 5), (4.2, 3)
 """Width in inches and number of panels side by side."""
@@ -26,7 +26,7 @@ FIT, JUDGE = drawing.MEASURED, drawing.MODEL
 
 
 @dataclass(frozen=True)
-class Plan(planning.Plan):
+class Plan(planning.PlannedDrives):
     """Drive records of one session, in the order in which they are recorded; fields as in `hystgen.planning.plan`."""
 
     def write(self, folder: str | os.PathLike[str]) -> list[Path]:
@@ -122,7 +122,7 @@ def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
     return said
 
 
-def _times(plan: Plan) -> Table:
+def _times(plan: Plan) -> HtmlTable:
     rows = [["record", "role", "starts at", "lasts", "samples", "one every", "fastest"]]
     for drive in plan.drives:
         rows.append(
@@ -136,7 +136,7 @@ def _times(plan: Plan) -> Table:
                 _rate(plan, drive.fastest),
             ]
         )
-    return Table(rows, (0, 1))
+    return HtmlTable(rows, (0, 1))
 
 
 def _purpose(drive: Drive) -> str:

@@ -28,7 +28,7 @@ class Expected:
 
 
 @dataclass(frozen=True)
-class Difference:
+class Mismatch:
     """Number of samples compared and number that differ, largest difference (None: infinite), first that differs."""
 
     samples: int
@@ -66,7 +66,7 @@ def _ulps(a: NDArray[Any], b: NDArray[Any]) -> float:
 
 def compare(
     run: Callable[[Bytes, NDArray[Any]], tuple[NDArray[Any], Bytes]], records: Sequence[Expected]
-) -> Difference:
+) -> Mismatch:
     """Run every record through `run` (calls and arguments to outputs and status) and compare it bit for bit."""
     samples = different = 0
     first = ""
@@ -80,4 +80,4 @@ def compare(
         if wrong.any():
             first = first or f"sample {int(np.argmax(wrong))} of {record.name}"
             worst = max(worst, _ulps(answer[wrong], record.answer[wrong]))
-    return Difference(samples, different, worst if np.isfinite(worst) else None, first)
+    return Mismatch(samples, different, worst if np.isfinite(worst) else None, first)

@@ -22,7 +22,7 @@ from hystgen.basics import extras, writing
 WARNINGS = [
     "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Wsign-conversion", "-Wdouble-promotion", "-Wshadow", "-Wundef",
     "-Wcast-qual", "-Wvla", "-Werror",
-]  # fmt: skip
+]
 C_WARNINGS = [*WARNINGS, "-Wmissing-prototypes", "-Wstrict-prototypes"]
 
 # The strict build, and that of a user who passes no flags: the default dialect of gcc and clang, in which they may
@@ -39,7 +39,7 @@ DEBIAN = {
     "gcc": "gcc", "clang": "clang", "arm-none-eabi-gcc": "gcc-arm-none-eabi",
     "riscv64-unknown-elf-gcc": "gcc-riscv64-unknown-elf", "avr-gcc": "gcc-avr avr-libc", "avr-size": "binutils-avr",
     "simavr": "simavr",
-}  # fmt: skip
+}
 """Debian packages of the commands that a verification calls."""
 
 
@@ -66,7 +66,7 @@ class Compiler:
             done = subprocess.run(
                 [*self.command, *map(str, arguments)], capture_output=True, encoding="utf-8", errors="replace",
                 check=False, stdin=subprocess.DEVNULL, env={**os.environ, **_own(self.name), "TMPDIR": str(folder)},
-            )  # fmt: skip
+            )
         except OSError as failure:
             raise MissingError(f"{self.name} cannot be started: {failure.strerror}; reinstall it") from None
         if done.returncode:

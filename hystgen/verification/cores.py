@@ -66,7 +66,7 @@ def _emulated(
     folder: Path,
 ) -> Iterator[Row]:
     try:
-        path = compiler.image(sources, folder, flags, cross.Layout(), f"{sources.name}_selftest")
+        path = compiler.image(sources, folder, flags, cross.MemoryMap(), f"{sources.name}_selftest")
         image = emulator.Image.load(path)
     except compilers.CompileError as error:
         yield failed(Row(target.name, compiler.name, build, "-"), error)

@@ -24,7 +24,7 @@ FREESTANDING = ["-ffreestanding", "-fno-unwind-tables", "-fno-asynchronous-unwin
 
 
 @dataclass(frozen=True)
-class Layout:
+class MemoryMap:
     """Where an image is placed in memory."""
 
     flash: int = 0x0800_0000
@@ -51,7 +51,7 @@ class CrossCompiler:
         sources: Sources,
         folder: Path,
         flags: Sequence[str],
-        layout: Layout,
+        layout: MemoryMap,
         entry: str,
         more: Sequence[Path] = (),
     ) -> Path:

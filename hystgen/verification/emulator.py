@@ -17,7 +17,7 @@ from hystgen.emission import runtime
 from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 from hystgen.verification import compilers
-from hystgen.verification.cross import Layout
+from hystgen.verification.cross import MemoryMap
 from hystgen.verification.loading import LoadError, load
 from hystgen.verification.targets import Target
 
@@ -113,7 +113,7 @@ class _Registers:
 class Core:
     """A core with an image loaded. Use it for one image; `counts` holds the instructions of every step so far."""
 
-    def __init__(self, target: Target, image: Image, layout: Layout = Layout()) -> None:  # noqa: B008  frozen
+    def __init__(self, target: Target, image: Image, layout: MemoryMap = MemoryMap()) -> None:  # noqa: B008  frozen
         self._image = image
         self._thumb = target.architecture == "arm"
         self._top = layout.ram + layout.ram_size
@@ -141,7 +141,7 @@ class Core:
             return _Registers(
                 tuple(arguments), arguments[0], arm_const.UC_ARM_REG_LR, arm_const.UC_ARM_REG_SP,
                 arm_const.UC_ARM_REG_PC,
-            )  # fmt: skip
+            )
         self._uc = unicorn.Uc(unicorn.UC_ARCH_RISCV, unicorn.UC_MODE_RISCV32, getattr(riscv_const, target.cpu))
         if target.fpu:
             self._uc.reg_write(riscv_const.UC_RISCV_REG_MSTATUS, 1 << 13)  # FS: the FPU on
@@ -149,7 +149,7 @@ class Core:
         return _Registers(
             tuple(arguments), arguments[0], riscv_const.UC_RISCV_REG_RA, riscv_const.UC_RISCV_REG_SP,
             riscv_const.UC_RISCV_REG_PC,
-        )  # fmt: skip
+        )
 
     @property
     def counts(self) -> NDArray[np.uint32]:

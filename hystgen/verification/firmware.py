@@ -9,7 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 from hystgen.emission import module
-from hystgen.verification.cross import CrossCompiler, Layout
+from hystgen.verification.cross import CrossCompiler, MemoryMap
 from hystgen.verification.emulator import EmulatorError
 from hystgen.verification.sources import Sources
 from hystgen.verification.targets import Machine, Target
@@ -32,7 +32,7 @@ def build(
     source = folder.with_name(f"{folder.name}.c")
     values = SimpleNamespace(name=sources.name, fpu=target.fpu, fault=FAULT)
     source.write_text(module.render("firmware.c.j2", values), encoding="ascii")
-    layout = Layout(machine.flash, ram=machine.ram, **SIZES)
+    layout = MemoryMap(machine.flash, ram=machine.ram, **SIZES)
     return compiler.image(sources, folder, flags, layout, "firmware_reset", [source])
 
 
@@ -44,7 +44,7 @@ def run(machine: Machine, image: Path) -> int:
     command = [
         QEMU, "-M", machine.name, "-nographic", "-monitor", "none", "-serial", "none",
         "-semihosting-config", "enable=on,target=native", "-icount", "shift=6", "-kernel", str(image),
-    ]  # fmt: skip
+    ]
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL, timeout=SECONDS

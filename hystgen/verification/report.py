@@ -159,7 +159,7 @@ class Report:
             "testsuite", name=f"hystgen verify {title}", tests=str(len(self.rows)),
             failures=str(sum(not row.ok and not row.missing for row in self.rows)),
             errors=str(sum(row.missing for row in self.rows)),
-        )  # fmt: skip
+        )
         for row in self.rows:
             where = f"{title}.{self.arithmetic}.{self.engine}.{self.layout}"
             case = ElementTree.SubElement(

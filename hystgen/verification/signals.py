@@ -58,7 +58,7 @@ def _onto_the_plays(
 def _coincidences(
     tables: Tables | FixedTables, inverse: bool, low: float, high: float, length: int,
     rng: np.random.Generator,
-) -> tuple[Bytes, NDArray[np.float64]]:  # fmt: skip
+) -> tuple[Bytes, NDArray[np.float64]]:
     """Turns right where plays start to follow, from other such turns and from the ends of the range.
 
     With round thresholds several corners end at the same drive, exactly or to within a last bit: no search may depend
@@ -100,7 +100,7 @@ def _bends(tables: Tables | FixedTables) -> NDArray[np.float64]:
 def _onto_the_bends(
     bends: NDArray[np.float64], least: Any, tables: Tables | FixedTables, inverse: bool, length: int,
     rng: np.random.Generator,
-) -> NDArray[np.float64]:  # fmt: skip
+) -> NDArray[np.float64]:
     """Drives at bends of the memoryless part, or references that lead there, give or take last bits.
 
     A piece between two bends can be as short as one code.
@@ -144,9 +144,9 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
     drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
     rng = np.random.default_rng(20261126)
     kinds = [slots.OP_SETTLE, slots.OP_OFFSET]
-    if len(tables.gain):
+    if "set_temperature" in tables.calls:
         kinds.append(slots.OP_TEMPERATURE)
-    if len(tables.ageing.turns):
+    if "travel" in tables.calls:
         kinds += [slots.OP_GAIN, slots.OP_TRAVEL, slots.OP_TRAVELLED]
     if inverse:
         kinds += [slots.OP_COMMIT, slots.OP_EXPECTED, slots.OP_CORRECT, *([slots.OP_PUSH] * (len(tables.tap) > 0))]

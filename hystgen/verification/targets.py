@@ -90,7 +90,7 @@ TARGETS = (
         RISCV_GCC, ("-march=rv32imafc", "-mabi=ilp32f"),
         fpu=True, calls=10_000,
     ),
-)  # fmt: skip
+)
 
 AVR = Board("atmega1284p", "avr-gcc", ("-mmcu=atmega1284p",), "simavr", "avr-size", 0x4000)
 

@@ -27,9 +27,9 @@ import numpy as np
 
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
-from hystgen.compensator.bounds import SECOND_ORDER, ErrorBounds, LoopRoundings, error_bounds
-from hystgen.compensator.chain import moving, own
-from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, crossing, lead
+from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, ErrorBounds, LoopRoundings, error_bounds, together
+from hystgen.compensator.chain import moving
+from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, ahead_of, crossing, lead
 from hystgen.compensator.chain.parts import Parts
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.compensator import TABLE_ERROR
@@ -44,16 +44,9 @@ from hystgen.front.tanh import kernels
 from hystgen.plays import slots
 
 SAME = "both have seen the same drives"
-UNSLEWED = "no slew limit acts"
 
 STILL = "the drive does not stand still"
 """Of a quiet drive in front of a lag: what has arrived is then within twice its dither of what is sought."""
-
-
-def together(*conditions: str) -> str:
-    """Conditions that all have to hold, in words; empty ones are left out."""
-    *others, last = [each for each in conditions if each] or [""]
-    return f"{', '.join(others)} and {last}" if others else last
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,10 +64,10 @@ def _sizes(compiled: Compiled) -> _Sizes:
     drive = max(abs(end) for end in static.input_range)
     bent = moving.largest_bend(static, compiled.parts.plays)
     plays = LoopRoundings.of(static).level + math.fsum(map(abs, static.pi.weights)) * bent
-    output = plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
-    output *= math.prod(each.forward.largest for each in compiled.own[t.own.ahead :])
+    output = plays * math.prod(float(row[creep.REST]) for row in t.of("creep").block)
+    output *= math.prod(each.forward.largest for each in compiled.own_behind)
     ends = [abs(float(t.limits[slots.OUTPUT_MIN])), abs(float(t.limits[slots.OUTPUT_MAX]))]
-    settings = 2.0 * max(ends) * (1 + 3 * len(t.clock))  # a drift has six roundings of its own
+    settings = 2.0 * max(ends) * (1 + 3 * len(t.of("clock")))  # a drift has six roundings of its own
     return _Sizes(drive, plays, output, max(ends) + abs(static.output_offset) + settings)
 
 
@@ -107,7 +100,8 @@ def _saturation(compiled: Compiled, u: float, kind: str) -> tuple[float, float, 
 
 def _creep(compiled: Compiled, j: int, size: float, u: float) -> tuple[float, float]:
     """Roundings of the output of a block whose input is at most `size`, and the gain of its inverse."""
-    _, rest, terms = creep.numbers(compiled.parts.creeps[j], compiled.seconds)
+    one = compiled.ones["creep"][j]
+    rest, terms = one.rest, one.terms
     rate, late, weight = terms[:, creep.RATE], terms[:, creep.LATE], terms[:, creep.WEIGHT]
     total = float(np.sum(weight))
     states = (16.0 + len(terms)) * total + u * float(np.sum(weight / rate))
@@ -118,7 +112,8 @@ def _creep(compiled: Compiled, j: int, size: float, u: float) -> tuple[float, fl
 
 def _late(compiled: Compiled) -> float:
     """Largest change of the ageing gain in a step at the fastest rate, share of the output, plus its table's error."""
-    return max(ageing.most_at_once(each, compiled.largest_step) for each in compiled.parts.ageing) + TABLE_ERROR
+    effects = compiled.parts.blocks["ageing"]
+    return max(ageing.most_at_once(each, compiled.largest_step) for each in effects) + TABLE_ERROR
 
 
 def _warmed(compiled: Compiled) -> float:
@@ -127,7 +122,7 @@ def _warmed(compiled: Compiled) -> float:
     return math.fsum(
         thermal.most_at_once(each, ends, compiled.largest_step, compiled.seconds)
         * (abs(each.gain_per_degree) * output + abs(each.offset_per_degree))
-        for each in compiled.parts.heat
+        for each in compiled.parts.blocks["heat"]
     )
 
 
@@ -135,7 +130,7 @@ def _misjudged(compiled: Compiled, u: float, emitted: bool) -> float:
     """Change of the output by what the plays that rub are wrong about the heat at the fastest rate."""
     ends, output, step = compiled.static.input_range, _sizes(compiled).output, compiled.largest_step
     found = 0.0
-    for each in compiled.parts.heat:
+    for each in compiled.parts.blocks["heat"]:
         rubbing = thermal.thresholds(each, ends)
         if not rubbing:
             continue
@@ -151,9 +146,9 @@ def _misjudged(compiled: Compiled, u: float, emitted: bool) -> float:
 
 def _gain_ends(compiled: Compiled) -> tuple[float, float]:
     """Least and largest product of the gains: those that are set, and those of own heat at the fastest rate."""
-    set_ones = len(compiled.tables.gain) + len(compiled.tables.ageing.turns)
+    set_ones = len(compiled.tables.of("gain")) + len(compiled.tables.of("ageing").turns)
     least, largest = LEAST_GAIN**set_ones, LARGEST_GAIN**set_ones
-    for each in compiled.parts.heat:
+    for each in compiled.parts.blocks["heat"]:
         _, low, high = thermal.reached(each, compiled.static.input_range, compiled.largest_step, compiled.seconds)
         least, largest = least * low, largest * high
     return least, largest
@@ -198,7 +193,7 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
     u = float(np.finfo(kind).eps) / 2
     t, sizes = compiled.tables, _sizes(compiled)
     slope, back, there = _saturation(compiled, u, kind)
-    gains = len(t.gain) + len(t.ageing.turns) + 9 * len(t.heat.turns)  # own heat: the temperature's roundings too
+    gains = sum(map(t.number_of, ("gain", "ageing"))) + 9 * t.number_of("heat")  # own heat: the temperature's too
     least, gain = _gain_ends(compiled)
     taps = float(np.sum(np.abs(compiled.taps.weights))) if compiled.taps else 1.0
     inverse = 4.0 * u * sizes.displacement * slope + back
@@ -206,42 +201,42 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
         inverse = taps * (inverse + u * (len(compiled.taps.weights) + 1) * sizes.displacement * slope)
     inverse = inverse / least + 3.0 * u * gains * taps * sizes.output / least
     late = 0.0
-    if t.ageing.turns.size and emitted:  # the C takes the gain at the travel one sample before, from a table
+    if t.of("ageing").turns.size and emitted:  # the C takes the gain at the travel one sample before, from a table
         late = _late(compiled) * sizes.output
         inverse += late / least
-    if t.heat.turns.size and emitted:  # the C leaves out the heat of one sample
+    if t.of("heat").turns.size and emitted:  # the C leaves out the heat of one sample
         inverse += _warmed(compiled) / least
     misjudged = _misjudged(compiled, u, emitted)
     inverse += misjudged / least
-    moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.lag.block)
-    moved += 4.0 * u * sizes.drive * (t.delay.samples > 0)
+    moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.of("lag").block)
+    moved += 4.0 * u * sizes.drive * (t.of("delay").samples > 0)
     moved += _slewed(compiled, kind)
     if not emitted:  # in double precision each step of such a drive is rounded
         moved += u * sizes.drive * crossing(compiled.static, compiled.parts, compiled.seconds)
-    moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own[: t.own.ahead])
+    moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own_ahead)
     static = compiled.static
     forward = static.front_slopes[1] * math.fsum(abs(p) for p in static.pi.weights) * moved
-    followed = len(t.lag.exact) or t.own.ahead
+    followed = len(t.of("lag").exact) or compiled.own_ahead
     if emitted and followed and static.branches_differ:  # the input of the front may come to rest on either branch
         forward += static.pi.slopes[-1] * static.branch_gap
-    size = sizes.plays * math.prod(float(row[creep.REST]) for row in t.creep.block)
+    size = sizes.plays * math.prod(float(row[creep.REST]) for row in t.of("creep").block)
     roundings = []
-    for each in compiled.own[t.own.ahead :]:
+    for each in compiled.own_behind:
         roundings.append(each.rounding(size, u))
         size *= each.forward.largest
-    for each, (_, back) in zip(reversed(compiled.own[t.own.ahead :]), reversed(roundings), strict=True):
+    for each, (_, back) in zip(reversed(compiled.own_behind), reversed(roundings), strict=True):
         inverse = each.passed(inverse) + back
     size = sizes.plays
-    for j in range(len(t.creep.block)):
+    for j in range(len(t.of("creep").block)):
         rounding, back_gain = _creep(compiled, j, size, u)
-        forward = forward * float(t.creep.block[j, creep.REST]) + rounding
-        inverse = (1.0 / float(t.creep.block[j, creep.SLOPE]) if same else back_gain) * (inverse + rounding)
-        size *= float(t.creep.block[j, creep.REST])
-    for each, (there_own, _) in zip(compiled.own[t.own.ahead :], roundings, strict=True):
+        forward = forward * float(t.of("creep").block[j, creep.REST]) + rounding
+        inverse = (1.0 / float(t.of("creep").block[j, creep.SLOPE]) if same else back_gain) * (inverse + rounding)
+        size *= float(t.of("creep").block[j, creep.REST])
+    for each, (there_own, _) in zip(compiled.own_behind, roundings, strict=True):
         forward = forward * each.forward.largest + there_own
     forward = gain * (forward + 3.0 * u * sizes.output * gains) + misjudged + TABLE_ERROR * sizes.output * (late > 0.0)
     size, ringing = gain * sizes.output + sizes.displacement, 1.0
-    for mode in compiled.modes:
+    for mode in compiled.ones["mode"]:
         forward = mode.largest * forward + resonance.rounding(mode, size, u)
         size, ringing = mode.largest * size, ringing * mode.largest
     return forward + ringing * there + 3.0 * u * ringing * sizes.displacement, inverse
@@ -254,9 +249,9 @@ def _lags(compiled: Compiled, error: float, u: float, same: bool) -> float:
     targets, `W = theta^2 e + theta (1 - theta) W`.
     """
     drive, turning = _sizes(compiled).drive, bool(compiled.tables.turning)
-    for each in reversed(compiled.own[: compiled.tables.own.ahead]):
+    for each in reversed(compiled.own_ahead):
         error = each.passed(error) + each.rounding(drive, u)[1]
-    for exact, row in zip(compiled.tables.lag.exact, compiled.tables.lag.block.astype(float), strict=True):
+    for exact, row in zip(compiled.tables.of("lag").exact, compiled.tables.of("lag").block.astype(float), strict=True):
         rate = float(row[lag.RATE])
         if exact:
             error = ((2.0 - rate) * error + 8.0 * u * drive) / float(row[lag.LATE] - row[lag.EARLY])
@@ -273,10 +268,10 @@ def _lags(compiled: Compiled, error: float, u: float, same: bool) -> float:
 def _seen(compiled: Compiled) -> float:
     """Factor by which the states of creep and of the user's own blocks, which see the sum of the plays, multiply an
     error of the plays."""
-    t, found = compiled.tables.creep, 1.0
+    t, found = compiled.tables.of("creep"), 1.0
     for j, slope in enumerate(t.block[:, creep.SLOPE].astype(float).tolist()):
         found *= slope * _creep(compiled, j, 0.0, 0.0)[1]
-    for each in compiled.own[compiled.tables.own.ahead :]:
+    for each in compiled.own_behind:
         found *= each.passed(0.0, 1.0)
     return max(found, 1.0)
 
@@ -308,8 +303,8 @@ def kept_branch(compiled: Compiled) -> float:
     beyond a target that has half of that rounding itself. Between neighbours in a grid of drives both branches rise, so
     that their values there bound those in between.
     """
-    static, seconds, t = compiled.static, compiled.seconds, compiled.tables
-    theta = lag.numbers(compiled.parts.lags[0], seconds, True)[1][lag.THETA] if t.turning else 0.0
+    static, t = compiled.static, compiled.tables
+    theta = compiled.ones["lag"][0].row[lag.THETA] if t.turning else 0.0
     unit = 1.0
     if compiled.codes is not None:
         unit = float(compiled.codes.drive_lsb) / 2.0 ** float(t.number[DRIVE_BITS])
@@ -324,8 +319,8 @@ def kept_branch(compiled: Compiled) -> float:
         far = last + theta * (last - other) + math.copysign(more, last - first)
         worst = max(worst, abs(float(static.front(far, up)) - begin))
     steep = 1.0 + abs(moving.steepest_bend(static, compiled.parts.plays))
-    rest = math.prod(creep.numbers(each, seconds).rest for each in compiled.parts.creeps)
-    rest *= math.prod(each.forward.largest for each in compiled.own[t.own.ahead :])
+    rest = math.prod(one.rest for one in compiled.ones["creep"])
+    rest *= math.prod(each.forward.largest for each in compiled.own_behind)
     return worst * static.pi.slopes[-1] * steep * rest * _gain_ends(compiled)[1]
 
 
@@ -334,8 +329,7 @@ def swing(static: StaticModel, parts: Parts, seconds: float) -> float:
     the other, in drive units; 0 where it comes to rest."""
     if not static.branches_differ or not parts.own_drives:
         return 0.0
-    lags = [lag.numbers(each, seconds) for each in parts.lags]
-    gain = lead(lags, [own.linear(each, seconds) for each in parts.own_drives])
+    gain = lead(ahead_of(parts.ones(seconds)))
     low, high = static.input_range
     return min(gain * static.branch_gap / static.front_slopes[0], high - low)
 
@@ -353,8 +347,8 @@ def condition(compiled: Compiled) -> str:
     still = STILL * (compiled.tables.quiet > 0)
     if compiled.tables.braked:
         return together(SAME, UNSLEWED, still)
-    missed = not all(compiled.tables.lag.exact) or compiled.tables.own.ahead > 0
-    remembered = compiled.static.pi.n > 0 or len(compiled.tables.creep.block) > 0
+    missed = not all(compiled.tables.of("lag").exact) or len(compiled.own_ahead) > 0
+    remembered = compiled.static.pi.n > 0 or len(compiled.tables.of("creep").block) > 0
     dilated = compiled.tables.moving.moves == moving.DILATED
     return together(SAME, still) if dilated or compiled.tables.turning or (missed and remembered) else ""
 
@@ -400,10 +394,10 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
         min(SECOND_ORDER * _lags(compiled, seen * own + (seen - 1.0) * only_seen + gain * asked, u, same), whole)
         for own in (plays.inverse, plays.rounding)
     )
-    if same or (compiled.tables.slew and (len(compiled.tables.lag.exact) or compiled.tables.own.ahead)):
+    if same or (compiled.tables.slew and (len(compiled.tables.of("lag").exact) or compiled.own_ahead)):
         inverse = whole
-    rest = math.prod(float(row[creep.REST]) for row in compiled.tables.creep.block)
-    rest *= math.prod(each.forward.largest for each in compiled.own[compiled.tables.own.ahead :])
+    rest = math.prod(float(row[creep.REST]) for row in compiled.tables.of("creep").block)
+    rest *= math.prod(each.forward.largest for each in compiled.own_behind)
     most = _gain_ends(compiled)[1] * rest
-    most *= math.prod(mode.largest for mode in compiled.modes)
+    most *= math.prod(mode.largest for mode in compiled.ones["mode"])
     return ErrorBounds(SECOND_ORDER * (forward + most * plays.forward), inverse, rounding)

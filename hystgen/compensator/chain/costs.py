@@ -6,6 +6,7 @@ from collections import Counter
 
 from hystgen.compensator import engines
 from hystgen.compensator.chain import moving
+from hystgen.compensator.chain.catalogue import NAMES
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.plays import slots
 
@@ -20,19 +21,21 @@ is found by a search, `braked` for a lag and a slew limit together, `quiet` for 
 OPERATORS = {"preview": "inverse", "quiet": "inverse", "mode": "forward", "delay": "forward"}
 """Parts that only one operator has, and that operator."""
 
+PER_PLAY = ("relaxing", "dilated", "dashpot", "polynomial", "centre")
+"""Parts that move or bend plays: each play adds to what a sample takes."""
+
 
 def parts(t: ChainTables, operator: str) -> list[str]:
     """The parts that an operator of a model has; two blocks of one kind share their code."""
-    exact = [bool(each) for each in t.lag.exact]
+    exact = t.of("lag").exact.tolist()
     kinds = [int(kind) for kind in (t.behind.kind if t.fixed else t.behind.stage_kind)]
-    found = Counter({
-        "creep": len(t.creep.block), "lag": exact.count(False), "lag_exact": exact.count(True),
-        "heat": len(t.heat.turns), "friction": t.heat.plays.any(), "clock": len(t.clock),
-        "ageing": len(t.ageing.turns), "gain": len(t.gain), "preview": len(t.tap), "slew": t.slew, "braked": t.braked,
+    found = Counter(dict(zip(NAMES, t.count.tolist(), strict=True)) | {
+        "lag": exact.count(0), "lag_exact": exact.count(1), "friction": t.of("heat").plays.any(), "preview": len(t.tap),
+        "slew": t.slew, "braked": t.braked,
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),
         "relaxing": t.moving.scanned, "dilated": t.moving.used and not t.moving.scanned,
         "dashpot": t.moving.moves == moving.DASHPOT,
-        "mode": len(t.mode), "delay": t.delay.samples, "quiet": t.quiet,
+        "quiet": t.quiet,
         "polynomial": t.moving.bends == moving.POLYNOMIAL, "centre": t.moving.bends == moving.CENTRE,
     })  # fmt: skip
     common = "any" if t.plays.engine == slots.LOOP else "any_corners"

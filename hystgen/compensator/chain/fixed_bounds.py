@@ -19,14 +19,15 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from hystgen.arithmetic.factors import MANTISSA_BITS, lifted
 from hystgen.arithmetic.factors import error as missed
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.bounds import SECOND_ORDER
-from hystgen.compensator.chain.bounds import SAME, STILL, UNSLEWED, together
+from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, together
+from hystgen.compensator.chain.bounds import SAME, STILL
 from hystgen.compensator.chain.layout import DITHER, ChainTables, largest_way
 from hystgen.compensator.chain.moving import (
     DASHPOT,
@@ -39,7 +40,7 @@ from hystgen.compensator.chain.moving import (
     steepest_bend,
     yield_error,
 )
-from hystgen.compensator.chain.own_fixed import Formats, asked_of_input
+from hystgen.compensator.chain.own_fixed import Formats
 from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, upward
 from hystgen.effects.ageing import compensator as ageing
@@ -48,14 +49,17 @@ from hystgen.effects.creep import fixed as creep_fixed
 from hystgen.effects.creep.compensator import CreepNumbers
 from hystgen.effects.lag import compensator as lag
 from hystgen.effects.lag import fixed as lag_fixed
+from hystgen.effects.lag.compensator import LagNumbers
 from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.resonance import fixed as resonance_fixed
-from hystgen.effects.resonance.compensator import ModeNumbers
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
 from hystgen.effects.thermal.fixed import GAIN_BITS, TEMPERATURE_BITS
 from hystgen.effects.thermal.model import OwnHeat
+
+GAINS = ("ageing", "heat", "gain")
+"""Parts whose blocks are gains, in the order of the chain."""
 
 DOUBLE = 2.0**-40
 """Relative error of double precision itself: a thousand roundings."""
@@ -73,18 +77,16 @@ FACTOR_ERROR, DEGREES = 2.0**-MANTISSA_BITS, 2.0 ** -(TEMPERATURE_BITS + 1)
 class Sizes:
     """Largest sizes of the signals behind the plays, in output codes.
 
-    Forwards: the sum of the plays, the input of each creep, mode and saturation, that of the gains, and the output.
-    Backwards: the reference after the inverse of each saturation, the least and largest input to which each tanh is
-    inverted (`inverted`), the target of the output side, and the sum asked of the plays. For each block of the user's
-    own: the input, and the output asked for.
+    Forwards: the sum of the plays, the input of each block of each part (`given`) and of each saturation, and the
+    output. Backwards: the reference after the inverse of each saturation, the least and largest input to which each
+    tanh is inverted (`inverted`), the target of the output side, the output asked of each block (`wanted`), and the sum
+    asked of the plays.
     """
 
     plays: float
-    creeps: list[float]
-    owns: list[tuple[float, float]]
-    modes: list[float]
+    given: dict[str, list[float]]
+    wanted: dict[str, list[float]]
     saturations: list[float]
-    settled: float
     output: float
     undone: list[float]
     inverted: list[tuple[float, float]]
@@ -94,8 +96,8 @@ class Sizes:
     @property
     def largest(self) -> float:
         """The largest of them."""
-        own = (size for pair in self.owns for size in pair)
-        forwards = (self.plays, *self.creeps, *own, *self.modes, *self.saturations, self.output)
+        blocks = (size for sizes in (*self.given.values(), self.wanted["own_behind"]) for size in sizes)
+        forwards = (self.plays, *blocks, *self.saturations, self.output)
         return max(*forwards, *self.undone, self.target, self.asked)
 
 
@@ -128,11 +130,11 @@ class Bend:
 class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
-    `ahead`, `behind`: blocks of the user's own in front of the plays and behind; `bends`: the curve and inverse curve
-    of each tanh; `ends`: of the output; `slewed`: drive codes that rounding takes from a drive at a limited rate;
-    `drifted`: error of drifts in units of signals; `reached`: whether the lag can be led to every input asked of the
+    `ones`, `formats`: the blocks of each part; `in_front`: sizes of those in front of the plays; `bends`: the curve and
+    inverse curve of each tanh; `ends`: of the output; `slewed`: drive codes that rounding takes from a drive at a
+    limited rate; `reached`: whether the lag can be led to every input asked of the
     plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in front of the plays below their input;
-    `bumps`: of bent plays; `heats`: errors of temperatures of own heat, degrees.
+    `bumps`: of bent plays.
     """
 
     static: StaticModel
@@ -142,12 +144,9 @@ class Bounds:
     sizes: Sizes
     bits: int
     drop: int
-    creeps: list[CreepNumbers]
-    lags: list[tuple[bool, tuple[float, float, float, float]]]
-    ahead: list[Formats]
-    behind: list[Formats]
-    modes: list[ModeNumbers]
-    drifted: float
+    ones: dict[str, list[Any]]
+    formats: dict[str, list[Any]]
+    in_front: dict[str, list[tuple[float, float]]]
     taps: list[float]
     bends: list[Bend]
     ends: tuple[float, float]
@@ -157,7 +156,31 @@ class Bounds:
     finer: int
     seconds: float
     bumps: Bumps
-    heats: list[float]
+
+    @property
+    def lags(self) -> list[LagNumbers]:
+        """The lags."""
+        return self.ones["lag"]
+
+    @property
+    def creeps(self) -> list[CreepNumbers]:
+        """The creep blocks."""
+        return self.ones["creep"]
+
+    @property
+    def ahead(self) -> list[Formats]:
+        """Blocks of the user's own in front of the plays."""
+        return self.formats["own_ahead"]
+
+    @property
+    def behind(self) -> list[Formats]:
+        """Blocks of the user's own behind the plays."""
+        return self.formats["own_behind"]
+
+    @property
+    def drifted(self) -> float:
+        """Error of drifts in units of signals."""
+        return float(sum(each.error for each in self.formats["clock"]))
 
     @property
     def _fine(self) -> int:
@@ -183,8 +206,8 @@ class Bounds:
 
     def _creep(self, j: int) -> float:
         """Roundings of the output of creep j, in output codes."""
-        numbers, size = self.creeps[j], self.sizes.creeps[j]
-        bits, drop = (int(x) for x in self.tables.creep.block[j, [creep_fixed.BITS, creep_fixed.DROP]])
+        numbers, size = self.creeps[j], self.sizes.given["creep"][j]
+        bits, drop = (int(x) for x in self.tables.of("creep").block[j, [creep_fixed.BITS, creep_fixed.DROP]])
         state = 2.0**-bits * self._signal
         found = 0.0
         for rate, _, late, weight in numbers.terms.tolist():
@@ -197,7 +220,7 @@ class Bounds:
 
     def _creep_back(self, j: int) -> float:
         """Roundings of its inverse, as errors of the output."""
-        numbers, size = self.creeps[j], self.sizes.creeps[j]
+        numbers, size = self.creeps[j], self.sizes.given["creep"][j]
         moved = self.sizes.asked + size * numbers.rest
         return numbers.slope * (missed(1.0 / numbers.slope) * moved + 0.5 * self._signal)
 
@@ -214,10 +237,10 @@ class Bounds:
 
         `given`, `asked`: sizes of the input, and of the output asked for.
         """
-        exact, (rate, second, late, inverse) = self.lags[j]
-        bits, drop = (int(x) for x in self.tables.lag.block[j, [lag_fixed.BITS, lag_fixed.DROP]])
+        exact, (rate, second, late, inverse) = self.lags[j].exact, self.lags[j].row
+        bits, drop = (int(x) for x in self.tables.of("lag").block[j, [lag_fixed.BITS, lag_fixed.DROP]])
         state, scale = 2.0**-bits, 2.0**drop
-        sizes = lag_fixed.Sizes(exact, rate, late, given, asked, bool(self.tables.turning))
+        sizes = self.lags[j].sizes(given, asked, bool(self.tables.turning))
         kept = state * (0.5 / rate + scale) + 2.0 * given * missed(rate * scale) / scale / rate
         if exact:
             kept += (0.5 * state + 2.0 * given * missed(late * 2.0**bits) / 2.0**bits) / rate
@@ -226,21 +249,6 @@ class Bounds:
         product = state * (0.5 + scale * second) + sizes.state * missed(second * scale) / scale
         answer = sizes.state * missed(inverse * 2.0 ** (drop - bits)) * 2.0 ** (bits - drop) + state * scale * inverse
         return 3.0 * kept + product + 0.5, kept + 3.0 * product, answer + 1.0
-
-    def _lag_sizes(self) -> list[tuple[float, float]]:
-        """The largest input of each lag, and the largest output asked for, in units of signals."""
-        given = float(max(map(abs, self.inner.drive)) << self._fine) + 1.0
-        asked = given + 1.0
-        if not self.static.stages:
-            asked = float(max(map(abs, self.inner.play)) + self.inner.margin) * 2.0**self.finer
-        for each in reversed(self.ahead):
-            asked = asked_of_input(each.linear, given, asked) + 1.0
-        found = []
-        for exact, numbers in reversed(self.lags):
-            found.append((given, asked))
-            turning = bool(self.tables.turning)
-            asked = lag_fixed.Sizes(exact, numbers[lag.RATE], numbers[lag.LATE], given, asked, turning).answer
-        return found[::-1]
 
     def _passed(self, each: Formats, error: float, own: float) -> float:
         """Error of the input that a user's own block is solved for, by an error of its output and a rounding `own`."""
@@ -252,15 +260,18 @@ class Bounds:
     def _gains(self) -> list[Gain]:
         """The gains behind the plays, from there on."""
         lsb, step, ends = float(self.inner.output_lsb), self.largest_step, self.static.input_range
-        size, span = self.sizes.settled, (self.ends[1] - self.ends[0]) / lsb
+        span = (self.ends[1] - self.ends[0]) / lsb
+        size = next((sizes[0] for part in GAINS if (sizes := self.sizes.given[part])), 0.0)
         found = []
-        for each in self.parts.ageing:
+        for each in self.parts.blocks["ageing"]:
             begun = 0.5 * float(self.inner.drive_lsb) * abs(ageing.steepness(each, 0.0))  # pieces begin at whole codes
             wrong = ageing.TABLE_ERROR + begun + CUBIC_ERROR
             late = ageing.most_at_once(each, step) + wrong / LEAST_GAIN + RECIPROCAL_ERROR
             found.append(Gain(LEAST_GAIN, LARGEST_GAIN, wrong * size, late * size))
             size *= LARGEST_GAIN
-        linear = [*zip(self.parts.heat, self.heats, strict=True), *((each, DEGREES) for each in self.parts.thermal)]
+        heats = [one.error for one in self.formats["heat"]]
+        linear = [*zip(self.parts.blocks["heat"], heats, strict=True)]
+        linear += [(each, DEGREES) for each in self.parts.blocks["gain"]]
         for each, wrong in linear:
             least, largest, offset, at_once = LEAST_GAIN, LARGEST_GAIN, span, 0.0
             if isinstance(each, OwnHeat):
@@ -306,15 +317,15 @@ class Bounds:
     def _arrival(self) -> tuple[float, float]:
         """Roundings of the signal in front of the plays for the drive as sent, and its change by rounding the drive to
         a code, in units of signals."""
-        places = zip(range(len(self.lags)), self._lag_sizes(), strict=True)
-        here = sum(self._lag(j, *sizes)[0] for j, sizes in places) + sum(each.output for each in self.ahead)
+        here = sum(self._lag(j, *sizes)[0] for j, sizes in enumerate(self.in_front["lag"]))
+        here += sum(each.output for each in self.ahead)
         here += 0.5 * 2.0**self.finer if self.finer else 0.0
         code = 0.5 * 2.0**self._fine
         if self._kept:
             return here, code + self._kept
         if self.lags:
-            exact, (rate, theta, _, _) = self.lags[0]
-            return here, code * (1.0 if exact else rate * (1.0 + 2.0 * theta))
+            rate, theta, _, _ = self.lags[0].row
+            return here, code * (1.0 if self.lags[0].exact else rate * (1.0 + 2.0 * theta))
         rounded = bool(self.static.stages or self.ahead) or self._fine > 0
         return here, code * rounded
 
@@ -391,7 +402,7 @@ class Bounds:
     def forward(self) -> float:
         """Bound of the forward operator, in output codes."""
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
-        waited = 0.5 * 2.0**self._fine * bool(self.tables.delay.samples and self.tables.delay.share[0])
+        waited = 0.5 * 2.0**self._fine * bool(self.tables.of("delay").samples and self.tables.of("delay").share[0])
         error = self._plays(self._arrival()[0] + short + waited + self.slewed * 2.0**self._fine)
         if (self.lags or self.ahead) and self.static.branches_differ:  # the front may settle on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)
@@ -401,7 +412,7 @@ class Bounds:
             error = error * each.linear.forward.largest + each.output * self._signal
         for gain in self._gains:
             error = gain.largest * error + gain.there + self._signal
-        for mode, size, row in zip(self.modes, self.sizes.modes, self.tables.mode, strict=True):
+        for mode, size, row in zip(self.ones["mode"], self.sizes.given["mode"], self.tables.of("mode"), strict=True):
             scale = 2.0**self.bits
             error = error * mode.largest + resonance_fixed.rounding(mode, row, size * scale) / scale
         beside = self._saturation()[2] + 0.5 + (1.0 + self.drifted) * self._signal
@@ -503,8 +514,8 @@ class Bounds:
             code = 0.5 * 2.0**self._fine if j == 0 and not self.lags else 0.5
             error = self._passed(self.ahead[j], error + self.ahead[j].output, self.ahead[j].answer + code)
         for j in range(len(self.lags) - 1, -1, -1):
-            exact, (rate, second, late, _) = self.lags[j]
-            _, kept, answer = self._lag(j, *self._lag_sizes()[j])
+            exact, (rate, second, late, _) = self.lags[j].exact, self.lags[j].row
+            _, kept, answer = self._lag(j, *self.in_front["lag"][j])
             code = 0.5 * 2.0**self._fine if j == 0 else 0.5
             if not exact:  # its states have seen the same drives
                 turning = bool(self.tables.turning)
@@ -532,7 +543,7 @@ class Bounds:
     @property
     def condition(self) -> str:
         """The condition of `rounding` in words, if only the range bounds the difference of two drives; else ""."""
-        missed = self.ahead or any(not exact for exact, _ in self.lags)
+        missed = self.ahead or any(not one.exact for one in self.lags)
         dilated = self.tables.moving.moves == DILATED
         if not (missed or dilated or (self.lags and (not self.reached or self.parts.slew))):
             return ""

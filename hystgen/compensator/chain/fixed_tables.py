@@ -22,7 +22,8 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.arithmetic.factors import LARGEST, factor
 from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
-from hystgen.compensator.chain import moving, own, own_fixed
+from hystgen.compensator.chain import moving
+from hystgen.compensator.chain.catalogue import AHEAD, BEHIND, LED, NAMES, PARTS
 from hystgen.compensator.chain.fixed_bounds import Bend, Bounds, Sizes
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
@@ -47,6 +48,7 @@ from hystgen.compensator.chain.layout import (
     Codes,
     Compiled,
     OwnChainTables,
+    ahead_of,
     braked,
     crossing,
     fastest,
@@ -59,29 +61,13 @@ from hystgen.compensator.chain.layout import (
     too_slow,
 )
 from hystgen.compensator.chain.moving import Bumps
-from hystgen.compensator.chain.own_fixed import Formats
 from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.fixed_tables import TABLE_MAX, Builder, FixedCurve, lsbs, nearest
 from hystgen.effects import bend
-from hystgen.effects.ageing import compensator as ageing
-from hystgen.effects.ageing import fixed as ageing_fixed
-from hystgen.effects.creep import compensator as creep
-from hystgen.effects.creep import fixed as creep_fixed
-from hystgen.effects.delay import compensator as delay
-from hystgen.effects.delay.compensator import DelayTables
-from hystgen.effects.drift import fixed as drift
-from hystgen.effects.drift.fixed import ClockNumbers
-from hystgen.effects.lag import compensator as lag
-from hystgen.effects.lag import fixed as lag_fixed
 from hystgen.effects.lag.fixed import COARSE
-from hystgen.effects.resonance import compensator as resonance
-from hystgen.effects.resonance import fixed as resonance_fixed
+from hystgen.effects.part import Fixed, Margin, Part
 from hystgen.effects.saturation.fixed import Saturations
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
-from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal import fixed as thermal_fixed
-from hystgen.effects.thermal.compensator import HeatTables
-from hystgen.effects.thermal.fixed import Heat
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
@@ -139,70 +125,55 @@ class _Builder:
         self.drive_lsb, self.output_lsb = lsbs(self.static, arithmetic, *lsb, (self.low, self.high))
         self.reading = read(self.static, self.parts, seconds, how)
         self.taps = self.reading.taps
-        self.creeps = [creep.numbers(each, seconds) for each in self.parts.creeps]
-        self.modes = [resonance.numbers(each, seconds) for each in self.parts.modes]
         self.turning = self.parts.turning(self.static.branches_differ)
-        self.lags = [lag.numbers(each, seconds, self.turning) for each in self.parts.lags]
-        self.own_drives, self.own_outputs = (
-            [own.linear(each, seconds) for each in side] for side in (self.parts.own_drives, self.parts.own_outputs)
-        )
+        self.ones = self.parts.ones(seconds, self.turning)
+        self.leading = ahead_of(self.ones)
+        self.formats: dict[str, list[Any]] = {}
+        self.in_front: dict[str, list[tuple[float, float]]] = {}
         self.given = (lsb[0] is not None, lsb[1] is not None)
 
     def build(self) -> Compiled:
         static = self.static
         plain = dataclasses.replace(static, output_offset=0.0)
         inner = (self.drive_lsb, self.output_lsb)
-        beyond, self.reached = self._beyond() if self.lags else (0, True)
+        beyond, self.reached = self._beyond() if self.ones[NAMES[LED]] else (0, True)
         bent = moving.largest_bend(static, self.parts.plays)
-        led = bool(self.lags or self.own_drives)
-        self.inner = Builder(plain, self.arithmetic, self.engine, inner, self.given, beyond, led, bent)
+        self.inner = Builder(plain, self.arithmetic, self.engine, inner, self.given, beyond, bool(self.leading), bent)
         plays, _ = self.inner.build()
         room = LARGEST.bit_length() - 2 - math.ceil(math.log2(self.sizes.largest))
         if room < 1:
             self._refuse(f"signals behind the plays reach {self.sizes.largest:.3g} output codes, too many")
         self.finer = 0
-        self.ahead: list[Formats] = []
         self.bits = min(self.inner.bits, room)
         self.drop = self.inner.bits - self.bits
         limits = self._limits(plays.limits)
         saturations = self._saturations()
         drive = [end << self.inner.fine for end in self.inner.drive]
         plays.limits[slots.DRIVE_MIN], plays.limits[slots.DRIVE_MAX] = drive
-        span = self.static.input_range[1] - self.static.input_range[0]
-        names = " and ".join(dict.fromkeys(each.effect.name for each in self.own_outputs))
-        self.behind = self._need(self._own_behind, names)
         tables = ChainTables(
             plays,
             limits,
             self._need(lambda: self._moving(plays), "effects on plays"),
-            self._need(self._lags, "effects in front of the plays" if self.own_drives else "a lag"),
-            self._need(self._creep_tables, "creep"),
-            self._need(self._delay, "a delay"),
-            self._need(self._mode_tables, "resonance"),
-            self._need(lambda: self._ageing(span), "ageing"),
-            self._need(self._gains, "a temperature"),
-            self._need(self._heat_tables, "own heat"),
-            self._need(self._clock_tables, "drift"),
-            own_fixed.build([*self.ahead, *self.behind], len(self.ahead)),
+            self._tables(),
+            self.parts.count,
             saturations,
             self._need(self._tap, "the preview"),
             np.array(self._numbers(), dtype=np.int64),
             int(bool(self.parts.slew)),
-            braked(self.parts, [exact for exact, _ in self.lags]),
             quiet(self.how, self.taps),
             int(self.turning),
         )
         if self.parts.own_drives or self.parts.own_outputs:
             tables = OwnChainTables(*tables)
-            tables.own_effects = tuple(map(type, (*self.parts.own_drives, *self.parts.own_outputs)))
+            own_sides = self.parts.own_drives, self.parts.own_outputs
+            tables.own_sides = tuple(map(type, own_sides[0])), tuple(map(type, own_sides[1]))
         slewed = (0.5 + self._slewed) * bool(self.parts.slew)
         max_rate = fastest(static, self.parts, self.seconds, self.how)
         weights = self.taps.weights.tolist() if self.taps else []
         bounds = Bounds(
-            static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.creeps, self.lags,
-            self.ahead, self.behind, self.modes, sum(each.error for each in self.clocks), weights,
-            self.bends, (self.low, self.high), slewed, self.reached, self._largest_step(), self.finer,
-            self.seconds, self.bumps, [one.error for one in self.heats],
+            static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.ones, self.formats,
+            self.in_front, weights, self.bends, (self.low, self.high), slewed, self.reached, self._largest_step(),
+            self.finer, self.seconds, self.bumps,
         )  # fmt: skip
         if static.branches_differ:
             plays.limits[slots.HOLD] = hold(bounds.hold(), tables.number[DITHER], self.turning)
@@ -241,25 +212,18 @@ class _Builder:
         w = max(*map(abs, static.play_range), *map(abs, static.pi.start))
         w += moving.largest_bend(static, self.parts.plays)
         size = plays = self._code(math.fsum(static.pi.weights) * w) * slack + 1.0
-        creeps = []
-        for each in self.creeps:
-            creeps.append(size)
-            size = size * each.rest * slack + 1.0
-        owns = []
-        for one in self.own_outputs:
-            owns.append(size)
-            size = size * one.forward.largest * slack + 1.0
-        settled = size
         span = self._code(self.high - self.low)
-        for _ in self.parts.ageing:
-            size *= thermal.LARGEST_GAIN
-        for _ in (*self.parts.heat, *self.parts.thermal):
-            size = size * thermal.LARGEST_GAIN + span
+        margin, blocks = Margin(slack, span), [(part, one) for part in BEHIND for one in self.ones[part.name]]
+        given: dict[str, list[float]] = {part.name: [] for part in BEHIND}
+        for part, one in blocks:
+            if not part.forward:
+                given[part.name].append(size)
+                size = one.grown(size, margin)
         still = size
-        modes = []
-        for mode in self.modes:
-            modes.append(size)
-            size = size * mode.largest * slack + 1.0
+        for part, one in blocks:
+            if part.forward:
+                given[part.name].append(size)
+                size = one.grown(size, margin)
         saturations, at_rest = [], []
         low, high = (self._code(end - static.output_offset) for end in self._unlimited)
         for effect in self.parts.saturations:
@@ -272,7 +236,7 @@ class _Builder:
                 self._code(float(end))
                 for end in effect.mapped(np.array([low, high]) * float(self.output_lsb), None)
             )
-        away = abs(self._code(static.output_offset)) + span * (1 + len(self.parts.drift))
+        away = abs(self._code(static.output_offset)) + span * (1 + len(self.ones["clock"]))
         back = float(self.about.code_max) + away + 1.0
         undone, inverted = [back], []
         for effect, ends in zip(reversed(self.parts.saturations), reversed(at_rest), strict=True):
@@ -286,21 +250,12 @@ class _Builder:
                 back = back / effect.give if effect.give else self._code(stop)
             undone.append(back)
         target = back * (math.fsum(map(abs, self.taps.weights.tolist())) if self.taps else 1.0) + 1.0
-        asked = target
-        for _ in (*self.parts.heat, *self.parts.thermal):
-            asked = (asked + span) / thermal.LEAST_GAIN
-        asked_of_own: list[float] = []
-        for _ in self.parts.ageing:
-            asked = asked / thermal.LEAST_GAIN
-        for one, inside in zip(reversed(self.own_outputs), reversed(owns), strict=True):
-            asked_of_own.append(asked)
-            asked = own_fixed.asked_of_input(one, inside, asked) * slack + 1.0
-        for each, inside in zip(reversed(self.creeps), reversed(creeps), strict=True):
-            moved = inside + (asked + inside * each.rest) / each.slope
-            asked = max(moved, asked / each.rest) * slack + 1.0
-        pairs = list(zip(owns, reversed(asked_of_own), strict=True))
-        forwards = settled, size + away
-        return Sizes(plays, creeps, pairs, modes, saturations, *forwards, undone, inverted[::-1], target, asked)
+        asked, wanted = target, {part.name: [0.0] * len(given[part.name]) for part in BEHIND}
+        for part in reversed(BEHIND):
+            for j in range(len(given[part.name]) * (not part.forward) - 1, -1, -1):
+                wanted[part.name][j] = asked
+                asked = self.ones[part.name][j].asked(given[part.name][j], asked, margin)
+        return Sizes(plays, given, wanted, saturations, size + away, undone, inverted[::-1], target, asked)
 
     @cached_property
     def _unlimited(self) -> tuple[float, float]:
@@ -384,7 +339,7 @@ class _Builder:
         found[MOST_CODE] = self.inner.drive[1] + 2 * span
         found[SHARE_BITS] = 31 - self.about.code_bits
         found[DRIVE_BITS], found[ARRIVING_BITS] = self.inner.fine + self.finer, self.finer
-        found[DITHER] = (1 << found[DRIVE_BITS]) + math.ceil(lead(self.lags, self.own_drives))
+        found[DITHER] = (1 << found[DRIVE_BITS]) + math.ceil(lead(self.leading))
         found[BRAKED_DROP] = max((span << found[DRIVE_BITS]).bit_length() + 2 - COARSE.bit_length(), 0)
         return found
 
@@ -410,16 +365,59 @@ class _Builder:
         """Codes that rounding a limited rate adds up to while the drive crosses its range."""
         return crossing(self.static, self.parts, self.seconds) * 2.0**-REST_BITS
 
-    def _lags(self) -> Any:
-        wanted = self._finest()
-        for bits in range(wanted, -1, -1):  # as many as there is room for
-            self.finer = bits
-            try:
-                return self._lag_tables()
-            except OverflowError:
-                if not bits:
-                    raise
-        return None
+    def _tables(self) -> tuple[Any, ...]:
+        """Those of all parts, in their order; what is in front of the plays with as many bits as there is room for."""
+        margin = Margin(1.0, turning=self.turning)
+        about = Fixed(
+            self.seconds, self.static.input_range, self.high - self.low, self.reading.ahead(self.how.preview),
+            braked(self.parts, self.ones), self.drive_lsb, self.output_lsb, self.bits, self.about.code_bits,
+            self.about.code_max, TEMPERATURE_BITS[self.about.code_bits], max(map(abs, self.inner.drive)),
+            self.signal(self.high - self.low), margin,
+        )  # fmt: skip
+
+        def made(part: Part) -> Any:
+            pairs = zip(self.in_front.get(part.name) or self._behind(part), self.ones[part.name], strict=True)
+            self.formats[part.name] = [part.fixed.formats(one, about, *sizes) for sizes, one in pairs]
+            return part.fixed.tables(self.formats[part.name], about)
+
+        def ahead() -> dict[str, Any]:
+            for bits in range(self._finest(), -1, -1):
+                self.finer = bits
+                try:
+                    self.in_front = self._in_front(margin)
+                    return {part.name: made(part) for part in AHEAD}
+                except OverflowError:
+                    if not bits:
+                        raise
+            return {}
+
+        found = self._need(ahead, next((part.words for part in reversed(AHEAD) if self.ones[part.name]), ""))
+        for part in PARTS:
+            if part not in AHEAD:
+                names = " and ".join(dict.fromkeys(getattr(each, "name", "") for each in self.parts.blocks[part.name]))
+                found[part.name] = self._need(lambda part=part: made(part), part.words or names)
+        return tuple(found[name] for name in NAMES)
+
+    def _behind(self, part: Part) -> list[tuple[float, float]]:
+        """Sizes of the input and of the output asked for of each block, in output codes."""
+        if part not in BEHIND:
+            return [(0.0, 0.0)] * len(self.ones[part.name])
+        return list(zip(self.sizes.given[part.name], self.sizes.wanted[part.name], strict=True))
+
+    def _in_front(self, margin: Margin) -> dict[str, list[tuple[float, float]]]:
+        """The same of each block in front of the plays, in signals there."""
+        c = self.inner
+        given = float(max(map(abs, c.drive)) << (c.fine + self.finer)) + 1.0
+        asked = float(max(map(abs, c.play)) + c.margin) * 2.0**self.finer if not self.static.stages else given + 1.0
+        found: dict[str, list[tuple[float, float]]] = {}
+        for part in reversed(AHEAD):
+            found[part.name] = []
+            for one in reversed(self.ones[part.name]):
+                found[part.name].insert(0, (given, asked))
+                asked = one.asked(given, asked, margin)
+                if asked > 2.0**60:
+                    raise OverflowError("no room")
+        return found
 
     def _finest(self) -> int:
         """Bits below the plays' input with which the lead of the lags amplifies rounding to no more than half a code.
@@ -429,98 +427,8 @@ class _Builder:
         """
         if self.static.stages or self.parts.plays or self.inner.fine:
             return 0
-        leads = [math.log2(4.0 / numbers[lag.RATE]) for exact, numbers in self.lags if not exact]
-        leads += [math.log2(2.0 * one.backward.largest) for one in self.own_drives]
+        leads = [one.fineness for one in self.leading if one.fineness]
         return min(MOST_FINER, math.ceil(sum(leads)) + 1) if leads else 0
-
-    def _lag_tables(self) -> Any:
-        c = self.inner
-        given = float(max(map(abs, c.drive)) << (c.fine + self.finer)) + 1.0
-        asked = float(max(map(abs, c.play)) + c.margin) * 2.0**self.finer if not self.static.stages else given + 1.0
-        rows = []
-        self.ahead = []
-        for one in reversed(self.own_drives):
-            self.ahead.insert(0, own_fixed.formats(one, given, asked, 0))
-            asked = own_fixed.asked_of_input(one, given, asked) + 1.0
-        for exact, numbers in reversed(self.lags):
-            sizes = lag_fixed.Sizes(exact, numbers[lag.RATE], numbers[lag.LATE], given, asked, self.turning)
-            rows.append((exact, numbers, sizes))
-            asked = sizes.answer
-            if asked > 2.0**60:
-                raise OverflowError("no room")
-        return lag_fixed.tables(rows[::-1])
-
-    def _creep_tables(self) -> Any:
-        scale = 2.0**self.bits
-        sizes = [size * scale for size in self.sizes.creeps]
-        return creep_fixed.tables(list(zip(self.creeps, sizes, strict=True)), self.bits)
-
-    def _own_behind(self) -> list[Formats]:
-        """Blocks of the user's own behind the plays."""
-        scale = 2.0**self.bits
-        pairs = zip(self.own_outputs, self.sizes.owns, strict=True)
-        return [own_fixed.formats(one, given * scale, asked * scale, self.bits) for one, (given, asked) in pairs]
-
-    @cached_property
-    def clocks(self) -> list[ClockNumbers]:
-        """The clocks of the drifts, for references as far ahead as they may come."""
-        ahead = self.reading.ahead(self.how.preview)
-        signal = self.output_lsb / 2**self.bits
-        farthest = float(self.signal(self.high - self.low))
-        return [drift.numbers(each, self.seconds, signal, farthest, ahead) for each in self.parts.drift]
-
-    def _clock_tables(self) -> Any:
-        return np.array([one.table for one in self.clocks], dtype=np.int64).reshape(-1, 7)
-
-    def _delay(self) -> DelayTables:
-        waited, waiting = delay.numbers(self.parts.delay, self.seconds)
-        return DelayTables(np.array(factor(waited) if waiting else (), dtype=np.int64), waiting)
-
-    def _mode_tables(self) -> Any:
-        scale = 2.0**self.bits
-        pairs = zip(self.modes, self.sizes.modes, strict=True)
-        return resonance_fixed.tables([resonance_fixed.row(one, size * scale) for one, size in pairs])
-
-    def _ageing(self, span: float) -> Any:
-        rows = [
-            (ageing.pieces(each), ageing.turns(each, span, 2.0**-thermal_fixed.GAIN_BITS)) for each in self.parts.ageing
-        ]
-        bits = thermal_fixed.GAIN_BITS - (self.about.code_bits - 2)
-        return ageing_fixed.tables(rows, float(self.drive_lsb), bits)
-
-    @cached_property
-    def heats(self) -> list[Heat]:
-        """Own heat, of each effect."""
-        span, level = self.high - self.low, 2.0**self.bits / float(self.output_lsb)
-        largest, lsb = max(map(abs, self.inner.drive)), float(self.drive_lsb)
-        ends, code_bits = self.static.input_range, self.about.code_bits
-        return [
-            thermal_fixed.heat(
-                thermal.heat_numbers(each, ends, span, self.seconds), thermal.thresholds(each, ends), largest, lsb,
-                level, code_bits,
-            )
-            for each in self.parts.heat
-        ]  # fmt: skip
-
-    def _heat_tables(self) -> HeatTables:
-        ends, roundoff = self.static.input_range, 2.0**-thermal_fixed.GAIN_BITS
-        turns = [thermal.heat_turns(each, ends, self.seconds, roundoff) for each in self.parts.heat]
-        table = np.array([one.table for one in self.heats], dtype=np.int64)
-        rubbing = [one.thresholds for one in self.heats]
-        return HeatTables(
-            table.reshape(-1, thermal_fixed.BITS_BELOW + 1),
-            np.array(turns, dtype=np.int64),
-            np.array(thermal.padded(rubbing), dtype=np.int64),
-            np.array([len(each) for each in rubbing], dtype=np.int64),
-        )
-
-    def _gains(self) -> Any:
-        span = self.high - self.low
-        rows = [thermal.numbers(each, span) for each in self.parts.thermal]
-        kept = TEMPERATURE_BITS[self.about.code_bits]
-        level = 2.0**self.bits / float(self.output_lsb)
-        degrees = self.about.code_max / 2.0**kept
-        return thermal_fixed.tables(rows, level, thermal_fixed.TEMPERATURE_BITS - kept, degrees)
 
     def _tap(self) -> Any:
         rows = [factor(weight) for weight in self.taps.weights.tolist()] if self.taps else []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
@@ -14,7 +13,8 @@ from numpy.typing import NDArray
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
-from hystgen.compensator.chain import moving, own
+from hystgen.compensator.chain import moving
+from hystgen.compensator.chain.catalogue import BEHIND, LED, NAMES, PARTS
 from hystgen.compensator.chain.layout import (
     MOST_SLEWED,
     VERIFIED_SHARE,
@@ -22,6 +22,7 @@ from hystgen.compensator.chain.layout import (
     Compiled,
     OwnChainTables,
     Stages,
+    ahead_of,
     braked,
     crossing,
     fastest,
@@ -35,17 +36,8 @@ from hystgen.compensator.chain.layout import (
 )
 from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.float_tables import build_float, inward
-from hystgen.effects.ageing import compensator as ageing
-from hystgen.effects.ageing.compensator import AgeingTables
-from hystgen.effects.creep import compensator as creep
-from hystgen.effects.delay import compensator as delay
-from hystgen.effects.delay.compensator import DelayTables
-from hystgen.effects.drift import compensator as drift
-from hystgen.effects.lag import compensator as lag
-from hystgen.effects.resonance import compensator as resonance
+from hystgen.effects.part import Floating
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
-from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal.compensator import HeatTables
 from hystgen.front.tanh import kernels
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
@@ -84,37 +76,6 @@ def _behind(parts: Parts, arithmetic: str) -> Stages:
     kind, first, size = (np.array(each, dtype=np.int64) for each in (kinds, firsts, sizes))
     numbers = np.array(data, dtype=dtype)
     return Stages(kind, first, size, numbers, kernels.TANH_TABLES[arithmetic], kernels.ATANH_TABLES[arithmetic])
-
-
-def _ageing(parts: Parts, span: float, reals: Callable[[Any, str], NDArray[Any]], roundoff: float) -> AgeingTables:
-    """Gains over travel."""
-    rows = [ageing.pieces(each) for each in parts.ageing]
-    last = [float(pieces[-1, ageing.BEGIN] + 1.0 / pieces[-1, ageing.INVERSE_LENGTH]) for pieces in rows]
-    numbers = [(1.0, 2.0, thermal.LEAST_GAIN, thermal.LARGEST_GAIN, end) for end in last]
-    return AgeingTables(
-        np.cumsum([0, *map(len, rows)]).astype(np.int64),
-        reals(np.concatenate([np.empty((0, 6)), *rows]), "travels of the ageing"),
-        reals(numbers, "travels of the ageing").reshape(-1, 5),
-        np.array([ageing.turns(each, span, roundoff) for each in parts.ageing], dtype=np.int64),
-    )
-
-
-def _heat(
-    parts: Parts,
-    ends: tuple[float, float],
-    span: float,
-    seconds: float,
-    reals: Callable[[Any, str], NDArray[Any]],
-    roundoff: float,
-) -> HeatTables:
-    """Gains over the temperature of own heat."""
-    rubbing = [thermal.thresholds(each, ends) for each in parts.heat]
-    return HeatTables(
-        reals([thermal.heat_numbers(each, ends, span, seconds) for each in parts.heat], "temperatures").reshape(-1, 7),
-        np.array([thermal.heat_turns(each, ends, seconds, roundoff) for each in parts.heat], dtype=np.int64),
-        reals(thermal.padded(rubbing), "thresholds"),
-        np.array([len(each) for each in rubbing], dtype=np.int64),
-    )
 
 
 def _in_two(x: Fraction, dtype: Any) -> tuple[float, float]:
@@ -159,9 +120,9 @@ def build(
         raise FormatError((("input_range",), f"the range of the output is narrower than {arithmetic} can tell apart"))
     plays.limits[slots.OUTPUT_MIN], plays.limits[slots.OUTPUT_MAX] = low, high
 
-    creeps = [creep.numbers(each, seconds) for each in parts.creeps]
     turning = parts.turning(static.branches_differ)
-    lags = [lag.numbers(each, seconds, turning) for each in parts.lags]
+    ones = parts.ones(seconds, turning)
+    leading, behind = ahead_of(ones), [one for part in BEHIND for one in ones[part.name]]
     span, drive_span = float(high) - float(low), static.input_range[1] - static.input_range[0]
     reading = read(static, parts, seconds, how)
     taps, ahead = reading.taps, reading.ahead(how.preview)
@@ -169,41 +130,33 @@ def build(
     steps = crossing(static, parts, seconds)
     if slewed(steps, dtype) > MOST_SLEWED * float(np.finfo(dtype).eps):
         raise FormatError((("model", "effects"), too_slow(steps, arithmetic, "float64")))
-    lead_room = math.prod((2.0 / row[lag.LATE if exact else lag.RATE] for exact, row in lags), start=8.0)
-    steepest = 1.0 / (min(static.pi.weights) if parts.lags and min(static.pi.weights) > 0.0 else 1.0)
+    lead_room = math.prod((one.room for one in (*leading, *behind)), start=8.0)
+    steepest = 1.0 / (min(static.pi.weights) if ones[NAMES[LED]] and min(static.pi.weights) > 0.0 else 1.0)
     weights = float(np.sum(np.abs(taps.weights))) if taps else 1.0
-    drives, outputs = ([own.linear(each, seconds) for each in side] for side in (parts.own_drives, parts.own_outputs))
-    lead_room *= math.prod(max(one.backward.largest, 1.0) for one in (*drives, *outputs))
     most = max(map(abs, static.input_range)) * lead_room + span * weights * lead_room * steepest
     reals([most], "intermediate results")
-    waited, waiting = delay.numbers(parts.delay, seconds)
     max_rate = fastest(static, parts, seconds, how)
     rounded = ROUNDINGS * float(np.finfo(dtype).eps) / 2 * max(map(abs, static.input_range))
-    dither = max(rounded * max(lead(lags, drives), 1.0), drive_lsb or 0.0)
+    dither = max(rounded * max(lead(leading), 1.0), drive_lsb or 0.0)
     if static.branches_differ:
         plays.limits[slots.HOLD] = hold(plays.limits[slots.HOLD], dither, turning)
+    about = Floating(
+        seconds, static.input_range, span, ahead, braked(parts, ones), reals, float(np.finfo(dtype).eps) / 2
+    )
     tables = ChainTables(
         plays,
         plays.limits,
         moving.build(static, parts.plays, seconds, min(max_rate * seconds, drive_span), dtype),
-        lag.tables(lags, reals),
-        creep.tables(creeps, reals),
-        DelayTables(reals([waited] * (waiting > 0), "the delay"), waiting),
-        reals([resonance.numbers(each, seconds).table for each in parts.modes], "the modes").reshape(-1, 5),
-        _ageing(parts, drive_span, reals, float(np.finfo(dtype).eps) / 2),
-        reals([thermal.numbers(each, span) for each in parts.thermal], "temperatures").reshape(-1, 8),
-        _heat(parts, static.input_range, span, seconds, reals, float(np.finfo(dtype).eps) / 2),
-        reals([drift.numbers(each, seconds, span, ahead) for each in parts.drift], "drift").reshape(-1, 8),
-        own.build(drives, outputs, reals),
+        tuple(part.floating.tables(ones[part.name], about) for part in PARTS),
+        parts.count,
         _behind(parts, arithmetic),
         reals(taps.weights if taps else [], "weights of the preview"),
         reals([static.output_offset, span, *slew[::2], *slew[1::2], VERIFIED_SHARE, dither], "offset or rates"),
         int(bool(parts.slew)),
-        braked(parts, [exact for exact, _ in lags]),
         quiet(how, taps),
         int(turning),
     )
-    if drives or outputs:
+    if parts.own_drives or parts.own_outputs:
         tables = OwnChainTables(*tables)
-        tables.own_effects = tuple(type(one.effect) for one in (*drives, *outputs))
+        tables.own_sides = tuple(map(type, parts.own_drives)), tuple(map(type, parts.own_outputs))
     return Compiled(tables, taps, parts, seconds, static, max_rate, how.preview, *reading[1:])

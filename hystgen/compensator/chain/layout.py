@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -12,22 +12,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.chain import noise, own, preview
+from hystgen.compensator.chain import noise, preview
+from hystgen.compensator.chain.catalogue import AHEAD, LED, NAMES, PARTS
 from hystgen.compensator.chain.noise import Smoothing
-from hystgen.compensator.chain.own import Linear, OwnTables
+from hystgen.compensator.chain.own import Linear
 from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.chain.preview import Shaped, Taps
-from hystgen.effects.ageing.compensator import AgeingTables
 from hystgen.effects.base import Effect
-from hystgen.effects.creep import compensator as creep
-from hystgen.effects.creep.compensator import CreepTables
-from hystgen.effects.delay.compensator import DelayTables
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.lag.compensator import LagTables
-from hystgen.effects.resonance import compensator as resonance
-from hystgen.effects.resonance.compensator import ModeNumbers
-from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal.compensator import HeatTables
+from hystgen.effects.part import One
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import MOST_REFERENCES, Compensation
 from hystgen.plays.slots import Counts, Reals
@@ -87,20 +80,12 @@ class ChainTables(NamedTuple):
     plays: Any  # `Tables` or `FixedTables`
     limits: Reals
     moving: Any  # `MovingTables` or `FixedMovingTables`
-    lag: LagTables
-    creep: CreepTables
-    delay: DelayTables  # of the forward operator, like the modes
-    mode: Reals  # (k, 5), in fixed point (k, 13)
-    ageing: AgeingTables
-    gain: Reals  # (k, 8)
-    heat: HeatTables
-    clock: Reals  # (k, 8), in fixed point (k, 7)
-    own: OwnTables
+    blocks: tuple[Any, ...]  # tables of each of `catalogue.PARTS`
+    count: Counts  # of their blocks
     behind: Any  # `Stages`, or in fixed point `hystgen.effects.saturation.fixed.Saturations`
     tap: Reals  # (L,), in fixed point factors (L, 2); none without a preview
     number: Reals
     slew: int  # 1 if the rate of the drive is limited
-    braked: int  # 1 if a lag behind that limit is kept from overshooting
     quiet: int  # equal references after which the drive stands still, 0 if it never has to
     turning: int  # 1 if a lag must not arrive at two branches from the wrong side
 
@@ -108,6 +93,24 @@ class ChainTables(NamedTuple):
     def fixed(self) -> bool:
         """Whether the arithmetic is fixed point."""
         return bool(self.plays.fixed)
+
+    def of(self, part: str) -> Any:
+        """The tables of a part of the chain."""
+        return self.blocks[NAMES.index(part)]
+
+    def number_of(self, part: str) -> int:
+        """Of blocks of a part of the chain."""
+        return int(self.count[NAMES.index(part)])
+
+    @property
+    def calls(self) -> set[str]:
+        """What its blocks add to the interface."""
+        return {call for part in PARTS if self.number_of(part.name) for call in part.calls}
+
+    @property
+    def braked(self) -> bool:
+        """Whether a lag behind a slew limit is kept from overshooting."""
+        return bool(self.blocks[LED].braked)
 
     @property
     def threshold(self) -> Reals:
@@ -117,15 +120,20 @@ class ChainTables(NamedTuple):
 
 
 class OwnChainTables(ChainTables):
-    """The same of a model with effects of the user's own, whose classes are in the order of `own`."""
+    """The same of a model with effects of the user's own: their classes, in front of the plays and behind."""
 
-    own_effects: tuple[type[Effect], ...]
+    own_sides: tuple[tuple[type[Effect], ...], tuple[type[Effect], ...]]
+
+    @property
+    def own_effects(self) -> tuple[type[Effect], ...]:
+        """All of them."""
+        return (*self.own_sides[0], *self.own_sides[1])
 
     @property
     def own_blocks(self) -> tuple[tuple[OwnBlock, ...], tuple[OwnBlock, ...]]:
         """Their blocks, in front of the plays and behind."""
-        blocks = tuple(effect.block for effect in self.own_effects if effect.block is not None)
-        return blocks[: self.own.ahead], blocks[self.own.ahead :]
+        ahead, behind = (tuple(e.block for e in side if e.block is not None) for side in self.own_sides)
+        return ahead, behind
 
 
 @dataclass(frozen=True)
@@ -171,7 +179,7 @@ class Compiled:
     @property
     def largest_way(self) -> float:
         """Largest move of the plays' input in such a step."""
-        return largest_way(self.static, self.own[: self.tables.own.ahead], self.largest_step)
+        return largest_way(self.static, self.own_ahead, self.largest_step)
 
     @property
     def ahead(self) -> int:
@@ -183,15 +191,20 @@ class Compiled:
         """Samples by which the motion is late on a ramp."""
         return Read(self.taps, self.smoothing, self.shaped).late(self.asked)
 
-    @cached_property
-    def own(self) -> list[Linear]:
-        """Blocks of the user's own, in the order of `tables.own`."""
-        return [own.linear(each, self.seconds) for each in (*self.parts.own_drives, *self.parts.own_outputs)]
+    @property
+    def own_ahead(self) -> list[Linear]:
+        """Blocks of the user's own in front of the plays."""
+        return self.ones["own_ahead"]
+
+    @property
+    def own_behind(self) -> list[Linear]:
+        """Blocks of the user's own behind the plays."""
+        return self.ones["own_behind"]
 
     @cached_property
-    def modes(self) -> list[ModeNumbers]:
-        """Modes of the stage."""
-        return [resonance.numbers(each, self.seconds) for each in self.parts.modes]
+    def ones(self) -> dict[str, list[Any]]:
+        """Its blocks."""
+        return self.parts.ones(self.seconds, bool(self.tables.turning))
 
     @property
     def gain(self) -> noise.Gain:
@@ -215,20 +228,19 @@ def quiet(how: Compensation, taps: Taps | None) -> int:
     return QUIET + (len(taps.weights) if taps else 1) - 1 if how.quiet else 0
 
 
-def lead(lags: Sequence[tuple[bool, tuple[float, float, float, float]]], ahead: Sequence[Linear]) -> float:
+def ahead_of(ones: Mapping[str, Sequence[Any]]) -> list[Any]:
+    """The blocks in front of the plays."""
+    return [one for part in AHEAD for one in ones[part.name]]
+
+
+def lead(ahead: Sequence[One]) -> float:
     """Largest gain from what arrives in front of the plays to the drive, 0 if the drive itself arrives there."""
-    if not lags and not ahead:
-        return 0.0
-    gains = [
-        (2.0 - rate) / (late - second) if exact else (1.0 + 2.0 * second) * (2.0 - rate) / rate
-        for exact, (rate, second, late, _) in lags
-    ]
-    return math.prod([*gains, *(max(one.backward.largest, 1.0) for one in ahead)])
+    return math.prod(one.lead for one in ahead) if ahead else 0.0
 
 
-def braked(parts: Parts, exact: Sequence[bool]) -> int:
-    """1 where a slew limit has one lag behind it that is led; `exact`: whether each lag is inverted exactly."""
-    return int(bool(parts.slew) and list(exact) == [False])
+def braked(parts: Parts, ones: Mapping[str, Sequence[Any]]) -> int:
+    """1 where a slew limit has one block behind it that is led."""
+    return int(bool(parts.slew) and [one.exact for one in ones[NAMES[LED]]] == [False])
 
 
 def rates(parts: Parts, seconds: float) -> tuple[Fraction, ...]:
@@ -273,7 +285,7 @@ def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation
     ends = static.input_range
     asked = how.max_rate or (ends[1] - ends[0]) / (SAMPLES_A_SWEEP * seconds)
     low, high = output_range(static, parts, seconds)
-    moves = [thermal.farthest(each, ends, high - low, seconds) for each in parts.heat]
+    moves = [one.farthest(ends, high - low, seconds) for one in parts.behind(seconds)]
     slew = (rate for each in parts.slew for rate in (each.rate, each.falling_rate))
     return float(min([asked, *slew, *(move / seconds for move in moves)]))
 
@@ -348,12 +360,8 @@ def settled(static: StaticModel, effects: Sequence[Effect], w: float) -> float:
 def output_range(static: StaticModel, parts: Parts, seconds: float) -> tuple[float, float]:
     """Extremes of the settled output over every drive history inside the input range."""
     low, high = (settled(static, parts.plays, end) for end in static.play_range)
-    for each in parts.creeps:
-        rest = creep.numbers(each, seconds).rest
-        low, high = low * rest, high * rest
-    for each in parts.own_outputs:
-        rest = own.linear(each, seconds).rest
-        low, high = low * rest, high * rest
+    for one in parts.behind(seconds):
+        low, high = one.at_rest(low), one.at_rest(high)
     for effect in parts.saturations:
         low, high = (float(end) for end in effect.mapped(np.array([low, high]), None))
     return low + static.output_offset, high + static.output_offset

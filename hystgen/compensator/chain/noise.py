@@ -21,13 +21,12 @@ from numpy.typing import NDArray
 
 from hystgen.basics.problems import UnsupportedEffectsError
 from hystgen.chain.static import StaticModel
-from hystgen.compensator.chain import moving, own
-from hystgen.compensator.chain.own import Linear
+from hystgen.compensator.chain import moving
+from hystgen.compensator.chain.catalogue import AHEAD, BEHIND
 from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.chain.preview import Taps, averages, whole
 from hystgen.effects.base import decays
-from hystgen.effects.creep import compensator as creep
-from hystgen.effects.lag import compensator as lag
+from hystgen.effects.part import One, Response
 from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.rate_dependence.compensator import Movement
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate
@@ -74,9 +73,11 @@ class Gain:
     taps: Taps
 
     @cached_property
-    def own(self) -> list[Linear]:
-        """Blocks of the user's own."""
-        return [own.linear(each, self.seconds) for each in (*self.parts.own_drives, *self.parts.own_outputs)]
+    def _blocks(self) -> list[One]:
+        """The blocks of the inverse, those of the user's own last."""
+        parts = sorted((part for part in (*AHEAD, *BEHIND) if not part.forward), key=lambda part: part.joined)
+        turning = self.parts.turning(self.static.branches_differ)
+        return [one for each in self.parts.ones(self.seconds, turning, parts).values() for one in each]
 
     def __call__(self, at: Array) -> Array:
         led, rest, answers = self._answers(at)
@@ -96,33 +97,14 @@ class Gain:
         rest and the response (N,) by which the lead is divided."""
         z = np.exp(-1j * at)
         led = np.polynomial.polynomial.polyval(z, self.taps.weights[::-1].astype(complex))
-        arriving = np.ones_like(z)
-        turning = self.parts.turning(self.static.branches_differ)
-        for each in self.parts.lags:
-            exact, (rate, second, late, _) = lag.numbers(each, self.seconds, turning)
-            if exact:
-                led = led * (1.0 - (1.0 - rate) * z) / (late + second * z)
-            else:
-                led = led * (1.0 + second - second * z) * (1.0 - (1.0 - rate) * z) / rate
-                arriving = arriving * (1.0 - second * second * (1.0 - z) ** 2)
-        passed, direct, rest = np.ones_like(z), 1.0, 1.0
-        for each in self.parts.creeps:
-            one = creep.numbers(each, self.seconds)
-            rate, early, late, _ = one.terms.T[:, :, None]
-            states = np.sum((early * z + late) / (1.0 - (1.0 - rate) * z), axis=0)
-            passed = passed * (one.slope - float(np.sum(late)) + states)
-            direct, rest = direct * one.slope, rest * one.rest
-        for block in self.own:
-            if block.exact:
-                passed, direct = passed * block.forward.response(z), direct * block.forward.d
-            else:
-                led = led * block.backward.response(z)
-            rest = rest * block.rest
+        found = Response(led, np.ones_like(z), np.ones_like(z), 1.0, 1.0)
+        for one in self._blocks:
+            found = one.respond(z, found)
         answers = []
         for slope, plays, at_once in self._plays(z):
-            later, first = plays * passed, at_once * direct
-            answers.append((slope, first + (later - first) * arriving))
-        return led, rest, answers
+            later, first = plays * found.passed, at_once * found.direct
+            answers.append((slope, first + (later - first) * found.arriving))
+        return found.led, found.rest, answers
 
     def _plays(self, z: NDArray[np.complex128]) -> Iterator[tuple[float, NDArray[np.complex128], float]]:
         """For each number of plays that follow their slope at rest, their response, and what of it comes at once."""
@@ -159,8 +141,7 @@ class Gain:
     @cached_property
     def near(self) -> Array:
         """Frequencies between which it does not rise and fall unseen: blocks of the user's own may ring."""
-        ringing = [np.abs(np.angle(np.linalg.eigvals(block.backward.a))) for block in self.own]
-        return np.unique(np.concatenate([FREQUENCIES, *ringing]))
+        return np.unique(np.concatenate([FREQUENCIES, *(one.ringing for one in self._blocks)]))
 
 
 def peaks(gain: Callable[[Array], Array], near: Array) -> tuple[Array, Array]:

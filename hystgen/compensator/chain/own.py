@@ -8,8 +8,9 @@ by sums of powers of A, whichever is smaller; if two modes coincide, only by pow
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -19,8 +20,12 @@ from numpy.typing import NDArray
 from hystgen.basics.jit import jit
 from hystgen.effects import own
 from hystgen.effects.base import Array, Effect, Place
-from hystgen.effects.kinds import Constants
+from hystgen.effects.kinds import VERBS, Constants, OwnBlock
+from hystgen.effects.part import Arithmetic, Function, Margin, One, Response, Verbs
 from hystgen.plays.slots import Counts, Reals
+
+Glue = tuple[Function, Function, Function]
+"""What an arithmetic puts around blocks: product, a signal into a block, and a signal out of it."""
 
 SAME = 1e-9
 """Relative difference up to which two answers of a block differ only by rounding, for time constants of up to a million
@@ -28,15 +33,13 @@ samples, with which a difference of states loses as many digits."""
 
 
 class OwnTables(NamedTuple):
-    """Blocks in front of the plays, then those behind: `number` (m,), in fixed point (m, 4), of block j from `first[j]`
-    (k + 1) on; its memory from `place[j]` (k + 1) on; `bits` (k,): bits of its signals below those of the chain, in
-    fixed point; `ahead`: the number of blocks in front."""
+    """Blocks on one side of the plays: `number` (m,), in fixed point (m, 4), of block j from `first[j]` (k + 1) on; its
+    memory from `place[j]` (k + 1) on; `bits` (k,): bits of its signals below those of the chain, in fixed point."""
 
     first: Counts
     number: Reals
     place: Counts
     bits: Counts
-    ahead: int
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,7 @@ class System:
 
 
 @dataclass(frozen=True)
-class Linear:
+class Linear(One):
     """A block at one step length: forwards and backwards, its gain at rest, and the states (n,) of the input 1."""
 
     effect: Effect
@@ -134,6 +137,41 @@ class Linear:
         """Whether solve gives the input for which absorb returns the output asked for."""
         f, b = self.forward, self.backward
         return abs(b.d * f.d - 1.0) <= SAME and bool(np.all(np.abs(b.c + b.d * f.c) <= SAME * (1.0 + np.abs(f.c))))
+
+    @property
+    def lead(self) -> float:
+        """Largest gain of its inverse."""
+        return max(self.backward.largest, 1.0)
+
+    @property
+    def ringing(self) -> Array:
+        """Frequencies (k,) in rad a sample at which its inverse may ring."""
+        return np.asarray(np.abs(np.angle(np.linalg.eigvals(self.backward.a))))
+
+    def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
+        """What it makes of frequencies, behind other blocks."""
+        found = found._replace(rest=found.rest * self.rest)
+        if not self.exact:
+            return found._replace(led=found.led * self.backward.response(z))
+        return found._replace(passed=found.passed * self.forward.response(z), direct=found.direct * self.forward.d)
+
+    @property
+    def fineness(self) -> float:
+        """Bits that its lead takes from a signal in front of the plays."""
+        return math.log2(2.0 * self.backward.largest)
+
+    def at_rest(self, x: float) -> float:
+        """The settled output for an input."""
+        return x * self.rest
+
+    def grown(self, size: float, margin: Margin) -> float:
+        """Largest output for inputs within a size."""
+        return size * self.forward.largest * margin.slack + 1.0
+
+    def asked(self, given: float, asked: float, margin: Margin) -> float:
+        """Largest input that solve or resting can give for an output within a size, after inputs `given`."""
+        now, before = abs(self.forward.d), self.forward.before()
+        return max((asked + before * given) / now, asked / self.rest) * margin.slack + 1.0
 
     def sizes(self) -> Array:
         """Largest states (n,) for inputs within 1, from rest at one."""
@@ -297,15 +335,13 @@ def _adds_up(one: Linear, seconds: float) -> bool:
     return True
 
 
-def build(drives: Sequence[Linear], outputs: Sequence[Linear], reals: Any) -> OwnTables:
-    """The numbers of blocks in front of the plays and behind."""
-    every = [*drives, *outputs]
+def build(every: Sequence[Linear], reals: Any) -> OwnTables:
+    """The numbers of the blocks on one side of the plays."""
     return OwnTables(
         np.cumsum([0, *(len(each.numbers) for each in every)]).astype(np.int64),
         reals(np.concatenate([np.empty(0), *(each.numbers for each in every)]), "numbers of effects of your own"),
         np.cumsum([0, *(len(each.settled) for each in every)]).astype(np.int64),
         np.zeros(len(every), dtype=np.int64),
-        len(drives),
     )
 
 
@@ -337,3 +373,57 @@ def product(number: Any, x: Any) -> Any:
 def passed(t: OwnTables, j: int, x: Any) -> Any:  # noqa: ARG001  as in fixed point
     """A signal of the chain as one of block j, and the reverse: the same number."""
     return x
+
+
+# ---------------------------------------------------------------- as a part of the chain
+
+
+def memory(t: OwnTables, dtype: Any) -> Reals:
+    """Memory (m,) of all blocks on one side of the plays."""
+    return np.zeros(t.place[-1], dtype)
+
+
+def arithmetic(
+    blocks: Sequence[OwnBlock], effects: Sequence[type[Effect]], made: Glue, *tables: Callable[..., Any]
+) -> Arithmetic:
+    """Blocks on one side of the plays, one after the other, as one of the chain; `tables` and formats as it has."""
+
+    def through(verb: str) -> Function:
+        calls = [_one(made, block, verb, j) for j, block in enumerate(blocks)]
+        return functools.reduce(_both, calls[::-1] if verb in ("solve", "resting") else calls)
+
+    verbs = {verb: through(verb) for verb in VERBS} if blocks else {}
+    return Arithmetic(Verbs(memory, **verbs), lambda t: constants(t, effects), *tables)
+
+
+def _both(first: Function, behind: Function) -> Function:
+    """A verb applied by two blocks, one after the other."""
+
+    @jit
+    def both(t: OwnTables, s: Reals, j: int, x: Any) -> Any:
+        return behind(t, s, j, first(t, s, j, x))
+
+    return both
+
+
+def _one(made: Glue, block: OwnBlock, verb: str, j: int) -> Function:
+    """A verb of block j, with its numbers and memory picked."""
+    product, entered, left = made
+    function = block.compiled(verb, product)
+    if verb == "resting":
+
+        @jit
+        def resting(t: OwnTables, s: Reals, k: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+            return left(t, j, function(t.number[t.first[j] : t.first[j + 1]], entered(t, j, y)))
+
+        return resting
+
+    @jit
+    def call(t: OwnTables, s: Reals, k: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+        row, memory = t.number[t.first[j] : t.first[j + 1]], s[t.place[j] : t.place[j + 1]]
+        return left(t, j, function(row, memory, entered(t, j, x)))
+
+    return call
+
+
+GLUE: Glue = product, passed, passed

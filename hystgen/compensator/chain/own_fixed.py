@@ -16,7 +16,11 @@ import numpy as np
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, error, factor, lifted, times
 from hystgen.basics.jit import jit
+from hystgen.compensator.chain import own
 from hystgen.compensator.chain.own import Linear, OwnTables
+from hystgen.effects.base import Effect, Place
+from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.part import Fixed, Part
 from hystgen.plays.fixed import nearest
 
 MANTISSA, SHIFT, DROP, LIFT = range(4)
@@ -118,12 +122,6 @@ class _Trace:
         return [each.seen for each in numbers], most[0], output, max(each.error for each in back)
 
 
-def asked_of_input(linear: Linear, given: float, asked: float) -> float:
-    """Largest input that solve or resting can give for an output up to `asked`, after inputs up to `given`."""
-    now, before = abs(linear.forward.d), linear.forward.before()
-    return max((asked + before * given) / now, asked / linear.rest)
-
-
 def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
     """A block for an input and an output asked for up to these sizes, in signals of the chain.
 
@@ -141,15 +139,14 @@ def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
     return Formats(linear, rows, bits, output / 2.0**bits + 0.5, answer / 2.0**bits + 0.5)
 
 
-def build(rows: Sequence[Formats], ahead: int) -> OwnTables:
-    """Blocks in front of the plays, `ahead` of them, and behind."""
+def build(rows: Sequence[Formats]) -> OwnTables:
+    """The numbers of the blocks on one side of the plays."""
     table = [number for each in rows for number in each.table]
     return OwnTables(
         np.cumsum([0, *(len(each.table) for each in rows)]).astype(np.int64),
         np.array(table, dtype=np.int64).reshape(-1, 4),
         np.cumsum([0, *(len(each.linear.settled) for each in rows)]).astype(np.int64),
         np.array([each.bits for each in rows], dtype=np.int64),
-        ahead,
     )
 
 
@@ -172,3 +169,23 @@ def entered(t: OwnTables, j: int, x: Any) -> Any:
 def left(t: OwnTables, j: int, x: Any) -> Any:
     """A signal of block j as one of the chain."""
     return nearest(x, t.bits[j])
+
+
+def part(name: str, place: Place, blocks: Sequence[OwnBlock] = (), effects: Sequence[type[Effect]] = ()) -> Part:
+    """Blocks on one side of the plays as a part of the chain."""
+    ahead = place is Place.DRIVE
+
+    def takes(effect: Effect) -> bool:
+        return effect.block is not None and (effect.place is Place.DRIVE) == ahead
+
+    def format_of(one: Linear, about: Fixed, given: float, asked: float) -> Formats:
+        bits = 0 if ahead else about.bits  # of the sizes in front of the plays below those that are given
+        return formats(one, given * 2.0**bits, asked * 2.0**bits, bits)
+
+    return Part(
+        name, "effects in front of the plays" if ahead else "", takes,
+        lambda effect, seconds, _: own.linear(effect, seconds),
+        own.arithmetic(blocks, effects, own.GLUE, lambda every, about: own.build(every, about.reals)),
+        own.arithmetic(blocks, effects, (product, entered, left), lambda rows, _: build(rows), format_of),
+        joined=True,
+    )  # fmt: skip

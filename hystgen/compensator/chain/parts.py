@@ -7,26 +7,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from hystgen.compensator.chain.catalogue import AHEAD, BEHIND, PARTS
 from hystgen.effects.base import Effect, Place
+from hystgen.effects.part import Part
+from hystgen.plays.slots import Counts
 
 
 @dataclass(frozen=True)
 class Parts:
-    """The effects of a model by their part in the chain, each list in the order of the chain."""
+    """The effects of a model by their part in the chain, each list in the order of the chain; `blocks`: of each of the
+    parts."""
 
-    lags: list[Any]
-    creeps: list[Any]
-    ageing: list[Any]
-    thermal: list[Any]
-    heat: list[Any]
-    drift: list[Any]
-    modes: list[Any]
+    blocks: dict[str, list[Any]]
     saturations: list[Any]
     slew: list[Any]
     plays: list[Effect]
-    delay: float
-    own_drives: list[Effect]
-    own_outputs: list[Effect]
 
     @classmethod
     def of(cls, effects: Sequence[Effect]) -> Parts:
@@ -35,18 +32,53 @@ class Parts:
         def called(name: str) -> list[Any]:
             return [effect for effect in effects if effect.name == name]
 
-        thermal_effects = called("thermal")
-        return cls(
-            [each for each in called("lag") if each.time_constant > 0.0], called("creep"), called("ageing"),
-            [each for each in thermal_effects if each.columns], [each for each in thermal_effects if not each.columns],
-            called("drift"), [each for each in called("resonance") if each.block is None], called("saturation"),
-            called("slew_limit"),
-            [effect for effect in effects if effect.place is Place.PLAYS],
-            math.fsum(each.time for each in called("delay")),
-            [effect for effect in effects if effect.block and effect.place is Place.DRIVE],
-            [effect for effect in effects if effect.block and effect.place is not Place.DRIVE],
-        )  # fmt: skip
+        blocks = {part.name: [effect for effect in effects if part.takes(effect)] for part in PARTS}
+        plays = [effect for effect in effects if effect.place is Place.PLAYS]
+        return cls(blocks, called("saturation"), called("slew_limit"), plays)
+
+    @property
+    def delay(self) -> float:
+        """Of a drive on its way, in s."""
+        return math.fsum(each.dead_time for each in self.blocks["delay"])
+
+    @property
+    def modes(self) -> list[Any]:
+        """Those that the preview inverts."""
+        return self.blocks["mode"]
+
+    @property
+    def own_drives(self) -> list[Effect]:
+        """The user's own in front of the plays."""
+        return self.blocks["own_ahead"]
+
+    @property
+    def own_outputs(self) -> list[Effect]:
+        """The user's own behind the plays."""
+        return self.blocks["own_behind"]
+
+    @property
+    def count(self) -> Counts:
+        """As in `ChainTables`."""
+        found = [len(self.blocks[part.name]) for part in PARTS]
+        most = [1 if part.joined else len(self.blocks[part.name]) for part in PARTS]
+        return np.minimum(np.array(found, dtype=np.int64), most)
+
+    def ones(self, seconds: float, turning: bool = False, parts: Sequence[Part] = PARTS) -> dict[str, list[Any]]:
+        """The blocks of some parts at steps of `seconds`."""
+        return {
+            part.name: [part.one(effect, seconds, turning) for effect in self.blocks[part.name]] for part in parts
+        }
+
+    @property
+    def leading(self) -> list[Any]:
+        """Effects in front of the plays, whose inverse leads."""
+        return [effect for part in AHEAD for effect in self.blocks[part.name]]
+
+    def behind(self, seconds: float) -> list[Any]:
+        """The blocks of the inverse behind the plays at steps of `seconds`."""
+        ones = self.ones(seconds, parts=[part for part in BEHIND if not part.forward])
+        return [one for each in ones.values() for one in each]
 
     def turning(self, branches: bool) -> bool:
-        """Whether a lag alone is in front of a memoryless part that has two `branches`."""
-        return branches and len(self.lags) == 1 and not self.own_drives
+        """Whether a block that is led, alone, is in front of a memoryless part that has two `branches`."""
+        return branches and len(self.blocks[AHEAD[0].name]) == 1 == len(self.leading)

@@ -33,7 +33,7 @@ def with_status(compiled: Compiled, record: Run, inverse: bool) -> tuple[NDArray
     later = np.append(x[ahead:], np.full(min(ahead, len(x)), x[-1:])) if ahead else x
     calls = [np.full(min(ahead, len(x)), slots.OP_PUSH, dtype=np.uint8)]
     given = [x[:ahead]]
-    if len(t.gain):
+    if len(t.of("gain")):
         op = np.tile(np.array([slots.OP_TEMPERATURE, slots.OP_STEP], dtype=np.uint8), len(x))
         calls.append(op)
         warm = record.extra[COLUMN]

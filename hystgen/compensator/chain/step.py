@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
+from hystgen.compensator.chain.catalogue import BESIDE, LED, PARTS, parts_with
 from hystgen.compensator.chain.layout import (
     DITHER,
     FALLING,
@@ -23,18 +24,13 @@ from hystgen.compensator.chain.layout import (
     RISING_REST,
     SHARE,
     ChainTables,
+    OwnChainTables,
 )
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat
-from hystgen.compensator.chain.sides import Blocks, sides_of
+from hystgen.compensator.chain.sides import Blocks, moves, resetting, sides_of, told
 from hystgen.compensator.layout import clamp_drive, inverse_clamp
 from hystgen.compensator.step import Hooks, Operations, operations_of, plays_of
-from hystgen.effects.ageing.compensator import HIGH as AGEING_HIGH
-from hystgen.effects.ageing.compensator import AgeingState
-from hystgen.effects.creep.compensator import CreepState
-from hystgen.effects.delay.compensator import Waiting, delay_put, delay_rest
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.lag.compensator import HIGH as LAG_HIGH
-from hystgen.effects.thermal.compensator import HEAT_STATE
 from hystgen.plays import loop
 from hystgen.plays.corners.corners_fixed import new_fixed_memory
 from hystgen.plays.corners.corners_float import new_memory
@@ -75,6 +71,8 @@ from hystgen.plays.slots import (
 
 SET, OUTPUT, APPLIED, REACHED, ARRIVED, REFERENCE, WAY, MOVED, REST = range(9)
 MOVING, OPERATOR, EQUAL, RISES = range(4)
+(CLOCK,) = map(PARTS.index, BESIDE)
+AGED = next(k for k, part in enumerate(PARTS) if "travel" in part.calls)
 
 
 class ChainState(NamedTuple):
@@ -88,15 +86,8 @@ class ChainState(NamedTuple):
     plays: State
     lost: Reals  # (n + 1,), what rounding took from each play that a nonlinear dashpot moves
     bent: Reals  # (n + 1,), what each play contributes, if an effect moves or bends them
-    lag: Reals  # (k, 6), in fixed point (k, 5)
-    creep: CreepState
-    ageing: AgeingState
-    gain: Reals  # (k, 3)
-    heat: Reals  # (k, 22), with the plays that rub; in fixed point the fifth is not used
-    clock: Reals  # (k, 3), in fixed point (k, 5)
-    mode: Reals  # (k, 3), of the forward operator
-    waiting: Waiting  # of the forward operator
-    own: Reals  # (m,)
+    blocks: tuple[Any, ...]  # memory of each of `catalogue.PARTS`
+    count: Counts  # of their blocks in this operator
     line: Line
     real: Reals
     flags: Counts
@@ -107,7 +98,8 @@ class ChainState(NamedTuple):
 def new_state(t: ChainTables, inverse: bool) -> ChainState:
     """Memory for one instance of an operator; `init` sets it."""
     dtype = t.threshold.dtype
-    modes, waiting = (0, 0) if inverse else (len(t.mode), t.delay.samples)
+    parts = parts_with(*t.own_blocks) if isinstance(t, OwnChainTables) else PARTS
+    verbs = [part.arithmetic(t.fixed).verbs for part in parts]
     corners = int(t.plays.engine == CORNERS)
     memory = new_fixed_memory if t.fixed else new_memory
     loops = loop.new_state(t.plays)
@@ -115,15 +107,8 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         loops._replace(play=loops.play[:0]) if corners else loops,
         np.zeros(len(t.threshold), dtype),
         np.zeros(len(t.threshold), dtype),
-        np.zeros((len(t.lag.block), 5 if t.fixed else 6), dtype),
-        CreepState(np.zeros((len(t.creep.block), 2), dtype), np.zeros((len(t.creep.term), 2), dtype)),
-        AgeingState(np.zeros((len(t.ageing.turns), 4), dtype), np.zeros(len(t.ageing.turns), np.int64)),
-        np.zeros((len(t.gain), 3), dtype),
-        np.zeros((len(t.heat.turns), HEAT_STATE), dtype),
-        np.zeros((len(t.clock), 5 if t.fixed else 3), dtype),
-        np.zeros((modes, 3), dtype),
-        Waiting(np.zeros(waiting, dtype), np.zeros(1, np.int64)),
-        np.zeros(t.own.place[-1], dtype),
+        tuple(each.memory(tables, dtype) for each, tables in zip(verbs, t.blocks, strict=True)),
+        np.where([inverse and part.forward for part in parts], 0, t.count),
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
         np.zeros(9, dtype),
         np.array([0, int(inverse), 0, 1], np.int64),
@@ -150,24 +135,25 @@ def made_of(
 ) -> Operations:
     """The operations of models with effects in one arithmetic, with blocks of the user's own in front of the plays and
     behind them."""
-    ageing, thermal = blocks.ageing, blocks.thermal
-    ageing_move, ageing_set, ageing_set_travel = ageing.ageing_move, ageing.ageing_set, ageing.ageing_set_travel
-    gain_reset, gain_heat = thermal.gain_reset, thermal.gain_heat
-    heat_reset, heat_move = thermal.heat_reset, thermal.heat_move
-    drift = blocks.drift
-    clock_start, clock_tick, clock_drift = drift.clock_start, drift.clock_tick, drift.clock_drift
-    LEAD, MOST_AHEAD, ONE = drift.LEAD, drift.MOST_AHEAD, drift.ONE
-    saturated, unsaturated = blocks.saturation
-    preview_target, delayed = blocks.target, blocks.delayed
+    every = [blocks.verbs(part) for part in parts_with(drives, outputs)]
+    blocks_reset, blocks_move = resetting(every), moves(every)
+    temperature_set, gain_set, travel_set = (told(every, f"set_{what}") for what in ("temperature", "gain", "travel"))
+    travelled_by = every[AGED].travelled
+    clock_reset, clock_added = every[CLOCK].reset, every[CLOCK].added
+    clock_lead, clock_ahead = every[CLOCK].lead, every[CLOCK].ahead
+    bent, unbent = blocks.bent
+    preview_target = blocks.target
     front_forward, front_inverse = blocks.front
     start, follow, started, inverse_input = blocks.plays
     finer, braked, ramp = blocks.finer, blocks.braked, blocks.ramp
-    steady_solve, steady_kept, steady_absorb = blocks.lag.steady_solve, blocks.lag.steady_kept, blocks.lag.steady_absorb
-    steady_missed = blocks.lag.steady_missed
+    led = every[LED].led
+    assert led
+    led_state, led_solve, led_kept, led_absorb, led_missed, *_ = led
     finite, drive_signal, arriving, level_signal, drive_code, output_code, entered_travel, shared = codes
     plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
 
-    side = sides_of(blocks, drives, outputs)
+    side = sides_of(every)
+    sent_rest, sent_absorb = side.sent_rest, side.sent_absorb
     drive_side_rest, drive_side_absorb, drive_side_solve = side.drive_rest, side.drive_absorb, side.drive_solve
     output_side_rest, output_side_absorb = side.output_rest, side.output_absorb
     output_side_resting, output_side_solve = side.output_resting, side.output_solve
@@ -176,28 +162,19 @@ def made_of(
     def displacement(t: ChainTables, s: ChainState, y: Any) -> Any:
         """The displacement: the result of the output side after saturation, plus the offsets."""
         offset = t.number[OFFSET] + s.real[SET]
-        for j in range(len(t.clock)):
-            offset = offset + clock_drift(t.clock, s.clock, j, t.limits[ZERO])
-        return saturated(t.behind, y) + offset
+        for j in range(s.count[CLOCK]):
+            offset = offset + clock_added(t.blocks[CLOCK], s.blocks[CLOCK], j)
+        return bent(t.behind, y) + offset
 
     @jit(inline=True)
     def undisplaced(t: ChainTables, s: ChainState, u: Any) -> tuple[Any, int]:
         """The result that the output side has to give for the displacement u, and whether none gives it."""
         offset = t.number[OFFSET] + s.real[SET]
-        for j in range(len(t.clock)):
-            lead = s.clock[j, LEAD] if s.line.filled[0] else t.limits[ZERO]
-            offset = offset + clock_drift(t.clock, s.clock, j, lead + t.clock[j, ONE] if s.flags[MOVING] else lead)
-        y, limited = unsaturated(t.behind, u - offset)
+        for j in range(s.count[CLOCK]):
+            filled, moving = s.line.filled[0], s.flags[MOVING]
+            offset = offset + clock_ahead(t.blocks[CLOCK], s.blocks[CLOCK], j, filled, moving)
+        y, limited = unbent(t.behind, u - offset)
         return y, limited
-
-    @jit
-    def led(t: ChainTables, s: ChainState) -> None:
-        """A reference has come: the next one lies one sample further ahead, up to the preview."""
-        for j in range(len(t.clock)):
-            lead = t.clock[j, ONE]
-            if s.line.filled[0]:
-                lead = lead + s.clock[j, LEAD]
-            s.clock[j, LEAD] = t.clock[j, MOST_AHEAD] if lead > t.clock[j, MOST_AHEAD] else lead
 
     @jit
     def settings_reset(t: ChainTables, s: ChainState) -> None:
@@ -205,24 +182,12 @@ def made_of(
         s.real[SET] = t.limits[ZERO]
         s.real[REACHED] = t.limits[ZERO]
         s.real[REST] = t.limits[ZERO]
-        for j in range(len(t.clock)):
-            clock_start(s.clock, j)
-        for j in range(len(t.heat.turns)):
-            heat_reset(t.heat, s.heat, j)
-        for j in range(len(t.gain)):
-            gain_reset(t.gain, s.gain, j)
-        for j in range(len(t.ageing.turns)):
-            ageing_set_travel(t.ageing, s.ageing, j, t.limits[ZERO])
+        blocks_reset(t, s)
 
     @jit
     def travelled(t: ChainTables, s: ChainState, v: Any) -> None:
         """The drive moves to v from where it was, in one sample."""
-        for j in range(len(t.clock)):
-            clock_tick(t.clock, s.clock, j)
-        for j in range(len(t.heat.turns)):
-            heat_move(t.heat, s.heat, j, s.real[APPLIED], v)
-        for j in range(len(t.ageing.turns)):
-            ageing_move(t.ageing, s.ageing, j, v - s.real[APPLIED])
+        blocks_move(t, s, s.real[APPLIED], v)
 
     # ---------------------------------------------------------------- chain_turn.c, chain_turn_late.c
 
@@ -233,7 +198,7 @@ def made_of(
         missed = back - t.plays.limits[HOLD]
         if not t.turning:
             return bool(missed > 0)
-        return bool(missed > steady_missed(t.lag, -way if way < 0 else way))
+        return bool(missed > led_missed(t.blocks[LED], -way if way < 0 else way))
 
     # ---------------------------------------------------------------- chain_two_branches.c
 
@@ -276,13 +241,15 @@ def made_of(
         elif a < s.plays.real[DRIVE]:
             s.flags[RISES] = 0
         last = drive_signal(t, s.real[APPLIED])
-        v, s.real[WAY] = steady_solve(t.lag, s.lag, a, s.real[MOVED], s.flags[RISES], last, t.number[DITHER])
+        moved, rises = s.real[MOVED], s.flags[RISES]
+        v, s.real[WAY] = led_solve(t.blocks[LED], s.blocks[LED], a, moved, rises, last, t.number[DITHER])
         return v
 
     @jit
     def steady_hold(t: ChainTables, s: ChainState, v: Any) -> Any:
         """The drive v, or one that does not take the lag back from its branch."""
-        return steady_kept(t.lag, s.lag, v, s.flags[RISES], drive_signal(t, s.real[APPLIED]), t.number[DITHER])
+        last = drive_signal(t, s.real[APPLIED])
+        return led_kept(t.blocks[LED], s.blocks[LED], v, s.flags[RISES], last, t.number[DITHER])
 
     # ---------------------------------------------------------------- quiet.c
 
@@ -373,10 +340,10 @@ def made_of(
             travelled(t, s, v)
         x = drive_signal(t, reached)
         steady = t.turning and s.flags[OPERATOR]
-        before = s.lag[0, LAG_HIGH] if steady else t.limits[ZERO]
+        before = led_state(s.blocks[LED]) if steady else t.limits[ZERO]
         a = drive_side_absorb(t, s, x) if moving else drive_side_rest(t, s, x)
         if steady and moving:
-            steady_absorb(s.lag, before)
+            led_absorb(s.blocks[LED], before)
             s.real[MOVED] = s.real[WAY]
             s.real[WAY] = t.limits[ZERO]
         elif steady:
@@ -442,7 +409,7 @@ def made_of(
         if not t.slew or not s.flags[MOVING]:
             return v
         near, rest = inverse_within(t, s, v)
-        if t.braked and not (t.quiet and s.flags[EQUAL] >= t.quiet):
+        if t.blocks[LED].braked and not (t.quiet and s.flags[EQUAL] >= t.quiet):
             drive = braked(t, s, v, near)
             if t.turning:
                 drive = drive_code(t, steady_hold(t, s, drive_signal(t, drive)))
@@ -453,13 +420,7 @@ def made_of(
     @jit
     def forward_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
         """The drive is v: it passes the delay, and the amplifier follows."""
-        late = v
-        if len(s.waiting.sample):
-            if s.flags[MOVING]:
-                delay_put(s.waiting, v)
-            else:
-                delay_rest(s.waiting, v)
-            late = delayed(t.delay, s.waiting)
+        late = sent_absorb(t, s, v) if s.flags[MOVING] else sent_rest(t, s, v)
         reached = forward_slewed(t, s, late)
         if reached != late:
             s.plays.counts[STATUS] |= SLEW_LIMITED
@@ -513,7 +474,8 @@ def made_of(
             s.plays.counts[STATUS] |= DOMAIN
         if len(t.tap) == 0:
             return wanted
-        led(t, s)
+        for j in range(s.count[CLOCK]):
+            clock_lead(t.blocks[CLOCK], s.blocks[CLOCK], j, s.line.filled[0])
         preview_put(s.line, wanted)
         return preview_target(t.tap, s.line)
 
@@ -579,8 +541,8 @@ def made_of(
         """Set the offset of the displacement; drift starts again."""
         put_offset(t, s, d)
         if finite(t, d):
-            for j in range(len(t.clock)):
-                clock_start(s.clock, j)
+            for j in range(s.count[CLOCK]):
+                clock_reset(t.blocks[CLOCK], s.blocks[CLOCK], j)
 
     @jit
     def correct(t: ChainTables, s: ChainState, measured: Any, share: Any) -> None:
@@ -593,17 +555,15 @@ def made_of(
         """Set the temperature."""
         if not finite(t, degrees):
             s.plays.counts[STATUS] |= HELD
-            return
-        for j in range(len(t.gain)):
-            if gain_heat(t.gain, s.gain, j, degrees):
-                s.plays.counts[STATUS] |= LIMITED_SETTING
+        elif temperature_set(t, s, degrees):
+            s.plays.counts[STATUS] |= LIMITED_SETTING
 
     @jit
     def set_gain(t: ChainTables, s: ChainState, gain: Any) -> None:
         """Set a gain in place of the one that follows the travel."""
         if not finite(t, gain):
             s.plays.counts[STATUS] |= HELD
-        elif ageing_set(t.ageing, s.ageing, 0, gain):
+        elif gain_set(t, s, gain):
             s.plays.counts[STATUS] |= LIMITED_SETTING
 
     @jit
@@ -611,7 +571,7 @@ def made_of(
         """Set the distance travelled."""
         if not finite(t, travel):
             s.plays.counts[STATUS] |= HELD
-        elif ageing_set_travel(t.ageing, s.ageing, 0, travel):
+        elif travel_set(t, s, travel):
             s.plays.counts[STATUS] |= LIMITED_SETTING
 
     @jit
@@ -633,7 +593,7 @@ def made_of(
         elif call == OP_TRAVEL:
             set_travel(t, s, entered_travel(t, x))
         elif call == OP_TRAVELLED:
-            return s.ageing.block[0, AGEING_HIGH]
+            return travelled_by(s.blocks[AGED], 0)
         elif call == OP_CORRECT:
             correct(t, s, x, t.number[SHARE])
         elif call == OP_EXPECTED:

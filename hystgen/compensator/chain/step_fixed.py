@@ -10,7 +10,8 @@ from typing import Any
 from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_fixed
-from hystgen.compensator.chain import corners_fixed, moving_fixed, own_fixed
+from hystgen.compensator.chain import corners_fixed, moving_fixed
+from hystgen.compensator.chain.catalogue import LED, PARTS
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
     BRAKED_DROP,
@@ -31,15 +32,7 @@ from hystgen.compensator.chain.preview import Line
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import ChainState, Codes
 from hystgen.compensator.layout import FixedTables
-from hystgen.effects.ageing import fixed as ageing
-from hystgen.effects.creep import fixed as creep
-from hystgen.effects.delay.compensator import fixed_delayed
-from hystgen.effects.drift import fixed as drift
-from hystgen.effects.lag import fixed as lag
-from hystgen.effects.lag.fixed import braked as lag_braked
-from hystgen.effects.resonance import fixed as resonance
 from hystgen.effects.saturation.fixed import saturated, unsaturated
-from hystgen.effects.thermal import fixed as thermal
 from hystgen.front import curve
 from hystgen.plays.fixed import divide_by_slope, nearest
 from hystgen.plays.slots import CODE_MAX, OUTPUT_CLAMPED, Reals, zero
@@ -164,14 +157,17 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:
 
 # ---------------------------------------------------------------- chain_braked.c
 
+assert PARTS[LED].fixed.verbs.led
+led_braked = PARTS[LED].fixed.verbs.led.braked
+
 
 @jit
 def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
     """The drive from which the lag does not overshoot, where the one in reach is near instead of v."""
     bits = t.number[DRIVE_BITS]
     beyond = v - near if v > near else near - v
-    drive = lag_braked(
-        t.lag, s.lag, near << bits, beyond << bits, t.number[FALLING] << bits, t.number[RISING] << bits,
+    drive = led_braked(
+        t.blocks[LED], s.blocks[LED], near << bits, beyond << bits, t.number[FALLING] << bits, t.number[RISING] << bits,
         1 << bits, t.number[BRAKED_DROP],
     )  # fmt: skip
     return drive_code(t, drive)
@@ -190,9 +186,8 @@ def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
 
 
 BLOCKS = Blocks(
-    lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, fixed_delayed,
-    (front_forward, front_inverse), moving_fixed.PLAYS, finer, braked, ramp,
-    (own_fixed.product, own_fixed.entered, own_fixed.left),
+    lambda part: part.fixed.verbs, (saturated, unsaturated), preview_target, (front_forward, front_inverse),
+    moving_fixed.PLAYS, finer, braked, ramp,
 )  # fmt: skip
 CORNERS = BLOCKS._replace(plays=corners_fixed.PLAYS, finer=corners_fixed.finer)
 CODES = Codes(

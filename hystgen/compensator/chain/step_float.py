@@ -6,33 +6,25 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_float
-from hystgen.compensator.chain import corners_float, moving_float, own
+from hystgen.compensator.chain import corners_float, moving_float
+from hystgen.compensator.chain.catalogue import LED, PARTS
 from hystgen.compensator.chain.layout import FALLING, RISING, ChainTables, Stages
 from hystgen.compensator.chain.preview import preview_target
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import ChainState, Codes
-from hystgen.effects.ageing import compensator as ageing
-from hystgen.effects.creep import compensator as creep
-from hystgen.effects.delay.compensator import delayed
-from hystgen.effects.drift import compensator as drift
-from hystgen.effects.lag import compensator as lag
-from hystgen.effects.lag.compensator import HALVES
-from hystgen.effects.lag.compensator import braked as lag_braked
-from hystgen.effects.resonance import compensator as resonance
-from hystgen.effects.thermal import compensator as thermal
 from hystgen.front.compensator import front_forward, front_inverse
 
 # ---------------------------------------------------------------- chain_float.c
 
 
 @jit(inline=True)
-def saturated(t: Stages, x: Any) -> Any:
+def bent(t: Stages, x: Any) -> Any:
     """The output of the saturation for the input x."""
     return front_forward(t, x, 1)
 
 
 @jit(inline=True)
-def unsaturated(t: Stages, y: Any) -> tuple[Any, int]:
+def unbent(t: Stages, y: Any) -> tuple[Any, int]:
     """The input of the saturation that gives y, and whether none does."""
     return front_inverse(t, y, 1)
 
@@ -63,12 +55,15 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:  # noqa: ARG001  as in fi
 
 # ---------------------------------------------------------------- chain_braked.c
 
+assert PARTS[LED].floating.verbs.led
+led_braked, HALVES = PARTS[LED].floating.verbs.led[-2:]
+
 
 @jit
 def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
     """The drive from which the lag does not overshoot, where the one in reach is near instead of v."""
     beyond = v - near if v > near else near - v
-    return lag_braked(t.lag, s.lag, near, beyond, t.number[FALLING], t.number[RISING], HALVES)
+    return led_braked(t.blocks[LED], s.blocks[LED], near, beyond, t.number[FALLING], t.number[RISING], HALVES)
 
 
 # ---------------------------------------------------------------- slew_float.c
@@ -86,8 +81,8 @@ def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
 
 
 BLOCKS = Blocks(
-    lag, creep, ageing, thermal, resonance, drift, (saturated, unsaturated), preview_target, delayed,
-    (front_forward, front_inverse), moving_float.PLAYS, finer, braked, ramp, (own.product, own.passed, own.passed),
+    lambda part: part.floating.verbs, (bent, unbent), preview_target, (front_forward, front_inverse),
+    moving_float.PLAYS, finer, braked, ramp,
 )  # fmt: skip
 CORNERS = BLOCKS._replace(plays=corners_float.PLAYS)
 CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)

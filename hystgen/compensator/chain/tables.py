@@ -73,7 +73,7 @@ def refusals(
                 yield effect, "in front of the slew limit; give it an order: ClassVar[int] above that of slew_limit, 1"
         elif effect.name.startswith(USER):
             yield effect, "an effect of your own, which has no compensator"
-        elif effect in parts.ageing[1:]:
+        elif effect in parts.blocks["ageing"][1:]:
             yield effect, "one gain follows the travel, and there is another one"
         elif isinstance(effect, AGEING):
             yield from ((effect, reason) for reason in ageing.problems(effect, high - low))

@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.diagnosis.data.items import Item, Model
+from hystgen.diagnosis.data.items import FittedLike, Item
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import converter_step, peaks, still
 from hystgen.diagnosis.findings.kinds import Line, Ripple, StickSlip
@@ -66,7 +66,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
         able = [
             j for j, n in enumerate(lengths)
             if n * frequency >= acceptance.LINE_PERIODS and 2.0 * frequency <= rates[j]
-        ]  # fmt: skip
+        ]
         strength = sum(p[0] for p in near)
         common = len(seen) >= max(2, acceptance.SEEN_IN * len(able)) or len(able) == len(seen)
         rules = min(p[0] for p in near) > acceptance.RULING_SHARE
@@ -351,7 +351,7 @@ def _strongest_first(
 # Records without the lines and ripples that rule their errors ------------------------------------------------
 
 
-Fitted = TypeVar("Fitted", bound=Model)
+Fitted = TypeVar("Fitted", bound=FittedLike)
 
 ROUNDS = 3
 """Rounds of removal: a model fitted to a ripple is wrong about the positions over which the ripple appears, and becomes
@@ -366,7 +366,7 @@ class Cleaned:
     clean: Prepared
     lines: tuple[Line | Ripple, ...] = ()
 
-    def seen_by(self, fitted: Model) -> Cleaned:
+    def seen_by(self, fitted: FittedLike) -> Cleaned:
         """The measured records without the lines in a model's errors, over the positions that it predicts."""
         measured, clean = _items(self.measured), _items(self.clean)
         errors = [
@@ -382,7 +382,7 @@ class Cleaned:
         lines = tuple(replace(line, repaired=True) for k, line in enumerate(found) if not is_known(line, found[:k]))
         return replace(self, clean=replace(self.measured, to_fit=items[:number], held=items[number:]), lines=lines)
 
-    def left_by(self, fitted: Model) -> bool:
+    def left_by(self, fitted: FittedLike) -> bool:
         """Whether a model's errors show further such lines."""
         clean = _items(self.clean)
         return bool(ruling(clean, fitted.errors(clean))[0])

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hystgen.diagnosis.search import acceptance
 from hystgen.effects.base import Run
 from hystgen.identification.joint import DIFFERENCE
-from hystgen.identification.reduction import Course, Start
+from hystgen.identification.reduction import Course, StartMemory
 
 Array = NDArray[np.float64]
 Samples = slice | NDArray[np.intp]
@@ -113,7 +113,7 @@ class Item:
         """The record as `identify` compares it."""
         samples = np.flatnonzero(self.known)
         first, last = (int(samples[0]), int(samples[-1]) + 1) if len(samples) else (0, 0)
-        start = None if self.turns is None else Start(self.turns, 0.0)
+        start = None if self.turns is None else StartMemory(self.turns, 0.0)
         return Course(self.name, self.run.v, self.y, self.history, first, last, first, start=start)
 
     def step(self, h: Array) -> float:
@@ -154,7 +154,7 @@ def masks(items: Sequence[Item]) -> list[tuple[str, Mask]]:
     return list(found.values())
 
 
-class Model(Protocol):
+class FittedLike(Protocol):
     """A fitted model, as far as the judgement of records needs it."""
 
     @property

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.problems import counted
 from hystgen.chain import chain
-from hystgen.diagnosis.data.items import Item, Model, masks, rms
+from hystgen.diagnosis.data.items import FittedLike, Item, masks, rms
 from hystgen.diagnosis.data.signals import still, unresolved_edges
 from hystgen.diagnosis.findings.kinds import (
     DropOuts,
@@ -207,7 +207,7 @@ def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found
 # Whether the records begin in the memory that the given history leaves ---------------------------------------
 
 
-def contradicted(items: Sequence[Item], fitted: Model) -> OtherHistory | None:
+def contradicted(items: Sequence[Item], fitted: FittedLike) -> OtherHistory | None:
     """A finding if the starts, which depend on the history, are off by far more than the rest, else None.
 
     `items`: fitted records; held-out ones decide nothing about a fit, and may go where it is a guess. The history
@@ -216,7 +216,7 @@ def contradicted(items: Sequence[Item], fitted: Model) -> OtherHistory | None:
     return _off(*_parts(items, fitted, False))
 
 
-def bends(items: Sequence[Item], fitted: Model, free: Model) -> OtherHistory | None:
+def bends(items: Sequence[Item], fitted: FittedLike, free: FittedLike) -> OtherHistory | None:
     """The same if a model fitted with the history can follow the starts, but only at the cost of the rest.
 
     `free`: the model fitted to the samples that do not depend on the history, which predicts the right starts. Starts
@@ -227,7 +227,7 @@ def bends(items: Sequence[Item], fitted: Model, free: Model) -> OtherHistory | N
     return _off(starts, rest) if rms(bent) > acceptance.HISTORY_COSTS * rms(rest) else None
 
 
-def _parts(items: Sequence[Item], fitted: Model, own: bool) -> tuple[list[Array], list[Array]]:
+def _parts(items: Sequence[Item], fitted: FittedLike, own: bool) -> tuple[list[Array], list[Array]]:
     """Errors that depend on the history, and errors that do not; `own`: both less the mean of the latter."""
     first, later = [], []
     for item, e in zip(items, fitted.errors(items), strict=True):

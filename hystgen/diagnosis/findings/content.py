@@ -15,11 +15,11 @@ from hystgen.diagnosis.data import disturbances, preparing
 from hystgen.diagnosis.data.items import Item, compared, rms
 from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, repetition, reversals, still
-from hystgen.diagnosis.findings.kinds import Fault, Finding, Line, Ripple, Structure, times_noise
+from hystgen.diagnosis.findings.kinds import Fault, Finding, Line, Ripple, Structured, times_noise
 from hystgen.diagnosis.findings.result import (
     AtEnd,
     Contender,
-    Errors,
+    FitErrors,
     Gap,
     Inverse,
     NamedEffect,
@@ -57,7 +57,7 @@ def result_of(
     ready: Prepared,
     noise: NoiseFloor,
     found: Outcome,
-    as_given: Errors,
+    as_given: FitErrors,
     odd: Sequence[Finding],
     one_loop: bool,
     inverse: Inverse,
@@ -69,11 +69,11 @@ def result_of(
     """
     before = [found.refitted.errors(group) for group in (ready.to_fit, ready.held)]
     after = [found.fitted.errors(group) for group in (ready.to_fit, ready.held)]
-    gap = Gap(as_given, *(Errors(*map(rms, each)) for each in (before, after)))
+    gap = Gap(as_given, *(FitErrors(*map(rms, each)) for each in (before, after)))
     remaining = _unexplained(ready, after, noise.rms, max(gap.after.fit, noise.rms), odd)
     everything = [*ready.to_fit, *ready.held]
     rivals = found.not_separable
-    structured = any(isinstance(each, Structure) for each in remaining)
+    structured = any(isinstance(each, Structured) for each in remaining)
     result = Result(
         verdict="effects_found" if found.found else "unexplained" if remaining else "nothing_missing",
         noise_floor=noise.rms,
@@ -120,8 +120,8 @@ def _withdrawn(found: Outcome, unit: str | None) -> Withdrawn | None:
     left = tuple(each.left if math.isfinite(each.left) else None for each in (held, to_fit))
     return Withdrawn(
         them.names,
-        Errors(to_fit.before, held.before),
-        Errors(to_fit.after, held.after),
+        FitErrors(to_fit.before, held.before),
+        FitErrors(to_fit.after, held.after),
         (left[0], left[1]),
         tuple((each.name, _at_end(each)) for each in them.ends),
         reason(them.refused, unit),
@@ -187,7 +187,7 @@ def _unexplained(
         alone = tuple(
             item.name for item, e in zip(ready.held, after[1], strict=True)
             if rms([e]) > acceptance.HELD_OUT_ALONE * usual
-        )  # fmt: skip
+        )
         remaining.append(described(everything, errors, noise, alone))
     return remaining
 
@@ -316,7 +316,9 @@ VARIABLES = (
 )
 
 
-def described(items: Sequence[Item], errors: Sequence[Array], noise: float, held_out_alone: Sequence[str]) -> Structure:
+def described(
+    items: Sequence[Item], errors: Sequence[Array], noise: float, held_out_alone: Sequence[str]
+) -> Structured:
     """The remaining errors of several records, `noise` rms; `held_out_alone`: held-out records that have most of it."""
     share, by_variable = shares(items, errors)
     total = np.concatenate([e[np.isfinite(e)] for e in errors])
@@ -327,7 +329,7 @@ def described(items: Sequence[Item], errors: Sequence[Array], noise: float, held
         by_variable["memory"], main = round(free, 4), "memory"
     repeats = repeatable(items, errors)
     even = even_share(items, errors)
-    return Structure(
+    return Structured(
         rms=rms,
         above_floor=rms / noise if noise else None,
         main_variable=main,

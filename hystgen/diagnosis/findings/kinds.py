@@ -296,7 +296,7 @@ class NotAPlaySum(Finding):
         instead = (
             "" if not named else f"; {named} would explain less of it" if self.shows_speed else
             f"; {named} would explain about as much, but the drive takes equal ways in equal times throughout"
-        )  # fmt: skip
+        )
         return (
             f"the hysteresis is no play sum: minor loops stay open, by {100.0 * self.open:.0f} % of their height where "
             f"they pass a tenth of the drive range, and depend on what was before. A part that forgets over "
@@ -343,11 +343,11 @@ VARIABLE_NAMES = {
     "drive": "the drive", "rate": "the drive rate", "displacement": "the displacement", "memory": "the memory",
     "loop centre": "the loop's centre", "session time": "the session time",
     "time in the record": "the time in the record", "travel": "the distance travelled",
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
-class Structure(Finding):
+class Structured(Finding):
     """An error that is not noise and that no effect removes.
 
     `share_by_variable`: shares of its variance that smooth functions of one variable explain on samples that they have

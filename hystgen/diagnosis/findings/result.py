@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics import arguments, display, drawing
 from hystgen.diagnosis.findings import kinds
-from hystgen.diagnosis.findings.kinds import Fault, Finding, NotAPlaySum, Structure
+from hystgen.diagnosis.findings.kinds import Fault, Finding, NotAPlaySum, Structured
 from hystgen.diagnosis.search import acceptance
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Errors:
+class FitErrors:
     """rms errors over fitted and held-out records, output units."""
 
     fit: float
@@ -38,9 +38,9 @@ class Errors:
 class Gap:
     """Errors of the model as given, of the same model refitted, and of the model with the effects."""
 
-    as_given: Errors
-    refitted: Errors
-    after: Errors
+    as_given: FitErrors
+    refitted: FitErrors
+    after: FitErrors
 
 
 NO_WIDER = {
@@ -92,8 +92,8 @@ class Withdrawn:
     """
 
     names: tuple[str, ...]
-    before: Errors
-    after: Errors
+    before: FitErrors
+    after: FitErrors
     left: tuple[float | None, float | None]
     ends: tuple[tuple[str, AtEnd], ...]
     why: str
@@ -297,7 +297,7 @@ class Diagnosis:
         result = self.result
         gap, unit, seen = result.gap, result.unit, result.unexplained
         before, after = self._rms(gap.refitted.holdout), self._rms(gap.after.holdout)
-        structured = any(isinstance(each, Structure) for each in seen)
+        structured = any(isinstance(each, Structured) for each in seen)
         if self.verdict == "effects_found":
             names = ", ".join(self._name(effect.name) for effect in result.effects)
             more = f", {self._times(gap.after.holdout)} and with structure" if structured else ""
@@ -312,7 +312,7 @@ class Diagnosis:
         if acceptance.is_noise(left, result.noise_floor):  # the held-out records do not show it
             where, left = " of the fitted records", gap.after.fit
         missing = f"{self._missing()}: {self._rms(left)} rms is left{where}{self._nearest()}"
-        disturbing = [each for each in seen if not isinstance(each, Fault | Structure | NotAPlaySum)]
+        disturbing = [each for each in seen if not isinstance(each, Fault | Structured | NotAPlaySum)]
         if not disturbing:
             return missing
         first = disturbing[0].sentence(unit)

@@ -191,7 +191,7 @@ def _element(now: Fitted, records: Records) -> Tried:
     candidate = Candidate(
         "an element that forgets", np.array([-WEIGHT, ends[0], 0.5 + 1e-6]), np.array([0.0, ends[1], 1.0]), starts[0],
         build, None, tuple(starts[1:]), amounts=(0,),
-    )  # fmt: skip
+    )
 
     def structure(part: Candidate) -> Structure:
         return replace(now.structure, parts=(*now.structure.parts, Part(NAME, part)))
@@ -237,7 +237,7 @@ def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, recor
     return Forgets(
         records.residual(now), tried.held_out, element.width / (high - low), _open(tried.fitted, element, low, high),
         names, shown,
-    )  # fmt: skip
+    )
 
 
 def _open(fitted: Fitted, element: Forgetting, low: float, high: float) -> float:

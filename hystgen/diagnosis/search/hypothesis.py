@@ -538,6 +538,6 @@ def predicted(record: Record, actuator: Actuator, weights: Array, history: tuple
     """(N,) prediction of an actuator with these weights for a record, up to an offset, output units."""
     assert record.y is not None
     run = Run(np.ascontiguousarray(record.t, dtype=np.float64), np.ascontiguousarray(record.v, dtype=np.float64),
-              dict(record.extra))  # fmt: skip
+              dict(record.extra))
     rows, constant = actuator.columns(Item(record.name, run, np.asarray(record.y), history, 1.0), weights)
     return np.asarray(rows[0] + constant)

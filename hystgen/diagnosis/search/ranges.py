@@ -138,7 +138,7 @@ def ends(now: Fitted, leaves: float | None, only_noise: bool) -> tuple[End, ...]
                     k, part.name, key, value, LARGEST if largest else LEAST, _number(build, x, j, largest, end[j])[1],
                     _number(build, x, j, largest, far[j])[1] if tried else None, leaves if tried else None, why,
                 )
-            )  # fmt: skip
+            )
     return tuple(found)
 
 

@@ -234,7 +234,7 @@ class Records:
         return cls(
             to_fit, held, full, quick, thin, thin_held, known, user, noise, gap, tick, _jobs(),
             signals.one_loop([*to_fit, *held]), signals.one_speed(to_fit), taking_part / recorded,
-        )  # fmt: skip
+        )
 
     def terms(self, now: Fitted, other: Fitted) -> list[Fitted]:
         """A hypothesis, and the same with the weights that suit the start states which another one leaves free.
@@ -312,7 +312,7 @@ _SCREEN, _JOIN, _POLISH, _RESTART = range(4)
 memories found anew."""
 
 
-class _Task(NamedTuple):
+class _Trial(NamedTuple):
     what: int
     k: int
     """index of the option"""
@@ -348,7 +348,7 @@ class _Searches:
     found: Sequence[_Pair]
     records: Records
 
-    def __call__(self, task: _Task) -> _Numbers:
+    def __call__(self, task: _Trial) -> _Numbers:
         """The numbers that one search finds."""
         pair, records = self.found[task.k], self.records
         if task.what == _SCREEN:
@@ -360,7 +360,7 @@ class _Searches:
         residual = rms(fitted.errors(held)) if math.isfinite(fitted.rms) else math.inf
         return _Numbers(fitted.shape, fitted.weights, fitted.rms, residual, fitted.structure.starts)
 
-    def _screen(self, option: Option, task: _Task) -> Fitted:
+    def _screen(self, option: Option, task: _Trial) -> Fitted:
         """A few steps from each start on thinned records, and a few more from the best of them."""
         now, thin = self.rough, self.records.thin
         without = rms(now.errors(thin))
@@ -387,7 +387,7 @@ class _Searches:
         search = _while_falling(best, acceptance.SCREENING_STEPS)
         return min(search, *searches, key=lambda each: each.now.rms).found(now.weights)
 
-    def _join(self, option: Option, task: _Task) -> Fitted:
+    def _join(self, option: Option, task: _Trial) -> Fitted:
         """The whole hypothesis fitted from the start of a task, by its number of steps."""
         assert task.shape is not None
         assert task.weights is not None
@@ -398,7 +398,7 @@ class _Searches:
             search = _while_falling(search, task.steps)
         return search.found(task.weights)
 
-    def _restarted(self, option: Option, task: _Task) -> Fitted:
+    def _restarted(self, option: Option, task: _Trial) -> Fitted:
         """The fit of a task with start memories found beside its effects."""
         assert task.shape is not None
         assert task.weights is not None
@@ -418,7 +418,7 @@ def _while_falling(search: Search, steps: int) -> Search:
     return search
 
 
-_Pool = parallel.Pool[_Task, _Numbers]
+_Pool = parallel.Pool[_Trial, _Numbers]
 
 
 def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
@@ -443,13 +443,13 @@ def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
     def cost(k: int) -> int:
         return sum(_cost(found[j].alone, found[j]) for j in (k, *containing(found[k])))
 
-    def further(task: _Task, numbers: _Numbers) -> list[_Task]:
+    def further(task: _Trial, numbers: _Numbers) -> list[_Trial]:
         if found[task.k].beyond or not helps(screened(task.k, numbers), *without):
             return []
-        return [_Task(_SCREEN, k, numbers.shape, numbers.weights) for k in containing(found[task.k])]
+        return [_Trial(_SCREEN, k, numbers.shape, numbers.weights) for k in containing(found[task.k])]
 
     first = sorted((k for k, option in enumerate(found) if not option.beyond), key=cost, reverse=True)
-    done = {task.k: numbers for task, numbers in pool.each([_Task(_SCREEN, k) for k in first], records.tick, further)}
+    done = {task.k: numbers for task, numbers in pool.each([_Trial(_SCREEN, k) for k in first], records.tick, further)}
     every = [screened(k, done[k]) for k in sorted(done)]
     tried = [each for each in every if not each.option.beyond]
     simpler = {each.option.label: each for each in tried if helps(each, *without)}
@@ -506,20 +506,20 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) ->
     by_held_out = acceptance.PROMISING * min((each.residual for each in kept), default=0.0)
     by_fit = acceptance.PROMISING * min((each.fitted.rms for each in kept), default=0.0)
 
-    def join(each: _Screened) -> _Task:
+    def join(each: _Screened) -> _Trial:
         promising = each.residual <= by_held_out or each.fitted.rms <= by_fit
         shape = found[each.k].joined(now, each.fitted.shape)
-        return _Task(_JOIN, each.k, shape, now.weights, acceptance.JOINT_STEPS if promising else 0)
+        return _Trial(_JOIN, each.k, shape, now.weights, acceptance.JOINT_STEPS if promising else 0)
 
     starting_anew = any(map(fits.restarts, (*records.to_fit, *records.held)))
 
-    def anew(k: int, numbers: _Numbers) -> list[_Task]:
-        return [_Task(_RESTART, k, *numbers[:2], rms=numbers.rms)] if starting_anew else []
+    def anew(k: int, numbers: _Numbers) -> list[_Trial]:
+        return [_Trial(_RESTART, k, *numbers[:2], rms=numbers.rms)] if starting_anew else []
 
-    def then(task: _Task, numbers: _Numbers) -> list[_Task]:
+    def then(task: _Trial, numbers: _Numbers) -> list[_Trial]:
         return anew(task.k, numbers) if task.what == _POLISH else []
 
-    def all_of(tasks: Sequence[_Task]) -> dict[int, _Numbers]:
+    def all_of(tasks: Sequence[_Trial]) -> dict[int, _Numbers]:
         order = sorted(tasks, key=lambda task: _cost(found[task.k].structure, found[task.k]), reverse=True)
         return {task.k: numbers for task, numbers in pool.each(order, records.tick, then)}  # the latest of each
 
@@ -530,7 +530,7 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) ->
         if numbers.residual > hopeful:
             others += anew(k, numbers)  # with the old start memories the right shape can leave twice the error
         else:
-            going_on.append(_Task(_POLISH, k, *numbers[:2], joint.MOST_STEPS))
+            going_on.append(_Trial(_POLISH, k, *numbers[:2], joint.MOST_STEPS))
     done |= all_of([*going_on, *others])
     tried = []
     for k, option in found.items():

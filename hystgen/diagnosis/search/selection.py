@@ -427,7 +427,7 @@ class Ranked:
 
 
 @dataclass(frozen=True)
-class Withdrawn:
+class Withdrawal:
     """Effects that were accepted at first but not in the end (`borne_out`): what they would have explained."""
 
     names: tuple[str, ...]
@@ -449,7 +449,7 @@ class Outcome:
     fitted: Fitted
     found: tuple[Found, ...]
     rankings: tuple[tuple[Ranked, ...], ...]
-    withdrawn: Withdrawn | None = None
+    withdrawn: Withdrawal | None = None
     ends: tuple[End, ...] = ()
     written: str = REFITTED
 
@@ -583,7 +583,7 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
     if why is None:
         return Outcome(refitted, now, tuple(found), tuple(rankings), ends=ends, written=EXTENDED)
     of_them = tuple(dict.fromkeys(each.name for each in found))
-    withdrawn = Withdrawn(of_them, why, *explained(now, none, records), ends)
+    withdrawn = Withdrawal(of_them, why, *explained(now, none, records), ends)
     return Outcome(refitted, none, (), refused(rankings, why), withdrawn)
 
 

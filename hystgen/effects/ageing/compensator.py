@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.part import Arithmetic, Floating, Margin, One, Verbs
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -101,6 +103,21 @@ def problems(effect: Ageing, span: float) -> Iterator[str]:
         yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST_CHANGE:.0%}"
 
 
+@dataclass(frozen=True)
+class Aged(One):
+    """The block of an effect."""
+
+    effect: Ageing
+
+    def grown(self, size: float, margin: Margin) -> float:
+        """Largest output for inputs within a size."""
+        return size * LARGEST_GAIN
+
+    def asked(self, given: float, asked: float, margin: Margin) -> float:
+        """Largest input that it is solved for, by outputs within a size."""
+        return asked / LEAST_GAIN
+
+
 def turns(effect: Ageing, span: float, roundoff: float) -> int:
     """Newton steps after which the reciprocal of the gain is exact up to rounding."""
     left = max(most_at_once(effect, span), 1e-9)
@@ -130,6 +147,19 @@ class AgeingTables(NamedTuple):
     turns: Counts
 
 
+def tables(blocks: Sequence[Aged], about: Floating) -> AgeingTables:
+    """The tables of several blocks in floating point."""
+    rows = [pieces(one.effect) for one in blocks]
+    last = [float(each[-1, BEGIN] + 1.0 / each[-1, INVERSE_LENGTH]) for each in rows]
+    span = about.ends[1] - about.ends[0]
+    return AgeingTables(
+        np.cumsum([0, *map(len, rows)]).astype(np.int64),
+        about.reals(np.concatenate([np.empty((0, 6)), *rows]), "travels of the ageing"),
+        about.reals([(1.0, 2.0, LEAST_GAIN, LARGEST_GAIN, x) for x in last], "travels of the ageing").reshape(-1, 5),
+        np.array([turns(one.effect, span, about.roundoff) for one in blocks], dtype=np.int64),
+    )
+
+
 def constants(t: AgeingTables) -> Iterator[Constants]:
     """The numbers of each gain."""
     for j, turns in enumerate(map(int, t.turns)):
@@ -142,6 +172,11 @@ class AgeingState(NamedTuple):
 
     block: Reals
     own: Counts
+
+
+def memory(t: AgeingTables, dtype: Any) -> AgeingState:
+    """Memory of all gains."""
+    return AgeingState(np.zeros((len(t.turns), 4), dtype), np.zeros(len(t.turns), np.int64))
 
 
 @jit
@@ -178,6 +213,18 @@ def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> b
 
 
 @jit
+def ageing_reset(t: AgeingTables, s: AgeingState, j: int) -> None:
+    """As in the parameter file: nothing has been travelled."""
+    ageing_set_travel(t, s, j, zero(t.number[j, LAST]))
+
+
+@jit
+def ageing_travelled(s: AgeingState, j: int) -> Any:
+    """The travel."""
+    return s.block[j, HIGH]
+
+
+@jit
 def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
     """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
     inside = gain
@@ -192,8 +239,9 @@ def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
 
 
 @jit
-def ageing_move(t: AgeingTables, s: AgeingState, j: int, way: Any) -> None:
-    """The drive has moved by `way`, either sign."""
+def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) -> None:
+    """The drive has moved to v."""
+    way = v - before
     change = (way if way >= zero(way) else -way) + s.block[j, LOW]
     high = s.block[j, HIGH]
     following = high + change
@@ -212,12 +260,21 @@ def ageing_move(t: AgeingTables, s: AgeingState, j: int, way: Any) -> None:
 
 
 @jit(inline=True)
-def ageing_solve(s: AgeingState, j: int, y: Any) -> Any:
+def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
     """The input that gives the output y."""
     return y * s.block[j, INVERSE]
 
 
 @jit(inline=True)
-def ageing_absorb(s: AgeingState, j: int, x: Any) -> Any:
+def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """The output for the input x."""
     return s.block[j, GAIN] * x
+
+
+ARITHMETIC = Arithmetic(
+    Verbs(
+        memory, absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move, set_gain=ageing_set,
+        set_travel=ageing_set_travel, travelled=ageing_travelled,
+    ),
+    constants, tables,
+)  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -12,9 +12,19 @@ from hystgen.arithmetic.factors import LARGEST as MOST
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.ageing import compensator as floating
-from hystgen.effects.ageing.compensator import GAIN, HIGH, INVERSE, LAST, AgeingState, AgeingTables
+from hystgen.effects.ageing.compensator import (
+    GAIN,
+    HIGH,
+    INVERSE,
+    LAST,
+    Aged,
+    AgeingState,
+    AgeingTables,
+    ageing_travelled,
+)
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.part import Arithmetic, Fixed, Verbs
 from hystgen.effects.thermal.fixed import GAIN_BITS, LARGEST, LEAST, ONE, followed, reciprocal
 from hystgen.plays.slots import zero
 
@@ -38,7 +48,7 @@ def constants(t: AgeingTables) -> Iterator[Constants]:
         yield replace(each, kind=KIND, table=number[-1:], counts=counts, products=(8 + 2 * each.counts[1], 2))
 
 
-def tables(rows: list[tuple[Array, int]], lsb: float, bits: int) -> AgeingTables:
+def tables(rows: Sequence[tuple[Array, int]], lsb: float, bits: int) -> AgeingTables:
     """Pieces of the gain and Newton steps of each ageing, for drive codes of `lsb`.
 
     `bits`: of a gain below a code that sets it. Raises OverflowError.
@@ -65,6 +75,17 @@ def tables(rows: list[tuple[Array, int]], lsb: float, bits: int) -> AgeingTables
         np.array(number, dtype=np.int64).reshape(-1, 5),
         np.array([turns for _, turns in rows], dtype=np.int64),
     )
+
+
+def formats(one: Aged, about: Fixed, *_: float) -> tuple[Array, int]:
+    """Pieces of the gain and Newton steps of a block."""
+    span = about.ends[1] - about.ends[0]
+    return floating.pieces(one.effect), floating.turns(one.effect, span, 2.0**-GAIN_BITS)
+
+
+def made(rows: Sequence[tuple[Array, int]], about: Fixed) -> AgeingTables:
+    """As `tables`."""
+    return tables(rows, float(about.drive_lsb), GAIN_BITS - (about.code_bits - 2))
 
 
 # ---------------------------------------------------------------- ageing_fixed.c
@@ -109,6 +130,12 @@ def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> b
 
 
 @jit
+def ageing_reset(t: AgeingTables, s: AgeingState, j: int) -> None:
+    """As in the parameter file: nothing has been travelled."""
+    ageing_set_travel(t, s, j, zero(t.number[j, LAST]))
+
+
+@jit
 def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
     """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
     given = gain << t.number[j, BITS]
@@ -124,8 +151,9 @@ def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
 
 
 @jit
-def ageing_move(t: AgeingTables, s: AgeingState, j: int, way: Any) -> None:
-    """The drive has moved by `way`, either sign."""
+def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) -> None:
+    """The drive has moved to v."""
+    way = v - before
     following = s.block[j, HIGH] + (way if way >= 0 else -way)
     if following > t.number[j, LAST]:
         following = t.number[j, LAST]
@@ -137,12 +165,21 @@ def ageing_move(t: AgeingTables, s: AgeingState, j: int, way: Any) -> None:
 
 
 @jit
-def ageing_solve(s: AgeingState, j: int, y: Any) -> Any:
+def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
     """The input that gives the output y."""
     return times(y, s.block[j, INVERSE], GAIN_BITS)
 
 
 @jit
-def ageing_absorb(s: AgeingState, j: int, x: Any) -> Any:
+def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """The output for the input x."""
     return times(x, s.block[j, GAIN], GAIN_BITS)
+
+
+ARITHMETIC = Arithmetic(
+    Verbs(
+        floating.memory, absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
+        set_gain=ageing_set, set_travel=ageing_set_travel, travelled=ageing_travelled,
+    ),
+    constants, made, formats,
+)  # fmt: skip

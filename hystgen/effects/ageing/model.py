@@ -121,7 +121,7 @@ class SeveralAgeing(_Ageing):
             return cls(
                 name="ageing", shape="exponentials", losses=tuple((0.1 * x[:2]).tolist()),
                 travels=tuple((total * 10.0 ** x[2:]).tolist()),
-            )  # fmt: skip
+            )
 
         def grown(one: Array) -> Array:
             loss, travel = one

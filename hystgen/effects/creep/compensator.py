@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array, Block, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
 from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.part import Arithmetic, Margin, One, Response, Verbs
 from hystgen.plays.slots import Counts, Reals, zero
 
 EFFECTS = (ExponentialCreep, LogarithmicCreep)
@@ -30,7 +33,8 @@ def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:
 RATE, EARLY, LATE, WEIGHT = 0, 1, 2, 3
 
 
-class CreepNumbers(NamedTuple):
+@dataclass(frozen=True)
+class CreepNumbers(One):
     """Constants of a block `y_k = d h_k + sum X_i`, `X_i <- E_i X_i + c_i (b0_i h_(k-1) + b1_i h_k)` at even steps, in
     double precision: d is the share of a step that arrives at once, c_i >= 0 the weights. `terms` (m, 4): of each state
     1 - E, c b0, c b1, c.
@@ -42,6 +46,26 @@ class CreepNumbers(NamedTuple):
     slope: float  # d + sum c_i b1_i
     rest: float  # d + sum c_i
     terms: Array
+
+    def at_rest(self, x: float) -> float:
+        """The settled output for an input."""
+        return x * self.rest
+
+    def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
+        """What it makes of frequencies, behind other blocks."""
+        rate, early, late, _ = self.terms.T[:, :, None]
+        states = np.sum((early * z + late) / (1.0 - (1.0 - rate) * z), axis=0)
+        passed = found.passed * (self.slope - float(np.sum(late)) + states)
+        return found._replace(passed=passed, direct=found.direct * self.slope, rest=found.rest * self.rest)
+
+    def grown(self, size: float, margin: Margin) -> float:
+        """Largest output for inputs within a size."""
+        return size * self.rest * margin.slack + 1.0
+
+    def asked(self, given: float, asked: float, margin: Margin) -> float:
+        """Largest input that it is solved for, by outputs within a size and after inputs `given`."""
+        moved = given + (asked + given * self.rest) / self.slope
+        return max(moved, asked / self.rest) * margin.slack + 1.0
 
 
 def numbers(effect: ExponentialCreep | LogarithmicCreep, seconds: float) -> CreepNumbers:
@@ -114,6 +138,11 @@ class CreepState(NamedTuple):
     state: Reals
 
 
+def memory(t: CreepTables, dtype: Any) -> CreepState:
+    """Memory of all blocks."""
+    return CreepState(np.zeros((len(t.block), 2), dtype), np.zeros((len(t.term), 2), dtype))
+
+
 @jit
 def creep_rest(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     """Everything has settled at the input x. Returns the output."""
@@ -155,6 +184,11 @@ def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     return y
 
 
+ARITHMETIC = Arithmetic(
+    Verbs(memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
+    lambda blocks, about: tables(blocks, about.reals),
+)  # fmt: skip
+
 # ---------------------------------------------------------------- at steps of any length
 
 
@@ -165,7 +199,7 @@ class UnevenCreep(Block):
         self._numbers = functools.lru_cache(maxsize=64)(functools.partial(numbers, effect))
         self._tables = functools.lru_cache(maxsize=256)(self._of_steps)
         self.advance(1.0)
-        self.state = CreepState(np.zeros((1, 2)), np.zeros((len(self.table.term), 2)))
+        self.state = memory(self.table, np.float64)
 
     def _of_steps(self, seconds: float, later: float) -> CreepTables:
         """As `tables`, with the states on their way to the next output, by the E and b0 of the next step; an input has

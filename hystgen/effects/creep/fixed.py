@@ -8,7 +8,7 @@ rounding leaves is a dead band, and no cycle.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,6 +19,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.creep import compensator as floating
 from hystgen.effects.creep.compensator import AHEAD, BEFORE, HIGH, CreepNumbers, CreepState, CreepTables
 from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.part import Arithmetic, Verbs
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import zero
 
@@ -48,7 +49,7 @@ def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
     return bits, max(0, math.ceil(math.log2(states)) + bits + 2 - (LARGEST.bit_length() - 1))
 
 
-def tables(blocks: list[tuple[CreepNumbers, float]], code: int) -> CreepTables:
+def tables(blocks: Sequence[tuple[CreepNumbers, float]], code: int) -> CreepTables:
     """All creep blocks of a model, each with the largest size of its input; `code` as for `guard`, which may raise."""
     block: list[list[int]] = []
     term: list[list[int]] = []
@@ -116,3 +117,9 @@ def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     s.block[j, BEFORE] = x
     s.block[j, AHEAD] = direct + nearest(following, t.block[j, BITS])
     return direct + nearest(total, t.block[j, BITS])
+
+
+ARITHMETIC = Arithmetic(
+    Verbs(floating.memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
+    lambda blocks, about: tables(blocks, about.bits), lambda one, about, given, _: (one, given * 2.0**about.bits),
+)  # fmt: skip

@@ -233,7 +233,7 @@ class LogarithmicCreep(_Creep):
             return cls(
                 name="creep", shape="logarithmic", per_decade=0.1 * float(x[0]), t0=t0,
                 t_min=10.0**first, t_max=10.0 ** (first + decades),
-            )  # fmt: skip
+            )
 
         wide = high - low
         inside = min(SHORTER, 0.5 * (wide - SHORTEST))  # a short session does not have that many decades
@@ -248,7 +248,7 @@ class LogarithmicCreep(_Creep):
                 np.array([0.1, low, wide]), ended, np.array([0.0, low, wide]),
                 beyond=LOGARITHMIC, amounts=(0,), grown=lambda x: np.array([x[0], low + inside, wide - 2.0 * inside]),
             ),
-        ]  # fmt: skip
+        ]
 
 
 SHAPES = (ExponentialCreep, LogarithmicCreep)

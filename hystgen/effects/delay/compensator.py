@@ -6,10 +6,14 @@ The inverse has it in its preview (`hystgen.compensator.chain.preview`).
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from hystgen.arithmetic.factors import times
+import numpy as np
+
+from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
+from hystgen.effects.part import Arithmetic, Function, Surroundings, Verbs
 from hystgen.plays.slots import Counts, Reals
 
 MOST_SAMPLES = 2**15
@@ -75,3 +79,42 @@ def fixed_delayed(t: DelayTables, line: Waiting) -> Any:
     """The same in fixed point, to the nearest code."""
     oldest = line.sample[line.oldest[0]]
     return oldest + times(line.sample[delay_next(line)] - oldest, t.share[0], t.share[1])
+
+
+def memory(t: DelayTables, dtype: Any) -> Waiting:
+    """Memory of the delay of a model."""
+    return Waiting(np.zeros(t.samples, dtype), np.zeros(1, np.int64))
+
+
+def verbs(delayed: Function) -> Verbs:
+    """What a delay does in an arithmetic, by the function of this name."""
+
+    @jit
+    def rest(t: DelayTables, line: Waiting, j: int, v: Any) -> Any:  # noqa: ARG001  as of every block
+        """The drive has always been v. Returns the one that leaves the delay."""
+        delay_rest(line, v)
+        return delayed(t, line)
+
+    @jit
+    def absorb(t: DelayTables, line: Waiting, j: int, v: Any) -> Any:  # noqa: ARG001  as of every block
+        """The drive is v at this sample. Returns the one that leaves the delay."""
+        delay_put(line, v)
+        return delayed(t, line)
+
+    return Verbs(memory, rest, absorb)
+
+
+def tables(seconds: Sequence[float], about: Surroundings, share: Callable[[float], Any]) -> DelayTables:
+    """The tables of all delays of a model, which follow one another; `share`: that of an arithmetic."""
+    waited, waiting = numbers(math.fsum(seconds), about.seconds)
+    return DelayTables(share(waited) if waiting else share(0.0)[:0], waiting)
+
+
+ARITHMETIC = Arithmetic(
+    verbs(delayed), lambda _: (),
+    lambda blocks, about: tables(blocks, about, lambda share: about.reals([share], "the delay")),
+)  # fmt: skip
+FIXED_ARITHMETIC = Arithmetic(
+    verbs(fixed_delayed), lambda _: (),
+    lambda blocks, about: tables(blocks, about, lambda share: np.array(factor(share), dtype=np.int64)),
+)  # fmt: skip

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
+
+import numpy as np
 
 from hystgen.basics.jit import jit
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.part import Arithmetic, Floating, Function, Verbs
 from hystgen.plays.slots import Reals, zero
 
 # ---------------------------------------------------------------- clock.c
@@ -34,15 +38,20 @@ def constants(t: Reals) -> list[Constants]:
     return [Constants(KIND, row[:ONE], (5, 0)) for row in t]
 
 
+def memory(t: Reals, dtype: Any) -> Reals:
+    """Memory (k, 3) of the clock of a model."""
+    return np.zeros((len(t), 3), dtype)
+
+
 @jit
-def clock_start(s: Reals, j: int) -> None:
+def clock_start(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  as of every block
     """Start the clock at the drive absorbed last."""
     s[j, HIGH] = zero(s[j, HIGH])
     s[j, LOW] = zero(s[j, LOW])
 
 
 @jit
-def clock_tick(t: Reals, s: Reals, j: int) -> None:
+def clock_tick(t: Reals, s: Reals, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  as of every block
     """One sample later."""
     following = s[j, LOW] + t[j, ONE]
     if following >= t[j, CARRY]:
@@ -62,3 +71,38 @@ def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
     if drift < -t[j, FARTHEST]:
         return -t[j, FARTHEST]
     return drift
+
+
+def verbs(memory: Function, start: Function, tick: Function, drift: Function, one: int, most: int) -> Verbs:
+    """What a clock does, by its functions in an arithmetic and the places of 1 and of the farthest lead in tables."""
+
+    @jit(inline=True)
+    def added(t: Reals, s: Reals, j: int) -> Any:
+        """The drift now."""
+        return drift(t, s, j, zero(t[j, one]))
+
+    @jit
+    def lead(t: Reals, s: Reals, j: int, filled: int) -> None:
+        """A reference has come: the next one lies one sample further ahead, up to the preview."""
+        following = t[j, one]
+        if filled:
+            following = following + s[j, LEAD]
+        s[j, LEAD] = t[j, most] if following > t[j, most] else following
+
+    @jit(inline=True)
+    def ahead(t: Reals, s: Reals, j: int, filled: int, moving: int) -> Any:
+        """The drift by the time of the newest reference."""
+        late = s[j, LEAD] if filled else zero(t[j, one])
+        return drift(t, s, j, late + t[j, one] if moving else late)
+
+    return Verbs(memory, reset=start, move=tick, added=added, lead=lead, ahead=ahead)
+
+
+def tables(effects: Sequence[LinearDrift | CurvedDrift], about: Floating) -> Reals:
+    """The tables (k, 8) of the clock of a model."""
+    rows = [numbers(each, about.seconds, about.span, about.ahead) for each in effects]
+    found: Reals = about.reals(rows, "drift").reshape(-1, 8)
+    return found
+
+
+ARITHMETIC = Arithmetic(verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants, tables)

@@ -11,9 +11,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
 from hystgen.basics.jit import jit
+from hystgen.effects.drift import compensator as floating
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.part import Arithmetic, Fixed
 from hystgen.plays.slots import Reals, zero
 
 MOST_SAMPLES = 2**44
@@ -25,7 +29,7 @@ STATE_BITS = 58
 KIND = Kind("clock", own=(), letters="wwwwb", memory="wwwww")
 
 SLOPE, CHANGE, SAMPLES, FARTHEST, BITS, ONE, MOST_AHEAD = range(7)
-LEAD, WHOLE, PART, GAINED, COUNT = 2, 0, 1, 3, 4
+WHOLE, PART, GAINED, COUNT = 0, 1, 3, 4
 
 
 @dataclass(frozen=True)
@@ -85,8 +89,13 @@ def constants(t: Reals) -> list[Constants]:
 # ---------------------------------------------------------------- clock_fixed.c
 
 
+def memory(t: Reals, dtype: Any) -> Reals:
+    """Memory (k, 5) of the clock of a model."""
+    return np.zeros((len(t), 5), dtype)
+
+
 @jit
-def clock_start(s: Reals, j: int) -> None:
+def clock_start(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  as of every block
     """Start the clock at the drive absorbed last."""
     s[j, WHOLE] = zero(s[j, WHOLE])
     s[j, PART] = s[j, WHOLE]
@@ -95,7 +104,7 @@ def clock_start(s: Reals, j: int) -> None:
 
 
 @jit
-def clock_tick(t: Reals, s: Reals, j: int) -> None:
+def clock_tick(t: Reals, s: Reals, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  as of every block
     """One sample later."""
     if s[j, COUNT] >= t[j, SAMPLES]:
         return
@@ -117,3 +126,14 @@ def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
     if drift < -t[j, FARTHEST]:
         return -t[j, FARTHEST]
     return drift
+
+
+def formats(effect: LinearDrift | CurvedDrift, about: Fixed, *_: float) -> ClockNumbers:
+    """The clock of an effect, for references as far ahead as they may come."""
+    return numbers(effect, about.seconds, about.output_lsb / 2**about.bits, float(about.farthest), about.ahead)
+
+
+ARITHMETIC = Arithmetic(
+    floating.verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants,
+    lambda clocks, _: np.array([one.table for one in clocks], dtype=np.int64).reshape(-1, 7), formats,
+)  # fmt: skip

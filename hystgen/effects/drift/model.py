@@ -45,7 +45,7 @@ class LinearDrift(_Drift):
                 "drift", np.array([-10.0]), np.array([10.0]), np.array([0.0]),
                 lambda x: cls(name="drift", rate=float(x[0]) * unit), none=np.array([0.0]),
             )
-        ]  # fmt: skip
+        ]
 
 
 class CurvedDrift(_Drift):

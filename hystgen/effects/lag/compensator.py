@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Block, decays
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag.model import Lag
+from hystgen.effects.part import Arithmetic, Led, Margin, One, Response, Verbs
 from hystgen.plays.slots import Counts, Reals, zero
 
 LONG_STEP = 2.0
@@ -28,10 +32,66 @@ its end, without a limit 0.1. A sine of 100 samples from rest is missed by 0.003
 0.0045 with 1. Set by: benchmarks/chosen_numbers.py branches."""
 
 
-def numbers(
-    effect: Lag, seconds: float, turning: bool = False, exact: bool | None = None
-) -> tuple[bool, tuple[float, float, float, float]]:
-    """Whether the inverse is exact, and its constants: `1 - E`, then b0, b1, `1/b1`, or else theta, b1, `1/(1 - E)`.
+@dataclass(frozen=True)
+class LagNumbers(One):
+    """Whether the inverse is `exact`, and constants: `1 - E`, then b0, b1, `1/b1`, or else theta, b1, `1/(1 - E)`."""
+
+    exact: bool
+    row: tuple[float, float, float, float]
+
+    @property
+    def lead(self) -> float:
+        """Largest gain of its inverse."""
+        rate, second, late, _ = self.row
+        return (2.0 - rate) / (late - second) if self.exact else (1.0 + 2.0 * second) * (2.0 - rate) / rate
+
+    @property
+    def room(self) -> float:
+        """The same, for results on the way."""
+        return 2.0 / self.row[LATE if self.exact else RATE]
+
+    def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
+        """What it makes of frequencies, behind other blocks."""
+        rate, second, late, _ = self.row
+        if self.exact:
+            return found._replace(led=found.led * (1.0 - (1.0 - rate) * z) / (late + second * z))
+        led = found.led * (1.0 + second - second * z) * (1.0 - (1.0 - rate) * z) / rate
+        return found._replace(led=led, arriving=found.arriving * (1.0 - second * second * (1.0 - z) ** 2))
+
+    @property
+    def fineness(self) -> float:
+        """Bits that its lead takes from a signal in front of the plays, 0 for none."""
+        return 0.0 if self.exact else math.log2(4.0 / self.row[RATE])
+
+    def asked(self, given: float, asked: float, margin: Margin) -> float:
+        """Largest input that it is solved for, by outputs within a size and after inputs `given`."""
+        return self.sizes(given, asked, margin.turning).answer
+
+    def sizes(self, given: float, asked: float, turning: bool) -> Sizes:
+        """Those of its signals."""
+        return Sizes(self.exact, self.row[RATE], self.row[LATE], given, asked, turning)
+
+
+class Sizes:
+    """Largest sizes of a lag's signals: its input, the output asked of it, its states, the answer of its inverse;
+    `turning`: in front of two branches."""
+
+    def __init__(
+        self, exact: bool, rate: float, late: float, given: float, asked: float, turning: bool = False
+    ) -> None:
+        self.given, self.asked = given, asked
+        if exact:
+            self.state = given + asked
+            self.answer = given + self.state / late
+        else:
+            # |wanted| <= theta^2 asked + (1 - theta)(theta |wanted| + given), theta at most 1/2; or with two branches
+            # asked and a move that is led, 2 asked, less what the input was short of, (1 - theta)(2 asked + 3 given)
+            self.state = 3.0 * (given + (2.0 if turning else 1.0) * asked)
+            self.answer = given + self.state / rate
+
+
+def numbers(effect: Lag, seconds: float, turning: bool = False, exact: bool | None = None) -> LagNumbers:
+    """The constants of a lag at steps of `seconds`.
 
     `turning`: what follows differs with the direction in which the lag arrives, so that it is led in any case; `exact`:
     as asked for.
@@ -45,7 +105,7 @@ def numbers(
         exact = seconds >= LONG_STEP * effect.time_constant and not turning
     _, early, late = (float(x[0]) for x in decays(np.array([seconds]), effect.time_constant))
     rate = -float(np.expm1(-seconds / effect.time_constant))
-    return exact, (rate, early, late, 1.0 / late) if exact else (rate, early / rate, late, 1.0 / rate)
+    return LagNumbers(exact, (rate, early, late, 1.0 / late) if exact else (rate, early / rate, late, 1.0 / rate))
 
 
 def shifted(theta: float, turning: bool = False) -> float:
@@ -85,26 +145,32 @@ EXACT_KIND = Kind(
 
 
 class LagTables(NamedTuple):
-    """All lags of a model: `exact` (k,), 1 where it is inverted exactly; `block` (k, 4), in fixed point (k, 8)."""
+    """All lags of a model: `exact` (k,), 1 where it is inverted exactly; `block` (k, 4), in fixed point (k, 8);
+    `braked`: 1 if the only one is kept from overshooting behind a slew limit."""
 
     exact: Counts
     block: Reals
+    braked: int
 
 
-def tables(
-    lags: Sequence[tuple[bool, tuple[float, float, float, float]]], reals: Callable[[Any, str], Any]
-) -> LagTables:
+def tables(lags: Sequence[LagNumbers], reals: Callable[[Any, str], Any], braked: int = 0) -> LagTables:
     """The tables of several lags in floating point; `reals`: numbers, with a name, as those of the arithmetic."""
     return LagTables(
-        np.array([int(exact) for exact, _ in lags], dtype=np.int64),
-        reals([row for _, row in lags], "constants of the lag").reshape(len(lags), 4),
+        np.array([int(one.exact) for one in lags], dtype=np.int64),
+        reals([one.row for one in lags], "constants of the lag").reshape(len(lags), 4),
+        braked,
     )
 
 
-def constants(t: LagTables, braked: bool) -> Iterator[Constants]:
-    """The numbers of each lag; `braked`: of the one that there is, behind a slew limit."""
+def constants(t: LagTables) -> Iterator[Constants]:
+    """The numbers of each lag."""
     for exact, row in zip(t.exact, t.block, strict=True):
-        yield Constants(EXACT_KIND if exact else BRAKED_KIND if braked else KIND, row, (3, 3 if exact else 2))
+        yield Constants(EXACT_KIND if exact else BRAKED_KIND if t.braked else KIND, row, (3, 3 if exact else 2))
+
+
+def memory(t: LagTables, dtype: Any) -> Reals:
+    """Memory (k, 6) of all lags."""
+    return np.zeros((len(t.exact), 6), dtype)
 
 
 @jit
@@ -267,6 +333,18 @@ def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any
     return -room if over < -room else over
 
 
+@jit
+def steady_state(s: Reals) -> Any:
+    """Where the lag is."""
+    return s[0, HIGH]
+
+
+LED = Led(steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked, HALVES)
+ARITHMETIC = Arithmetic(
+    Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
+    lambda blocks, about: tables(blocks, about.reals, about.braked),
+)  # fmt: skip
+
 # ---------------------------------------------------------------- at steps of any length
 
 
@@ -338,5 +416,5 @@ class UnevenLag(Block):
 
 def _uneven(effect: Lag, seconds: float) -> tuple[bool, LagTables]:
     """Whether a step is long enough for the exact inverse, and the numbers of both."""
-    long, _ = numbers(effect, seconds)
+    long = numbers(effect, seconds).exact
     return long, tables([numbers(effect, seconds, exact=exact) for exact in (False, True)], lambda x, _: np.array(x))

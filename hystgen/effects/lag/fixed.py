@@ -7,7 +7,7 @@ move `lead` of the lag that it was to make: what another input makes of it is `c
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +17,8 @@ from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag import compensator as floating
-from hystgen.effects.lag.compensator import HALVES, LagTables, steady_led
+from hystgen.effects.lag.compensator import HALVES, LagNumbers, LagTables, Sizes, steady_led
+from hystgen.effects.part import Arithmetic, Led, Verbs
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
@@ -29,34 +30,22 @@ BRAKED_KIND = Kind("braked", own=KIND.own, letters=KIND.letters, memory=KIND.mem
 EXACT_KIND = Kind("lag_exact", own=("rest", "solve", "absorb"), letters="fffbb", memory="ww")
 
 
-def constants(t: LagTables, braked: bool) -> Iterator[Constants]:
+def constants(t: LagTables) -> Iterator[Constants]:
     """As in floating point."""
-    for each, exact in zip(floating.constants(t, braked), t.exact, strict=True):
-        yield replace(each, kind=EXACT_KIND if exact else BRAKED_KIND if braked else KIND, products=(8, 4))
+    for each, exact in zip(floating.constants(t), t.exact, strict=True):
+        yield replace(each, kind=EXACT_KIND if exact else BRAKED_KIND if t.braked else KIND, products=(8, 4))
 
 
-class Sizes:
-    """Largest sizes of a lag's signals: its input, the output asked of it, its states, the answer of its inverse;
-    `turning`: in front of two branches."""
-
-    def __init__(
-        self, exact: bool, rate: float, late: float, given: float, asked: float, turning: bool = False
-    ) -> None:
-        self.given, self.asked = given, asked
-        if exact:
-            self.state = given + asked
-            self.answer = given + self.state / late
-        else:
-            # |wanted| <= theta^2 asked + (1 - theta)(theta |wanted| + given), theta at most 1/2; or with two branches
-            # asked and a move that is led, 2 asked, less what the input was short of, (1 - theta)(2 asked + 3 given)
-            self.state = 3.0 * (given + (2.0 if turning else 1.0) * asked)
-            self.answer = given + self.state / rate
+def memory(t: LagTables, dtype: Any) -> Reals:
+    """Memory (k, 5) of all lags."""
+    return np.zeros((len(t.exact), 5), dtype)
 
 
-def tables(rows: list[tuple[bool, tuple[float, float, float, float], Sizes]]) -> LagTables:
+def tables(rows: Sequence[tuple[LagNumbers, Sizes]], braked: int) -> LagTables:
     """All lags of a model, with the sizes of their signals. Raises OverflowError where states have no room."""
     block: list[list[int]] = []
-    for exact, numbers, sizes in rows:
+    for one, sizes in rows:
+        exact, numbers = one.exact, one.row
         room = STATE_BITS - math.ceil(math.log2(sizes.state))
         wanted = EXACT_BITS if exact else max(math.ceil(-math.log2(numbers[floating.RATE])), 0) + GUARD
         bits = min(wanted, room)
@@ -71,7 +60,7 @@ def tables(rows: list[tuple[bool, tuple[float, float, float, float], Sizes]]) ->
             given = (rate * 2.0**drop, second * 2.0**drop, inverse * 2.0 ** (drop - bits))
         block.append([*(part for x in given for part in factor(x)), bits, drop])
     return LagTables(
-        np.array([int(exact) for exact, *_ in rows], dtype=np.int64), np.array(block, np.int64).reshape(-1, 8)
+        np.array([int(one.exact) for one, _ in rows], dtype=np.int64), np.array(block, np.int64).reshape(-1, 8), braked
     )
 
 
@@ -253,3 +242,11 @@ def coarse(x: Any, drop: Any) -> Any:
 def coarsely(t: LagTables, x: Any, drop: Any) -> Any:
     """`x/(1 - E)` of numbers to search with."""
     return coarse(scaled(t, 0, x << (t.block[0, BITS] + drop), INVERSE), drop)
+
+
+LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked)
+ARITHMETIC = Arithmetic(
+    Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
+    lambda blocks, about: tables(blocks, about.braked),
+    lambda one, about, given, asked: (one, one.sizes(given, asked, about.margin.turning)),
+)  # fmt: skip

@@ -171,7 +171,7 @@ class LoopCentre(_Noncongruent):
             return cls(
                 name="noncongruent", shape="centre", amplitude=float(x[0]),
                 centre=low + wide * float(x[1]), width=10.0 ** float(x[2]),
-            )  # fmt: skip
+            )
 
         def grown(cubic: Array) -> Array:
             largest = max(map(abs, about.drive))
@@ -189,7 +189,7 @@ class LoopCentre(_Noncongruent):
                 "noncongruent, loop centre", np.array([-0.9, 0.0, ends[0]]), np.array([3.0, 1.0, ends[1]]),
                 np.array([0.05, 0.5, start]), build, np.array([0.0, 0.5, start]), (), CUBIC, grown,
             )
-        ]  # fmt: skip
+        ]
 
 
 SHAPES = (PlayFunctions, LoopCentre)

@@ -393,7 +393,7 @@ class RelaxingPlays(_RateDependence):
                 np.append(low, -0.6), np.append(high, 0.6), np.append(start, 0.0), bent, none=np.zeros(2),
                 beyond=straight.label, grown=lambda x: np.append(x, 0.0),
             ),
-        ]  # fmt: skip
+        ]
 
 
 SHAPES = (ThresholdRate, RelaxingPlays)

@@ -17,6 +17,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.part import Arithmetic, Margin, One, Verbs
 from hystgen.effects.resonance.model import Resonance
 from hystgen.plays.slots import Reals, zero
 
@@ -39,7 +40,7 @@ def denominator(effect: Resonance, step: float) -> tuple[float, float]:
 
 
 @dataclass(frozen=True)
-class ModeNumbers:
+class ModeNumbers(One):
     """A mode at one step length, and sums of sizes over all samples of what it does.
 
     `table`: (5,) what `off` and `rate` lose of themselves in a step, how they turn into each other, and what a change
@@ -54,6 +55,10 @@ class ModeNumbers:
     rate_after: float
     turned: float
     slowed: float
+
+    def grown(self, size: float, margin: Margin) -> float:
+        """Largest output for inputs within a size."""
+        return size * self.largest * margin.slack + 1.0
 
 
 def numbers(effect: Resonance, seconds: float) -> ModeNumbers:
@@ -107,8 +112,13 @@ def constants(t: Reals) -> Iterator[Constants]:
         yield Constants(KIND, row, (6, 0))
 
 
+def memory(t: Reals, dtype: Any) -> Reals:
+    """Memory (k, 3) of all modes."""
+    return np.zeros((len(t), 3), dtype)
+
+
 @jit
-def mode_rest(s: Reals, j: int, x: Any) -> Any:
+def mode_rest(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """Everything has settled at the input x. Returns the output."""
     s[j, BEFORE] = x
     s[j, OFF] = zero(x)
@@ -126,3 +136,9 @@ def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
     s[j, RATE] = rate + ((t[j, SWING] * rate - t[j, TURN] * off) + t[j, PUSH] * change)
     s[j, BEFORE] = x
     return x + s[j, OFF]
+
+
+ARITHMETIC = Arithmetic(
+    Verbs(memory, mode_rest, mode_absorb), constants,
+    lambda blocks, about: about.reals([one.table for one in blocks], "the modes").reshape(-1, 5),
+)  # fmt: skip

@@ -7,7 +7,7 @@ below the sample rate a small factor, to 31 bits of its own.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifte
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
+from hystgen.effects.part import Arithmetic, Verbs
 from hystgen.effects.resonance import compensator
 from hystgen.effects.resonance.compensator import BEFORE, OFF, RATE, ModeNumbers
 from hystgen.plays.fixed import nearest
@@ -67,7 +68,7 @@ def rounding(one: ModeNumbers, table: Any, size: float) -> float:
     return lost + 0.5 * state + 0.5
 
 
-def tables(rows: list[list[int]]) -> Any:
+def tables(rows: Sequence[list[int]]) -> Any:
     """All modes of a model, (k, 13)."""
     return np.array(rows, dtype=np.int64).reshape(-1, 13)
 
@@ -97,3 +98,9 @@ def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
     s[j, RATE] = rate + (scaled(t, j, rate, SWING) - scaled(t, j, off, TURN) + push)
     s[j, BEFORE] = x
     return x + nearest(s[j, OFF], t[j, BITS])
+
+
+ARITHMETIC = Arithmetic(
+    Verbs(compensator.memory, mode_rest, mode_absorb), constants, lambda rows, _: tables(rows),
+    lambda one, about, given, _: row(one, given * 2.0**about.bits),
+)  # fmt: skip

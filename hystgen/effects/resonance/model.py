@@ -148,7 +148,7 @@ class Resonance(_Mode):
                 others=tuple(starts[1:]),
             )
             for name, starts in _places(about).items() if starts
-        ]  # fmt: skip
+        ]
 
 
 class PartMode(_Mode):
@@ -198,7 +198,7 @@ class PartMode(_Mode):
                 "resonance of a share", np.array([low, -2.5, 1e-3]), np.array([high, np.log10(0.2), 0.5]), first,
                 build, others=tuple(others), amounts=(2,),
             )
-        ]  # fmt: skip
+        ]
 
 
 FIRST_SHARE = 0.1

@@ -88,7 +88,7 @@ class TanhSaturation(_Level):
                 "saturation behind, tanh off centre", np.array([-1.0, -1.0]), np.array([3.0, 2.0]), starts[0], build,
                 none, tuple(starts[1:]),
             ),
-        ]  # fmt: skip
+        ]
 
 
 class HardSaturation(_Level):
@@ -145,7 +145,7 @@ class Stops(_Saturation):
             return cls(
                 name="saturation", shape="stops", lower=bottom + wide * float(x[1]), upper=top - wide * float(x[0]),
                 give=float(x[2]),
-            )  # fmt: skip
+            )
 
         def grown(hard: Array) -> Array:
             level = wide * 10.0 ** float(hard[0])
@@ -158,7 +158,7 @@ class Stops(_Saturation):
                 "saturation behind, stops", np.array([AWAY, AWAY, 0.0]), np.array([FARTHEST, FARTHEST, 0.9]), one,
                 build, np.array([AWAY, AWAY, GIVE]), (other,), HARD, grown,
             )
-        ]  # fmt: skip
+        ]
 
 
 SHAPES = (TanhSaturation, HardSaturation, Stops)

@@ -124,7 +124,7 @@ class SensorCurve(_Sensor):
         return x, np.stack([
             np.concatenate([y[:1], y[:-1], y[-1:]]), np.concatenate([at[:1], at]),
             np.concatenate([zero, square, zero]), np.concatenate([zero, cube, zero]),
-        ])  # fmt: skip
+        ])
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
@@ -145,7 +145,7 @@ class SensorCurve(_Sensor):
                 return cls(
                     name="sensor_nonlinearity", shape="curve", knots=tuple(knots.tolist()),
                     values=tuple(values.tolist()),
-                )  # fmt: skip
+                )
 
             def grown(cubic: Array) -> Array:
                 shown = SensorPolynomial(

@@ -193,7 +193,7 @@ class SuddenSlewLimit(_SlewLimit):
     edge: float = Field(
         default=MIDDLE, ge=0.0, le=1.0,
         description="when such a step happens: 0 at the earlier of two samples, 1 at the later one",
-    )  # fmt: skip
+    )
 
     later: ClassVar[tuple[str, ...]] = ("shape", "edge")
 
@@ -239,7 +239,7 @@ class SuddenSlewLimit(_SlewLimit):
                 f"{SUDDEN} anywhere, {both}", 2, about, True, beyond=STRAIGHT,
                 grown=lambda x: np.append(np.repeat(x, 2), MIDDLE),
             ),
-        ]  # fmt: skip
+        ]
 
 
 SHAPES = (SlewLimit, SuddenSlewLimit)

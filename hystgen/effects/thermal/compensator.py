@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.part import Arithmetic, Floating, Margin, One, Verbs
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -44,6 +46,31 @@ def constants(t: Reals) -> Iterator[Constants]:
         yield Constants(KIND, row[:ONE], (1, 1))
 
 
+@dataclass(frozen=True)
+class Warm(One):
+    """The block of an effect."""
+
+    effect: LoggedThermal | OwnHeat
+
+    def farthest(self, ends: tuple[float, float], span: float, seconds: float) -> float:
+        """Largest move of a drive within `ends` that may be repeated in every step, where the output spans `span`."""
+        return math.inf if isinstance(self.effect, LoggedThermal) else farthest(self.effect, ends, span, seconds)
+
+    def grown(self, size: float, margin: Margin) -> float:
+        """Largest output for inputs within a size."""
+        return size * LARGEST_GAIN + margin.span
+
+    def asked(self, given: float, asked: float, margin: Margin) -> float:
+        """Largest input that it is solved for, by outputs within a size."""
+        return (asked + margin.span) / LEAST_GAIN
+
+
+def tables(blocks: Sequence[Warm], about: Floating) -> Any:
+    """The tables (k, 8) of several gains in floating point."""
+    effects: list[Any] = [one.effect for one in blocks]
+    return about.reals([numbers(each, about.span) for each in effects], "temperatures").reshape(-1, 8)
+
+
 def numbers(effect: LoggedThermal, span: float) -> tuple[float, ...]:
     """Constants of a block behind which the output spans `span`: rates, reference, and between which temperatures.
 
@@ -62,6 +89,11 @@ def numbers(effect: LoggedThermal, span: float) -> tuple[float, ...]:
         effect.reference + max(down, -largest), effect.reference + min(up, largest),
         LEAST_GAIN, LARGEST_GAIN, 1.0,
     )  # fmt: skip
+
+
+def memory(t: Reals, dtype: Any) -> Reals:
+    """Memory (k, 3) of all gains."""
+    return np.zeros((len(t), 3), dtype)
 
 
 @jit
@@ -100,13 +132,13 @@ def gain_heat(t: Reals, s: Reals, j: int, temperature: Any) -> bool:
 
 
 @jit(inline=True)
-def gain_solve(s: Reals, j: int, y: Any) -> Any:
+def gain_solve(t: Reals, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
     """The input that gives the output y."""
     return (y - s[j, OFFSET]) * s[j, INVERSE]
 
 
 @jit(inline=True)
-def gain_absorb(s: Reals, j: int, x: Any) -> Any:
+def gain_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """The output for the input x."""
     return s[j, GAIN] * x + s[j, OFFSET]
 
@@ -261,10 +293,28 @@ def heat_turns(effect: OwnHeat, ends: tuple[float, float], seconds: float, round
     return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
 
 
+def heat_tables(blocks: Sequence[Warm], about: Floating) -> HeatTables:
+    """The tables of several blocks in floating point."""
+    effects: list[Any] = [one.effect for one in blocks]
+    ends, seconds = about.ends, about.seconds
+    rubbing = [thresholds(each, ends) for each in effects]
+    return HeatTables(
+        about.reals([heat_numbers(e, ends, about.span, seconds) for e in effects], "temperatures").reshape(-1, 7),
+        np.array([heat_turns(each, ends, seconds, about.roundoff) for each in effects], dtype=np.int64),
+        about.reals(padded(rubbing), "thresholds"),
+        np.array([len(each) for each in rubbing], dtype=np.int64),
+    )
+
+
 def heat_constants(t: HeatTables) -> Iterator[Constants]:
     """The numbers of each block."""
     for row, turns in zip(t.number, map(int, t.turns), strict=True):
         yield Constants(HEAT_KIND, row[:HEAT_ONE], (7 + 2 * turns, 1), counts=(turns,))
+
+
+def heat_memory(t: HeatTables, dtype: Any) -> Reals:
+    """Memory of all blocks."""
+    return np.zeros((len(t.turns), HEAT_STATE), dtype)
 
 
 @jit
@@ -306,13 +356,13 @@ def heat_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> None:
 
 
 @jit(inline=True)
-def heat_solve(s: Reals, j: int, y: Any) -> Any:
+def heat_solve(t: HeatTables, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
     """The input that gives the output y."""
     return (y - s[j, HEAT_OFFSET]) * s[j, HEAT_INVERSE]
 
 
 @jit(inline=True)
-def heat_absorb(s: Reals, j: int, x: Any) -> Any:
+def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """The output for the input x."""
     return s[j, HEAT_GAIN] * x + s[j, HEAT_OFFSET]
 
@@ -355,3 +405,13 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
         s[j, AT + i] = to
         odd = odd + t.number[j, HEAT_TWO]
     return amount
+
+
+ARITHMETIC = Arithmetic(
+    Verbs(memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
+    constants, tables,
+)  # fmt: skip
+HEAT_ARITHMETIC = Arithmetic(
+    Verbs(heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
+    heat_constants, heat_tables,
+)  # fmt: skip

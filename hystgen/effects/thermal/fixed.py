@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.part import Arithmetic, Fixed, Verbs
 from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
     AT,
@@ -22,6 +23,7 @@ from hystgen.effects.thermal.compensator import (
     LEAST_GAIN,
     OFFSET,
     HeatTables,
+    Warm,
 )
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
@@ -44,7 +46,7 @@ def constants(t: Reals) -> Iterator[Constants]:
     yield from (Constants(KIND, row, (2, 2)) for row in t)
 
 
-def tables(rows: list[tuple[float, ...]], level: float, bits: int, degrees: float) -> Reals:
+def tables(rows: Sequence[tuple[float, ...]], level: float, bits: int, degrees: float) -> Reals:
     """All gains of a model, `rows` as `numbers` has them; `level`: signals per unit of the output, `bits`: of a
     temperature below a code, of which the largest is `degrees`. Raises OverflowError."""
     found = []
@@ -55,6 +57,17 @@ def tables(rows: list[tuple[float, ...]], level: float, bits: int, degrees: floa
         inside = [round(min(max(end, -degrees), degrees) * whole) for end in ends]
         found.append([*(part for x in rates for part in factor(x)), *inside, bits])
     return np.array(found, dtype=np.int64).reshape(-1, 8)
+
+
+def formats(one: Warm, about: Fixed, *_: float) -> tuple[float, ...]:
+    """The numbers of a gain."""
+    return floating.numbers(one.effect, about.span)  # type: ignore[arg-type]
+
+
+def made(rows: Sequence[tuple[float, ...]], about: Fixed) -> Reals:
+    """As `tables`."""
+    degrees = about.code_max / 2.0**about.temperature
+    return tables(rows, about.level, TEMPERATURE_BITS - about.temperature, degrees)
 
 
 # ---------------------------------------------------------------- gain_fixed.c
@@ -110,13 +123,13 @@ def gain_heat(t: Reals, s: Reals, j: int, temperature: Any) -> bool:
 
 
 @jit
-def gain_solve(s: Reals, j: int, y: Any) -> Any:
+def gain_solve(t: Reals, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
     """The input that gives the output y."""
     return times(y - s[j, OFFSET], s[j, INVERSE], GAIN_BITS)
 
 
 @jit
-def gain_absorb(s: Reals, j: int, x: Any) -> Any:
+def gain_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """The output for the input x."""
     return times(x, s[j, GAIN], GAIN_BITS) + s[j, OFFSET]
 
@@ -146,6 +159,8 @@ class Heat:
     table: tuple[int, ...]
     thresholds: tuple[int, ...]
     error: float
+    turns: int = 0
+    """Newton steps"""
 
 
 def heat(
@@ -176,6 +191,26 @@ def heat(
     error = rounding / rate + 2.0 * kept + min(warmest, hottest) * 2.0**-29
     hot = min(round(hottest / kept), 1 << AMOUNT_BITS)
     return Heat((*factors, hot, coarse, lift, drop, bits), tuple(rows), error)
+
+
+def heat_formats(one: Warm, about: Fixed, *_: float) -> Heat:
+    """Own heat of a block."""
+    effect: Any = one.effect
+    numbers = floating.heat_numbers(effect, about.ends, about.span, about.seconds)
+    rubbing = floating.thresholds(effect, about.ends)
+    turns = floating.heat_turns(effect, about.ends, about.seconds, 2.0**-GAIN_BITS)
+    found = heat(numbers, rubbing, about.drive, float(about.drive_lsb), about.level, about.code_bits)
+    return replace(found, turns=turns)
+
+
+def heat_tables(rows: Sequence[Heat], about: Fixed) -> HeatTables:  # noqa: ARG001  as of every block
+    """The tables of several blocks."""
+    return HeatTables(
+        np.array([one.table for one in rows], dtype=np.int64).reshape(-1, BITS_BELOW + 1),
+        np.array([one.turns for one in rows], dtype=np.int64),
+        np.array(floating.padded([one.thresholds for one in rows]), dtype=np.int64),
+        np.array([len(one.thresholds) for one in rows], dtype=np.int64),
+    )
 
 
 def heat_constants(t: HeatTables) -> Iterator[Constants]:
@@ -222,13 +257,13 @@ def heat_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> None:
 
 
 @jit
-def heat_solve(s: Reals, j: int, y: Any) -> Any:
+def heat_solve(t: HeatTables, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
     """The input that gives the output y."""
     return times(y - s[j, HEAT_OFFSET], s[j, HEAT_INVERSE], GAIN_BITS)
 
 
 @jit
-def heat_absorb(s: Reals, j: int, x: Any) -> Any:
+def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
     """The output for the input x."""
     return times(x, s[j, HEAT_GAIN], GAIN_BITS) + s[j, HEAT_OFFSET]
 
@@ -274,3 +309,13 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
             break
         s[j, AT + i] = to
     return amount
+
+
+ARITHMETIC = Arithmetic(
+    Verbs(floating.memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
+    constants, made, formats,
+)  # fmt: skip
+HEAT_ARITHMETIC = Arithmetic(
+    Verbs(floating.heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
+    heat_constants, heat_tables, heat_formats,
+)  # fmt: skip

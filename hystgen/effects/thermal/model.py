@@ -194,7 +194,7 @@ class SelfHeating(OwnHeat):
                 return cls(
                     name="thermal", source="self_heating", time_constant=float(10.0 ** x[0]), heating=heating,
                     gain_per_degree=gain, offset_per_degree=offset,
-                )  # fmt: skip
+                )
 
             low, high, start, others = _numbers(row, about)
             found.append(Candidate(f"{SELF_HEATING}, {what}", low, high, start, build, start, others))
@@ -238,7 +238,7 @@ class HysteresisHeating(OwnHeat):
                     name="thermal", source="hysteresis", time_constant=float(10.0 ** x[0]),
                     heating=2.0 / max(reach * reach * rate, 1e-12), reach=reach,
                     gain_per_degree=gain, offset_per_degree=offset,
-                )  # fmt: skip
+                )
 
             def grown(x: Array) -> Array:
                 return np.append(x, REACH)
@@ -249,7 +249,7 @@ class HysteresisHeating(OwnHeat):
                     f"thermal, heat of hysteresis, {what}", np.append(low, SMALLEST), np.append(high, LARGEST),
                     grown(start), build, grown(start), tuple(map(grown, others)), f"{SELF_HEATING}, {what}", grown,
                 )
-            )  # fmt: skip
+            )
         return found
 
 

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 8b3e18cf53be0d8692dc82ee4a689e4b0e23c7b9dd3dfd1234ef9c26cec0db1f, without this line
+ * Text: sha256 2d3f1b0b55a9cbd567b898af731c5c0de340d1ddc7c91c373e737069d0e63b16, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -19,6 +19,10 @@
  *     inverse instance  104 bytes of RAM
  *     forward step, worst case: 8 multiplications (2 + 1 n), 22 comparisons (10 + 2 n)
  *     inverse step, worst case: 23 multiplications (5 + 3 n), 38 comparisons (20 + 3 n)
+ *     forward step, dearest: about 8260 instructions and 216 bytes of stack on a Cortex-M0+, 4409
+ *         and 204 on a Cortex-M4F, as measured for such a model
+ *     inverse step, dearest: about 19054 instructions and 272 bytes of stack on a Cortex-M0+, 9478
+ *         and 272 on a Cortex-M4F, as measured for such a model
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
  * memory of the parameter file; reset starts again from plays at 0. Not for targets that flush

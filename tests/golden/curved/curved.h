@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 9236fca093b4064ea45d6f9fd71c33f88f05ff8487f9e0684d8a5b767758d454, without this line
+ * Text: sha256 48420c62b5144758d40c977b35e68f25adcc795811e40d433a529c6ac7c7e817, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -24,6 +24,8 @@
  *     inverse instance  168 bytes of RAM
  *     inverse step, worst case: 13 multiplications of 32 by 32 bits, 47 comparisons (35 + 4 b, b =
  *         3 the bits of n)
+ *     inverse step, dearest: about 1904 instructions and 248 bytes of stack on a Cortex-M0+, 902
+ *         and 112 on a Cortex-M4F, as measured for such a model
  * On an 8-bit AVR constants lie in RAM too: at most 2197 bytes of RAM in all, 33 of them for each
  * play
  *

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 c7b5b02c88b41ecb35c23f350e076d76cdb35b0fcfbbdb7f537ab445264af7aa, without this line
+ * Text: sha256 a5a698b8f6e1c080ea8d5dcf0e5f0c5ed29345d84b21b6a193fbc6d6bb436723, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -16,6 +16,8 @@
  *     constant tables   212 bytes
  *     inverse instance  200 bytes of RAM
  *     inverse step, worst case: 17 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)
+ *     inverse step, dearest: about 2477 instructions and 248 bytes of stack on a Cortex-M0+, 272
+ *         and 112 on a Cortex-M4F, as measured for such a model
  * On an 8-bit AVR constants lie in RAM too: at most 384 bytes of RAM in all, 31 of them for each
  * play
  *

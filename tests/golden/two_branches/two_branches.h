@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 733618859add474504e2559c64574ac51d9954dc417cbfc277920a5e4df41869, without this line
+ * Text: sha256 7b40b36260742fa41814d1070ca2adde46a88514153c915e151abbf5738043fd, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -18,6 +18,8 @@
  *     inverse instance  220 bytes of RAM
  *     inverse step, worst case: 32 multiplications, 58 comparisons (46 + 4 b, b = 3 the bits of n),
  *         1 tanh, 2 atanh
+ *     inverse step, dearest: about 12362 instructions and 304 bytes of stack on a Cortex-M0+, 894
+ *         and 120 on a Cortex-M4F, as measured for such a model
  * On an 8-bit AVR constants lie in RAM too: at most 1016 bytes of RAM in all, 31 of them for each
  * play
  *

@@ -1,0 +1,125 @@
+"""Measure the dearest sample of emitted models: its instructions, and the bytes of stack of the deepest call.
+
+    python benchmarks/step_costs.py [-o FOLDER] [--jobs 2]
+
+The records are those of `hystgen verify`, and the figures are what it reports: of zig and gcc, and of their builds, the
+larger one, on a Cortex-M0+ without and a Cortex-M4F with an FPU. `plays` are models of so many plays, `effects` the
+same with the effect that takes least; a memoryless part and each part of the code of effects is what a model of
+`CODE_PLAYS` plays takes beyond that. Its stack is that of the whole model. Parts that move or bend plays are measured
+for one play as well. `step_costs.csv` is read by `hystgen.compensator.engines`, for the banner of emitted files.
+"""
+
+from __future__ import annotations
+
+import argparse
+import concurrent.futures
+import csv
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import effect_costs
+import engine_costs
+
+import hystgen
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.compensator import engines
+from hystgen.compensator.chain.costs import OPERATORS, PER_PLAY
+from hystgen.model import Model
+
+PLAYS = (1, 4, 16, 64)
+FEW, MANY = 1, engine_costs.CODE_PLAYS
+SAMPLES = 300
+"""Samples of each record: with 1000 the dearest of ten plays takes at most 2 % more (float32 and q31, both cores)."""
+
+Measured = dict[str, tuple[int, ...]]
+"""By operator: instructions on each core, then bytes of stack on each."""
+Row = tuple[Any, ...]
+
+
+def worst(model: Model, arithmetic: str, engine: str, operator: str = "both") -> Measured:
+    """The dearest sample and the deepest call of each operator."""
+    report = hystgen.verify(model, arithmetic, operator, engine, targets=list(engines.CORES), target_length=SAMPLES)
+    assert report.ok, report.table()
+    found = {}
+    for op in ("forward", "inverse") if operator == "both" else (operator,):
+        rows = [[row for row in report.rows if (row.operator, row.target) == (op, core)] for core in engines.CORES]
+        found[op] = (
+            *(max(row.max_instructions or 0 for row in of) for of in rows),
+            *(max(row.stack or 0 for row in of) for of in rows),
+        )
+    return found
+
+
+def beyond(found: Measured, base: Measured) -> Measured:
+    """The instructions that a model takes beyond those of another one, and its own stack."""
+    cores = len(engines.CORES)
+    return {
+        op: (*(a - b for a, b in zip(of[:cores], base[op][:cores], strict=True)), *of[cores:])
+        for op, of in found.items()
+    }
+
+
+def measure(arithmetic: str) -> list[Row]:
+    """All rows of an arithmetic."""
+    rows: list[Row] = []
+
+    def add(part: str, engine: str, n: int, found: Mapping[str, tuple[int, ...]]) -> None:
+        for op, of in found.items():
+            rows.append((part, arithmetic, engine, op, n, *of))
+            print(*rows[-1], flush=True)
+
+    bases: dict[tuple[str, str, int], Measured] = {}
+    for engine in engines.ENGINES:
+        for part, effects in (("plays", ""), ("effects", engine_costs.GAIN)):
+            for n in sorted({*PLAYS, MANY}):
+                bases[part, engine, n] = worst(engine_costs.model(n, "", effects), arithmetic, engine)
+                if n in PLAYS:
+                    add(part, engine, n, bases[part, engine, n])
+        for kind, front in engine_costs.FRONTS.items():
+            model = engine_costs.model(MANY, front)
+            if front and engines.kind(model.cascade, arithmetic) == kind:
+                add(kind, engine, MANY, beyond(worst(model, arithmetic, engine), bases["plays", engine, MANY]))
+    for part, n, found in _effects(arithmetic, bases):
+        add(part, "loop", n, found)
+    return rows
+
+
+def _effects(arithmetic: str, bases: Mapping[tuple[str, str, int], Measured]) -> Iterator[tuple[str, int, Measured]]:
+    for n in (MANY, FEW):
+        apart: dict[str, Measured] = {}
+        for part in effect_costs.EFFECTS:
+            if part == "gain" or (n == FEW and part not in PER_PLAY):
+                continue
+            operator = OPERATORS.get(part, "both")
+            apart[part] = worst(effect_costs.model(part, n), arithmetic, "loop", operator)
+        for part, found in apart.items():
+            base = bases["effects", "loop", n]
+            if part in effect_costs.MOVED:
+                base = apart["dilated"]
+            elif part in effect_costs.INSIDE:
+                base = apart[effect_costs.INSIDE[part]]
+            more = beyond(found, base)
+            if part == "braked":
+                for one in ("lag", "slew"):
+                    more = beyond(more, beyond(apart[one], base))
+            yield part, n, more
+
+
+def main() -> None:
+    """Measure everything and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("-o", "--output", type=Path, default=engine_costs.SHIPPED, help="folder, default the shipped")
+    parser.add_argument("--jobs", type=int, default=2)
+    given = parser.parse_args()
+    with concurrent.futures.ProcessPoolExecutor(given.jobs) as pool:
+        rows = [row for of in pool.map(measure, ARITHMETICS) for row in of]
+    with (given.output / "step_costs.csv").open("w", newline="", encoding="ascii") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        stacks = (f"{core} stack" for core in engines.CORES)
+        writer.writerow(("part", "arithmetic", "engine", "operator", "n", *engines.CORES, *stacks))
+        writer.writerows(sorted(rows))
+
+
+if __name__ == "__main__":
+    main()
