@@ -339,7 +339,7 @@ def _functions(
                 "}",
                 f"return hystgen_steady_{'braked' if t.braked else 'solve'}(&self->steady, {block.table}, "
                 f"&self->{block.name}, a, rises,",
-                "    hystgen_entered_drive(self->applied), HYSTGEN_DITHER);",
+                "    hystgen_drive_signal(self->applied), HYSTGEN_DITHER);",
             ]
             head = f"HYSTGEN_APART hystgen_signal_t hystgen_inverse_drive_side_solve({self_t}, hystgen_signal_t a)"
             yield _function(f"{leads} The lag arrives from the side of its branch.", head, lines)

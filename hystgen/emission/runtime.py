@@ -141,7 +141,7 @@ class Family(ABC):
     """Headers of the run time that have the prototypes of its kernels."""
     build: ClassVar[tuple[str, ...]] = ("arithmetic/build.h",)
     """Headers that check how code is built."""
-    shared_version: ClassVar[int] = 2
+    shared_version: ClassVar[int] = 3
     """Of the interface between emitted models and a shared run time."""
 
     @property
