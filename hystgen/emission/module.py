@@ -77,7 +77,7 @@ def _variant(
     moves, bends = chain.plays(t)
     return dataclasses.replace(
         plain, chain=True, slew=bool(t.slew), braked=bool(t.braked), quiet=bool(t.quiet), turning=bool(t.turning),
-        waits=t.delay.samples > 0, ages=bool(compiled.parts.ageing), moves=moves, bends=bends,
+        waits=t.delay.samples > 0, previews=len(t.tap) > 0, ages=bool(compiled.parts.ageing), moves=moves, bends=bends,
     )
 
 
