@@ -228,7 +228,7 @@ def files(module: Module) -> dict[str, str]:
     def top(file: str, what: str, details: Sequence[str] = ()) -> str:
         return interface.banner(file, what, command, module.sha256, details)
 
-    details = interface.details(one, module.doubts, module.cost)
+    details = interface.details(one, [*module.reading, *module.doubts], module.cost)
     found = {
         f"{name}.h": template(
             "module.h.j2", module=module, one=one, header=interface, single_header=single, shared=shared,
