@@ -9,7 +9,7 @@
 
 #ifdef HYSTGEN_FIXED
 uint64_t hystgen_wide(uint32_t a, uint32_t b);
-int64_t hystgen_over_slope(int64_t d, uint32_t reciprocal, unsigned int shift);
+int64_t hystgen_divide_by_slope(int64_t d, uint32_t reciprocal, unsigned int shift);
 int64_t hystgen_nearest(int64_t x, unsigned int bits);
 int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,
                       unsigned int pieces, unsigned int degree, int32_t x);
@@ -57,6 +57,6 @@ void hystgen_loop_start(const hystgen_tables_t *t, hystgen_play_t *play,
 void hystgen_loop_absorb(const hystgen_tables_t *t, hystgen_play_t *play, hystgen_play_t w);
 hystgen_sum_t hystgen_loop_output(const hystgen_tables_t *t, const hystgen_play_t *play);
 hystgen_reach_t hystgen_loop_solve(const hystgen_tables_t *t, const hystgen_play_t *play,
-                                   hystgen_sum_t output);
+                                   hystgen_sum_t here, hystgen_sum_t output);
 
 #endif

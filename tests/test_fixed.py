@@ -210,7 +210,7 @@ def test_the_reciprocal_divides_to_the_nearest(d: int, seed: int) -> None:
         slope = int(tables.slope[k])
         if d // slope < 2**32:
             allowed = Fraction(1, 2) + Fraction(d, slope * 2**31) + Fraction(1, 2**8)
-            assert abs(int(fixed.over_slope.py_func(tables, np.int64(d), k)) - Fraction(d, slope)) <= allowed
+            assert abs(int(fixed.divide_by_slope.py_func(tables, np.int64(d), k)) - Fraction(d, slope)) <= allowed
 
 
 @pytest.mark.parametrize("name", ["curved", "two_branches", "mixed", "bent", "behind"])

@@ -44,7 +44,7 @@ void loop(const double *r, const double *p, const double *lift, const double *in
     t.threshold = r; t.weight = p; t.lift = lift; t.inverse_slope = inverse; t.n = n;
     hystgen_loop_rest(&t, play, 0);
     for (i = 0; i < count; ++i) {
-        double w = invert ? hystgen_loop_solve(&t, play, x[i]) : x[i];
+        double w = invert ? hystgen_loop_solve(&t, play, hystgen_loop_output(&t, play), x[i]) : x[i];
         hystgen_loop_absorb(&t, play, w);
         y[i] = invert ? w : hystgen_loop_output(&t, play);
     }

@@ -168,7 +168,8 @@ HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t
 HYSTGEN_APART int64_t hystgen_solved(const hystgen_curve_t *t, const hystgen_place_t *here,
                                      const hystgen_kink_t *kink, int64_t to) {
     const hystgen_segment_t *s = &t->segment[kink->k];
-    const int64_t x = kink->input + hystgen_over_slope(to - kink->output, s->reciprocal, s->shift);
+    const int64_t x =
+        kink->input + hystgen_divide_by_slope(to - kink->output, s->reciprocal, s->shift);
     const int64_t most = t->range[hystgen_direction(here->rising)];
     return hystgen_along(here, x > most ? most : x);
 }

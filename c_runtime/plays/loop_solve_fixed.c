@@ -4,21 +4,21 @@
 #include "hystgen_runtime.h"
 
 /* The input of the plays whose output is d further than that of w, between `least` and `most`. */
-static hystgen_reach_t hystgen_going(const hystgen_tables_t *t, hystgen_reach_t w, hystgen_sum_t d,
-                                     unsigned int k, bool rising) {
-    const hystgen_sum_t step = hystgen_over_slope(d, t->reciprocal[k], t->shift[k]);
+static hystgen_reach_t hystgen_input_further(const hystgen_tables_t *t, hystgen_reach_t w,
+                                             hystgen_sum_t d, unsigned int k, bool rising) {
+    const hystgen_sum_t step = hystgen_divide_by_slope(d, t->reciprocal[k], t->shift[k]);
     if (rising) {
         return step > (hystgen_sum_t)t->most - w ? t->most : (hystgen_reach_t)(w + step);
     }
     return step > (hystgen_sum_t)w - t->least ? t->least : (hystgen_reach_t)(w - step);
 }
 
-/* The input of the plays that gives `output`: lets the plays follow one by one until the next would
-   be too much. The output still to go, `left`, only shrinks, so that no sum exceeds the first one,
-   whatever the plays hold. */
+/* The input of the plays that gives `output`; now they give `here`. Lets the plays follow one by
+   one until the next would be too much. The output still to go, `left`, only shrinks, so that no
+   sum exceeds the first one, whatever the plays hold. */
 HYSTGEN_API hystgen_reach_t hystgen_loop_solve(const hystgen_tables_t *t,
-                                               const hystgen_play_t *play, hystgen_sum_t output) {
-    const hystgen_sum_t here = hystgen_loop_output(t, play);
+                                               const hystgen_play_t *play, hystgen_sum_t here,
+                                               hystgen_sum_t output) {
     const bool rising = output > here;
     hystgen_sum_t left = rising ? output - here : here - output;
     hystgen_reach_t w = play[0];
@@ -39,5 +39,5 @@ HYSTGEN_API hystgen_reach_t hystgen_loop_solve(const hystgen_tables_t *t,
         left = left - step;
         w = start;
     }
-    return hystgen_going(t, w, left, k, rising);
+    return hystgen_input_further(t, w, left, k, rising);
 }

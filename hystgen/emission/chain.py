@@ -5,11 +5,12 @@ themselves are in `c_runtime/` and in the folders of effects.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from hystgen.emission.compensator import Effects, Field, Form, Glue, Stage, Table, Writer, entries
+from hystgen.emission.runtime import template
 from hystgen.emission.text import operand
 from hystgen.plays import slots
 
@@ -209,8 +210,7 @@ def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Seque
     t, chain = compiled.tables, Chain.of(compiled.tables, operators)
     shape = Shape.of(t, form)
     functions = [
-        line for op in operators
-        for line in _functions(op, shape, *chain.sides[op], behind, chain.clocks, chain.rubbing)
+        _functions(op, shape, *chain.sides[op], behind, chain.clocks, chain.rubbing) for op in operators
     ]
     heated = ["set_temperature"] * ("set_temperature" in t.calls)
     aged = ["set_gain", "travel", "set_travel"] * ("travel" in t.calls)
@@ -226,7 +226,7 @@ def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Seque
 def alone(operators: Sequence[str], plays: int, form: Form) -> Glue:
     """The glue of a model without effects in engine loop: a chain without blocks."""
     shape = Shape(form)
-    functions = [line for op in operators for line in _functions(op, shape, (), (), (), (), ())]
+    functions = [_functions(op, shape) for op in operators]
     return Glue({op: instance(op, shape, (), plays, 0, False) for op in operators}, "\n".join(functions), {})
 
 
@@ -274,186 +274,39 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
     ]
 
 
-def _function(comment: str, head: str, lines: Sequence[str]) -> str:
-    body = "\n".join(f"    {line}" for line in lines)
-    return f"/* {comment} */\n{head} {{\n{body}\n}}\n"
-
-
 def _functions(
     op: str,
     t: Shape,
-    before: Sequence[Block],
-    after: Sequence[Block],
-    behind: Sequence[Stage],
-    clocks: Sequence[Block],
-    rubbing: Sequence[Block | None],
-) -> Iterator[str]:
+    before: Sequence[Block] = (),
+    after: Sequence[Block] = (),
+    behind: Sequence[Stage] = (),
+    clocks: Sequence[Block] = (),
+    rubbing: Sequence[Block | None] = (),
+) -> str:
     """The functions of one operator that name the blocks."""
-    inverse, ahead = op == "inverse", t.taps > 0
-    self_t = f"hystgen_{op}_t *self"
-    apart = t.form.apart
-
-    def through(
-        blocks: Sequence[Block], verb: str, x: str, side: str, comment: str, more: Sequence[str] = (),
-        first: Sequence[str] = (),
-    ) -> str:
-        lines = [*first, *(f"{x} = {block.call(verb, x)};" for block in blocks), *more]
-        last = f"return {x};"
-        if blocks and not more:
-            last = lines.pop().replace(f"{x} =", "return", 1)
-        head = f"static hystgen_signal_t hystgen_{op}_{side}_{verb}({self_t}, hystgen_signal_t {x})"
-        return _function(comment, head, [*lines, last])
-
-    quiet = inverse and bool(t.quiet)
-    rest, absorb = (["hystgen_quiet_rest(&self->quiet, v);"], ["self->quiet.arrived = v;"]) if quiet else ([], [])
-    turning = inverse and bool(t.turning)
-    place = f"self->{before[0].name}{'.lag' * t.braked}" if turning else ""
-    first: list[str] = []
+    inverse = op == "inverse"
+    quiet, turning = inverse and t.quiet, inverse and t.turning
+    settled = absorbed = seen = ""
     if turning:
-        rest = ["hystgen_steady_rest(&self->steady);"]
-        first = [f"const hystgen_signal_t before = {place}.high;"]
-        absorb = [f"hystgen_steady_absorb(&self->steady, &{place}, before);"]
-    yield through(before, "rest", "v", "drive_side", "Settles at drive v. Returns what is in front of the plays.", rest)
-    yield through(
-        before, "absorb", "v", "drive_side", "Drive v at this sample. Returns what is in front of the plays.", absorb,
-        first,
-    )
-    yield through(after, "rest", "h", "output_side", "Settles at the sum h of the plays. Returns the output.")
-    yield through(after, "absorb", "h", "output_side", "The sum of the plays is h at this sample. Returns the output.")
-    if inverse:
-        back = list(reversed(before)), list(reversed(after))
-        leads = "The drive that leads to a in front of the plays."
-        if turning:
-            (block,) = before
-            yield _function(
-                "What the lag misses of a way in front of the plays in its first sample.",
-                "static hystgen_signal_t hystgen_inverse_missed(hystgen_signal_t way)",
-                [f"return hystgen_steady_missed({block.table}, way);"],
-            )
-            lines = [
-                "bool rises = self->ascending;",
-                "if (a > self->drive) {",
-                "    rises = true;",
-                "} else if (a < self->drive) {",
-                "    rises = false;",
-                "}",
-                f"return hystgen_steady_{'braked' if t.braked else 'solve'}(&self->steady, {block.table}, "
-                f"&self->{block.name}, a, rises,",
-                "    hystgen_entered_drive(self->applied), HYSTGEN_DITHER);",
-            ]
-            head = f"HYSTGEN_APART hystgen_signal_t hystgen_inverse_drive_side_solve({self_t}, hystgen_signal_t a)"
-            yield _function(f"{leads} The lag arrives from the side of its branch.", head, lines)
-        elif quiet:
-            lines = ["hystgen_signal_t v = a;", *(f"v = {block.call('solve', 'v')};" for block in back[0])]
-            lines.append("return hystgen_quiet_drive(&self->quiet, a, v, self->applied);")
-            head = f"static hystgen_signal_t hystgen_inverse_drive_side_solve({self_t}, hystgen_signal_t a)"
-            yield _function(leads, head, lines)
-        else:
-            yield through(back[0], "solve", "a", "drive_side", leads)
-        yield through(back[1], "solve", "y", "output_side", "The sum of the plays that gives y at this sample.")
-        yield through(back[1], "resting", "y", "output_side", "The sum of the plays that gives y at rest.")
-    lines = ["hystgen_signal_t x = y;"] if behind else []
-    x = "x" if behind else "y"
-    lines += [f"x = hystgen_{stage.kind}_forward({stage.table}, x);" for stage in behind]
-    offsets = "HYSTGEN_OUTPUT_OFFSET + self->offset" if t.effects else "HYSTGEN_OFFSET"
+        place = f"self->{before[0].name}{'.lag' * t.braked}"
+        settled = "    hystgen_steady_rest(&self->steady);\n"
+        seen = f"    const hystgen_signal_t before = {place}.high;\n"
+        absorbed = f"    hystgen_steady_absorb(&self->steady, &{place}, before);\n"
+    elif quiet:
+        settled, absorbed = "    hystgen_quiet_rest(&self->quiet, v);\n", "    self->quiet.arrived = v;\n"
+    kinds = {name: [block for block in after if block.kind.name == name] for name in ("gain", "ageing", "heat")}
 
-    def drifts(lead: str) -> str:
-        return "".join(f" + hystgen_clock_drift({each.table}, &self->{each.name}, {lead})" for each in clocks)
+    def offset(lead: str) -> str:
+        drifts = "".join(f" + hystgen_clock_drift({each.table}, &self->{each.name}, {lead})" for each in clocks)
+        return f"(HYSTGEN_OUTPUT_OFFSET + self->offset{drifts})" if t.effects else "HYSTGEN_OFFSET"
 
-    def total(more: str) -> str:
-        return f"({offsets}{more})" if t.effects else offsets
-
-    yield _function(
-        "Sum of the plays.", f"static hystgen_signal_t hystgen_{op}_level(const {self_t})",
-        ["return self->level;" if t.effects else "return hystgen_loop_output(&hystgen_model_tables, self->play);"],
-    )
-    yield _function(
-        "What the output side has given last.", f"static hystgen_signal_t hystgen_{op}_output(const {self_t})",
-        ["return self->output;" if after else f"return hystgen_{op}_level(self);"],
-    )
-    own = apart if behind or clocks else "static"
-    yield _function(
-        "The displacement for an output y of the chain.",
-        f"{own} hystgen_signal_t hystgen_{op}_displaced(const {self_t}, hystgen_signal_t y)",
-        [*lines, f"return {x} + {total(drifts('0'))};"],
-    )
-    if inverse:
-        lead = f"self->filled ? self->{clocks[0].name}.lead : 0" if clocks and ahead else "0"
-        lines = [f"const hystgen_signal_t lead = {lead};"] * len(clocks)
-        counted = ["hystgen_quiet_count(&self->quiet, u);"] * quiet
-        y = f"u - {total(drifts('self->moving ? lead + 1 : lead'))}"
-        lines += counted
-        if behind:
-            lines.append(f"hystgen_signal_t y = {y};")
-        for stage in reversed(behind):
-            y = f"hystgen_{stage.kind}_inverse({stage.table}, y{stage.limited})"
-            lines.append(f"y = {y};")
-        lines = lines[: len(lines) - bool(behind)]
-        yield _function(
-            "The output of the chain that gives the displacement u; `limited` tells whether none does.",
-            f"static hystgen_signal_t hystgen_inverse_undisplaced({'' if quiet else 'const '}{self_t}, "
-            "hystgen_signal_t u, bool *limited)",
-            [*lines, f"return {y};"],
-        )
-        put = [
-            line for each in clocks
-            for line in (f"const hystgen_signal_t lead = self->filled ? self->{each.name}.lead + 1 : 1;",
-                         f"self->{each.name}.lead = lead > HYSTGEN_LEAD ? HYSTGEN_LEAD : lead;")
-        ]
-        put.append("hystgen_preview_put(self->line, &self->filled, y);")
-        yield _function(
-            "What has to be given now for the newest reference, y once it is undisplaced.",
-            f"static hystgen_signal_t hystgen_inverse_ahead({self_t}, hystgen_signal_t y)",
-            [*put, "return hystgen_preview_target(hystgen_tap, self->line);"] if ahead
-            else ["return y;"],
-        )
-        yield _function(
-            "No new reference: the newest one once more.",
-            f"static void hystgen_inverse_repeat({self_t})",
-            ["hystgen_preview_repeat(self->line, &self->filled);"] if ahead else [],
-        )
-    gains = [block for block in after if block.kind.name == "gain"]
-    ageing = [block for block in after if block.kind.name == "ageing"]
-    heat = [block for block in after if block.kind.name == "heat"]
-    rubs = [block for block in rubbing if block]
-    warming = ["hystgen_heat_way(self->applied, v)" if each is None else each.warming() for each in rubbing]
-    way = "(hystgen_signal_t)v - self->applied"
-    yield _function(
-        "Offset and gains of the parameter file.",
-        f"static void hystgen_{op}_settings_init({self_t})",
-        [
-            *(["self->offset = 0;"] if t.effects else []),
-            *(["self->reached.drive = 0;", "self->reached.rest = 0;"] if t.slew else []),
-            *(["hystgen_delay_rest(self->waiting, &self->oldest, 0);"] if t.waiting and not inverse else []),
-            *(f"hystgen_clock_start(&self->{each.name});" for each in clocks),
-            *(f"self->{each.name}.lead = 0;" for each in clocks),
-            *(f"hystgen_heat_init(&self->{each.name});" for each in heat),
-            *(f"hystgen_friction_init(&self->{each.name});" for each in rubs),
-            *(f"hystgen_gain_init(&self->{block.name});" for block in gains),
-            *(f"(void)hystgen_ageing_set_travel({each.table}, &self->{each.name}, 0);" for each in ageing),
-        ],
-    )
-    yield _function(
-        "The drive moves to v from where it was, in one sample.",
-        f"{apart if clocks or heat or ageing else 'static'} void hystgen_{op}_travelled({self_t}, hystgen_real_t v)",
-        [
-            *(f"hystgen_clock_tick({each.table}, &self->{each.name});" for each in clocks),
-            *(
-                f"hystgen_heat_move({each.table}, &self->{each.name}, {amount});"
-                for each, amount in zip(heat, warming, strict=True)
-            ),
-            *(f"hystgen_ageing_move({each.table}, &self->{each.name}, {way});" for each in ageing),
-        ],
-    )
-    yield _function(
-        "Drift begins anew, at the drive absorbed last.",
-        f"static void hystgen_{op}_clock_start({self_t})",
-        [f"hystgen_clock_start(&self->{each.name});" for each in clocks],
-    )
-    heats = [f"hystgen_gain_heat({block.table}, &self->{block.name}, temperature)" for block in gains]
-    yield _function(
-        "Gains and offsets of a temperature. Returns whether it had to be limited.",
-        f"static bool hystgen_{op}_heat({self_t}, hystgen_real_t temperature)",
-        ["bool limited = false;", *(f"limited = {heat} || limited;" for heat in heats), "return limited;"]
-        if heats else ["return false;"],
+    return template(
+        "chain.c.j2", op=op, inverse=inverse, before=before, after=after, behind=behind, clocks=clocks,
+        rubbing=[each for each in rubbing if each], gains=kinds["gain"], ageing=kinds["ageing"], heat=kinds["heat"],
+        turning=turning, quiet=quiet, settled=settled, absorbed=absorbed, seen=seen, offset=offset,
+        solve="braked" if t.braked else "solve", counted="" if quiet else "const ",
+        lead=f"self->filled ? self->{clocks[0].name}.lead : 0" if clocks and t.taps else "0",
+        displacing=t.form.apart if behind or clocks else "static",
+        travelling=t.form.apart if clocks or kinds["heat"] or kinds["ageing"] else "static",
+        warming=["hystgen_heat_way(self->applied, v)" if each is None else each.warming() for each in rubbing],
     )

@@ -159,7 +159,7 @@ class Fixed(Form):
         if plays.moves == moving.DASHPOT:
             rows = [entries(row, "rcrr") for row in plays.yields]
             arrays.append(writer.rows("yield_t", "yields", rows, len(rows)))
-            arrays.append(writer.line("factor_t", "seen_share", _factor(plays.seen)))
+            arrays.append(writer.line("factor_t", "standing_share", _factor(plays.seen)))
             numbers += [
                 ("YIELDS", f"{len(rows)}u", "pieces of what a dashpot yields"),
                 ("YIELD_BITS", f"{plays.yield_bits}u", "of a yield below a step of the plays' input"),

@@ -112,7 +112,7 @@ class Floating(Form):
             ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
             ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
             ("LARGEST_INPUT", moving.LARGEST_INPUT, ""),
-            ("SEEN", moving.SEEN, "share of a step's way at which the input counts as standing still"),
+            ("STANDING_SHARE", moving.SEEN, "share of a step's way at which the input counts as standing still"),
         )
         names = {moving.RELAXING: ("late", "kept"), moving.DILATED: ("wider",)}.get(plays.moves, ())
         arrays = [

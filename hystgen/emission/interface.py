@@ -140,8 +140,8 @@ def _quiet(one: Compensator, compiled: Compiled) -> list[str]:
     ]
 
 
-def details(one: Compensator, doubts: Sequence[str], estimate: Cost) -> list[str]:
-    """The lines of a header's banner."""
+def details(one: Compensator, notes: Sequence[str], estimate: Cost) -> list[str]:
+    """The lines of a header's banner; `notes`: how the inverse reads references, and what makes it of little use."""
     parameters, options = one.parameters, one.options
     about = comment_text(parameters.description)
     avr = [] if estimate.avr is None else [
@@ -164,8 +164,7 @@ def details(one: Compensator, doubts: Sequence[str], estimate: Cost) -> list[str
         f"Model: {_model(one)}; arithmetic {options.arithmetic}; engine {options.engine}; operator {options.operator}; "
         f"layout {options.layout}",
         *(f"Not compensated: {words}" for words in options.left_out),
-        *reading(one),
-        *doubts,
+        *notes,
         *([""] if precision else []),
         *precision,
         "",

@@ -81,7 +81,7 @@ def _variant(
     moves, bends = chain.plays(t)
     return dataclasses.replace(
         plain, chain=True, slew=bool(t.slew), braked=bool(t.braked), quiet=bool(t.quiet), turning=bool(t.turning),
-        waits=t.number_of("wait") > 0, ages="travel" in t.calls, moves=moves, bends=bends,
+        waits=t.number_of("wait") > 0, previews=len(t.tap) > 0, ages="travel" in t.calls, moves=moves, bends=bends,
     )
 
 
@@ -241,7 +241,7 @@ def files(module: Module) -> dict[str, str]:
     def top(file: str, what: str, details: Sequence[str] = ()) -> str:
         return interface.banner(file, what, command, module.sha256, details)
 
-    details = interface.details(one, module.doubts, module.cost)
+    details = interface.details(one, [*module.reading, *module.doubts], module.cost)
     found = {
         f"{name}.h": template(
             "module.h.j2", module=module, one=one, header=interface, single_header=single, shared=shared,

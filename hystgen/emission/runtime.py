@@ -141,7 +141,7 @@ class Family(ABC):
     """Headers of the run time that have the prototypes of its kernels."""
     build: ClassVar[tuple[str, ...]] = ("arithmetic/build.h",)
     """Headers that check how code is built."""
-    shared_version: ClassVar[int] = 2
+    shared_version: ClassVar[int] = 3
     """Of the interface between emitted models and a shared run time."""
 
     @property
@@ -292,10 +292,9 @@ class Variant:
     `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
     drive code, or with effects what arrives there has bits below them; `saturates`: output codes are limited;
     `start_list`: each play starts at its own value; `chain`: it has effects, `slew`: one of them keeps the drive within
-    a rate, `braked`: and a lag behind that from overshooting, `quiet`: the drive stands still at rest, `turning`:
-    a lag arrives at two branches, `waits`: it does
-    not act at once, `ages`: one is a gain that follows the travel, `moves` and `bends`: how plays move and are bent
-    where that is not as in engine loop.
+    a rate, `braked`: and a lag behind that from overshooting, `quiet`: the drive stands still at rest, `turning`: a lag
+    arrives at two branches, `waits`: it does not act at once, `previews`: references are summed, `ages`: one is a gain
+    that follows the travel, `moves` and `bends`: how plays move and are bent where that is not as in engine loop.
     """
 
     engine: str
@@ -311,6 +310,7 @@ class Variant:
     quiet: bool = False
     turning: bool = False
     waits: bool = False
+    previews: bool = False
     ages: bool = False
     moves: str = ""
     bends: str = ""
@@ -330,7 +330,7 @@ class Variant:
             "FRONT": self.fronts, "TWO_BRANCHES": self.branches,
             "FINE_PLAYS": self.finer and not self.chain, "FINE_SIGNAL": self.finer and self.chain,
             "LIMITED_CODES": self.saturates, "SLEW_LIMIT": self.slew, "BRAKED_LAG": self.braked,
-            "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waits,
+            "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waits, "PREVIEW": self.previews,
             "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
             "DASHPOT_PLAYS": self.moves == "dashpot", "BENT_PLAYS": bent, "BUMP": self.bends == "centre",
             "MOVES_APART": self.family.moves_apart and bent and self.moves in ("relaxing", "dilated"),
@@ -596,7 +596,7 @@ def operator_pieces(
     blocks = family.chain_blocks if variant.chain else ()
     roots = [piece.name for op in operators for piece in _calls(op, calls.get(op, ()))]
     facts = family.facts | variant.facts
-    every = [*_pieces(blocks, facts), *own, *split_pieces(glue), *_pieces(variant.sources(), facts)]
+    every = [*_pieces(blocks, facts), *own, *split_pieces(chosen(glue, facts)), *_pieces(variant.sources(), facts)]
     pieces = needed(every, roots)
     parsed = [(piece, None if piece in own else folding.parsed(piece.text)) for piece in pieces]
     kernels = [found for piece in (*kernel_pieces(family), *own) if (found := folding.parsed(piece.text))]

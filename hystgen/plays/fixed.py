@@ -63,7 +63,7 @@ def code(t: FixedPlayTables, total: Any) -> tuple[Any, int]:
 
 
 @jit
-def over_slope(t: FixedPlayTables, d: Any, k: int) -> Any:
+def divide_by_slope(t: FixedPlayTables, d: Any, k: int) -> Any:
     """d / slope[k] to the nearest integer, d >= 0."""
     r = t.reciprocal[k]
     shift = t.shift[k]
@@ -72,9 +72,9 @@ def over_slope(t: FixedPlayTables, d: Any, k: int) -> Any:
 
 
 @jit
-def going(t: FixedPlayTables, w: Any, d: Any, k: int, rising: int) -> Any:
+def input_further(t: FixedPlayTables, w: Any, d: Any, k: int, rising: int) -> Any:
     """The input of the plays whose output is d further than that of w, at most a little outside their range."""
-    step = over_slope(t, d, k)
+    step = divide_by_slope(t, d, k)
     if rising:
         most = t.limits[PLAY_MAX] + t.limits[MARGIN]
         if step > most - w:
@@ -104,4 +104,4 @@ def loop_solve(t: FixedPlayTables, s: State, output: Any) -> Any:
         left = left - step
         w = start
         k += 1
-    return going(t, w, left, k, rising)
+    return input_further(t, w, left, k, rising)

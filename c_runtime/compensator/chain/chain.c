@@ -45,9 +45,9 @@ static inline void hystgen_operator_played(hystgen_operator_t *self, hystgen_rea
     if (reached < late || reached > late) {
         self->status |= HYSTGEN_STATUS_SLEW_LIMITED;
     }
-    const hystgen_signal_t x = hystgen_entered_drive(reached);
+    const hystgen_signal_t x = hystgen_drive_signal(reached);
 #else
-    const hystgen_signal_t x = hystgen_entered_drive(v);
+    const hystgen_signal_t x = hystgen_drive_signal(v);
 #endif
     const hystgen_signal_t a = self->moving ? hystgen_operator_drive_side_absorb(self, x)
                                             : hystgen_operator_drive_side_rest(self, x);
@@ -101,7 +101,7 @@ static hystgen_real_t hystgen_operator_shown(const hystgen_operator_t *self) {
 /* The part common to init and reset, once the plays are set: they rest at this drive. */
 HYSTGEN_APART_IN_CHAIN void hystgen_operator_begin(hystgen_operator_t *self, hystgen_real_t drive,
                                                    bool ascending) {
-    const hystgen_signal_t x = hystgen_entered_drive(drive);
+    const hystgen_signal_t x = hystgen_drive_signal(drive);
 #ifdef HYSTGEN_INVERSE
     self->pending = drive;
     self->answer = drive;

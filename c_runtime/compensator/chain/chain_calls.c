@@ -35,7 +35,7 @@ HYSTGEN_APART_IN_FIXED_CHAIN hystgen_signal_t hystgen_inverse_put(hystgen_invers
                                                                   hystgen_real_t level) {
     bool limited = false;
     const hystgen_signal_t wanted =
-        hystgen_inverse_undisplaced(self, hystgen_entered_level(level), &limited);
+        hystgen_inverse_undisplaced(self, hystgen_level_signal(level), &limited);
     if (limited) {
         self->status |= HYSTGEN_STATUS_DOMAIN;
     }
@@ -56,7 +56,7 @@ HYSTGEN_APART_IN_FIXED_CHAIN hystgen_reach_t hystgen_inverse_sought(hystgen_inve
                                                                     hystgen_signal_t h,
                                                                     hystgen_reach_t w) {
     const hystgen_signal_t a =
-        hystgen_inverse_finer(self, h, w, hystgen_inverse_drive(self, level, w));
+        hystgen_inverse_refined(self, h, w, hystgen_inverse_drive(self, level, w));
     return hystgen_drive_code(self->moving ? hystgen_inverse_drive_side_solve(self, a) : a);
 }
 

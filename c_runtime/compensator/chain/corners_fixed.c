@@ -84,7 +84,7 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *
     const hystgen_reach_t w = (hystgen_reach_t)hystgen_solve(
         &hystgen_model_curve, &self->here, self->corner, hystgen_asked(h), self->next, &self->kink);
     self->sought = true;
-    hystgen_inverse_seen(self, w);
+    hystgen_inverse_kink_before(self, w);
     return w;
 }
 #endif

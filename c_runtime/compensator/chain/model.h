@@ -55,7 +55,7 @@ extern const hystgen_tables_t hystgen_relaxing_tables;
 extern const hystgen_factor_t hystgen_late[HYSTGEN_N_PLAYS + 1];
 extern const hystgen_factor_t hystgen_kept[HYSTGEN_N_PLAYS + 1];
 extern const hystgen_factor_t hystgen_wider[HYSTGEN_N_PLAYS + 1];
-extern const hystgen_factor_t hystgen_seen_share;
+extern const hystgen_factor_t hystgen_standing_share;
 extern const hystgen_yield_t hystgen_yields[HYSTGEN_YIELDS];
 extern const hystgen_bump_t hystgen_bump[1];
 extern const uint16_t hystgen_bump_of[HYSTGEN_N_PLAYS + 1];
@@ -69,7 +69,7 @@ extern const uint16_t hystgen_bump_of[HYSTGEN_N_PLAYS + 1];
 #define HYSTGEN_WAITED 0.5f
 #define HYSTGEN_LATE 0.1f
 #define HYSTGEN_KEPT 0.2f
-#define HYSTGEN_SEEN 0.3f
+#define HYSTGEN_STANDING_SHARE 0.3f
 #define HYSTGEN_HALVES 40u
 #define HYSTGEN_LEAST_INPUT (-8.0f)
 #define HYSTGEN_LARGEST_INPUT 8.0f

@@ -10,9 +10,9 @@
 #endif
 
 #ifndef HYSTGEN_HAS_FINE_SIGNAL
-static inline hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *self,
-                                                     hystgen_signal_t h, hystgen_reach_t w,
-                                                     hystgen_reach_t a) {
+static inline hystgen_signal_t hystgen_inverse_refined(const hystgen_inverse_t *self,
+                                                       hystgen_signal_t h, hystgen_reach_t w,
+                                                       hystgen_reach_t a) {
     (void)self;
     (void)h;
     (void)w;
@@ -20,13 +20,13 @@ static inline hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *se
 }
 
 /* The solution w of engine corners is used as it is. */
-static inline void hystgen_inverse_seen(hystgen_inverse_t *self, hystgen_reach_t w) {
+static inline void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_reach_t w) {
     (void)self;
     (void)w;
 }
 #elif defined(HYSTGEN_HAS_CORNERS)
 /* The kink before a solution w, which it refines: plays that begin to follow at w do not count. */
-HYSTGEN_APART void hystgen_inverse_seen(hystgen_inverse_t *self, hystgen_reach_t w) {
+HYSTGEN_APART void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_reach_t w) {
     const int64_t x = hystgen_along(&self->here, w);
     if (x > hystgen_along(&self->here, self->here.input)) {
         self->kink.output = x - 1;
@@ -36,9 +36,9 @@ HYSTGEN_APART void hystgen_inverse_seen(hystgen_inverse_t *self, hystgen_reach_t
 
 /* The input of the plays that gives their sum h, with HYSTGEN_ARRIVING_BITS more bits than w, the
    nearest one without them: the remainder of h at w, divided by the slope there. */
-HYSTGEN_APART hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *self,
-                                                     hystgen_signal_t h, hystgen_reach_t w,
-                                                     hystgen_reach_t a) {
+HYSTGEN_APART hystgen_signal_t hystgen_inverse_refined(const hystgen_inverse_t *self,
+                                                       hystgen_signal_t h, hystgen_reach_t w,
+                                                       hystgen_reach_t a) {
     const hystgen_place_t *here = &self->here;
     const hystgen_signal_t whole = (hystgen_signal_t)a * ((int64_t)1 << HYSTGEN_ARRIVING_BITS);
     const int64_t x = hystgen_along(here, w);
@@ -53,15 +53,15 @@ HYSTGEN_APART hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *se
     if (size > s->slope) {
         return whole;
     }
-    const int64_t more =
-        hystgen_over_slope(size * ((int64_t)1 << HYSTGEN_ARRIVING_BITS), s->reciprocal, s->shift);
+    const int64_t more = hystgen_divide_by_slope(size * ((int64_t)1 << HYSTGEN_ARRIVING_BITS),
+                                                 s->reciprocal, s->shift);
     return whole + hystgen_along(here, left < 0 ? -more : more);
 }
 #else
 /* The input of the plays that gives their sum h, with HYSTGEN_ARRIVING_BITS more bits than w, the
    nearest one without them: the remainder of h at w, divided by the slope. */
-static hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *self, hystgen_signal_t h,
-                                              hystgen_reach_t w, hystgen_reach_t a) {
+static hystgen_signal_t hystgen_inverse_refined(const hystgen_inverse_t *self, hystgen_signal_t h,
+                                                hystgen_reach_t w, hystgen_reach_t a) {
     const hystgen_tables_t *t = &hystgen_model_tables;
     const hystgen_signal_t whole = (hystgen_signal_t)a * ((int64_t)1 << HYSTGEN_ARRIVING_BITS);
     hystgen_sum_t left = h;
@@ -88,7 +88,7 @@ static hystgen_signal_t hystgen_inverse_finer(const hystgen_inverse_t *self, hys
     if (size > t->slope[k]) { /* w was limited and is not the nearest */
         return whole;
     }
-    const hystgen_signal_t more = hystgen_over_slope(
+    const hystgen_signal_t more = hystgen_divide_by_slope(
         size * ((hystgen_sum_t)1 << HYSTGEN_ARRIVING_BITS), t->reciprocal[k], t->shift[k]);
     return left < 0 ? whole - more : whole + more;
 }

@@ -40,7 +40,7 @@ static void hystgen_operator_put_offset(hystgen_operator_t *self, hystgen_signal
 }
 
 void hystgen_operator_set_offset(hystgen_operator_t *self, hystgen_real_t d) {
-    const hystgen_signal_t level = hystgen_entered_level(d);
+    const hystgen_signal_t level = hystgen_level_signal(d);
     hystgen_operator_put_offset(self, level);
     if (hystgen_finite(level)) {
         hystgen_operator_clock_start(self);
@@ -75,7 +75,7 @@ hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self) {
 
 void hystgen_inverse_correct(hystgen_inverse_t *self, hystgen_real_t measured,
                              hystgen_real_t share) {
-    const hystgen_signal_t more = hystgen_entered_level(measured) -
+    const hystgen_signal_t more = hystgen_level_signal(measured) -
                                   hystgen_operator_displaced(self, hystgen_operator_output(self));
     hystgen_operator_put_offset(self, self->offset + hystgen_shared(share, more));
 }

@@ -38,7 +38,7 @@ static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a) {
     return (hystgen_fine_t)hystgen_nearest(a, HYSTGEN_ARRIVING_BITS);
 }
 
-static inline hystgen_signal_t hystgen_entered_level(hystgen_real_t u) {
+static inline hystgen_signal_t hystgen_level_signal(hystgen_real_t u) {
     return (hystgen_signal_t)u * ((hystgen_signal_t)1 << HYSTGEN_LEVEL_BITS);
 }
 
@@ -111,7 +111,7 @@ static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a) {
     return (hystgen_fine_t)a;
 }
 
-static inline hystgen_signal_t hystgen_entered_level(hystgen_real_t u) {
+static inline hystgen_signal_t hystgen_level_signal(hystgen_real_t u) {
     return (hystgen_signal_t)u * ((hystgen_signal_t)1 << HYSTGEN_FRACTION);
 }
 
@@ -140,7 +140,7 @@ static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a) {
     return a;
 }
 
-static inline hystgen_signal_t hystgen_entered_level(hystgen_real_t u) {
+static inline hystgen_signal_t hystgen_level_signal(hystgen_real_t u) {
     return u;
 }
 

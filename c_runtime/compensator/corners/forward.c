@@ -38,13 +38,22 @@ hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t v)
 #endif
 }
 
-/* The plays hold a start memory. */
-static void hystgen_operator_rest(hystgen_operator_t *self, unsigned int which) {
-    (void)which;
+/* The part common to init and reset. */
+static void hystgen_operator_begin(hystgen_operator_t *self, bool reset) {
 #ifdef HYSTGEN_FIXED
+    hystgen_start(&hystgen_model_curve, &self->here, self->corner,
+                  reset ? hystgen_model_zero : hystgen_model_start,
+                  reset ? 0u : HYSTGEN_START_STEP);
     self->next = self->here.input;
 #else
-    (void)self;
+    hystgen_start(&hystgen_operator_curve, &self->plays, self->corner,
+                  &hystgen_operator_start[reset ? 1 : 0]);
 #endif
+#ifdef HYSTGEN_HAS_FRONT
+    const hystgen_drive_t *first = &hystgen_operator_first_drive[reset ? 1 : 0];
+    self->drive = (hystgen_real_t)first->drive;
+    self->ascending = first->ascending;
+#endif
+    self->status = 0;
 }
 #endif

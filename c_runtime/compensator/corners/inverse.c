@@ -97,14 +97,16 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     self->before = m->here.input;
 }
 
-/* The plays hold a start memory: the drive rests within its range. */
-static void hystgen_operator_rest(hystgen_operator_t *self, unsigned int which) {
-    (void)which;
+/* The part common to init and reset: the drive rests within its range. */
+HYSTGEN_APART void hystgen_operator_begin(hystgen_operator_t *self, bool reset) {
+    hystgen_start(&hystgen_operator_curve, &self->plays, self->corner,
+                  &hystgen_operator_start[reset ? 1 : 0]);
     hystgen_move_to_output(&hystgen_operator_curve, &self->plays, self->corner,
                            hystgen_clamp_drive(self->plays.here.output));
     hystgen_copy_place(&self->undo, &self->plays.here);
     self->before = self->plays.here.input;
     self->stepped = false;
     self->committed = false;
+    self->status = 0;
 }
 #endif

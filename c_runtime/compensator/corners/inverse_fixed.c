@@ -24,7 +24,7 @@ static inline int64_t hystgen_inverse_left(int64_t on, uint32_t slope, uint32_t 
 #endif
 
 /* A reference along the present move; ~u is -u - 1, which overflows for no code. */
-static inline int32_t hystgen_inverse_sees(const hystgen_inverse_t *self, int32_t u) {
+static inline int32_t hystgen_inverse_along(const hystgen_inverse_t *self, int32_t u) {
     return self->here.rising ? u : ~u;
 }
 
@@ -39,7 +39,7 @@ static void hystgen_inverse_stay(hystgen_inverse_t *self) {
 HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next) {
     const hystgen_place_t *here = &self->here;
     const int32_t most =
-        hystgen_inverse_sees(self, here->rising ? HYSTGEN_OUTPUT_MAX : HYSTGEN_OUTPUT_MIN);
+        hystgen_inverse_along(self, here->rising ? HYSTGEN_OUTPUT_MAX : HYSTGEN_OUTPUT_MIN);
     const int32_t end = hystgen_front_forward(here->rising ? HYSTGEN_DRIVE_MAX : HYSTGEN_DRIVE_MIN);
     const uint32_t room = here->rising ? (uint32_t)end - (uint32_t)here->input
                                        : (uint32_t)here->input - (uint32_t)end;
@@ -93,10 +93,10 @@ hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u)
     hystgen_place_t *here = &self->here;
     const int64_t output = (int64_t)u * ((int64_t)1 << HYSTGEN_FRACTION);
     const int64_t on = here->rising ? output - here->output : here->output - output;
-    if (hystgen_inverse_sees(self, u) < self->next && on > 0 && u != self->reference) {
+    if (hystgen_inverse_along(self, u) < self->next && on > 0 && u != self->reference) {
         /* usual: the same plays follow */
         const hystgen_segment_t *s = &hystgen_model_curve.segment[here->k];
-        const int64_t step = hystgen_over_slope(on, s->reciprocal, s->shift);
+        const int64_t step = hystgen_divide_by_slope(on, s->reciprocal, s->shift);
         const int64_t w = here->rising ? here->input + step : here->input - step;
         const hystgen_real_t v = (hystgen_real_t)hystgen_front_inverse((hystgen_reach_t)w);
         const int32_t to = hystgen_front_forward(v);
@@ -131,14 +131,17 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
                           hystgen_front_forward(v));
 }
 
-/* The plays hold a start memory. */
-static void hystgen_operator_rest(hystgen_operator_t *self, unsigned int which) {
-    (void)which;
+/* The part common to init and reset. */
+static void hystgen_operator_begin(hystgen_operator_t *self, bool reset) {
+    hystgen_start(&hystgen_model_curve, &self->here, self->corner,
+                  reset ? hystgen_model_zero : hystgen_model_start,
+                  reset ? 0u : HYSTGEN_START_STEP);
     hystgen_copy_place(&self->undo, &self->here);
     hystgen_inverse_stay(self);
     self->before = 0;
     self->reference = 0;
     self->repeat = false;
     self->bits = 0;
+    self->status = 0;
 }
 #endif

@@ -97,11 +97,15 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     hystgen_inverse_replace(self, v);
 }
 
-/* The plays hold a start memory: the drive rests within its range. */
-static void hystgen_operator_rest(hystgen_operator_t *self, unsigned int which) {
+/* The part common to init and reset: the drive rests within its range. */
+HYSTGEN_APART void hystgen_operator_begin(hystgen_operator_t *self, bool reset) {
+    const hystgen_drive_t *first = &hystgen_operator_first_drive[reset ? 1 : 0];
+    hystgen_start(&hystgen_operator_curve, &self->plays, self->corner,
+                  &hystgen_operator_start[reset ? 1 : 0]);
     self->last = self->plays.here.input + HYSTGEN_OFFSET;
-    hystgen_move_to_output(&hystgen_operator_curve, &self->plays, self->corner,
-                           hystgen_operator_first_drive[which].w);
+    hystgen_move_to_output(&hystgen_operator_curve, &self->plays, self->corner, first->w);
+    self->drive = first->drive;
+    self->ascending = first->ascending;
     hystgen_inverse_keep(self);
     self->returned = self->drive;
     self->reference = 0;
@@ -109,5 +113,6 @@ static void hystgen_operator_rest(hystgen_operator_t *self, unsigned int which) 
     self->committed = false;
     self->repeat = false;
     self->bits = 0;
+    self->status = 0;
 }
 #endif

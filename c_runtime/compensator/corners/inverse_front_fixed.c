@@ -65,15 +65,21 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
                           hystgen_operator_arrive(self, v));
 }
 
-/* The plays hold a start memory. */
-static void hystgen_operator_rest(hystgen_operator_t *self, unsigned int which) {
+/* The part common to init and reset. */
+static void hystgen_operator_begin(hystgen_operator_t *self, bool reset) {
     unsigned int status = 0; /* not reported: this is no step */
-    (void)which;
+    const hystgen_drive_t *first = &hystgen_operator_first_drive[reset ? 1 : 0];
+    hystgen_start(&hystgen_model_curve, &self->here, self->corner,
+                  reset ? hystgen_model_zero : hystgen_model_start,
+                  reset ? 0u : HYSTGEN_START_STEP);
+    self->drive = (hystgen_real_t)first->drive;
+    self->ascending = first->ascending;
     hystgen_inverse_keep(self);
     self->reference = 0;
     self->last = hystgen_code(self->here.output, &status);
     self->repeat = false;
     self->next = -HYSTGEN_FAR;
     self->bits = 0;
+    self->status = 0;
 }
 #endif

@@ -24,7 +24,7 @@ from hystgen.plays.corners.corners_fixed import (
     solve,
 )
 from hystgen.plays.corners.corners_float import INPUT, NEXT, OUTPUT, RISING, SOUGHT
-from hystgen.plays.fixed import FixedPlayTables, over_slope
+from hystgen.plays.fixed import FixedPlayTables, divide_by_slope
 from hystgen.plays.slots import Reals
 
 
@@ -122,7 +122,7 @@ def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
     size = -left if left < 0 else left
     if size > t.plays.slope[k]:
         return whole
-    more = over_slope(t.plays, size << bits, k)
+    more = divide_by_slope(t.plays, size << bits, k)
     return whole + along(m, -more if left < 0 else more)
 
 

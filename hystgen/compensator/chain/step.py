@@ -121,9 +121,9 @@ class Codes(NamedTuple):
     """Conversion of an operator's arguments and answers to signals and back, in one arithmetic."""
 
     finite: Callable[..., Any]
-    entered_drive: Callable[..., Any]
+    drive_signal: Callable[..., Any]
     arriving: Callable[..., Any]  # a signal as an input of the plays
-    entered_level: Callable[..., Any]
+    level_signal: Callable[..., Any]
     drive_code: Callable[..., Any]
     output_code: Callable[..., Any]  # with status bits
     entered_travel: Callable[..., Any]  # as verification sets it
@@ -149,7 +149,7 @@ def made_of(
     led = every[LED].led
     assert led
     led_state, led_solve, led_kept, led_absorb, led_missed, *_ = led
-    finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared = codes
+    finite, drive_signal, arriving, level_signal, drive_code, output_code, entered_travel, shared = codes
     plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
 
     side = sides_of(every)
@@ -240,7 +240,7 @@ def made_of(
             s.flags[RISES] = 1
         elif a < s.plays.real[DRIVE]:
             s.flags[RISES] = 0
-        last = entered_drive(t, s.real[APPLIED])
+        last = drive_signal(t, s.real[APPLIED])
         moved, rises = s.real[MOVED], s.flags[RISES]
         v, s.real[WAY] = led_solve(t.blocks[LED], s.blocks[LED], a, moved, rises, last, t.number[DITHER])
         return v
@@ -248,7 +248,7 @@ def made_of(
     @jit
     def steady_hold(t: ChainTables, s: ChainState, v: Any) -> Any:
         """The drive v, or one that does not take the lag back from its branch."""
-        last = entered_drive(t, s.real[APPLIED])
+        last = drive_signal(t, s.real[APPLIED])
         return led_kept(t.blocks[LED], s.blocks[LED], v, s.flags[RISES], last, t.number[DITHER])
 
     # ---------------------------------------------------------------- quiet.c
@@ -283,7 +283,7 @@ def made_of(
             return v
         if s.flags[EQUAL] == t.quiet:
             return a
-        last = entered_drive(t, s.real[APPLIED])
+        last = drive_signal(t, s.real[APPLIED])
         if a - last > t.number[DITHER] or last - a > t.number[DITHER]:
             return a
         return last
@@ -302,9 +302,9 @@ def made_of(
         s.line.filled[0] = 0
         s.flags[MOVING] = 0
         drive = s.plays.real[DRIVE]
-        s.plays.real[DRIVE] = arriving(t, entered_drive(t, drive))
+        s.plays.real[DRIVE] = arriving(t, drive_signal(t, drive))
         s.real[APPLIED] = drive
-        a = drive_side_rest(t, s, entered_drive(t, drive))
+        a = drive_side_rest(t, s, drive_signal(t, drive))
         if t.turning:
             steady_rest(t, s)
         if t.quiet:
@@ -338,7 +338,7 @@ def made_of(
         moving = s.flags[MOVING] != 0
         if moving:
             travelled(t, s, v)
-        x = entered_drive(t, reached)
+        x = drive_signal(t, reached)
         steady = t.turning and s.flags[OPERATOR]
         before = led_state(s.blocks[LED]) if steady else t.limits[ZERO]
         a = drive_side_absorb(t, s, x) if moving else drive_side_rest(t, s, x)
@@ -412,7 +412,7 @@ def made_of(
         if t.blocks[LED].braked and not (t.quiet and s.flags[EQUAL] >= t.quiet):
             drive = braked(t, s, v, near)
             if t.turning:
-                drive = drive_code(t, steady_hold(t, s, entered_drive(t, drive)))
+                drive = drive_code(t, steady_hold(t, s, drive_signal(t, drive)))
             near, rest = inverse_within(t, s, drive)
         s.real[REACHED], s.real[REST] = near, rest
         return near
@@ -468,8 +468,8 @@ def made_of(
         """Take the next reference, within its range, through the preview if there is one. Returns the output to reach
         at this sample."""
         if t.quiet:
-            quiet_count(t, s, entered_level(t, level))
-        wanted, limited = undisplaced(t, s, entered_level(t, level))
+            quiet_count(t, s, level_signal(t, level))
+        wanted, limited = undisplaced(t, s, level_signal(t, level))
         if limited:
             s.plays.counts[STATUS] |= DOMAIN
         if len(t.tap) == 0:
@@ -547,7 +547,7 @@ def made_of(
     @jit
     def correct(t: ChainTables, s: ChainState, measured: Any, share: Any) -> None:
         """Trim the offset by a share of what a sensor measures beyond the expected displacement."""
-        more = shared(t, share, entered_level(t, measured) - displacement(t, s, s.real[OUTPUT]))
+        more = shared(t, share, level_signal(t, measured) - displacement(t, s, s.real[OUTPUT]))
         put_offset(t, s, s.real[SET] + more)
 
     @jit
@@ -585,7 +585,7 @@ def made_of(
                 s.plays.counts[HAS_PENDING] = 0
             settle(t, s, inverse, x)
         elif call == OP_OFFSET:
-            set_offset(t, s, entered_level(t, x))
+            set_offset(t, s, level_signal(t, x))
         elif call == OP_TEMPERATURE:
             set_temperature(t, s, x)
         elif call == OP_GAIN:

@@ -34,7 +34,7 @@ from hystgen.compensator.chain.step import ChainState, Codes
 from hystgen.compensator.layout import FixedTables
 from hystgen.effects.saturation.fixed import saturated, unsaturated
 from hystgen.front import curve
-from hystgen.plays.fixed import nearest, over_slope
+from hystgen.plays.fixed import divide_by_slope, nearest
 from hystgen.plays.slots import CODE_MAX, OUTPUT_CLAMPED, Reals, zero
 
 # ---------------------------------------------------------------- front_none.c, front_curve.c or front_two_curves.c
@@ -84,7 +84,7 @@ def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
     size = -left if left < 0 else left
     if size > t.plays.slope[k]:
         return whole
-    more = over_slope(t.plays, size << bits, k)
+    more = divide_by_slope(t.plays, size << bits, k)
     return whole - more if left < 0 else whole + more
 
 
@@ -104,7 +104,7 @@ def preview_target(tap: Reals, line: Line) -> Any:
 
 
 @jit
-def entered_drive(t: ChainTables, v: Any) -> Any:
+def drive_signal(t: ChainTables, v: Any) -> Any:
     """A drive code as a signal."""
     return v << t.number[DRIVE_BITS]
 
@@ -116,7 +116,7 @@ def arriving(t: ChainTables, a: Any) -> Any:
 
 
 @jit
-def entered_level(t: ChainTables, u: Any) -> Any:
+def level_signal(t: ChainTables, u: Any) -> Any:
     """An output code as a signal."""
     return u << t.number[LEVEL_BITS]
 
@@ -192,5 +192,5 @@ BLOCKS = Blocks(
 )
 CORNERS = BLOCKS._replace(plays=corners_fixed.PLAYS, finer=corners_fixed.finer)
 CODES = Codes(
-    step_fixed.finite, entered_drive, arriving, entered_level, drive_code, output_code, entered_travel, shared
+    step_fixed.finite, drive_signal, arriving, level_signal, drive_code, output_code, entered_travel, shared
 )

@@ -23,7 +23,7 @@ from hystgen.plays.corners.corners_float import (
     K,
     copy_place,
 )
-from hystgen.plays.fixed import nearest, over_slope
+from hystgen.plays.fixed import divide_by_slope, nearest
 from hystgen.plays.slots import (
     DRIVE_MAX,
     DRIVE_MIN,
@@ -41,7 +41,7 @@ NEVER = -(2**31)
 
 
 @jit(inline=True)
-def inverse_sees(m: FixedMemory, u: Any) -> Any:
+def inverse_along(m: FixedMemory, u: Any) -> Any:
     """A reference along the present move; ~u is -u - 1, which overflows for no code."""
     return u if m.counts[RISING] else ~u
 
@@ -57,7 +57,7 @@ def inverse_stay(m: FixedMemory) -> None:
 def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
     """Steps are usual up to the next kink or limit, less rounding, but not below the least reference."""
     rising = m.counts[RISING]
-    most = inverse_sees(m, t.limits[OUTPUT_MAX] if rising else t.limits[OUTPUT_MIN])
+    most = inverse_along(m, t.limits[OUTPUT_MAX] if rising else t.limits[OUTPUT_MIN])
     end = (t.limits[DRIVE_MAX] if rising else t.limits[DRIVE_MIN]) << t.limits[FINE]
     more = t.slope[m.counts[K] + 1] * along(m, end - m.real[INPUT])
     last = along(m, m.real[OUTPUT]) + more
@@ -92,9 +92,9 @@ def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
 def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     """One sample."""
     on = along(m, (u << t.limits[FRACTION]) - m.real[OUTPUT])
-    if inverse_sees(m, u) < m.real[NEXT] and on > 0 and u != m.real[REFERENCE]:
+    if inverse_along(m, u) < m.real[NEXT] and on > 0 and u != m.real[REFERENCE]:
         k = m.counts[K] + 1
-        v = nearest(m.real[INPUT] + along(m, over_slope(t, on, k)), t.limits[FINE])
+        v = nearest(m.real[INPUT] + along(m, divide_by_slope(t, on, k)), t.limits[FINE])
         m.real[BEFORE] = m.real[INPUT]
         m.real[INPUT] = v << t.limits[FINE]
         m.real[OUTPUT] += t.slope[k] * (m.real[INPUT] - m.real[BEFORE])

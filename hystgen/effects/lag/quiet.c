@@ -44,7 +44,7 @@ static hystgen_signal_t hystgen_quiet_drive(hystgen_quiet_t *self, hystgen_signa
     if (!hystgen_quiet_still(self)) {
         return v;
     }
-    const hystgen_signal_t last = hystgen_entered_drive(applied);
+    const hystgen_signal_t last = hystgen_drive_signal(applied);
     const hystgen_signal_t off = a - last;
     return kept && off <= HYSTGEN_DITHER && off >= -HYSTGEN_DITHER ? last : a;
 }

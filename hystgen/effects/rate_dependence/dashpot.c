@@ -9,7 +9,7 @@
 
 /* Where the input counts as standing still while it goes to w. */
 static inline hystgen_play_t hystgen_standing(const hystgen_play_t *play, hystgen_play_t w) {
-    return (hystgen_play_t)(play[0] + hystgen_seen((hystgen_sum_t)w - play[0]));
+    return (hystgen_play_t)(play[0] + hystgen_standing_way((hystgen_sum_t)w - play[0]));
 }
 
 /* How far play i moves, as a yield, while the input of the plays stands still there. */

@@ -14,7 +14,8 @@
 #ifdef HYSTGEN_FIXED
 /* Where play i rests: at most as far from the play before as their thresholds are from each other,
    in spite of rounding. */
-static hystgen_play_t hystgen_beside(const hystgen_play_t *play, unsigned int i, int64_t rest) {
+static hystgen_play_t hystgen_limited_rest(const hystgen_play_t *play, unsigned int i,
+                                           int64_t rest) {
     const hystgen_tables_t *t = &hystgen_model_tables;
     if (i > 1u) {
         const int64_t room = (int64_t)t->threshold[i] - t->threshold[i - 1u];
@@ -42,7 +43,7 @@ HYSTGEN_APART hystgen_sum_t hystgen_relaxing_follow(hystgen_play_t *play, hystge
         const int64_t z = play[i] + hystgen_times(on, &hystgen_relaxing_late);
         const int64_t left = hystgen_times(hystgen_stretch(w - z, r), &hystgen_relaxing_kept);
         sum += t->weight[i] * z;
-        play[i] = hystgen_beside(play, i, z + left);
+        play[i] = hystgen_limited_rest(play, i, z + left);
     }
     play[0] = w;
     return sum;
@@ -52,7 +53,8 @@ HYSTGEN_APART hystgen_sum_t hystgen_relaxing_follow(hystgen_play_t *play, hystge
    play 1 rests; from there on they are solved for like plain ones, with smaller slopes. */
 static hystgen_reach_t hystgen_relaxing_input(hystgen_play_t *play, hystgen_sum_t sum) {
     play[0] = play[1];
-    return hystgen_loop_solve(&hystgen_relaxing_tables, play, sum);
+    return hystgen_loop_solve(&hystgen_relaxing_tables, play,
+                              hystgen_loop_output(&hystgen_relaxing_tables, play), sum);
 }
 #else
 /* The plays follow their input w. Returns their sum. */

@@ -43,8 +43,8 @@ static int64_t hystgen_yield(int64_t x) {
 }
 
 /* How far into the step `way` the input counts as standing still. */
-static inline int64_t hystgen_seen(int64_t way) {
-    return hystgen_short_times(way, &hystgen_seen_share);
+static inline int64_t hystgen_standing_way(int64_t way) {
+    return hystgen_short_times(way, &hystgen_standing_share);
 }
 #else
 /* The part of a stretch x >= 0 that a play with a nonlinear dashpot gains in a step: a table, cubic
@@ -64,8 +64,8 @@ static hystgen_real_t hystgen_yield(hystgen_real_t x) {
 }
 
 /* How far into the step `way` the input counts as standing still. */
-static inline hystgen_real_t hystgen_seen(hystgen_real_t way) {
-    return way * HYSTGEN_SEEN;
+static inline hystgen_real_t hystgen_standing_way(hystgen_real_t way) {
+    return way * HYSTGEN_STANDING_SHARE;
 }
 
 /* The move of a play for a yield, and the reverse. */

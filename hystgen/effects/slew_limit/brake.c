@@ -28,8 +28,8 @@
 static hystgen_reach_t hystgen_inverse_braked(const hystgen_inverse_t *self, hystgen_reach_t v,
                                               hystgen_reach_t near) {
     return hystgen_drive_code(
-        hystgen_braked_drive(&hystgen_braked_1, &self->braked_1, hystgen_entered_drive(near),
-                             hystgen_entered_drive(v > near ? v - near : near - v)));
+        hystgen_braked_drive(&hystgen_braked_1, &self->braked_1, hystgen_drive_signal(near),
+                             hystgen_drive_signal(v > near ? v - near : near - v)));
 }
 
 #if defined(HYSTGEN_HAS_QUIET_DRIVE)
@@ -53,8 +53,8 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t 
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_kept(const hystgen_inverse_t *self,
                                                             hystgen_reach_t v) {
     return hystgen_drive_code(hystgen_steady_kept(
-        &self->steady, &hystgen_braked_1, &self->braked_1.lag, hystgen_entered_drive(v),
-        hystgen_entered_drive(self->applied), HYSTGEN_DITHER));
+        &self->steady, &hystgen_braked_1, &self->braked_1.lag, hystgen_drive_signal(v),
+        hystgen_drive_signal(self->applied), HYSTGEN_DITHER));
 }
 
 /* The drive nearest to v that the amplifier reaches in one step, or from which the lag behind it

@@ -8,7 +8,7 @@ import numpy as np
 
 from hystgen.basics.jit import jit
 from hystgen.plays.corners.corners_float import DEPTH, INPUT, LEVEL, NEXT, OUTPUT, RISING, K
-from hystgen.plays.fixed import FixedPlayTables, over_slope
+from hystgen.plays.fixed import FixedPlayTables, divide_by_slope
 from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN, Counts, Reals
 
 INPUT_MOST = 2**31 - 1  # inputs of the plays, in their least steps, are an int32_t in C
@@ -169,7 +169,7 @@ def plays_step(t: FixedPlayTables, m: FixedMemory, to: Any) -> Any:
 @jit
 def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
     """The input, at most a little outside the range, that gives `to`, an output beyond a kink along the move."""
-    x = kink[1] + over_slope(t, to - kink[0], kink[2] + 1)
+    x = kink[1] + divide_by_slope(t, to - kink[0], kink[2] + 1)
     most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.counts[RISING] else t.limits[MARGIN] - t.limits[PLAY_MIN]
     return along(m, most if x > most else x)
 

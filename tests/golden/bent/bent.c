@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 63126d16ef9ebf34670b54373d303d0257caff9033dc2d4bc64fe0366be88a1d, without this line
+ * Text: sha256 31ebfd90c4d626ef4912553fbb362799510baac5a6d9731421df53a8400d1015, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -118,14 +118,14 @@ static bent_real_t bent_loop_output(const bent_tables_t *t, const bent_real_t *p
     return sum;
 }
 
-/* The input of the plays that gives `output`: assumes first that every play follows, then drops the
-   largest thresholds one by one until the solution reaches the last play that is left. The answer
-   must not pass the input at which the play dropped last would follow: a rounding error of `output`
-   is divided by the slope before that input, which may be small, and must not run on along the
-   steeper slope behind it. */
+/* The input of the plays that gives `output`; now they give `here`. Assumes first that every play
+   follows, then drops the largest thresholds one by one until the solution reaches the last play
+   that is left. The answer must not pass the input at which the play dropped last would follow: a
+   rounding error of `output` is divided by the slope before that input, which may be small, and
+   must not run on along the steeper slope behind it. */
 static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *play,
-                                   bent_real_t output) {
-    const bool rising = output >= bent_loop_output(t, play);
+                                   bent_real_t here, bent_real_t output) {
+    const bool rising = output >= here;
     bent_real_t tail = 0;
     bent_real_t next = 0; /* input at which play k would start to follow */
     unsigned int k;
@@ -270,6 +270,12 @@ static inline bent_real_t bent_applied_drive(bent_real_t v) {
     return bent_clamp_drive(v) + 0;
 }
 
+/* Input of the plays at which their sum is h; now it is `level`. The plays are summed up again
+   where that is not kept, as without effects, or lacks bits, as in fixed point. */
+static inline bent_real_t bent_input_of(const bent_real_t *play, bent_real_t h) {
+    return bent_loop_solve(&bent_model_tables, play, bent_loop_output(&bent_model_tables, play), h);
+}
+
 /* Drive v has passed through the drive side and moved the plays. */
 static inline void bent_forward_played(bent_forward_t *self, bent_real_t v) {
     bent_loop_absorb(&bent_model_tables, self->play, bent_front_forward(v));
@@ -387,7 +393,7 @@ static inline bent_real_t bent_inverse_next(bent_inverse_t *self, bent_real_t u)
     }
     self->bits = bits;
     const bent_real_t h = bent_inverse_undisplaced(level);
-    const bent_real_t w = bent_loop_solve(&bent_model_tables, self->play, h);
+    const bent_real_t w = bent_input_of(self->play, h);
     const bent_real_t v = bent_front_inverse(w);
     return bent_inverse_answer(self, bent_inverse_limited(self, v));
 }

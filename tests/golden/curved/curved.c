@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 553e3ffacf5c6b3ddd11a410de4466e79504852f134f1374b9b972bae44cb5fc, without this line
+ * Text: sha256 0a03e6940c508b822a3483fecfd4bf2972a8b50d323c2dde082752be22ca65b4, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -93,7 +93,7 @@ static uint64_t curved_wide(uint32_t a, uint32_t b) {
 
 /* d / slope to the nearest integer, d >= 0: the upper bits of d times the reciprocal
    2^(32 + shift) / slope. A slope is at least 16, so that `shift` is 2 .. 29. */
-static int64_t curved_over_slope(int64_t d, uint32_t reciprocal, unsigned int shift) {
+static int64_t curved_divide_by_slope(int64_t d, uint32_t reciprocal, unsigned int shift) {
     const uint64_t low = curved_wide((uint32_t)d, reciprocal) >> CURVED_WORD;
     const uint64_t quotient = curved_wide((uint32_t)((uint64_t)d >> CURVED_WORD), reciprocal) + low;
     const uint32_t high = (uint32_t)(quotient >> CURVED_WORD);
@@ -234,7 +234,8 @@ CURVED_APART void curved_move_to_input(const curved_curve_t *t, curved_place_t *
 CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t *here,
                                    const curved_kink_t *kink, int64_t to) {
     const curved_segment_t *s = &t->segment[kink->k];
-    const int64_t x = kink->input + curved_over_slope(to - kink->output, s->reciprocal, s->shift);
+    const int64_t x =
+        kink->input + curved_divide_by_slope(to - kink->output, s->reciprocal, s->shift);
     const int64_t most = t->range[curved_direction(here->rising)];
     return curved_along(here, x > most ? most : x);
 }
@@ -535,32 +536,26 @@ void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied) {
                          curved_inverse_arrive(self, v));
 }
 
-/* The plays hold a start memory. */
-static void curved_inverse_rest(curved_inverse_t *self) {
+/* The part common to init and reset. */
+static void curved_inverse_begin(curved_inverse_t *self, bool reset) {
+    const curved_drive_t *first = &curved_inverse_first_drive[reset ? 1 : 0];
+    curved_start(&curved_model_curve, &self->here, self->corner,
+                 reset ? curved_model_zero : curved_model_start, reset ? 0u : CURVED_START_STEP);
+    self->drive = (curved_real_t)first->drive;
     curved_inverse_keep(self);
     self->reference = 0;
     self->repeat = false;
     self->next = -CURVED_FAR;
     self->bits = 0;
-}
-
-/* The start memory of the parameter file (`which` 0) or all plays at 0 (1). */
-static void curved_inverse_begin(curved_inverse_t *self, unsigned int which) {
-    curved_start(&curved_model_curve, &self->here, self->corner,
-                 which > 0u ? curved_model_zero : curved_model_start,
-                 which > 0u ? 0u : CURVED_START_STEP);
-    const curved_drive_t *first = &curved_inverse_first_drive[which];
-    self->drive = (curved_real_t)first->drive;
     self->status = 0;
-    curved_inverse_rest(self);
 }
 
 void curved_inverse_init(curved_inverse_t *self) {
-    curved_inverse_begin(self, 0);
+    curved_inverse_begin(self, false);
 }
 
 void curved_inverse_reset(curved_inverse_t *self, curved_real_t x) {
-    curved_inverse_begin(self, 1);
+    curved_inverse_begin(self, true);
     (void)curved_inverse_step(self, x);
 }
 

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 88a4783c2033acc6108d45c91d580f49ce66390b0aa750be8ac492755b493173, without this line
+ * Text: sha256 5bd8918f80a781e5e6c449e1662859a1d386e8190af089a64d9929ffc4df0dd1, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -412,29 +412,25 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied) {
     self->before = m->here.input;
 }
 
-/* The plays hold a start memory: the drive rests within its range. */
-static void plain_inverse_rest(plain_inverse_t *self) {
+/* The part common to init and reset: the drive rests within its range. */
+PLAIN_APART void plain_inverse_begin(plain_inverse_t *self, bool reset) {
+    plain_start(&plain_inverse_curve, &self->plays, self->corner,
+                &plain_inverse_start[reset ? 1 : 0]);
     plain_move_to_output(&plain_inverse_curve, &self->plays, self->corner,
                          plain_clamp_drive(self->plays.here.output));
     plain_copy_place(&self->undo, &self->plays.here);
     self->before = self->plays.here.input;
     self->stepped = false;
     self->committed = false;
-}
-
-/* The start memory of the parameter file (`which` 0) or all plays at 0 (1). */
-PLAIN_APART void plain_inverse_begin(plain_inverse_t *self, unsigned int which) {
-    plain_start(&plain_inverse_curve, &self->plays, self->corner, &plain_inverse_start[which]);
     self->status = 0;
-    plain_inverse_rest(self);
 }
 
 void plain_inverse_init(plain_inverse_t *self) {
-    plain_inverse_begin(self, 0);
+    plain_inverse_begin(self, false);
 }
 
 void plain_inverse_reset(plain_inverse_t *self, plain_real_t x) {
-    plain_inverse_begin(self, 1);
+    plain_inverse_begin(self, true);
     (void)plain_inverse_step(self, x);
 }
 

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 5f532dcc4f830c84df9d02bce65a84e13b2d507998385c09985fe950f7832745, without this line
+ * Text: sha256 7b40b36260742fa41814d1070ca2adde46a88514153c915e151abbf5738043fd, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -935,11 +935,15 @@ void two_branches_inverse_commit(two_branches_inverse_t *self, two_branches_real
     two_branches_inverse_replace(self, v);
 }
 
-/* The plays hold a start memory: the drive rests within its range. */
-static void two_branches_inverse_rest(two_branches_inverse_t *self, unsigned int which) {
+/* The part common to init and reset: the drive rests within its range. */
+TWO_BRANCHES_APART void two_branches_inverse_begin(two_branches_inverse_t *self, bool reset) {
+    const two_branches_drive_t *first = &two_branches_inverse_first_drive[reset ? 1 : 0];
+    two_branches_start(&two_branches_inverse_curve, &self->plays, self->corner,
+                       &two_branches_inverse_start[reset ? 1 : 0]);
     self->last = self->plays.here.input + TWO_BRANCHES_OFFSET;
-    two_branches_move_to_output(&two_branches_inverse_curve, &self->plays, self->corner,
-                                two_branches_inverse_first_drive[which].w);
+    two_branches_move_to_output(&two_branches_inverse_curve, &self->plays, self->corner, first->w);
+    self->drive = first->drive;
+    self->ascending = first->ascending;
     two_branches_inverse_keep(self);
     self->returned = self->drive;
     self->reference = 0;
@@ -947,26 +951,15 @@ static void two_branches_inverse_rest(two_branches_inverse_t *self, unsigned int
     self->committed = false;
     self->repeat = false;
     self->bits = 0;
-}
-
-/* The start memory of the parameter file (`which` 0) or all plays at 0 (1). */
-TWO_BRANCHES_APART void two_branches_inverse_begin(two_branches_inverse_t *self,
-                                                   unsigned int which) {
-    two_branches_start(&two_branches_inverse_curve, &self->plays, self->corner,
-                       &two_branches_inverse_start[which]);
-    const two_branches_drive_t *first = &two_branches_inverse_first_drive[which];
-    self->drive = (two_branches_real_t)first->drive;
-    self->ascending = first->ascending;
     self->status = 0;
-    two_branches_inverse_rest(self, which);
 }
 
 void two_branches_inverse_init(two_branches_inverse_t *self) {
-    two_branches_inverse_begin(self, 0);
+    two_branches_inverse_begin(self, false);
 }
 
 void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_t x) {
-    two_branches_inverse_begin(self, 1);
+    two_branches_inverse_begin(self, true);
     (void)two_branches_inverse_step(self, x);
 }
 
