@@ -92,7 +92,7 @@ def measured(
     one = model(effect)
     options = emit_options(one, operator, arithmetic, engine)
     files = sources.write(folder, one, options)
-    constants = module.cost_of(one.parameters, one.cascade, options).memory.tables
+    constants = module.of(one.parameters, one.cascade, options).cost.memory.tables
     numbers, real = one.tables(arithmetic, engine), ARITHMETICS[arithmetic].number
     first = slots.OUTPUT_MIN if operator == "inverse" else slots.DRIVE_MIN
     low, high = (float(end) for end in numbers.limits[first : first + 2])

@@ -12,7 +12,7 @@
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hystgen.basics.version import __version__ as __version__
 
@@ -87,9 +87,9 @@ _MODULES = {
 __all__ = [*sorted(_PLACES), *_MODULES, "__version__"]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name in _MODULES:
-        value: Any = importlib.import_module(f"hystgen.{_MODULES[name]}")
+        value: object = importlib.import_module(f"hystgen.{_MODULES[name]}")
     elif name in _PLACES:
         value = getattr(importlib.import_module(f"hystgen.{_PLACES[name]}"), name)
     else:

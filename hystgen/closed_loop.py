@@ -36,7 +36,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import FIXED
 from hystgen.basics import extras
 from hystgen.basics.arguments import finite
 from hystgen.cascade import PI, Cascade, InverseCascade
@@ -136,7 +136,7 @@ class Loop:
     plant.
     """
 
-    plant: Any
+    plant: object
     controller: object
     sample_time: float
     hysteresis: object = None
@@ -324,8 +324,9 @@ class _Operator:
     def reset(self) -> None:
         self._session.init()
 
-    def step(self, x: float, /) -> Any:
-        return self._session.run([x])[0].item()
+    def step(self, x: float, /) -> float:
+        answer: float = self._session.run([x])[0].item()
+        return answer
 
 
 class _InUnits:
@@ -337,8 +338,8 @@ class _InUnits:
     def __init__(self, operator: _Operator | Instance, model: Model, options: Options) -> None:
         self._operator = operator
         self._lsb: tuple[float, float] | None = None
-        chosen = ARITHMETICS[options.arithmetic]
-        if chosen.fixed:
+        chosen = FIXED.get(options.arithmetic)
+        if chosen:
             emit = model.parameters.emit
             lsbs = fixed_tables.lsbs(model.cascade, options.arithmetic, emit.drive_lsb, emit.output_lsb)
             drive, output = map(float, lsbs)

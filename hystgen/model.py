@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import arguments, display, drawing
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError, counted
 from hystgen.cascade import PI, Cascade
@@ -26,6 +26,8 @@ from hystgen.parameters.files import Parameters, load_parameters
 from hystgen.plays import slots
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from hystgen.chain.chain import Chain
     from hystgen.chain.settling import Settling
     from hystgen.compensator.chain.layout import ChainTables
@@ -84,7 +86,7 @@ class Model:
     def _repr_html_(self) -> str:
         return display.block(repr(self), draw=self._figure)
 
-    def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
+    def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
         """A picture of loops, the initial loading curve and, if it exists, the inverse with its accuracy.
 
         Returns matplotlib's Figure, which a notebook shows; with `path`, a .png or .svg file, it is also written there.
@@ -92,7 +94,7 @@ class Model:
         """
         return drawing.picture(self._figure, path)
 
-    def _figure(self) -> Any:
+    def _figure(self) -> Figure:
         from hystgen import portrait
 
         shown = not self.cascade.inverse_problems() and not self.effects
@@ -175,7 +177,7 @@ class Model:
             "limit it by averages of the reference with emit.compensation.noise_gain: 10, or allow it with "
             f"noise_gain: {math.ceil(gain)}"
         )
-        if ARITHMETICS[arithmetic].fixed:
+        if arithmetic in FIXED:
             compiled = chain_tables.build(self.chain, arithmetic, seconds, how, self._lsb)
             low, high = (int(end) for end in compiled.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
             if gain > MOST_A_CODE * (high - low):

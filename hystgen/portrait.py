@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,15 @@ from hystgen.basics.drawing import label
 from hystgen.cascade import Cascade
 from hystgen.parameters.schema import Units
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Array = NDArray[np.float64]
 
 
 def figure(
     name: str, cascade: Cascade, units: Units, inverse: Callable[[Array], Array] | None, effects: bool
-) -> Any:
+) -> Figure:
     """The figure; to be drawn within `drawing.styled`.
 
     `inverse`: drives (N,) for references (N,), inside the drive range; None where there is none to show; `effects`:

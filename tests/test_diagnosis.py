@@ -269,7 +269,7 @@ def test_what_is_said_of_withdrawn_effects_follows_from_their_figures(why: str, 
     """Of gaps of 50 and 40 times the noise, 0.02 um: shares from 3 to 90 %, which are stated and not judged."""
     of_held, of_fitted = selection.Explained(1.0, held, 0.02), selection.Explained(0.8, fitted, 0.02)
     refused = selection.Refusal(why, *{"range": (0.31, 0.105), "most": (held, 1.0), "above": (held, 0.04)}[why])
-    end = ranges.End(0, "creep", "weights 2", 3.0, "largest", 3.0, 9.0, 1.25 * held, "no less")
+    end = ranges.End(0, "creep", AtEnd("weights 2", 3.0, "largest", 3.0, 9.0, 1.25 * held, "no less"))
     model: Any = SimpleNamespace()
     withdrawn = selection.Withdrawal(("creep",), refused, of_held, of_fitted, (end,))
     outcome = selection.Outcome(model, model, (), (), withdrawn)

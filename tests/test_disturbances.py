@@ -21,7 +21,7 @@ from hystgen.diagnosis.data.items import Item
 from hystgen.diagnosis.data.signals import one_loop, one_speed, reversals
 from hystgen.diagnosis.findings import content
 from hystgen.diagnosis.findings.kinds import DropOuts, Finding, HeldSamples, Saturated
-from hystgen.diagnosis.findings.kinds import Structure as Remaining
+from hystgen.diagnosis.findings.kinds import Structured as Remaining
 from hystgen.diagnosis.search import fits, hypothesis
 from hystgen.diagnosis.search.hypothesis import Actuator, Part, Structure
 from hystgen.effects import shapes

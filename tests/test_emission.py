@@ -608,7 +608,7 @@ def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Pa
     """Memory in the banner is counted from the declarations of `c_runtime/`; here by the compiler of this machine."""
     family = runtime.FAMILIES[arithmetic]
     variants = [
-        runtime.Variant(engine, family.fixed, fronts, branches)
+        runtime.Variant(engine, family, fronts, branches)
         for engine in ("corners", "loop")
         for fronts, branches in ((False, False), (True, False), (True, True))
     ]
@@ -618,9 +618,9 @@ def test_sizes_of_declared_types_are_the_compilers(arithmetic: str, tmp_path: Pa
     shared = [*runtime.memory_pieces(family), *runtime.table_pieces(family)]
     for number, variant in enumerate(variants):
         operators = ["forward", "inverse"]
-        functions = runtime.operator_pieces(variant, family, operators, "")
+        functions = runtime.operator_pieces(variant, operators, "")
         pieces = [*shared, *runtime.state_pieces(variant, family, operators, functions)]
-        sizes = cost.declared(pieces, ARITHMETICS[arithmetic], cost.Layout(4, 8, packed=False), lengths)
+        sizes = cost.sizes(pieces, family, cost.Layout(4, 8, packed=False), lengths)
         types = [each.name for each in pieces if "typedef struct" in each.code]
         assert {"hystgen_corner_t", "hystgen_inverse_t", "hystgen_forward_t"} <= set(types)
         lines = ["#include <stdbool.h>", "#include <stdint.h>", "#include <stdio.h>"]

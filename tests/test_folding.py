@@ -14,6 +14,7 @@ from modelfiles import CHAINS, CREEP, FILES, chain
 from pycparser import c_ast, c_parser
 
 import hystgen
+from hystgen.emission import runtime
 from hystgen.emission.calls import emitted_files
 from hystgen.emission.folding import folded, parsed
 from hystgen.model import Model
@@ -190,7 +191,11 @@ def test_a_source_explains_its_words(name: str, engine: str, words: str) -> None
 def fold(*texts: str, fixed: bool = True) -> str:
     functions = [found for text in texts if (found := parsed(text))]
     assert len(functions) == len(texts)
-    kept = folded(functions, [], lambda made: called(made, functions[-1].name), fixed, ["HYSTGEN_APART "])
+    meaning = runtime.FAMILIES["q15" if fixed else "float32"].meaning
+    kept = folded(
+        functions, [], lambda made: called(made, functions[-1].name), ["HYSTGEN_APART "],
+        lambda kind: meaning(kind.removeprefix("hystgen_")),
+    )
     return " ".join(" ".join(each.text() for each in kept.values()).split())
 
 

@@ -15,7 +15,7 @@ from mutants import Mutant
 
 import hystgen
 from hystgen.arithmetic import ARITHMETICS
-from hystgen.emission import module, runtime
+from hystgen.emission import runtime
 from hystgen.emission.calls import emit_options
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
@@ -62,7 +62,7 @@ def sources(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def forget() -> None:
     """What has been read of the sources."""
-    module._environment.cache_clear()
+    runtime._environment.cache_clear()
     runtime._read.cache_clear()
 
 

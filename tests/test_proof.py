@@ -153,7 +153,7 @@ CALL = "        case {}: {}; break;\n"
 def chain_driver(one: Model, arithmetic: str) -> str:
     """Every call of both operators of a model with effects, in any order with any codes."""
     name = one.name
-    calls = module.calls_of(one.parameters, one.cascade, Options("both", arithmetic, "loop", "self-contained"))
+    calls = module.of(one.parameters, one.cascade, Options("both", arithmetic, "loop", "self-contained")).calls
     cases = [
         (op, f"{name}_{op}_{call}(&{op}{f', {ANY.get(call, CODE)}()' * given})")
         for op in ("forward", "inverse")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import hystgen
 from hystgen.basics.problems import ParameterError, PlanError
-from hystgen.planning.session import PlayedSession
+from hystgen.planning.session import Session
 from hystgen.records import Record
 from hystgen.report import diagnosis as report
 from hystgen.report.plan import Plan
@@ -48,7 +48,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> Plan:
     return made(tmp_path_factory.mktemp("played"), dac_bits=12, dac_range=(-40.0, 160.0))
 
 
-def parts_of(plan: Plan) -> PlayedSession:
+def parts_of(plan: Plan) -> Session:
     assert plan.session is not None
     return plan.session
 
@@ -223,7 +223,7 @@ class TestCut:
         content = {**json.loads(parts_of(played).to_json()), **change}
         (tmp_path / "session.json").write_text(json.dumps(content, indent=2))
         with pytest.raises(ParameterError) as refused:
-            PlayedSession.read(tmp_path / "session.json")
+            Session.read(tmp_path / "session.json")
         assert len(refused.value.problems) == len(said)
         for text in said:
             assert text in str(refused.value)
@@ -232,7 +232,7 @@ class TestCut:
         keys = json.loads(parts_of(played).to_json()).keys()
         (tmp_path / "session.json").write_text("{}")
         with pytest.raises(ParameterError) as refused:
-            PlayedSession.read(tmp_path / "session.json")
+            Session.read(tmp_path / "session.json")
         assert sorted(problem.path for problem in refused.value.problems) == sorted(keys)
 
     @pytest.mark.parametrize(
@@ -259,7 +259,7 @@ class TestCut:
 
     def test_the_file_is_read_back(self, played: Plan, tmp_path: Path) -> None:
         (tmp_path / "session.json").write_text(parts_of(played).to_json())
-        assert PlayedSession.read(tmp_path / "session.json") == parts_of(played)
+        assert Session.read(tmp_path / "session.json") == parts_of(played)
 
 
 class TestCommand:

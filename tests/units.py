@@ -8,12 +8,12 @@ The model is called `hystgen`, so that its macros and tables have the names that
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 
 from modelfiles import BRAKED, CALM, CHAINS, LED, STEADY
 from mutants import MODELS
 
-from hystgen.emission import module, runtime
+from hystgen.emission import interface, module, runtime
+from hystgen.emission.compensator import Compensator
 from hystgen.emission.options import Options
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
@@ -104,42 +104,41 @@ def relative(path: Path) -> str:
 
 def lines(name: str, arithmetic: str, engine: str) -> set[tuple[str, int]]:
     """The files that a unit is made of, each with the numbers of the lines that are compiled for its model."""
-    values = _values(name, arithmetic, engine)
+    one = _compensator(name, arithmetic, engine)
     found = set()
-    for file in {*values.variant.sources(), *values.family.kernel_files, *_states(values), *_blocks(values)}:
+    for file in {*one.variant.sources(), *one.family.kernel_files, *_states(one), *_blocks(one)}:
         folder = EFFECTS.parent if file.startswith("effects/") else RUNTIME
         text = (folder / file).read_text(encoding="utf-8").splitlines()
         numbered = "".join(f"{line}\n" if line.startswith("#") else f"{n}\n" for n, line in enumerate(text, 1))
         own = numbered + "hystgen_operator_t\n" * any("hystgen_operator_t" in line for line in text)
-        chosen = "".join(runtime.forms(own, values.family.facts | values.variant.facts)).splitlines()
+        chosen = "".join(runtime.forms(own, one.family.facts | one.variant.facts)).splitlines()
         found |= {(file, int(line)) for line in chosen if line.isdecimal()}
     return found
 
 
-def _values(name: str, arithmetic: str, engine: str) -> SimpleNamespace:
+def _compensator(name: str, arithmetic: str, engine: str) -> Compensator:
     one = model(name)
-    return module.values_of(one.parameters, one.cascade, Options("both", arithmetic, engine, "self-contained"))
+    return module.compensator(one.parameters, one.cascade, Options("both", arithmetic, engine, "self-contained"))
 
 
-def _states(values: SimpleNamespace) -> list[str]:
+def _states(one: Compensator) -> list[str]:
     """The headers with the memory of an instance, or of the blocks that it is made of."""
-    if values.instances:
-        return [values.family.chain_types[1]] * values.variant.chain
-    return [values.variant.state]
+    if one.glue:
+        return [one.family.chain_types[1]] * one.variant.chain
+    return [one.variant.state]
 
 
-def _blocks(values: SimpleNamespace) -> list[str]:
+def _blocks(one: Compensator) -> list[str]:
     """The files of blocks, without those of a preview, a delay, a quiet drive and two branches where there are none."""
-    if not values.variant.chain:
+    if not one.compiled:
         return []
-    blocks = runtime.FIXED_CHAIN_BLOCKS if values.fixed else runtime.CHAIN_BLOCKS
-    t = values.numbers
+    t = one.compiled.tables
     missing = {
-        "delay/preview": not len(t.tap), "delay/delay": not t.number_of("delay"), "lag/quiet": not t.quiet,
+        "delay/preview": not len(t.tap), "delay/delay": not t.number_of("wait"), "lag/quiet": not t.quiet,
         "lag/steady": not t.turning,
     }  # fmt: skip
     left_out = tuple(f"effects/{name}" for name, absent in missing.items() if absent)
-    return [file for file in blocks if not file.startswith(left_out)]
+    return [file for file in one.family.chain_blocks if not file.startswith(left_out)]
 
 
 def _included(file: str, facts: frozenset[str]) -> list[str]:
@@ -153,30 +152,30 @@ def _included(file: str, facts: frozenset[str]) -> list[str]:
 
 def write(folder: Path, name: str, arithmetic: str, engine: str) -> Path:
     """The unit of both operators of a model, with its kernels."""
-    values = _values(name, arithmetic, engine)
-    chain, loop = values.variant.chain, values.family.loop
-    facts = values.family.facts | values.variant.facts
-    types = [*([f'#include "{values.family.chain_types[0]}"'] * chain), *values.instances.values()]
+    one = _compensator(name, arithmetic, engine)
+    chain, loop = one.variant.chain, one.family.loop
+    facts = one.family.facts | one.variant.facts
+    types = [*([f'#include "{one.family.chain_types[0]}"'] * chain), *(one.glue.states.values() if one.glue else ())]
     api = ["compensator/api.h", *["compensator/chain/api.h"] * chain]
     text = "\n".join(
         [
             "#define HYSTGEN_CONFIGURED",
             *["#define HYSTGEN_CHAIN"] * chain,
             *["#define HYSTGEN_LOOP", "#define HYSTGEN_STATUS_SLEW_LIMITED 16u /* never set */"] * loop,
-            *(f"#define {fact}" for fact in sorted(values.variant.facts)),
+            *(f"#define {fact}" for fact in sorted(one.variant.facts)),
             '#include "hystgen_runtime.h"',
-            f"#define HYSTGEN_CORNERS {values.corners}",
-            *values.limits,
-            *values.status,
-            *(f"#define HYSTGEN_{macro} {value}" for macro, value, _ in values.constants),
-            *(f'#include "{header}"' for header in _states(values)),
+            f"#define HYSTGEN_CORNERS {one.corners}",
+            *interface.limits(one),
+            *interface.status(one),
+            *(f"#define HYSTGEN_{macro} {value}" for macro, value, _ in one.numbers.macros),
+            *(f'#include "{header}"' for header in _states(one)),
             *types,
             *(line for header in api for line in _included(header, facts)),
-            *(f'#include "{file}"' for file in values.family.kernel_files),
-            *values.every,
-            *(f'#include "{file}"' for file in _blocks(values)),
-            values.functions,
-            *(line for file in values.variant.sources() for line in _included(file, facts)),
+            *(f'#include "{file}"' for file in one.family.kernel_files),
+            *(table.text for table in (*one.numbers.plays, *one.numbers.beside)),
+            *(f'#include "{file}"' for file in _blocks(one)),
+            module.front(one),
+            *(line for file in one.variant.sources() for line in _included(file, facts)),
         ]
     )
     source = folder / f"unit_{name}_{arithmetic}_{engine}.c"

@@ -2,45 +2,40 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 if TYPE_CHECKING:
     import numpy as np
 
 
 @dataclass(frozen=True)
-class Arithmetic:
+class Arithmetic(ABC):
     """A number format in which compensators compute.
 
     `name`: of the contract; `short`: in names of the run time; `c_type`: NAME_real_t, the type of inputs and answers,
-    of `bytes` bytes, which numpy calls `number_name`; `computed_name`: numpy's name of the type that the bit reference
-    computes with; `finer`: the arithmetic to turn to where this one is too coarse, empty for none; `float_h`: what
-    <float.h> calls it.
+    of `bytes` bytes, which numpy calls `number_name`; `finer`: the arithmetic to turn to where this one is too coarse,
+    empty for none.
 
-    In fixed point (`fixed`) `reach` is the C type, of `reach_bytes`, of where plays start to follow; `code_bits` are
-    those of a code without its sign, `degree` is that of the polynomials of the memoryless part, and `finer_plays` says
-    whether the plays' input may have bits below those of a drive code. `play_bits` are those of the plays' input where
-    it is not the drive code itself, without its sign; a corner keeps a sum in 32 bits and `low_bits` more.
+    Of all of its kind: `fixed`: numbers are codes; `unused`: sizes of codes in the `emit` section that it has no use
+    for; `includes`: headers of the language that C needs; `travels`: what an argument is multiplied by to be a travel,
+    where a travel has more bits.
     """
 
     name: str
     short: str
     c_type: str
     number_name: str
-    computed_name: str
     bytes: int
     finer: str = ""
-    float_h: str = ""
-    fixed: bool = False
-    reach: str = ""
-    reach_bytes: int = 0
-    code_bits: int = 0
-    degree: int = 0
-    finer_plays: bool = False
-    play_bits: int = 0
-    low_bits: int = 0
+
+    fixed: ClassVar[bool]
+    unused: ClassVar[tuple[str, ...]]
+    includes: ClassVar[tuple[str, ...]]
+    travels: ClassVar[int]
 
     @cached_property
     def number(self) -> np.dtype[Any]:
@@ -50,13 +45,30 @@ class Arithmetic:
         return np.dtype(self.number_name)
 
     @cached_property
+    @abstractmethod
     def computed(self) -> np.dtype[Any]:
-        """What the bit reference computes with: in fixed point int64, however narrow a number is in C."""
-        import numpy as np
+        """What the bit reference computes with."""
 
-        return np.dtype(self.computed_name)
+    @cached_property
+    @abstractmethod
+    def real(self) -> type[np.floating[Any]]:
+        """Type of numbers in physical units."""
 
-    @property
-    def code_max(self) -> int:
-        """Largest code of fixed point; the smallest that answers is its negative."""
-        return (1 << self.code_bits) - 1
+    @cached_property
+    @abstractmethod
+    def types(self) -> Mapping[str, str]:
+        """Types in C of plays and sums, where these are others than NAME_real_t."""
+
+    @cached_property
+    @abstractmethod
+    def constants(self) -> Mapping[str, str]:
+        """What `hystgen_runtime.h` defines and emitted code names directly."""
+
+    @cached_property
+    @abstractmethod
+    def facts(self) -> tuple[str, ...]:
+        """Macros that choose the forms of the run time that it takes."""
+
+    @abstractmethod
+    def share(self, part: float) -> float:
+        """The argument that stands for a share."""

@@ -1,5 +1,5 @@
 """Double precision (IEEE 754 binary64)."""
 
-from hystgen.arithmetic.description import Arithmetic
+from hystgen.arithmetic.floating import Floating
 
-FLOAT64 = Arithmetic("float64", "f64", "double", "float64", "float64", 8, float_h="DBL")
+FLOAT64 = Floating("float64", "f64", "double", "float64", 8, float_h="DBL")

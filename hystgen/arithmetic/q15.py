@@ -1,8 +1,8 @@
 """Fixed point in 16 bits."""
 
-from hystgen.arithmetic.description import Arithmetic
+from hystgen.arithmetic.fixed import Fixed
 
-Q15 = Arithmetic(
-    "q15", "q15", "int16_t", "int16", "int64", 2, finer="q31", fixed=True, reach="int32_t", reach_bytes=4,
-    code_bits=15, degree=3, finer_plays=True, play_bits=26, low_bits=16,
-)  # fmt: skip
+Q15 = Fixed(
+    "q15", "q15", "int16_t", "int16", 2, finer="q31", reach="int32_t", code_bits=15, degree=3, finer_plays=True,
+    play_bits=26, low_bits=16,
+)

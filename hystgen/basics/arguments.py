@@ -34,7 +34,7 @@ def _article(name: str) -> str:
     return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
 
 
-def known_options(call: str, function: Callable[..., Any], given: Iterable[str]) -> None:
+def known_options(call: str, function: Callable[..., object], given: Iterable[str]) -> None:
     """Raise TypeError for an option that `function`, which does the work of `call`, does not have."""
     parameters = inspect.signature(function).parameters.values()
     options = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY or each.default is not each.empty]
@@ -57,7 +57,7 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
     return call
 
 
-def taking(options_of: Callable[..., Any], name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def taking(options_of: Callable[..., object], name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """The same for a call that passes its `**options` to `options_of`; they appear in its signature; `name`: for
     messages."""
     handed = [

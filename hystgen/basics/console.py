@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Iterator
-from typing import Any
+from typing import IO, Any
 
 import click
 
@@ -26,7 +26,7 @@ class OutputError(click.ClickException):
         super().__init__(f"standard output cannot be written: {failure.strerror}; free some space or write elsewhere")
         _discard(sys.stdout)
 
-    def show(self, file: Any = None) -> None:
+    def show(self, file: IO[str] | None = None) -> None:
         """Print the message in the format of all others."""
         note(f"error: {self.message}", file)
 
@@ -40,7 +40,7 @@ def say(result: str | bytes) -> None:
         click.echo(result, nl=isinstance(result, str))
 
 
-def note(words: str, file: Any = None) -> None:
+def note(words: str, file: IO[str] | None = None) -> None:
     """Print remarks on standard error, as far as it can be written; nothing depends on it."""
     try:
         click.echo(words, file=file, err=True)
@@ -60,7 +60,7 @@ def _output() -> Iterator[None]:
         raise OutputError(failure) from None
 
 
-def _discard(stream: Any) -> None:
+def _discard(stream: IO[str]) -> None:
     """Discard the remaining output of a stream; otherwise the interpreter tries again when it ends."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
@@ -86,7 +86,7 @@ class Commands(click.Group):
                 _discard(sys.stderr)  # a message of click's own could not be written
                 sys.exit(2)
 
-    def invoke(self, ctx: click.Context) -> Any:
+    def invoke(self, ctx: click.Context) -> object:
         """Run the command; an operating system error that it does not catch concerns the output."""
         with _output():
             return super().invoke(ctx)
@@ -117,7 +117,7 @@ def _ended_by_signals() -> Iterator[None]:
     """Raise SystemExit at the signals of ENDING, unless they are ignored (nohup) or already handled."""
     before: dict[signal.Signals, Any] = {}
 
-    def end(number: int, _: Any) -> None:
+    def end(number: int, _: object) -> None:
         for each in before:
             signal.signal(each, signal.SIG_IGN)  # once is enough; a second one would interrupt the clean-up
         raise SystemExit(128 + number)

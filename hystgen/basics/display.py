@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 from hystgen.basics import drawing
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
-def block(line: str, table: str = "", draw: Callable[[], Any] | None = None) -> str:
+
+def block(line: str, table: str = "", draw: Callable[[], Figure] | None = None) -> str:
     """HTML of a line, a table of text below it, and of the figure that `draw` makes, if matplotlib is installed."""
     parts = [f"<p>{html.escape(line.strip('<>'))}</p>"]
     if table:

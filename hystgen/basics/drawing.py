@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +20,16 @@ from numpy.typing import NDArray
 from hystgen.basics import arguments, extras
 from hystgen.basics.writing import write_atomically
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 Array = NDArray[np.float64]
 
 MEASURED, MODEL, RESIDUAL, OTHER = "#1f5a99", "#c2410c", "#3f7d3a", "#5b4a91"
 IGNORED, GAP, FAULT, QUIET = "#8a929c", "#e0a526", "#b01030", "#6b7280"
 
-LINES = {
+LINES: dict[str, dict[str, Any]] = {
     "measured": {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45},
     "model": {"color": MODEL, "linewidth": 0.9, "alpha": 1.0},
 }
@@ -75,7 +79,7 @@ def check_path(path: str | os.PathLike[str]) -> None:
     require()
 
 
-def picture(draw: Callable[[], Any], path: str | os.PathLike[str] | None = None) -> Any:
+def picture(draw: Callable[[], Figure], path: str | os.PathLike[str] | None = None) -> Figure:
     """The figure that `draw` makes, in the style of all pictures; with a path also written there, all or nothing.
 
     Raises PlotError.
@@ -140,14 +144,14 @@ def styled() -> Iterator[None]:
             yield
 
 
-def figure(width: float, height: float) -> Any:
+def figure(width: float, height: float) -> Figure:
     """An empty figure, in inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def content(drawn: Any, kind: str) -> bytes:
+def content(drawn: Figure, kind: str) -> bytes:
     """The bytes of a PNG or SVG (`kind`) of a figure, without date or version."""
     engine = drawn.get_layout_engine()
     if engine is not None:  # savefig would draw everything twice for the layout
@@ -164,7 +168,7 @@ def label(what: str, unit: str | None) -> str:
     return f"{what} ({unit})" if unit else what
 
 
-def noise_lines(axes: Any, noise: float | None) -> None:
+def noise_lines(axes: Axes, noise: float | None) -> None:
     """The standard deviation of the noise on both sides of zero; nothing if it is unknown."""
     if noise is None:
         return
@@ -172,7 +176,7 @@ def noise_lines(axes: Any, noise: float | None) -> None:
         axes.axhline(side, color=FAULT, linewidth=1.0, linestyle="--", label=name)
 
 
-def legend_above(axes: Any, columns: int = 3) -> None:
+def legend_above(axes: Axes, columns: int = 3) -> None:
     """A legend above the plot area, where it hides nothing."""
     axes.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, handlelength=1.4,

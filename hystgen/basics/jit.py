@@ -59,7 +59,7 @@ SHORT = 10_000
 plain model, whose functions take 8 s to compile, and 1 s with many effects, where that takes 80 s. Set by: `verify` of
 `mixed` and `everything` of tests/modelfiles.py, inverse, 0.035 and 0.10 ms a sample."""
 
-_samples: collections.Counter[tuple[Any, np.dtype[Any]]] = collections.Counter()
+_samples: collections.Counter[tuple[object, np.dtype[np.generic]]] = collections.Counter()
 
 
 @contextlib.contextmanager
@@ -76,7 +76,9 @@ def plain() -> Iterator[None]:
         _plain.reset(before)
 
 
-def for_samples(function: Callable[..., Any], samples: NDArray[Any]) -> contextlib.AbstractContextManager[None]:
+def for_samples(
+    function: Callable[..., object], samples: NDArray[np.generic]
+) -> contextlib.AbstractContextManager[None]:
     """As `plain` while `function` has been given few samples of their type in this process, and otherwise nothing."""
     key = function, samples.dtype
     if _samples[key] + len(samples) > SHORT:
@@ -157,7 +159,7 @@ class Jit(Generic[P, R]):
 def jit(function: Callable[P, R], /) -> Jit[P, R]: ...
 @overload
 def jit(*, inline: bool) -> Callable[[Callable[P, R]], Jit[P, R]]: ...
-def jit(function: Callable[..., Any] | None = None, /, *, inline: bool = False) -> Any:
+def jit(function: Callable[..., object] | None = None, /, *, inline: bool = False) -> Any:
     """Compile a function; `inline` makes it part of its callers, since passing a model's many tables costs more than a
     short function computes."""
     if function is None:
@@ -175,7 +177,7 @@ def _cache_class() -> Any:
             # The name holds the mark of everything that the code depends on; numba would pickle what a closure holds
             return sig, codegen.magic_tuple(), self._py_func.__qualname__
 
-        def load_overload(self, sig: Any, target_context: Any) -> Any:
+        def load_overload(self, sig: object, target_context: object) -> object:
             try:
                 return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
             except Exception:  # any error that unpickling half a file may raise
@@ -183,7 +185,7 @@ def _cache_class() -> Any:
                     self.flush()  # type: ignore[no-untyped-call]
                 return None
 
-        def save_overload(self, sig: Any, data: Any) -> None:
+        def save_overload(self, sig: object, data: object) -> None:
             with contextlib.suppress(OSError):
                 super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
@@ -216,10 +218,10 @@ def _listen() -> None:
     from numba.core import event
 
     class FirstCompilation(event.Listener):
-        def on_start(self, _: Any) -> None:
+        def on_start(self, _: object) -> None:
             _announce(lambda: ONCE if _cache_folder() else EVERY_TIME)
 
-        def on_end(self, _: Any) -> None:
+        def on_end(self, _: object) -> None:
             pass
 
     register: Callable[[str, event.Listener], None] = event.register

@@ -16,7 +16,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from hystgen.basics import extras
 
@@ -65,11 +65,11 @@ def each(
 
 
 @dataclass(eq=False)
-class _Job(Generic[T, R]):
+class _Pending(Generic[T, R]):
     item: T
     done: list[R] = field(default_factory=list)
     """the task's result, once available"""
-    after: list[_Job[T, R]] = field(default_factory=list)
+    after: list[_Pending[T, R]] = field(default_factory=list)
 
 
 class Pool(Generic[T, R]):
@@ -104,11 +104,11 @@ class Pool(Generic[T, R]):
         `then`: further tasks that follow from a result; they go first. An item that fails or kills its worker is rerun
         in this process: an exception is raised as in a plain loop.
         """
-        tasks = [_Job[T, R](item) for item in items]
+        tasks = [_Pending[T, R](item) for item in items]
 
-        def finish(task: _Job[T, R], result: R) -> list[_Job[T, R]]:
+        def finish(task: _Pending[T, R], result: R) -> list[_Pending[T, R]]:
             task.done.append(result)
-            task.after.extend(_Job(item) for item in then(task.item, result))
+            task.after.extend(_Pending(item) for item in then(task.item, result))
             tick()
             return task.after
 
@@ -122,13 +122,15 @@ class Pool(Generic[T, R]):
             found.append((task.item, task.done[0]))
         return found
 
-    def _elsewhere(self, waiting: deque[_Job[T, R]], finish: Callable[[_Job[T, R], R], list[_Job[T, R]]]) -> None:
+    def _elsewhere(
+        self, waiting: deque[_Pending[T, R]], finish: Callable[[_Pending[T, R], R], list[_Pending[T, R]]]
+    ) -> None:
         """Let the processes do the tasks; those after a failure may remain undone."""
         from multiprocessing import connection
 
         self._gather(len(waiting))
         free = list(self._workers)
-        busy: dict[Connection, _Job[T, R]] = {}
+        busy: dict[Connection, _Pending[T, R]] = {}
         failed = False
         while True:
             while free and waiting and not failed:
@@ -178,7 +180,7 @@ class Pool(Generic[T, R]):
 
 
 def _serve(
-    work: Callable[[Any], Any], reach: Connection, others: Sequence[Connection], at_work: memoryview[int]
+    work: Callable[[T], R], reach: Connection, others: Sequence[Connection], at_work: memoryview[int]
 ) -> None:
     global _at_work
     _at_work = at_work
@@ -192,7 +194,7 @@ def _serve(
         try:
             item = reach.recv()
             try:
-                answer = work(item), False
+                answer: tuple[R | None, bool] = work(item), False
             except Exception:
                 answer = None, True
             reach.send(answer)
@@ -220,7 +222,7 @@ def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
 # Threads of the linear algebra -------------------------------------------------------------------------------
 
 
-def one_thread() -> Any:
+def one_thread() -> contextlib.AbstractContextManager[object]:
     """Context in which linear algebra uses a single thread: on small matrices, several would wait for each other."""
     try:
         import scipy.linalg  # noqa: F401  # has a library of its own, and one that comes later is not limited
@@ -229,4 +231,5 @@ def one_thread() -> Any:
         extras.require_fit("a fit")
         raise
 
-    return threadpool_limits(1)
+    found: contextlib.AbstractContextManager[object] = threadpool_limits(1)
+    return found

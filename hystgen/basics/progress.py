@@ -5,7 +5,10 @@ from __future__ import annotations
 import sys
 import time
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rich import progress
 
 PATIENCE = 1.0
 """Seconds before the bar appears."""
@@ -28,8 +31,8 @@ class Progress:
         self._title = title
         self._done = 0.0
         self._next = time.monotonic() + PATIENCE
-        self._bar: Any = None
-        self._task: Any = None
+        self._bar: progress.Progress | None = None
+        self._task: progress.TaskID | None = None
 
     def __enter__(self) -> Progress:
         return self
@@ -47,7 +50,7 @@ class Progress:
         if not self._shown or now < self._next:
             return
         self._next = now + OFTEN
-        if self._bar is None:
+        if self._bar is None or self._task is None:
             try:
                 from rich.console import Console
                 from rich.progress import Progress as Bar

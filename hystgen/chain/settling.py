@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +69,7 @@ class Settling:
         """The longer of the two times, s."""
         return max(self.up, self.down)
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> dict[str, object]:
         """The fields for JSON; infinite times are None."""
         content = asdict(self)
         return content | {key: content[key] if math.isfinite(content[key]) else None for key in ("up", "down")}

@@ -10,7 +10,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import IO, TYPE_CHECKING, TypedDict, TypeVar
 
 import click
 
@@ -20,6 +20,9 @@ from hystgen.basics import console
 if TYPE_CHECKING:
     from hystgen.model import Model
 
+
+T = TypeVar("T")
+U = TypeVar("U")
 
 ADVICE = {
     errno.ENOENT: "give a path that exists",
@@ -41,12 +44,12 @@ class Failed(click.ClickException):
         super().__init__(message)
         self.exit_code = code  # type: ignore[misc]  # click declares it on the class and reads it on the instance
 
-    def show(self, file: Any = None) -> None:
+    def show(self, file: IO[str] | None = None) -> None:
         """Print just the message: it already says that it is an error."""
         console.note(self.message, file)
 
 
-def guarded(path: str, action: Callable[[], Any]) -> Any:
+def guarded(path: str, action: Callable[[], T]) -> T:
     """Run `action` and turn the errors it may raise into a message and an exit code."""
     from hystgen.basics.extras import MissingExtraError
     from hystgen.basics.problems import (
@@ -94,8 +97,7 @@ def _reason(error: Exception) -> str:
 def load_model(path: str, effects: Sequence[str] = ()) -> Model:
     from hystgen.model import load
 
-    model: Model = guarded(path, lambda: load(path, effects))
-    return model
+    return guarded(path, lambda: load(path, effects))
 
 
 def seconds(_context: click.Context, _option: click.Parameter, value: float) -> float:
@@ -128,10 +130,6 @@ skip_option = click.option(
     "--skip", type=float, callback=seconds, default=0.0,
     help="seconds at the start of every record that are not compared, although their drive counts",
 )
-T = TypeVar("T")
-U = TypeVar("U")
-
-
 def for_each(items: Sequence[T], action: Callable[[T], U]) -> list[U]:
     """The results of `action` for all items. Raises Failed with all messages and the highest of the exit codes."""
     made, failures = [], []
@@ -200,12 +198,21 @@ class Judging(click.Command):
         return rest
 
 
-def data_argument(required: bool) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def data_argument(required: bool) -> Callable[[Callable[..., object]], Callable[..., object]]:
     """The records given to a command."""
     return click.argument("data", nargs=-1, required=required, type=click.Path(), callback=matched)
 
 
-def reading_options(columns: str | None, sample_time: float | None, delimiter: str | None) -> dict[str, Any]:
+class ReadingOptions(TypedDict):
+    """The options of `read_records` that the command line gives."""
+
+    columns: dict[str, str] | None
+    sample_time: float | None
+    delimiter: str | None
+    progress: bool
+
+
+def reading_options(columns: str | None, sample_time: float | None, delimiter: str | None) -> ReadingOptions:
     from hystgen import records
 
     mapping = guarded("--columns", lambda: records.parse_columns(columns)) if columns else None
@@ -228,7 +235,7 @@ _RECORD_OPTIONS = [
 ]
 
 
-def record_options(command: Callable[..., Any]) -> Callable[..., Any]:
+def record_options(command: Callable[..., object]) -> Callable[..., object]:
     """The options shared by all commands that take records."""
     for option in reversed(_RECORD_OPTIONS):
         command = option(command)

@@ -10,21 +10,7 @@ from typing import Any
 import click
 
 from hystgen.basics import console
-from hystgen.cli.common import (
-    Judging,
-    data_argument,
-    effects_option,
-    guarded,
-    history_values,
-    keep_inputs,
-    load_model,
-    matched,
-    number_list,
-    params_argument,
-    reading_options,
-    record_options,
-    skip_option,
-)
+from hystgen.cli import common
 
 PLAYED = ("rate", "dac_bits", "dac_range", "dac_coding")
 """Options of a plan that is played at one rate."""
@@ -38,7 +24,7 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
     def run() -> None:
         drawing.require()
         planned = plan(params, effects=effects, **options)
-        keep_inputs([Path(output) / name for name in planned.names], [params, *effects])
+        common.keep_inputs([Path(output) / name for name in planned.names], [params, *effects])
         for sentence in planned.defaults:
             console.note(sentence)
         console.note(planned.sentence())
@@ -52,15 +38,15 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
             console.note(f"warning: from an earlier plan, with other drives: {names}; remove them, or give another -o")
         console.note(f"then run: {planned.command(output)}")
 
-    guarded(params, run)
+    common.guarded(params, run)
 
 
-@click.command(cls=Judging, short_help="Name the effects that a model is missing.")
-@params_argument
-@data_argument(required=False)
+@click.command(cls=common.Judging, short_help="Name the effects that a model is missing.")
+@common.params_argument
+@common.data_argument(required=False)
 @click.option("-o", "output", type=click.Path(file_okay=False), help="folder for the findings, or the plan")
 @click.option(
-    "--holdout", multiple=True, type=click.Path(), callback=matched,
+    "--holdout", multiple=True, type=click.Path(), callback=common.matched,
     help="record to judge by, not used in the fits; or a pattern in quotes, 'held/*.csv'",
 )
 @click.option("--plan", is_flag=True, help="write the drive records to measure, and a page that explains them")
@@ -76,9 +62,9 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
 @click.option(
     "--session", type=click.Path(), help="session.json of a plan: DATA is one recording of the whole session"
 )
-@effects_option
-@record_options
-@skip_option
+@common.effects_option
+@common.record_options
+@common.skip_option
 def diagnose(
     params: str, data: tuple[str, ...], output: str | None, holdout: tuple[str, ...], effects: tuple[str, ...],
     plan: bool, max_rate: float | None, session: str | None, history: str | None, rest: float, skip: float,
@@ -115,7 +101,7 @@ def diagnose(
         if "dac_coding" in asked and "dac_bits" not in asked:
             raise click.UsageError("--dac-coding is for codes; give --dac-bits and --dac-range with it")
         if "dac_range" in asked:
-            asked["dac_range"] = number_list("--dac-range", asked["dac_range"], "0,150")
+            asked["dac_range"] = common.number_list("--dac-range", asked["dac_range"], "0,150")
         _plan(params, output, effects, **asked)
         return
     if not data:
@@ -131,23 +117,24 @@ def diagnose(
     from hystgen import diagnosis, records
     from hystgen.basics import drawing, extras, writing
     from hystgen.effects import load_user_effects
-    from hystgen.planning.session import PlayedSession
+    from hystgen.planning.session import Session
     from hystgen.report import diagnosis as report
 
-    model = load_model(params, effects)
-    guarded(params, partial(extras.require_fit, "diagnose", plot=True))
-    guarded(params, drawing.require)
+    model = common.load_model(params, effects)
+    common.guarded(params, partial(extras.require_fit, "diagnose", plot=True))
+    common.guarded(params, drawing.require)
     inputs = (params, *data, *holdout, *([session] if session else []))
-    keep_inputs([Path(output) / name for name in diagnosis.Diagnosis.FILES], inputs)
-    guarded(output, partial(writing.check_files, Path(output), diagnosis.Diagnosis.FILES))
-    how: dict[str, Any] = {"holdout": list(holdout), "history": history_values(history), "rest": rest, "skip": skip}
-    read_as = reading_options(**reading)
+    common.keep_inputs([Path(output) / name for name in diagnosis.Diagnosis.FILES], inputs)
+    common.guarded(output, partial(writing.check_files, Path(output), diagnosis.Diagnosis.FILES))
+    visited = common.history_values(history)
+    how: dict[str, Any] = {"holdout": list(holdout), "history": visited, "rest": rest, "skip": skip}
+    read_as = common.reading_options(**reading)
 
     def run() -> None:
         own = [kind for path in effects for kind in load_user_effects(path)]
         to_fit: list[Any] = list(data)
         if session is not None:
-            played = PlayedSession.read(session)
+            played = Session.read(session)
             read = records.read_records(to_fit, **read_as)
             (recording,) = records.in_units(read, model.parameters.units, sources=to_fit)
             to_fit, held = played.cut(recording)
@@ -161,4 +148,4 @@ def diagnose(
         for path in found.write(output):
             console.say(str(path))
 
-    guarded(params, run)
+    common.guarded(params, run)

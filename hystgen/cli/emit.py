@@ -11,19 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hystgen.basics import console
-from hystgen.cli.common import (
-    Failed,
-    arithmetic_option,
-    effects_option,
-    engine_option,
-    for_each,
-    guarded,
-    layout_option,
-    load_model,
-    operator_option,
-    optimize_option,
-    partial_option,
-)
+from hystgen.cli import common
 
 if TYPE_CHECKING:
     from hystgen.model import Model
@@ -32,16 +20,16 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("params", nargs=-1, required=True, type=click.Path())
 @click.option("-o", "output", type=click.Path(file_okay=False), default=".", help="folder to write to")
-@operator_option
-@arithmetic_option
-@engine_option
-@optimize_option
-@layout_option
+@common.operator_option
+@common.arithmetic_option
+@common.engine_option
+@common.optimize_option
+@common.layout_option
 @click.option(
     "--check", is_flag=True, help="write nothing; exit 1 if C files differ, or none of PARAMS writes them; say which"
 )
-@partial_option
-@effects_option
+@common.partial_option
+@common.effects_option
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
 def emit(
     params: tuple[str, ...], output: str, check: bool, effects: tuple[str, ...], list_outputs: bool, **options: Any
@@ -58,10 +46,10 @@ def emit(
     from hystgen.emission import calls
 
     params = tuple(dict.fromkeys(params))
-    models = for_each(params, partial(load_model, effects=effects))
-    guarded(output, lambda: calls.check_names(models))
+    models = common.for_each(params, partial(common.load_model, effects=effects))
+    common.guarded(output, lambda: calls.check_names(models))
     named = list(zip(params, models, strict=True))
-    texts = for_each(named, lambda one: guarded(one[0], lambda: calls.emitted_files(one[1], **options)))
+    texts = common.for_each(named, lambda one: common.guarded(one[0], lambda: calls.emitted_files(one[1], **options)))
     made = {name: text for each in texts for name, text in each.items()}
     if check:
         _check(named, texts, output, options, effects)
@@ -69,7 +57,7 @@ def emit(
         for name in made:
             console.say(str(Path(output) / name))
     else:
-        for path in guarded(output, lambda: writing.write_files(Path(output), made)):
+        for path in common.guarded(output, lambda: writing.write_files(Path(output), made)):
             console.say(str(path))
 
 
@@ -84,14 +72,16 @@ def _check(
     folder = Path(output)
     differing = []
     for (path, model), files in zip(models, texts, strict=True):
-        found = guarded(path, partial(stale.find, folder, files))
+        found = common.guarded(path, partial(stale.find, folder, files))
         if not found:
             continue
         partial_too = {"allow_partial": True} if options["allow_partial"] else {}
         chosen = calls.emit_options(model, **options)
         wanted = {key: getattr(chosen, key) for key in OPTIONS} | partial_too
 
-        def again(other: Mapping[str, str], model: Model = model, found: Any = found) -> list[stale.Difference]:
+        def again(
+            other: Mapping[str, str], model: Model = model, found: Sequence[stale.Difference] = found
+        ) -> list[stale.Difference]:
             try:
                 with warnings.catch_warnings(action="ignore"):  # says which files were requested
                     return calls.stale_files(model, output, **other, allow_partial=options["allow_partial"])
@@ -100,9 +90,10 @@ def _check(
 
         differing.append(stale.Stale(path, found, wanted, again))
     written = {name for files in texts for name in files}
-    unwritten = guarded(output, lambda: stale.orphans(folder, written, [model.name for _, model in models]))
+    unwritten = common.guarded(output, lambda: stale.orphans(folder, written, [model.name for _, model in models]))
     if differing or unwritten:
-        wrong = [*(each for one in differing for each in one.differences), *unwritten]
-        problems = dict.fromkeys(f"error: {each.sentence()}" for each in wrong)
+        sentences = [each.sentence() for one in differing for each in one.differences]
+        sentences += [each.sentence() for each in unwritten]
+        problems = dict.fromkeys(f"error: {sentence}" for sentence in sentences)
         given = {key: value for key, value in options.items() if value and (key, value) != ("layout", "self-contained")}
-        raise Failed("\n".join([*problems, *stale.advice(differing, unwritten, output, given, effects)]), 1)
+        raise common.Failed("\n".join([*problems, *stale.advice(differing, unwritten, output, given, effects)]), 1)

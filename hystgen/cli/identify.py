@@ -11,18 +11,7 @@ import click
 
 from hystgen.basics import console
 from hystgen.basics.problems import counted
-from hystgen.cli.common import (
-    Failed,
-    Judging,
-    data_argument,
-    guarded,
-    history_values,
-    keep_inputs,
-    matched,
-    reading_options,
-    record_options,
-    skip_option,
-)
+from hystgen.cli import common
 
 
 def _units(_context: click.Context, _option: click.Parameter, value: str | None) -> dict[str, str] | None:
@@ -34,8 +23,8 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
     return dict(zip(("input", "output"), units, strict=True))
 
 
-@click.command(cls=Judging, short_help="Fit a model to measured records.")
-@data_argument(required=False)
+@click.command(cls=common.Judging, short_help="Fit a model to measured records.")
+@common.data_argument(required=False)
 @click.option("-o", "output", required=True, type=click.Path(), help="parameter file to write; with --batch a folder")
 @click.option("--batch", multiple=True, metavar="PATTERN", help="'units/*.csv', a file or a folder: one unit per file")
 @click.option("--emit/--no-emit", default=None, help="with --batch: write the C of every unit too  [default: emit]")
@@ -45,11 +34,11 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
 @click.option("--thresholds", type=int, help="number of plays without r_0; default: chosen on held-out error")
 @click.option("--breaks", type=int, help="number of breaks of a dead-zone sum; default: chosen on held-out error")
 @click.option(
-    "--holdout", multiple=True, type=click.Path(), callback=matched,
+    "--holdout", multiple=True, type=click.Path(), callback=common.matched,
     help="record not used in the fit; or a pattern in quotes, 'held/*.csv'; with --batch for example "
     "'holdout/{unit}.csv'",
 )
-@skip_option
+@common.skip_option
 @click.option("--loading-curve", is_flag=True, help="the records are initial loading curves, rising from 0")
 @click.option("--name", help="C identifier of the model; default: from the output file")
 @click.option(
@@ -58,7 +47,7 @@ def _units(_context: click.Context, _option: click.Parameter, value: str | None)
 )
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the fit")
 @click.option("--report", type=click.Path(file_okay=False), help="folder for report.html and its pictures")
-@record_options
+@common.record_options
 def identify(
     data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
     holdout: tuple[str, ...], skip: float, loading_curve: bool, name: str | None, units: dict[str, str] | None,
@@ -75,18 +64,18 @@ def identify(
     from hystgen.basics import extras, writing
     from hystgen.report import identification as pages
 
-    how = reading_options(**reading)
+    how = common.reading_options(**reading)
     options: dict[str, Any] = {
         "model": model,
         "thresholds": thresholds,
         "breaks": breaks,
-        "history": history_values(history),
+        "history": common.history_values(history),
         "rest": rest,
         "units": units,
         "skip": skip,
         "loading_curve": loading_curve,
     }
-    only_batch: dict[str, Any] = {"--emit": emit, "--jobs": jobs, "--scheduler": scheduler}
+    only_batch: dict[str, object] = {"--emit": emit, "--jobs": jobs, "--scheduler": scheduler}
     if batch:
         for option, value in (("--name", name), ("--plot", plot), ("--report", report)):
             if value is not None:
@@ -106,7 +95,7 @@ def identify(
         inside = Path(output) / "stage_x.yaml"
         raise click.BadParameter(f"'{output}' is a folder; give the file to write, as in {inside}", param_hint="'-o'")
     made = [str(Path(report) / name) for name in pages.names()] if report else []
-    keep_inputs((output, plot, *made), (*data, *holdout))
+    common.keep_inputs((output, plot, *made), (*data, *holdout))
 
     def run() -> None:
         from hystgen import records
@@ -148,7 +137,7 @@ def identify(
         if report:
             console.say(str(pages.write(fit, read, report, Path(output).name)))
 
-    guarded(data[0], run)
+    common.guarded(data[0], run)
 
 
 def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> None:
@@ -156,10 +145,11 @@ def _identify_batch(sources: tuple[str, ...], output: str, **options: Any) -> No
     from hystgen.fleet import batch as fleet
 
     try:
-        done = guarded(output, partial(fleet.identify_batch, sources, output, **options))
+        done = common.guarded(output, partial(fleet.identify_batch, sources, output, **options))
     except KeyboardInterrupt:
-        raise Failed("interrupted; finished units are kept, and the same command resumes from there", 130) from None
+        said = "interrupted; finished units are kept, and the same command resumes from there"
+        raise common.Failed(said, 130) from None
     console.note(done.table().rstrip("\n"))
     console.say(str(Path(output) / "summary.csv"))
     if done.failed:
-        raise Failed(f"error: {len(done.failed)} of {counted(len(done.units), 'unit')} failed", 1)
+        raise common.Failed(f"error: {len(done.failed)} of {counted(len(done.units), 'unit')} failed", 1)

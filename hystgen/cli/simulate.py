@@ -5,27 +5,20 @@ from __future__ import annotations
 import os
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import console
-from hystgen.cli.common import (
-    Failed,
-    data_argument,
-    effects_option,
-    guarded,
-    history_values,
-    keep_inputs,
-    load_model,
-    params_argument,
-    reading_options,
-    record_options,
-)
+from hystgen.cli import common
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 
-def _write_record(target: Path, header: list[str], columns: dict[str, Any]) -> None:
+def _write_record(target: Path, header: list[str], columns: dict[str, NDArray[np.float64]]) -> None:
     from hystgen import records
 
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -33,16 +26,16 @@ def _write_record(target: Path, header: list[str], columns: dict[str, Any]) -> N
 
 
 @click.command(short_help="Run a model, or its inverse, over records.")
-@params_argument
-@data_argument(required=True)
+@common.params_argument
+@common.data_argument(required=True)
 @click.option("-o", "output", type=click.Path(), help="CSV file, or a folder for several; default: standard output")
 @click.option("--operator", type=click.Choice(["forward", "inverse"]), default="forward", show_default=True)
 @click.option(
     "--arithmetic", type=click.Choice(list(ARITHMETICS)), help="compute as the emitted C does; default: double"
 )
 @click.option("--engine", type=click.Choice(["auto", "corners", "loop"]), help="with --arithmetic")
-@effects_option
-@record_options
+@common.effects_option
+@common.record_options
 def simulate(
     params: str, data: tuple[str, ...], output: str | None, operator: str, arithmetic: str | None, engine: str | None,
     effects: tuple[str, ...], history: str | None, rest: float, **reading: Any,
@@ -54,28 +47,29 @@ def simulate(
     from hystgen import records, simulation
 
     if len(data) > 1 and output is None:
-        raise Failed("error: several records need -o with a folder", 2)
+        raise common.Failed("error: several records need -o with a folder", 2)
     if len({Path(path).stem for path in data}) < len(data):
-        raise Failed("error: two records have the same name; their results would overwrite each other", 2)
-    model = load_model(params, effects)
-    visited = history_values(history)
-    how = reading_options(**reading)
+        raise common.Failed("error: two records have the same name; their results would overwrite each other", 2)
+    model = common.load_model(params, effects)
+    visited = common.history_values(history)
+    how = common.reading_options(**reading)
     column, answer = ("v", "y") if operator == "forward" else ("u", "v")
-    read = guarded(params, partial(records.read_records, data, need=(column,), **how))
+    read = common.guarded(params, partial(records.read_records, data, need=(column,), **how))
     units_of_model = model.parameters.units
-    converted = guarded(params, partial(records.in_units, read, units_of_model, need=(column,), sources=data))
+    converted = common.guarded(params, partial(records.in_units, read, units_of_model, need=(column,), sources=data))
     for record in converted:
         if {answer, f"{answer}_measured"} <= record.columns().keys():
-            raise Failed(f"error: {record.name} has both {answer} and {answer}_measured; rename one with --columns", 2)
+            both = f"{record.name} has both {answer} and {answer}_measured"
+            raise common.Failed(f"error: {both}; rename one with --columns", 2)
         for note in record.notes:
             console.note(f"warning: {record.name}: {note}")
     targets: list[Path | None] = [Path(output) if output else None] * len(data)
     if output and len(data) > 1 and Path(output).is_file():
-        raise Failed(f"error: {output} is a file, and several records need -o with a folder", 2)
+        raise common.Failed(f"error: {output} is a file, and several records need -o with a folder", 2)
     if output and (len(data) > 1 or Path(output).is_dir() or output.endswith(("/", os.sep))):
         targets = [Path(output) / f"{Path(path).stem}.csv" for path in data]
-    keep_inputs(targets, [params, *data])
-    simulated = guarded(
+    common.keep_inputs(targets, [params, *data])
+    simulated = common.guarded(
         params,
         lambda: simulation.simulate_records(model, converted, operator, arithmetic, engine, visited or (), rest),
     )
@@ -94,5 +88,5 @@ def simulate(
         if target is None:
             console.say(records.columns_text(header, list(columns.values())).encode())  # data: always UTF-8
             continue
-        guarded(str(target), partial(_write_record, target, header, columns))
+        common.guarded(str(target), partial(_write_record, target, header, columns))
         console.say(str(target))

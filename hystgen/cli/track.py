@@ -8,28 +8,17 @@ from typing import Any
 import click
 
 from hystgen.basics import console
-from hystgen.cli.common import (
-    data_argument,
-    effects_option,
-    guarded,
-    history_values,
-    keep_inputs,
-    load_model,
-    params_argument,
-    reading_options,
-    record_options,
-    skip_option,
-)
+from hystgen.cli import common
 
 
 @click.command(short_help="Print the tracking error on a recorded actuator.")
-@params_argument
-@data_argument(required=True)
+@common.params_argument
+@common.data_argument(required=True)
 @click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the tracking errors along time")
 @click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the errors for programs")
-@effects_option
-@record_options
-@skip_option
+@common.effects_option
+@common.record_options
+@common.skip_option
 def track(
     params: str, data: tuple[str, ...], plot: str | None, json_file: str | None, effects: tuple[str, ...],
     history: str | None, rest: float, skip: float, **reading: Any,
@@ -45,20 +34,21 @@ def track(
     from hystgen.basics import drawing, extras, writing
     from hystgen.report import plots
 
-    model = load_model(params, effects)
-    guarded(params, partial(extras.require_fit, "track", plot=plot is not None))
-    visited = history_values(history)
-    keep_inputs([plot, json_file], [params, *data])
+    model = common.load_model(params, effects)
+    common.guarded(params, partial(extras.require_fit, "track", plot=plot is not None))
+    visited = common.history_values(history)
+    common.keep_inputs([plot, json_file], [params, *data])
     if json_file:
-        guarded(json_file, partial(writing.check_writable, json_file))
+        common.guarded(json_file, partial(writing.check_writable, json_file))
     if plot:
-        guarded(params, partial(drawing.check_path, plot))
-    read = guarded(params, partial(records.read_records, data, need=("v", "y"), **reading_options(**reading)))
-    read = guarded(params, partial(records.in_units, read, model.parameters.units, sources=data))
+        common.guarded(params, partial(drawing.check_path, plot))
+    how = common.reading_options(**reading)
+    read = common.guarded(params, partial(records.read_records, data, need=("v", "y"), **how))
+    read = common.guarded(params, partial(records.in_units, read, model.parameters.units, sources=data))
     for record in read:
         for note in record.notes:
             console.note(f"warning: {record.name}: {note}")
-    found = guarded(params, lambda: tracking.track(model, read, visited or (), rest, skip))
+    found = common.guarded(params, lambda: tracking.track(model, read, visited or (), rest, skip))
     if note := tracking.late(model, read):
         console.note(f"warning: {note}")
     for each in found.records:
@@ -66,8 +56,8 @@ def track(
             console.note(f"warning: {sentence}")
     console.say(found.table())
     if json_file:
-        guarded(json_file, partial(writing.write_atomically, json_file, found.to_json()))
+        common.guarded(json_file, partial(writing.write_atomically, json_file, found.to_json()))
         console.say(json_file)
     if plot:
-        guarded(params, lambda: plots.show_tracking(found, plot))
+        common.guarded(params, lambda: plots.show_tracking(found, plot))
         console.say(plot)

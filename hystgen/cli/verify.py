@@ -10,20 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from hystgen.basics import console
-from hystgen.cli.common import (
-    Failed,
-    arithmetic_option,
-    effects_option,
-    engine_option,
-    for_each,
-    guarded,
-    keep_inputs,
-    layout_option,
-    load_model,
-    operator_option,
-    optimize_option,
-    partial_option,
-)
+from hystgen.cli import common
 from hystgen.verification.targets import NAMES as TARGETS
 
 if TYPE_CHECKING:
@@ -33,13 +20,13 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Compare the emitted C with the reference, bit by bit.")
 @click.argument("params", nargs=-1, required=True, type=click.Path())
-@operator_option
-@arithmetic_option
-@engine_option
-@optimize_option
-@layout_option
-@partial_option
-@effects_option
+@common.operator_option
+@common.arithmetic_option
+@common.engine_option
+@common.optimize_option
+@common.layout_option
+@common.partial_option
+@common.effects_option
 @click.option("--compiler", multiple=True, help="gcc, clang, zig or another command; default: all found")
 @click.option("--targets", default="host", show_default=True, help="comma separated: " + ", ".join(TARGETS))
 @click.option("--target-length", type=click.IntRange(min=1), help="calls per record on emulated cores")
@@ -63,14 +50,14 @@ def verify(
     chosen = tuple(targets.split(","))
     for word in chosen:
         if word not in TARGETS:
-            raise Failed(f"error: unknown target {word!r}; use {', '.join(TARGETS)}", 2)
+            raise common.Failed(f"error: unknown target {word!r}; use {', '.join(TARGETS)}", 2)
     params = tuple(dict.fromkeys(params))
-    keep_inputs((json_file, junit_file), params)
+    common.keep_inputs((json_file, junit_file), params)
     for file in (json_file, junit_file):
         if file:
-            guarded(file, partial(writing.check_writable, file))
-    named = list(zip(params, for_each(params, partial(load_model, effects=effects)), strict=True))
-    for_each(named, lambda one: guarded(one[0], partial(_check, one[1], options)))
+            common.guarded(file, partial(writing.check_writable, file))
+    named = list(zip(params, common.for_each(params, partial(common.load_model, effects=effects)), strict=True))
+    common.for_each(named, lambda one: common.guarded(one[0], partial(_check, one[1], options)))
 
     def verified(one: tuple[str, Model]) -> Report:
         path, model = one
@@ -79,19 +66,20 @@ def verify(
         def say(what: str) -> None:
             console.note(f"verifying: {about}{what}")
 
-        how: dict[str, Any] = {"compiler": compiler, "targets": chosen, "target_length": target_length, "progress": say}
-        found: Report = guarded(path, partial(verification.verify, model, **how, **options))
-        return replace(found, file=path)
+        check = partial(
+            verification.verify, model, compiler=compiler, targets=chosen, target_length=target_length, progress=say
+        )
+        return replace(common.guarded(path, partial(check, **options)), file=path)
 
-    report = verification.Reports(for_each(named, verified))
+    report = verification.Reports(common.for_each(named, verified))
     console.say(report.table())
     for file, text in ((json_file, report.to_json), (junit_file, report.to_junit)):
         if file:
-            guarded(file, partial(writing.write_atomically, file, text()))
+            common.guarded(file, partial(writing.write_atomically, file, text()))
     if report.wrong:
-        raise Failed("verification failed", 1)
+        raise common.Failed("verification failed", 1)
     if not report.ok:
-        raise Failed("could not verify everything: tools are missing on this machine", 2)
+        raise common.Failed("could not verify everything: tools are missing on this machine", 2)
 
 
 def _check(model: Model, options: Mapping[str, Any]) -> None:

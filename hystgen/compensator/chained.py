@@ -24,7 +24,7 @@ from hystgen.compensator.chain import noise, preview
 from hystgen.compensator.chain.layout import Read, read
 from hystgen.compensator.chain.parts import Parts
 from hystgen.compensator.chain.step_float import ramp
-from hystgen.effects import own
+from hystgen.effects import CATALOGUE, own
 from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.base import Array, Block, Effect, Place, Run
 from hystgen.effects.creep import compensator as creep
@@ -48,11 +48,6 @@ TURNS = 8
 with a loss of 1 % per decade from half the range on, converge to the last bit in 5 iterations on average, 7 at most."""
 
 STANDARD = Compensation()
-
-TAKEN_IN = frozenset({
-    "creep", "rate_dependence", "resonance", "lag", "delay", "slew_limit", "saturation", "thermal", "ageing",
-    "sensor_nonlinearity", "noncongruent",
-})
 
 
 @functools.cache
@@ -216,7 +211,7 @@ def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
     if isinstance(effect, OwnHeat):
         unmeasured = "thermal from the drive's own heat (the temperature is not measured, and drifts with the room's"
         return "" if "self_heating" in compensate else f"{unmeasured}{SWITCH % 'self_heating'})"
-    if effect.name not in TAKEN_IN and effect.block is None:
+    if effect.name not in CATALOGUE and effect.block is None:
         return f"{effect.name} (an effect of your own, which has no compensator)"
     return ""
 

@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import FIXED
 from hystgen.basics.problems import FormatError, Path, counted
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import error_bounds, largest_sum
@@ -118,7 +118,7 @@ def lsbs(
     `output_range`: that of a model with effects. Raises FormatError for an LSB that is too small, and for an output
     that stays 0.
     """
-    code_max = ARITHMETICS[arithmetic].code_max
+    code_max = FIXED[arithmetic].code_max
     found: list[Fraction] = []
     refused: list[tuple[Path, str]] = []
     for given, ends, what, key in (
@@ -174,8 +174,8 @@ class Builder:
         bent: float = 0.0,
     ) -> None:
         self.cascade, self.arithmetic, self.engine = cascade, arithmetic, engine
-        self.code_max = ARITHMETICS[arithmetic].code_max
-        self.play_bits = ARITHMETICS[arithmetic].play_bits
+        self.code_max = FIXED[arithmetic].code_max
+        self.play_bits = FIXED[arithmetic].play_bits
         self.drive_lsb, self.output_lsb = lsb
         self.given = dict(zip(("drive_lsb", "output_lsb"), given, strict=True))
         self.beyond, self.led, self.bent = beyond, led, bent
@@ -243,7 +243,7 @@ class Builder:
         high = max(Fraction(c.play_range[1]), *(Fraction(s) for s in pi.start), Fraction(0))
         self.span = high - low
         reach = max(abs(low), abs(high)) + 2 * min(self.span, Fraction(pi.thresholds[-1]))
-        below = ARITHMETICS[self.arithmetic].finer_plays
+        below = FIXED[self.arithmetic].finer_plays
         if c.stages:
             self.fine = 0
             if below and self.led:
@@ -323,7 +323,7 @@ class Builder:
             self.margin = max(1 << self.fine, self.beyond * (self.play[1] - self.play[0]))
             return
         lsb, step = float(self.drive_lsb / 2**self.fine), float(self.step)
-        degree = ARITHMETICS[self.arithmetic].degree
+        degree = FIXED[self.arithmetic].degree
         # a curve's own error: a 64th of a code, or rounding where codes are as fine as that
         allowed = max(0.5 * step, lsb * c.front_slopes[0] / 64)
         breaks = _breaks(c)
@@ -369,7 +369,7 @@ class Builder:
         largest = max(map(abs, self.hull)) + 1
         travel = self.play[1] - self.play[0]
         bent = math.ceil(Fraction(self.bent) / self.step)
-        low_bits = ARITHMETICS[self.arithmetic].low_bits
+        low_bits = FIXED[self.arithmetic].low_bits
         finer = self._finer("output_lsb")
         for i, g in enumerate(gain):
             if g > 0 and g * travel < Fraction(1, 2):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from hystgen.diagnosis.findings.kinds import NotAPlaySum, OtherHistory, WildInve
 from hystgen.diagnosis.findings.result import WRITTEN, Diagnosis, FitErrors, Inverse, Signals
 from hystgen.diagnosis.search import acceptance, fits, forgetting, harm, hypothesis, selection
 from hystgen.diagnosis.search.fits import Fitted
-from hystgen.diagnosis.search.forgetting import Forgets
 from hystgen.diagnosis.search.hypothesis import Structure
 from hystgen.diagnosis.search.screening import Records
 from hystgen.diagnosis.search.selection import Outcome, Refusal
@@ -121,7 +120,7 @@ def diagnose(
             done.noise,
             found,
             FitErrors(*(rms(first.errors(group)) for group in (ready.to_fit, ready.held))),
-            [*_of_another_kind(done.forgets), *wild, *odd, *([] if wrong is None else [wrong]), *done.cleaned.lines],
+            [*filter(None, [done.forgets]), *wild, *odd, *filter(None, [wrong]), *done.cleaned.lines],
             done.records.one_loop,
             _inverse(extended, made),
         )
@@ -148,7 +147,7 @@ class _Done:
     noise: NoiseFloor
     records: Records
     found: Outcome
-    forgets: Forgets | None = None
+    forgets: NotAPlaySum | None = None
     notes: tuple[str, ...] = ()
 
     def noting(self, note: str) -> _Done:
@@ -282,11 +281,6 @@ def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None
     ]
 
 
-def _of_another_kind(forgets: Forgets | None) -> list[NotAPlaySum]:
-    """The finding about hysteresis that no play sum has."""
-    return [] if forgets is None else [NotAPlaySum(**vars(forgets))]
-
-
 def _harmless(
     found: Outcome, done: _Done, written: Callable[[Outcome], Parameters]
 ) -> tuple[Outcome, list[WildInverse]]:
@@ -349,7 +343,7 @@ def _extended(
     if any(True for effect in actuator.effects for _ in effect.problems(fewer)):  # it has numbers for every play
         kept[:] = True
     offset = rounded(_offset(fitted, ready.to_fit[0]), DIGITS)
-    plays: dict[str, Any] = {"thresholds": r[kept].tolist(), "weights": p[kept].tolist()}
+    plays: dict[str, object] = {"thresholds": r[kept].tolist(), "weights": p[kept].tolist()}
     start = cascade.pi.start
     if np.any(start) and not cascade.stages and not actuator.stages:  # without a front the plays see the drive itself
         plays["initial_state"] = np.interp(r[kept], cascade.pi.thresholds, start).tolist()

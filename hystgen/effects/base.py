@@ -12,7 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -251,7 +251,7 @@ class Effect(BaseModel):
     """compensator of an effect of the user's own; those of the catalogue have theirs in their folders"""
 
     @classmethod
-    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+    def __pydantic_init_subclass__(cls, **_: object) -> None:
         """A user's own effect may fail or answer anything, and is guarded."""
         words = getattr(cls.model_fields["name"].annotation, "__args__", ())
         if words and str(words[0]).startswith(USER):

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hystgen.basics.problems import EffectsError
+
+E = TypeVar("E")
 
 FORMS: dict[str, Callable[..., tuple[int, ...]]] = {
     "drive": lambda a, *_: a.shape,
@@ -27,7 +30,7 @@ FORMS: dict[str, Callable[..., tuple[int, ...]]] = {
 """Shape of the array that each method returns, by its arguments; -1 stands for any number."""
 
 
-def guard(effect: type[Any], base: type[Any], name: str) -> None:
+def guard(effect: type[Any], base: type[E], name: str) -> None:
     """Make the methods of a class, and of its bases below `base`, raise EffectsError where they fail."""
     own: dict[str, Any] = {}
     for each in reversed(effect.__mro__[: effect.__mro__.index(base)]):
@@ -39,9 +42,9 @@ def guard(effect: type[Any], base: type[Any], name: str) -> None:
         effect.candidates = classmethod(_candidates(own["candidates"].__func__, name))
 
 
-def _method(own: Callable[..., Any], name: str, method: str) -> Callable[..., Any]:
+def _method(own: Callable[..., object], name: str, method: str) -> Callable[..., object]:
     @functools.wraps(own)
-    def answer(self: Any, *arguments: Any) -> Any:
+    def answer(self: object, *arguments: object) -> NDArray[np.float64]:
         try:
             found = np.asarray(own(self, *arguments))
         except Exception as error:
@@ -58,9 +61,9 @@ def _method(own: Callable[..., Any], name: str, method: str) -> Callable[..., An
     return answer
 
 
-def _candidates(own: Callable[..., Any], name: str) -> Callable[..., list[Any]]:
+def _candidates(own: Callable[..., Sequence[Any]], name: str) -> Callable[..., list[Any]]:
     @functools.wraps(own)
-    def candidates(cls: type[Any], about: Any) -> list[Any]:
+    def candidates(cls: type[E], about: object) -> list[Any]:
         try:
             return [_candidate(each, cls, name) for each in own(cls, about)]
         except EffectsError:
@@ -71,8 +74,8 @@ def _candidates(own: Callable[..., Any], name: str) -> Callable[..., list[Any]]:
     return candidates
 
 
-def _candidate(each: Any, cls: type[Any], name: str) -> Any:
-    def build(x: Any) -> Any:
+def _candidate(each: Any, cls: type[E], name: str) -> Any:
+    def build(x: NDArray[np.float64]) -> E:
         try:
             made = each.build(x)
         except Exception as error:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.effects.base import Array
-from hystgen.effects.kinds import Constants
+from hystgen.effects.kinds import Constants, Kind
 
 Function = Callable[..., Any]
 
@@ -78,7 +78,7 @@ class Margin(NamedTuple):
     turning: bool = False
 
 
-class Response(NamedTuple):
+class Responses(NamedTuple):
     """What blocks of an inverse make of frequencies (N,): the lead, the share of what is wanted that arrives in front
     of the plays, the response behind them, what of that comes at once, and the gain at rest."""
 
@@ -89,8 +89,58 @@ class Response(NamedTuple):
     rest: float
 
 
+class Speed(NamedTuple):
+    """How fast a drive within `ends` moves: by at most `step` in each of steps of `seconds`."""
+
+    ends: tuple[float, float]
+    step: float
+    seconds: float
+
+
+class Gained(NamedTuple):
+    """A gain behind the plays: roundings of its own, its ends, and what it adds to errors of its output (`there`) and
+    of the output asked for (`back`)."""
+
+    roundings: float
+    least: float
+    largest: float
+    there: float
+    back: float
+
+
 class One:
     """One block at a step length, in double precision."""
+
+    @property
+    def growth(self) -> float:
+        """Largest output for inputs within 1."""
+        return 1.0
+
+    @property
+    def misses(self) -> bool:
+        """Whether what arrives differs from what it was solved for."""
+        return False
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it has states that see what it gets."""
+        return False
+
+    def rounding(self, size: float, u: float) -> tuple[float, float]:
+        """Roundings of the output for inputs within `size`, and of the input that it is solved for."""
+        return 0.0, 0.0
+
+    def solved(self, error: float, size: float, u: float, same: bool) -> float:
+        """Error of the input that it is solved for, by one of the output; `same`: its states have seen the same."""
+        return error
+
+    def seen(self) -> float:
+        """Factor by which states that see its input multiply an error of that."""
+        return 1.0
+
+    def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
+        """It as a gain, for outputs within a size; `emitted`: with the approximations of the C."""
+        return Gained(0.0, 1.0, 1.0, 0.0, 0.0)
 
     def at_rest(self, x: float) -> float:
         """The settled output for an input."""
@@ -120,7 +170,7 @@ class One:
         """Frequencies (k,) in rad a sample at which its inverse may ring."""
         return np.empty(0)
 
-    def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
+    def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
         """What it makes of frequencies, `z` (N,) the factor of a delay by a sample, behind other blocks."""
         return found
 
@@ -131,6 +181,69 @@ class One:
     def asked(self, given: float, asked: float, margin: Margin) -> float:
         """Largest input that it is solved for, by outputs within a size and after inputs `given`."""
         return asked
+
+
+class CodedGain(NamedTuple):
+    """A gain in fixed point: its ends, and in output codes what it adds to errors of its output and of its input that
+    is solved for, beside the rounding of either, and the largest offset."""
+
+    least: float
+    largest: float
+    there: float
+    back: float
+    offset: float = 0.0
+
+
+class Coding(NamedTuple):
+    """Units per code of drive and output, and the `span` of the output in codes."""
+
+    drive_lsb: float
+    output_lsb: float
+    span: float
+
+
+class Sought(NamedTuple):
+    """What a block behind the plays is solved for: sizes of its input and of the sum asked of the plays, the unit of
+    signals, how far states that see the sum of the plays, and their inputs, may be `apart`; `same`: they are not."""
+
+    size: float
+    asked: float
+    signal: float
+    apart: float
+    seen: float
+    same: bool
+
+
+class Coded:
+    """One block in fixed point; errors of those behind the plays are in output codes, of those in front in signals."""
+
+    one: Any
+
+    @property
+    def arrived(self) -> float:
+        """Roundings of the output in front of the plays."""
+        return 0.0
+
+    @property
+    def follows(self) -> float:
+        """What a change of its input in one sample is of the output."""
+        return 1.0
+
+    def there(self, size: float, signal: float) -> float:
+        """Roundings of the output for inputs within a size, with signals of this unit."""
+        return 0.0
+
+    def solved(self, error: float, at: Sought) -> float:
+        """Error of the input that it is solved for, by one of the output."""
+        return error
+
+    def residual(self, missed: float, same: bool) -> float:
+        """The error of an output that the inverse makes of one of the sum of the plays."""
+        return missed
+
+    def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain | None:
+        """It as a gain, for inputs within a size."""
+        return None
 
 
 @dataclass(frozen=True)
@@ -146,7 +259,7 @@ class Surroundings:
 
 
 @dataclass(frozen=True)
-class Floating(Surroundings):
+class FloatSurroundings(Surroundings):
     """The same in floating point: `reals` makes numbers, with a name, those of the arithmetic, which rounds by
     `roundoff`."""
 
@@ -155,7 +268,7 @@ class Floating(Surroundings):
 
 
 @dataclass(frozen=True)
-class Fixed(Surroundings):
+class FixedSurroundings(Surroundings):
     """The same in fixed point: units per code, `bits` of signals behind the plays below a code, those of a code and the
     largest one, fraction bits of a `temperature`, the largest `drive` in codes, and the span in signals, `farthest`."""
 
@@ -176,33 +289,36 @@ class Fixed(Surroundings):
 
 
 @dataclass(frozen=True)
-class Arithmetic:
+class Realized:
     """A kind of block in one arithmetic: its verbs, its constants from its tables, and tables of blocks; in fixed point
     of their `formats`, each of a block, surroundings, and the largest sizes of its input and of the output asked for.
+    `beside`: constants of what stands beside each block.
     """
 
     verbs: Verbs
     constants: Callable[[Any], Iterable[Constants]]
     tables: Callable[[Sequence[Any], Any], Any]
-    formats: Callable[[Any, Fixed, float, float], Any] = lambda one, *_: one
+    formats: Callable[[Any, FixedSurroundings, float, float], Any] = lambda one, *_: one
+    beside: Callable[[Any], Iterable[Constants | None]] = lambda _: ()
 
 
 @dataclass(frozen=True)
-class Part:
+class ChainPart:
     """One kind of block. `name`: as in C; `words`: in messages; `takes`: whether an effect is one; `one`: a block of an
     effect at a step length, where it may be `turning`; `calls`: of the interface that it answers; `forward`: only the
-    forward operator has it; `joined`: all of them are one block."""
+    forward operator has it; `joined`: all of them are one block; `kinds`: of its C, in floating point."""
 
     name: str
     words: str
     takes: Callable[[Any], bool]
     one: Callable[[Any, float, bool], Any]
-    floating: Arithmetic
-    fixed: Arithmetic
+    floating: Realized
+    fixed: Realized
     calls: tuple[str, ...] = ()
     forward: bool = False
     joined: bool = False
+    kinds: tuple[Kind, ...] = ()
 
-    def arithmetic(self, fixed: bool) -> Arithmetic:
+    def arithmetic(self, fixed: bool) -> Realized:
         """It in fixed point, or else in floating point."""
         return self.fixed if fixed else self.floating

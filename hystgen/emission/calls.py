@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import ARITHMETICS, FIXED
 from hystgen.basics import arguments, writing
 from hystgen.basics.problems import FormatError, NotInvertibleError
 from hystgen.basics.problems import Path as Key
@@ -66,14 +66,15 @@ def emit_options(
 
 def _check_codes(model: Model, arithmetic: str, operator: str) -> None:
     """Raise FormatError for sizes of codes in floating point, where only a quiet drive has one, its converter's."""
-    if ARITHMETICS[arithmetic].fixed:
-        return
     emit = model.parameters.emit
-    quiet = emit.compensation.quiet and model.effects and operator != "forward"
-    given = {"drive_lsb": None if quiet else emit.drive_lsb, "output_lsb": emit.output_lsb}
-    fixed = " or ".join(each.name for each in ARITHMETICS.values() if each.fixed)
+    quiet = emit.compensation.quiet and bool(model.effects) and operator != "forward"
+    fixed = " or ".join(FIXED)
     words = f"is the size of a code, and {arithmetic} has no codes; remove it, or emit with --arithmetic {fixed}"
-    problems: list[tuple[Key, str]] = [(("emit", key), words) for key, value in given.items() if value is not None]
+    problems: list[tuple[Key, str]] = [
+        (("emit", key), words)
+        for key in ARITHMETICS[arithmetic].unused
+        if getattr(emit, key) is not None and not (quiet and key == "drive_lsb")
+    ]
     if problems:
         raise FormatError(*problems)
 
@@ -97,10 +98,10 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
     for model in models:
         chosen = emit_options(model, **options)
         kept = emitted_model(model, chosen)
-        texts, found = module.emitted(kept.parameters, model.cascade, chosen, parameters_sha256(model.parameters))
-        for doubt in (*doubts(model), *found):
+        whole = module.of(kept.parameters, model.cascade, chosen, parameters_sha256(model.parameters))
+        for doubt in (*doubts(model), *whole.doubts):
             warnings.warn(f"{model.name}: {doubt}", stacklevel=3)
-        made |= texts
+        made |= module.files(whole)
     return made
 
 

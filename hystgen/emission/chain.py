@@ -4,41 +4,28 @@ themselves are in `c_runtime/` and in the folders of effects.
 
 from __future__ import annotations
 
-import textwrap
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from hystgen.emission.text import WIDTH, constant, literal, operand, structure, table
+from hystgen.emission.compensator import Effects, Field, Form, Glue, Stage, Table, Writer, entries
+from hystgen.emission.text import operand
 from hystgen.plays import slots
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Compiled
-    from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
-    from hystgen.effects.bend import Bends
     from hystgen.effects.kinds import Constants, Kind
 
-
-@dataclass(frozen=True)
-class Field:
-    """A field of an instance: `kind` is that of a number, flag, status, or of a block and then made of `members`, real
-    numbers r or those of fixed point as in `Kind`, and `flags`, or a type of the corner engine; with a `count` it is an
-    array, which C gives the length `length`, if any."""
-
-    kind: str
-    name: str
-    comment: str = ""
-    count: int = 0
-    members: str = ""
-    flags: int = 0
-    length: str = ""
-
-    def text(self) -> str:
-        """Its declaration."""
-        kind = {"flag": "bool", "status": "unsigned int"}.get(self.kind, f"hystgen_{self.kind}_t")
-        size = f"[{self.length or self.count}]" if self.count else ""
-        return f"{kind} {self.name}{size};" + (f" /* {self.comment} */" if self.comment else "")
+NUMBERS = {
+    "OUTPUT_OFFSET": "part of every displacement",
+    "FARTHEST_OFFSET": "largest that can be set beside it",
+    "SLEW_RISING": "largest move of the drive in a step",
+    "SLEW_FALLING": "",
+    "SLEW_RISING_REST": "and what rounding took from that",
+    "SLEW_FALLING_REST": "",
+}
+"""Macros of the first places of `ChainTables.number`."""
 
 
 @dataclass(frozen=True)
@@ -62,10 +49,9 @@ class Block:
     def fields(self) -> list[Field]:
         """Its memory."""
         kind, rows = self.kind, self.kind.rows
-        found = [Field(kind.name, self.name, members=kind.memory or len(kind.state) * "r", flags=len(kind.flags))]
+        found = [Field(f"{kind.name}_t", self.name)]
         if rows and (rows.state or rows.memory):
-            count, members = len(self.constants.rows), rows.memory or len(rows.state) * "r"
-            found.append(Field(f"{kind.name}_state", f"{self.name}_state", count=count, members=members))
+            found.append(Field(f"{kind.name}_state_t", f"{self.name}_state", count=len(self.constants.rows)))
         return found
 
     def call(self, verb: str, x: str) -> str:
@@ -84,24 +70,17 @@ class Block:
         """What plays that rub make of a move of the drive to v."""
         return f"hystgen_friction_move({self.table}, &self->{self.name}, self->{self.fields[1].name}, self->applied, v)"
 
-    def arrays(self, prefix: str) -> list[str]:
+    def tables(self, writer: Writer) -> list[Table]:
         """Its table, behind that of its rows where it has any."""
-        kind, constants, own = self.kind, self.constants, f"{prefix}_{self.name}"
-        numbers = [_entries(constants.table, kind.letters)] * (len(constants.table) > 0)
+        kind, constants = self.kind, self.constants
+        numbers = [entries(constants.table, kind.letters)] * (len(constants.table) > 0)
         numbers += map(str, constants.counts)
         if not kind.rows:
-            return [_table(f"{prefix}_{kind.tabled}_table_t {own}", numbers)]
-        rows, n = f"{own}_{kind.rows.name}", len(constants.rows)
-        lines = ",\n".join(f"    {{{_entries(row, kind.rows.letters)}}}" for row in constants.rows)
-        return [
-            f"static const {prefix}_{kind.name}_{kind.rows.name}_t {rows}[{n}] = {{\n{lines},\n}};\n",
-            _table(f"{prefix}_{kind.name}_table_t {own}", [rows, *numbers]),
-        ]
+            return [writer.block(f"{kind.tabled}_table_t", self.name, numbers)]
+        rows = [entries(row, kind.rows.letters) for row in constants.rows]
+        of_rows = writer.rows(f"{kind.name}_{kind.rows.name}_t", f"{self.name}_{kind.rows.name}", rows, len(rows))
+        return [of_rows, writer.block(f"{kind.name}_table_t", self.name, [of_rows.name, *numbers])]
 
-
-def _table(declared: str, entries: Sequence[str]) -> str:
-    lines = textwrap.wrap(", ".join(entries) + ",", WIDTH, initial_indent="    ", subsequent_indent="    ")
-    return f"static const {declared} = {{\n" + "\n".join(lines) + "\n};\n"
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
     """The blocks of an operator in front of the plays, starting from the drive, and those behind them."""
@@ -115,58 +94,6 @@ def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
             counts[constants.kind.name] += 1
             found[-1].append(Block(constants, f"{constants.kind.name}_{counts[constants.kind.name]}"))
     return found[0], found[1]
-
-
-def _entries(values: Any, letters: str = "") -> str:
-    """Numbers of a table as they stand in C; `letters` as in `Kind`."""
-    found, rest = [], iter(values)
-    for letter in letters or len(values) * "r":
-        if letter == "f":
-            found.append(f"{{{literal(next(rest))}, {next(rest)}}}")
-        elif letter == "n":
-            found.append(f"{{{_entries([next(rest), next(rest)], 'f')}, {next(rest)}, {next(rest)}}}")
-        elif letter == "c":
-            found.append(f"{{{', '.join(literal(next(rest)) for _ in range(4))}}}")
-        else:
-            found.append(literal(next(rest)))
-    return ", ".join(found)
-
-
-def saturation(t: ChainTables, j: int, name: str, prefix: str) -> dict[str, Any]:
-    """What saturates in fixed point, as `numbers.stage` has it in floating point."""
-    behind, own = t.behind, f"{name}_behind_{j + 1}"
-    if behind.kind[j] == slots.DEAD_ZONE:
-        lower, upper, *over = behind.piece[j]
-        entries = f"{literal(lower)}, {literal(upper)}, {_entries(over, 'ff')}"
-        text = f"static const {prefix}_stops_t {own} = {{\n    {entries},\n}};\n"
-        return {"kind": "stops", "arrays": [text], "table": f"&hystgen_behind_{j + 1}", "limited": ""}
-    arrays, ends = [], []
-    for which, direction in ((2 * j, "there"), (2 * j + 1, "back")):
-        more, entries = _curve(behind.bends, which, f"{own}_{direction}")
-        arrays += more
-        ends.append(f"    {{{entries}}}")
-    arrays.append(f"static const {prefix}_bend_t {own} = {{\n" + ",\n".join(ends) + ",\n};\n")
-    return {"kind": "bend", "arrays": arrays, "table": f"&hystgen_behind_{j + 1}", "limited": ", limited"}
-
-
-def _curve(t: Bends, which: int, own: str) -> tuple[list[str], str]:
-    """The tables of a curve in fixed point, and the initializer of the curve itself."""
-    arrays, pointers = _pieces(t, which, own)
-    counts = (*t.domain[which], t.pieces[which], t.coefficient.shape[1] - 1, *t.scaled[which])
-    return arrays, f"{pointers},\n     {_entries(counts)}"
-
-
-def _pieces(t: Bends, which: int, own: str) -> tuple[list[str], str]:
-    """The tables of a curve's pieces, and their names."""
-    here = int(t.first[which])
-    rows = slice(here, here + int(t.pieces[which]))
-    arrays = [
-        table("int32_t", f"{own}_knot", list(t.knot[rows])),
-        table("uint8_t", f"{own}_scale", list(t.scale[rows])),
-        table("int32_t", f"{own}_coefficient", list(t.coefficient[rows].ravel())),
-    ]
-    pointers = ", ".join(f"{own}_{part}" for part in ("knot", "scale", "coefficient"))
-    return arrays, pointers
 
 
 MOVES = ("play", "dilated", "relaxing", "dashpot")
@@ -193,98 +120,13 @@ def plays(t: ChainTables) -> tuple[str, str]:
     return (MOVES[t.moving.moves], BENDS[t.moving.bends]) if t.moving.used else ("", "")
 
 
-def _moving(t: MovingTables, prefix: str) -> tuple[list[str], list[tuple[str, str, str]]]:
-    """Tables and numbers of plays that an effect moves or bends."""
-    from hystgen.compensator.chain import moving
-
-    real_t = f"{prefix}_real_t"
-    arrays: list[str] = []
-    if t.scanned:
-        members = [("share", list(t.share)), ("inverse", list(t.inverse))]
-        numbers = [("LATE", operand(t.first[1]), "of a stretch, what a play gains at the end of a step"),
-                   ("KEPT", operand(t.second[1]), "and on the way to the next")]  # fmt: skip
-        return [structure(real_t, f"{prefix}_relaxing", members)], numbers
-    if t.moves == moving.DILATED:
-        arrays.append(table(real_t, f"{prefix}_wider", list(t.first)))
-    if t.moves == moving.RELAXING:
-        arrays += [table(real_t, f"{prefix}_late", list(t.first)), table(real_t, f"{prefix}_kept", list(t.second))]
-    if t.moves == moving.DASHPOT:
-        rows = ",\n".join(f"    {{{_entries(row)}}}" for row in t.yields)
-        n, terms = t.yields.shape
-        arrays.append(f"static const {real_t} {prefix}_yields[{n}][{terms}] = {{\n{rows},\n}};\n")
-    if t.bends == moving.POLYNOMIAL:
-        n, terms = t.curve.shape
-        rows = ",\n".join(f"    {{{', '.join(map(literal, row))}}}" for row in t.curve)
-        arrays.append(f"static const {real_t} {prefix}_curve[{n}][{terms}] = {{\n{rows},\n}};\n")
-    words = (
-        ("SCALE", moving.SCALE, "largest threshold"), ("INVERSE_SCALE", moving.INVERSE_SCALE, ""),
-        ("CENTRE", moving.MIDDLE, "of the loops that count more or less"),
-        ("INVERSE_WIDTH", moving.INVERSE_WIDTH, ""), ("BUMP", moving.BUMP, "how much, times the width"),
-        ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
-        ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
-        ("LARGEST_INPUT", moving.LARGEST_INPUT, ""),
-        ("STANDING_SHARE", moving.SEEN, "share of a step's way at which the input counts as standing still"),
-    )  # fmt: skip
-    constants = [(name, operand(t.number[place]), comment) for name, place, comment in words]
-    counts = [("TERMS", f"{t.curve.shape[1]}u", "of a polynomial"), ("HALVES", f"{t.halves}u", "steps of the search"),
-              ("YIELDS", f"{len(t.yields)}u", "pieces of what a dashpot yields")]  # fmt: skip
-    return arrays, [*constants, *counts]
-
-
-def _fixed_moving(t: FixedMovingTables, prefix: str, inverse: bool) -> tuple[list[str], list[tuple[str, str, str]]]:
-    """Tables and numbers of plays that an effect moves or bends in fixed point."""
-    from hystgen.compensator.chain import moving
-
-    factor_t = f"{prefix}_factor_t {prefix}"
-    numbers = [("LARGEST_INPUT", operand(t.farthest), "of the plays, for a search")]
-    if t.scanned:
-        arrays = [
-            f"static const {factor_t}_relaxing_{name} = {{{_entries(rows[1], 'f')[1:-1]}}};\n"
-            for name, rows in (("late", t.first), ("kept", t.second))
-        ]
-        if inverse:
-            arrays += [
-                table("int32_t", f"{prefix}_relaxing_slope", list(t.relaxed.slope)),
-                table("uint32_t", f"{prefix}_relaxing_reciprocal", list(t.relaxed.reciprocal)),
-                table("uint8_t", f"{prefix}_relaxing_shift", list(t.relaxed.shift)),
-            ]
-        return arrays, numbers
-    names = {moving.RELAXING: ("late", "kept"), moving.DILATED: ("wider",)}.get(t.moves, ())
-    arrays = [
-        constant(f"{factor_t}_{name}[{len(rows)}]", [f"    {_entries(row, 'f')}," for row in rows])
-        for name, rows in zip(names, (t.first, t.second), strict=False)
-    ]
-    if t.moves == moving.DASHPOT:
-        rows = ",\n".join(f"    {{{_entries(row, 'rcrr')}}}" for row in t.yields)
-        arrays.append(f"static const {prefix}_yield_t {prefix}_yields[{len(t.yields)}] = {{\n{rows},\n}};\n")
-        arrays.append(f"static const {factor_t}_standing_share = {{{_entries(t.seen, 'f')[1:-1]}}};\n")
-        numbers += [
-            ("YIELDS", f"{len(t.yields)}u", "pieces of what a dashpot yields"),
-            ("YIELD_BITS", f"{t.yield_bits}u", "of a yield below a step of the plays' input"),
-            ("STRETCH", operand(t.stretch), "of a play, up to which there are any"),
-        ]
-    if t.bends != moving.STRAIGHT:
-        curves = [_pieces(t.bump, k, f"{prefix}_bump_{k + 1}") for k in range(len(t.bump.pieces))]
-        arrays += [text for texts, _ in curves for text in texts]
-        rows = ",\n".join(f"    {{{names}, {n}}}" for (_, names), n in zip(curves, t.bump.pieces, strict=True))
-        arrays.append(f"static const {prefix}_bump_t {prefix}_bump[{len(curves)}] = {{\n{rows},\n}};\n")
-        arrays.append(table("uint16_t", f"{prefix}_bump_of", list(t.bump_of)))
-        numbers += [
-            ("BUMP_END", operand(t.bump.domain[0, 1]), "largest input of what a bent play adds"),
-            ("BUMP_DEGREE", f"{t.bump.coefficient.shape[1] - 1}u", ""),
-            ("BUMP_LIFT", f"{t.bump.scaled[0, 1]}u", "bits that its polynomials leave out"),
-            ("BUMP_BITS", f"{t.bump_bits}u", "and those of it below a step of the plays' input"),
-        ]
-    return arrays, numbers
-
-
 @dataclass(frozen=True)
 class Shape:
     """What decides on functions and memory of a chain beside its blocks: `effects`: it has any; `corners`: engine
     corners, `taps`: samples of the reference that are summed, `waiting`: drives that wait; the others as in `Variant`.
     """
 
-    fixed: bool
+    form: Form
     effects: bool = False
     corners: bool = False
     slew: bool = False
@@ -295,142 +137,97 @@ class Shape:
     waiting: int = 0
 
     @classmethod
-    def of(cls, t: ChainTables) -> Shape:
+    def of(cls, t: ChainTables, form: Form) -> Shape:
         """That of a model with effects."""
         return cls(
-            t.fixed, True, t.plays.engine == slots.CORNERS, bool(t.slew), bool(t.braked), bool(t.quiet),
-            bool(t.turning), len(t.tap), t.of("delay").samples,
-        )  # fmt: skip
+            form, True, t.plays.engine == slots.CORNERS, bool(t.slew), bool(t.braked), bool(t.quiet),
+            bool(t.turning), len(t.tap), t.of("wait").samples,
+        )
 
 
 @dataclass(frozen=True)
-class Glue:
-    """The operators of a model with effects: the memory of an instance and the text of its type by operator, functions,
-    tables, which functions of the interface it has beside those of every model, and the numbers that functions name."""
+class Chain:
+    """The blocks of a model with effects, by operator in front of the plays and behind, and those beside: its clock,
+    and what rubs."""
 
-    fields: dict[str, list[Field]]
-    states: dict[str, str]
-    functions: str
-    arrays: list[str]
-    beside: list[str]
-    calls: dict[str, list[str]]
-    constants: list[tuple[str, str, str]]
+    sides: Mapping[str, tuple[list[Block], list[Block]]]
+    clocks: list[Block]
+    rubbing: list[Block | None]
+
+    @classmethod
+    def of(cls, t: ChainTables, operators: Sequence[str]) -> Chain:
+        """Those of a model."""
+        from hystgen.compensator.chain import blocks
+
+        rubbing = [
+            Block(constants, f"{constants.kind.name}_{i}") if constants else None
+            for i, constants in enumerate(blocks.rubbing(t), 1)
+        ]
+        return cls({op: sides(t, op) for op in operators}, [Block(each, "clock") for each in blocks.clocks(t)], rubbing)
+
+    def blocks(self, operator: str) -> list[Block]:
+        """Every block of an operator."""
+        before, after = self.sides[operator]
+        return [*before, *after, *(each for each in self.rubbing if each), *self.clocks]
 
 
-def glue(compiled: Compiled, operators: Sequence[str], prefix: str, behind: Sequence[dict[str, Any]]) -> Glue:
-    """The glue of a model; `behind`: its stages of saturation as `numbers.stage` has them."""
-    from hystgen.compensator.chain import blocks, moving
+def effects(
+    compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[Stage], writer: Writer
+) -> Effects:
+    """Tables and macros of a model's effects; `behind`: its stages of saturation."""
     from hystgen.compensator.chain.layout import DITHER
 
-    t = compiled.tables
-    shape = Shape.of(t)
-    named = {op: sides(t, op) for op in operators}
-    clocks = [Block(constants, "clock") for constants in blocks.clocks(t)]
-    rubbing = [
-        Block(constants, f"{constants.kind.name}_{i}") if constants else None
-        for i, constants in enumerate(blocks.rubbing(t), 1)
+    t, chain = compiled.tables, Chain.of(compiled.tables, operators)
+    largest = max(map(chain.blocks, operators), key=len)  # the forward operator has what the inverse has, and modes
+    tables = [table for block in largest for table in block.tables(writer)]
+    numbers = dict(zip(NUMBERS, t.number, strict=False))
+    constants = [(name, operand(value), NUMBERS[name]) for name, value in numbers.items()]
+    constants += [("LEAD", operand(row[-1]), "samples that references come ahead") for row in t.of("clock")]
+    constants.append(("WAITING", f"{t.of('wait').samples}u", "samples of the drive that wait"))
+    if t.of("wait").samples:
+        waited, share = form.waited(t, writer)
+        tables += waited * ("forward" in operators)
+        constants += share
+    if "inverse" in operators and len(t.tap):
+        tables.append(form.tap(t, writer))
+    constants += [
+        ("QUIET", f"{t.quiet}u", "equal references after which the drive stands still"),
+        ("DITHER", operand(t.number[DITHER]), "signal by which a drive at rest goes to and fro"),
+        ("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"),
+        *form.effects(t),
     ]
+    if t.moving.used:
+        moved, numbers_of_plays = form.moving(t, "inverse" in operators, writer)
+        tables, constants = tables + moved, constants + numbers_of_plays
+    return Effects(compiled, tuple(tables), tuple(each for stage in behind for each in stage.arrays), tuple(constants))
+
+
+def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[Stage]) -> Glue:
+    """The glue of a model with effects."""
+    from hystgen.compensator.chain import moving
+
+    t, chain = compiled.tables, Chain.of(compiled.tables, operators)
+    shape = Shape.of(t, form)
     functions = [
-        line for op in operators for line in _functions(op, shape, *named[op], behind, clocks, rubbing)
+        line for op in operators
+        for line in _functions(op, shape, *chain.sides[op], behind, chain.clocks, chain.rubbing)
     ]
     heated = ["set_temperature"] * ("set_temperature" in t.calls)
     aged = ["set_gain", "travel", "set_travel"] * ("travel" in t.calls)
     every = ["settle", "set_offset", *heated, *aged]
-    calls = {
-        "forward": every,
-        "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))],
-    }
-    beside = [*(each for each in rubbing if each), *clocks]
-    own = {op: [*before, *after, *beside] for op, (before, after) in named.items()}
-    largest = max(own.values(), key=len)  # the forward operator has what the inverse has, and modes
-    arrays = [text for block in largest for text in block.arrays(prefix)]
-    if "forward" in operators and t.of("delay").samples and t.fixed:
-        share = _entries(t.of("delay").share, "f")[1:-1]
-        arrays.append(f"static const {prefix}_factor_t {prefix}_waited = {{{share}}};\n")
-    if "inverse" in operators and len(t.tap):
-        arrays.append(
-            constant(f"{prefix}_factor_t {prefix}_tap[{len(t.tap)}]", [f"    {_entries(row, 'f')}," for row in t.tap])
-            if t.fixed else table(f"{prefix}_real_t", f"{prefix}_tap", list(t.tap))
-        )  # fmt: skip
-    names = ("OUTPUT_OFFSET", "FARTHEST_OFFSET", "SLEW_RISING", "SLEW_FALLING", "SLEW_RISING_REST", "SLEW_FALLING_REST")
-    number = dict(zip(names, t.number, strict=False))
-    words = {
-        "OUTPUT_OFFSET": "part of every displacement",
-        "FARTHEST_OFFSET": "largest that can be set beside it",
-        "SLEW_RISING": "largest move of the drive in a step",
-        "SLEW_FALLING": "",
-        "SLEW_RISING_REST": "and what rounding took from that",
-        "SLEW_FALLING_REST": "",
-    }
-    constants = [(name, operand(value), words[name]) for name, value in number.items()]
-    constants += [("LEAD", operand(row[-1]), "samples that references come ahead") for row in t.of("clock")]
-    waited = t.of("delay")
-    constants.append(("WAITING", f"{waited.samples}u", "samples of the drive that wait"))
-    if waited.samples and not t.fixed:
-        constants.append(("WAITED", operand(waited.share[0]), "part of the step after the oldest that is over"))
-    constants.append(("QUIET", f"{t.quiet}u", "equal references after which the drive stands still"))
-    constants.append(("DITHER", operand(t.number[DITHER]), "signal by which a drive at rest goes to and fro"))
-    constants.append(("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"))
-    constants += _fixed_constants(t) if t.fixed else []
-    if t.moving.used:
-        more, numbers = (
-            _fixed_moving(t.moving, prefix, "inverse" in operators)
-            if isinstance(t.moving, moving.FixedMovingTables) else _moving(t.moving, prefix)
-        )  # fmt: skip
-        arrays, constants = arrays + more, constants + numbers
+    calls = {"forward": every, "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))]}
     searched = t.moving.used and not t.moving.scanned
     n = len(t.threshold) - 1
     kept = n * (t.moving.moves == moving.DASHPOT)
-    fields = {op: instance(op, shape, own[op], n, kept, searched) for op in operators}
-    return Glue(
-        fields,
-        {op: _state(op, fields[op]) for op in operators},
-        "\n".join(functions), arrays, [text for stage in behind for text in stage["arrays"]], calls, constants,
-    )  # fmt: skip
+    fields = {op: instance(op, shape, chain.blocks(op), n, kept, searched) for op in operators}
+    return Glue(fields, "\n".join(functions), calls)
 
 
-def alone(operators: Sequence[str], plays: int, fixed: bool) -> Glue:
+def alone(operators: Sequence[str], plays: int, form: Form) -> Glue:
     """The glue of a model without effects in engine loop: a chain without blocks."""
-    shape = Shape(fixed)
+    shape = Shape(form)
     functions = [line for op in operators for line in _functions(op, shape, (), (), (), (), ())]
-    fields = {op: instance(op, shape, (), plays, 0, False) for op in operators}
-    return Glue(fields, {op: _state(op, fields[op]) for op in operators}, "\n".join(functions), [], [], {}, [])
-
-
-def with_fields(made: Glue, named: Mapping[str, Collection[str]]) -> Glue:
-    """The glue with the fields alone that the functions of each operator name."""
-    fields = {op: [each for each in found if each.name in named[op]] for op, found in made.fields.items()}
-    return replace(made, fields=fields, states={op: _state(op, found) for op, found in fields.items()})
-
-
-def _fixed_constants(t: ChainTables) -> list[tuple[str, str, str]]:
-    """Numbers that functions name in fixed point alone."""
-    from hystgen.compensator.chain.layout import (
-        ARRIVING_BITS,
-        BRAKED_DROP,
-        DRIVE_BITS,
-        LARGEST_LEVEL,
-        LEAST_CODE,
-        LEVEL_BITS,
-        LEVEL_DROP,
-        MOST_CODE,
-        SHARE_BITS,
-    )
-
-    low, high = t.plays.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
-    return [
-        ("FINE_MIN", operand(low), "what the ends of the drive's range are in front of the plays"),
-        ("FINE_MAX", operand(high), ""),
-        ("LEAST_CODE", operand(t.number[LEAST_CODE]), "between which a drive is kept before it is limited"),
-        ("MOST_CODE", operand(t.number[MOST_CODE]), ""),
-        ("DRIVE_BITS", f"{t.number[DRIVE_BITS]}u", "bits of a signal in front of the plays below a drive code"),
-        ("ARRIVING_BITS", f"{t.number[ARRIVING_BITS]}u", "and below an input of the plays"),
-        ("LEVEL_BITS", f"{t.number[LEVEL_BITS]}u", "bits of a signal behind the plays below an output code"),
-        ("LEVEL_DROP", f"{t.number[LEVEL_DROP]}u", "and those that a sum of the plays has beyond that"),
-        ("LARGEST_LEVEL", operand(t.number[LARGEST_LEVEL]), "sum that is asked of the plays"),
-        ("SHARE_BITS", f"{t.number[SHARE_BITS]}u", "bits of a mantissa below a code"),
-        ("BRAKED_DROP", f"{t.number[BRAKED_DROP]}u", "bits of a signal beyond those of a search for a lead"),
-    ]
+    return Glue({op: instance(op, shape, (), plays, 0, False) for op in operators}, "\n".join(functions), {})
 
 
 _PLAYS = "play 0 is the input of the plays"
@@ -442,57 +239,39 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
     """The memory of one operator, field by field."""
     inverse, taps = op == "inverse", t.taps
     waiting = 0 if inverse else t.waiting
-    arrived = Field("fine", "drive", "what arrived of it in front of the plays")
+    arrived = Field("fine_t", "drive", "what arrived of it in front of the plays")
+    answer = "drive" if inverse else "displacement" if t.effects else "output"
+    length = "" if kept else "HYSTGEN_N_PLAYS + 1"
+    searched = [Field("bool", "sought", "a solution has been found since the plays followed")] * inverse
     return [
-        *([Field("real", "pending", "drive sent but not yet part of the memory")] if inverse else []),
-        Field("real", "applied", "drive seen last"),
-        *([Field("ramp", "reached", "drive at a limited rate")] if t.slew else []),
-        arrived if t.effects else Field("real", "drive", "seen last"),
-        *([Field("real", "reference", "of the last step"), Field("real", "last", _LAST)] if inverse else []),
-        Field("signal", "level", "sum of the plays"),
-        Field("signal", "output", "what the output side made of it"),
-        Field("real", "answer", f"{'drive' if inverse else 'displacement' if t.effects else 'output'} returned last"),
-        Field("signal", "offset", "set beside that of the model"),
+        *[Field("real_t", "pending", "drive sent but not yet part of the memory")] * inverse,
+        Field("real_t", "applied", "drive seen last"),
+        *[Field("ramp_t", "reached", "drive at a limited rate")] * t.slew,
+        arrived if t.effects else Field("real_t", "drive", "seen last"),
+        *[Field("real_t", "reference", "of the last step"), Field("real_t", "last", _LAST)] * inverse,
+        Field("signal_t", "level", "sum of the plays"),
+        Field("signal_t", "output", "what the output side made of it"),
+        Field("real_t", "answer", f"{answer} returned last"),
+        Field("signal_t", "offset", "set beside that of the model"),
         *(field for block in blocks for field in block.fields),
-        *([Field("quiet", "quiet", members="wwi" if t.fixed else "rri")] if inverse and t.quiet else []),
-        *([Field("steady", "steady", members="ww" if t.fixed else "rr", flags=1)] if inverse and t.turning else []),
-        *([Field("signal", "line", "references, the newest one last", taps)] if inverse and taps else []),
-        *([Field("real", "waiting", "drives", waiting), Field("status", "oldest", "of them")] if waiting else []),
-        Field("flag", "ascending", "direction of the drive's last move"),
-        Field("flag", "moving", "a drive was applied"),
-        *([Field("flag", "has_pending"), Field("flag", "repeat", "the last answer still stands for `reference`"),
-           Field("flag", "stepped", "a step has answered")] if inverse else []),
-        *([Field("flag", "filled", "there are references"), Field("status", "bits", "of the last step")] if inverse
-          else []),
-        Field("status", "status"),
-        *(_corners(t, inverse, plays) if t.corners
-          else [Field("play", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept,
-                      length="" if kept else "HYSTGEN_N_PLAYS + 1")]),
-        *([Field("signal", "bent", "what each contributes", plays + 1)] if moving else []),
-    ]  # fmt: skip
-
-
-def _corners(t: Shape, inverse: bool, plays: int) -> list[Field]:
-    """The memory of the plays of engine corners."""
-    sought = [Field("flag", "sought", "a solution has been found since the plays followed")] * inverse
-    if not t.fixed:
-        undo = [Field("place", "undo", "where the plays were before the solution")] * inverse
-        return [*sought, Field("plays", "plays"), *undo, Field("corner", "corner", "", plays + 1)]
-    return [
-        *sought,
-        Field("place", "here"),
-        Field("signal", "next", "output, along the move, at which another play begins to follow"),
-        Field("kink", "kink", "of the present step; here rather than on the stack"),
-        Field("corner", "corner", "", max(plays, 1)),
-    ]  # fmt: skip
-
-
-def _state(op: str, fields: Sequence[Field]) -> str:
-    """The type of an instance."""
-    words = "reference in, drive out" if op == "inverse" else "drive in, displacement out"
-    top = f"/* One {op} operator: {words}. Plain data, owned by the caller. */"
-    body = "\n".join(f"    {field.text()}" for field in fields)
-    return f"{top}\ntypedef struct {{\n{body}\n}} hystgen_{op}_t;\n"
+        *[Field("quiet_t", "quiet")] * (inverse and t.quiet),
+        *[Field("steady_t", "steady")] * (inverse and t.turning),
+        *[Field("signal_t", "line", "references, the newest one last", taps)] * (inverse and taps > 0),
+        *[Field("real_t", "waiting", "drives", waiting), Field("unsigned int", "oldest", "of them")] * (waiting > 0),
+        Field("bool", "ascending", "direction of the drive's last move"),
+        Field("bool", "moving", "a drive was applied"),
+        *[
+            Field("bool", "has_pending"),
+            Field("bool", "repeat", "the last answer still stands for `reference`"),
+            Field("bool", "stepped", "a step has answered"),
+            Field("bool", "filled", "there are references"),
+            Field("unsigned int", "bits", "of the last step"),
+        ] * inverse,
+        Field("unsigned int", "status"),
+        *([*searched, *t.form.corners(inverse, plays)] if t.corners
+          else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept, length)]),
+        *[Field("signal_t", "bent", "what each contributes", plays + 1)] * moving,
+    ]
 
 
 def _function(comment: str, head: str, lines: Sequence[str]) -> str:
@@ -505,14 +284,14 @@ def _functions(
     t: Shape,
     before: Sequence[Block],
     after: Sequence[Block],
-    behind: Sequence[dict[str, Any]],
+    behind: Sequence[Stage],
     clocks: Sequence[Block],
     rubbing: Sequence[Block | None],
 ) -> Iterator[str]:
     """The functions of one operator that name the blocks."""
     inverse, ahead = op == "inverse", t.taps > 0
     self_t = f"hystgen_{op}_t *self"
-    apart = "HYSTGEN_APART" if t.fixed else "static"  # its products of 64 bits stay off the stack of what calls it
+    apart = t.form.apart
 
     def through(
         blocks: Sequence[Block], verb: str, x: str, side: str, comment: str, more: Sequence[str] = (),
@@ -532,13 +311,13 @@ def _functions(
     first: list[str] = []
     if turning:
         rest = ["hystgen_steady_rest(&self->steady);"]
-        first = [] if t.fixed else [f"const hystgen_signal_t before = {place}.high;"]
-        absorb = [f"hystgen_steady_absorb(&self->steady{'' if t.fixed else f', &{place}, before'});"]
+        first = [f"const hystgen_signal_t before = {place}.high;"]
+        absorb = [f"hystgen_steady_absorb(&self->steady, &{place}, before);"]
     yield through(before, "rest", "v", "drive_side", "Settles at drive v. Returns what is in front of the plays.", rest)
     yield through(
         before, "absorb", "v", "drive_side", "Drive v at this sample. Returns what is in front of the plays.", absorb,
         first,
-    )  # fmt: skip
+    )
     yield through(after, "rest", "h", "output_side", "Settles at the sum h of the plays. Returns the output.")
     yield through(after, "absorb", "h", "output_side", "The sum of the plays is h at this sample. Returns the output.")
     if inverse:
@@ -575,7 +354,7 @@ def _functions(
         yield through(back[1], "resting", "y", "output_side", "The sum of the plays that gives y at rest.")
     lines = ["hystgen_signal_t x = y;"] if behind else []
     x = "x" if behind else "y"
-    lines += [f"x = hystgen_{stage['kind']}_forward({stage['table']}, x);" for stage in behind]
+    lines += [f"x = hystgen_{stage.kind}_forward({stage.table}, x);" for stage in behind]
     offsets = "HYSTGEN_OUTPUT_OFFSET + self->offset" if t.effects else "HYSTGEN_OFFSET"
 
     def drifts(lead: str) -> str:
@@ -587,11 +366,11 @@ def _functions(
     yield _function(
         "Sum of the plays.", f"static hystgen_signal_t hystgen_{op}_level(const {self_t})",
         ["return self->level;" if t.effects else "return hystgen_loop_output(&hystgen_model_tables, self->play);"],
-    )  # fmt: skip
+    )
     yield _function(
         "What the output side has given last.", f"static hystgen_signal_t hystgen_{op}_output(const {self_t})",
         ["return self->output;" if after else f"return hystgen_{op}_level(self);"],
-    )  # fmt: skip
+    )
     own = apart if behind or clocks else "static"
     yield _function(
         "The displacement for an output y of the chain.",
@@ -607,7 +386,7 @@ def _functions(
         if behind:
             lines.append(f"hystgen_signal_t y = {y};")
         for stage in reversed(behind):
-            y = f"hystgen_{stage['kind']}_inverse({stage['table']}, y{stage['limited']})"
+            y = f"hystgen_{stage.kind}_inverse({stage.table}, y{stage.limited})"
             lines.append(f"y = {y};")
         lines = lines[: len(lines) - bool(behind)]
         yield _function(
@@ -620,7 +399,7 @@ def _functions(
             line for each in clocks
             for line in (f"const hystgen_signal_t lead = self->filled ? self->{each.name}.lead + 1 : 1;",
                          f"self->{each.name}.lead = lead > HYSTGEN_LEAD ? HYSTGEN_LEAD : lead;")
-        ]  # fmt: skip
+        ]
         put.append("hystgen_preview_put(self->line, &self->filled, y);")
         yield _function(
             "What has to be given now for the newest reference, y once it is undisplaced.",
@@ -632,7 +411,7 @@ def _functions(
             "No new reference: the newest one once more.",
             f"static void hystgen_inverse_repeat({self_t})",
             ["hystgen_preview_repeat(self->line, &self->filled);"] if ahead else [],
-        )  # fmt: skip
+        )
     gains = [block for block in after if block.kind.name == "gain"]
     ageing = [block for block in after if block.kind.name == "ageing"]
     heat = [block for block in after if block.kind.name == "heat"]
@@ -677,4 +456,4 @@ def _functions(
         f"static bool hystgen_{op}_heat({self_t}, hystgen_real_t temperature)",
         ["bool limited = false;", *(f"limited = {heat} || limited;" for heat in heats), "return limited;"]
         if heats else ["return false;"],
-    )  # fmt: skip
+    )

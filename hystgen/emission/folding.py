@@ -10,22 +10,19 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 _HEAD = re.compile(r"(?P<before>(?:[\w*]+\s+\**)+?)(?P<name>hystgen_\w+)\((?P<parameters>[^(){};]*)\)\s*\{\n")
 _OWN = ("static ", "HYSTGEN_APART_IN_FLOAT ", "HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ",
         "HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART_IN_FIXED_CHAIN ", "HYSTGEN_APART_IN_CHAIN ",
-        "HYSTGEN_APART ")  # fmt: skip
+        "HYSTGEN_APART ")
 """How functions begin that only the model itself calls."""
 _DELIMITED = (re.compile(r"(?:[(,?:]|(?<![=!<>])=|\breturn)\s*$"), re.compile(r"\s*[),;:]"))
 """What stands before and behind a whole argument, initializer or answer."""
 _MARK = re.compile(r"^ *\(void\)(\w+);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
 """A statement that marks a parameter as not used."""
-_NUMBERS = ("real", "signal", "fine", "travel", "play", "reach", "sum")
-"""Types that are one in floating point."""
 
 
 @dataclass(frozen=True)
@@ -90,9 +87,8 @@ def folded(
     functions: Iterable[Function],
     kernels: Iterable[Function],
     wanted: Callable[[dict[str, Function]], Collection[str]],
-    fixed: bool,
     apart: Sequence[str],
-    types: Mapping[str, str] = MappingProxyType({}),
+    meaning: Callable[[str], str] = str,
 ) -> dict[str, Function]:
     """The functions of a model without what does nothing. `wanted` names those that are called; otherwise as `Folding`.
     """
@@ -103,7 +99,7 @@ def folded(
         return f"/*{len(comments) - 1}*/"
 
     masked = [replace(each, body=_COMMENT.sub(mask, each.body)) for each in functions]
-    folding = _Folding(masked, list(kernels), fixed, apart, types)
+    folding = _Folding(masked, list(kernels), apart, meaning)
     while folding.once():
         kept = wanted(folding.functions)
         folding.functions = {name: each for name, each in folding.functions.items() if name in kept}
@@ -117,17 +113,17 @@ def folded(
 
 
 class _Folding:
-    """The functions of a model's operators. `kernels`: others that they call, which stay as they are; `fixed`: numbers
-    of several types; `apart`: how functions begin that the compiler keeps apart here, for the sake of the stack;
-    `types`: names of types that stand for others here."""
+    """The functions of a model's operators. `kernels`: others that they call, which stay as they are; `apart`: how
+    functions begin that the compiler keeps apart here, for the sake of the stack; `meaning`: of names of types, of
+    which several may stand for one here."""
 
     def __init__(
-        self, functions: Sequence[Function], kernels: Sequence[Function], fixed: bool, apart: Sequence[str],
-        types: Mapping[str, str],
-    ) -> None:  # fmt: skip
+        self, functions: Sequence[Function], kernels: Sequence[Function], apart: Sequence[str],
+        meaning: Callable[[str], str],
+    ) -> None:
         self.functions = {each.name: each for each in functions}
         self._known = {each.name: each for each in kernels}
-        self._fixed, self._apart, self._types = fixed, tuple(apart), types
+        self._apart, self._meaning = tuple(apart), meaning
 
     def once(self) -> bool:
         """One round. Returns whether anything has changed."""
@@ -250,8 +246,7 @@ class _Folding:
         """Whether two types are one."""
         def plain(kind: str) -> str:
             kind = " ".join(re.sub(r"\b(const|inline)\b", "", kind).split()).replace(" *", "*")
-            kind = re.sub(r"\w+", lambda name: self._types.get(name[0], name[0]), kind)
-            return kind if self._fixed else re.sub(rf"\bhystgen_({'|'.join(_NUMBERS)})_t\b", "real", kind)
+            return re.sub(r"\w+", lambda name: self._meaning(name[0]), kind)
 
         return plain(one) == plain(other)
 

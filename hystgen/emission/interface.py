@@ -1,14 +1,306 @@
-"""What the header says of every call: what it does, when it may be made, its units, status bits and cost."""
+"""What the files of a model say of it: the banner, the header's macros and calls, and the words of the C."""
 
 from __future__ import annotations
 
 import re
+import shlex
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
-from types import SimpleNamespace
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
+from hystgen.arithmetic import ARITHMETICS
+from hystgen.basics.version import __version__
+from hystgen.compensator.bounds import UNSLEWED, together
+from hystgen.emission import cost, runtime
+from hystgen.emission.compensator import Compensator, Macro
+from hystgen.emission.cost import Cost
+from hystgen.emission.options import OPTIONS, Options
 from hystgen.emission.runtime import Piece
-from hystgen.emission.text import WIDTH
+from hystgen.emission.text import WIDTH, comment_text, define, literal, operand
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.parameters.files import Parameters
+from hystgen.plays import slots
+
+if TYPE_CHECKING:
+    from hystgen.compensator.chain.layout import Compiled
+
+# Banner
+
+PERIODS = (50, 200)
+"""[samples] Periods for which the header states what is lost of a sine: a fast one, as long as the fastest sweep for
+which bounds are stated, and a slow one."""
+
+
+def banner(file: str, what: str, command: str, sha256: str, details: Sequence[str] = ()) -> str:
+    """A banner; `command`: that made the file, `sha256`: hash of the parameters, `details`: lines of its own."""
+    width = WIDTH - len(" * ")
+    lines = []
+    for line in details:
+        hang = " " * 8 if line.startswith(" ") else ""
+        lines += textwrap.wrap(line, width, subsequent_indent=hang, break_on_hyphens=False) or [""]
+    whole = re.sub(r"(--\w+) ", "\\1\0", command)  # an option and its value stay together
+    words = textwrap.wrap(whole, width - len("     \\"), subsequent_indent=" " * 4, break_on_hyphens=False)
+    return runtime.template(
+        "banner.c.j2", file=file, what=what, version=__version__, sha256=sha256, details=lines,
+        command=" \\\n *     ".join(words).replace("\0", " "),
+    ).rstrip("\n")
+
+
+def command(parameters: Parameters, options: Options) -> str:
+    """The command that emits a model again."""
+    origins: dict[str, None] = {}
+    if effects := parameters.model.effects:
+        from hystgen.effects import own as own_effects
+        from hystgen.effects.base import USER
+
+        origins = {own_effects.origin(type(each)): None for each in effects if each.name.startswith(USER)}
+    more = " --allow-partial" * bool(options.left_out) + "".join(f" --effects {shlex.quote(each)}" for each in origins)
+    chosen = " ".join(f"--{key} {getattr(options, key)}" for key in OPTIONS)
+    return f"hystgen emit {parameters.name}.yaml {chosen}{more}"
+
+
+def conditions(one: Compensator) -> tuple[str, str]:
+    """The conditions of NAME_INVERSE_ROUNDING_ERROR in words: of two branches, and of the memory; empty ones do not
+    matter."""
+    branch = "both take the same branch" if one.variant.branches else ""
+    return branch, one.numbers.errors.condition or UNSLEWED * one.variant.slew
+
+
+def unbounded(one: Compensator) -> list[str]:
+    """A bound of the inverse's error that says nothing."""
+    if not one.options.inverse:
+        return []
+    limits, errors, form = one.numbers.tables.limits, one.numbers.errors, one.form
+    whole = float(limits[slots.DRIVE_MAX]) - float(limits[slots.DRIVE_MIN])
+    if errors.inverse < whole:
+        return []
+    macro, unit = f"{one.names.NAME}_INVERSE_MAX_ERROR{form.suffix}", form.unit(one.units.drive)
+    said = f"Error: {macro} is the whole range of the drive, {whole:.4g}{unit}"
+    if errors.rounding < whole:
+        return [f"{said}; at most {errors.rounding:.3g}{unit} while {together(*conditions(one))}"]
+    return [f"{said}: no drive is near the exact one for certain"]
+
+
+def reading(one: Compensator) -> list[str]:
+    """How the inverse of a model with effects reads the reference: one sentence for each option."""
+    compiled = one.compiled
+    if compiled is None or not one.options.inverse:
+        return []
+    return [*_averaged(compiled), *_branches(compiled, one.parameters), *_quiet(one, compiled)]
+
+
+def _averaged(compiled: Compiled) -> list[str]:
+    """What holds the noise gain, what keeps modes from ringing, and what both cost."""
+    from hystgen.compensator.chain.layout import LEAST_LATE
+
+    found = []
+    if (one := compiled.smoothing) is not None:
+        often = {1: "once", 2: "twice"}.get(one.times, f"{one.times} times")
+        losses = " and ".join(f"{100.0 * one.loss(period):.2g} % with {period} samples a period" for period in PERIODS)
+        late = f", and the motion is {one.late:.3g} samples later" if one.late > LEAST_LATE else ""
+        found.append(
+            f"Noise: references are averaged {often} over {one.width:.4g} samples, so that the noise gain is "
+            f"{compiled.noise_gain:.4g} instead of {one.without:.4g}; a sine loses {losses}{late}"
+        )
+    if (kept := compiled.shaped) is not None:
+        missed = 100.0 * kept.missed(PERIODS[-1])
+        found.append(
+            f"Resonance: after a step of the reference the stage does not ring ({kept.by}). Not for tracking: it makes "
+            f"the motion {kept.late:.3g} samples late, and a sine with {PERIODS[-1]} samples a period is missed by "
+            f"{missed:.2g} % of its size"
+        )
+    return found
+
+
+def _branches(compiled: Compiled, parameters: Parameters) -> list[str]:
+    """What a drive that comes to rest in front of two branches leaves."""
+    from hystgen.compensator.chain.bounds import kept_branch
+
+    if not compiled.tables.turning:
+        return []
+    most = f"{kept_branch(compiled):.3g} {comment_text(parameters.units.output)}".rstrip()
+    return [
+        "Branches: the drive turns to the other branch only if staying on its own would miss more than a turn does at "
+        f"first; that leaves at most {most} of a reference at rest"
+    ]
+
+
+def _quiet(one: Compensator, compiled: Compiled) -> list[str]:
+    """When and how far a drive is kept at rest."""
+    from hystgen.compensator.chain.layout import DITHER
+
+    t = compiled.tables
+    if not one.variant.quiet:
+        return []
+    unit = one.form.unit(one.units.drive, "drive")
+    kept = float(t.number[DITHER]) / 2.0 ** one.form.drive_bits(t)
+    return [
+        f"Quiet: after {t.quiet} equal references the drive stands still as long as it is within {kept:.4g}{unit} of "
+        "the drive that is needed at rest; the input of the plays is then within twice that of the one sought"
+    ]
+
+
+def details(one: Compensator, doubts: Sequence[str], estimate: Cost) -> list[str]:
+    """The lines of a header's banner."""
+    parameters, options = one.parameters, one.options
+    about = comment_text(parameters.description)
+    avr = [] if estimate.avr is None else [
+        f"On an 8-bit AVR constants lie in RAM too: at most {estimate.avr.all} bytes of RAM in all, "
+        f"{estimate.avr.play} of them for each play"
+    ]
+    single = f" Define {one.names.NAME}_IMPLEMENTATION in one C file before including this header."
+    use = (
+        "Use: one instance per actuator, init once, then step from one context only. init takes the start memory of "
+        f"the parameter file; reset starts again from plays at 0.{single * (options.layout == 'single-header')}"
+        f"{one.form.warning}"
+    )
+    shapes = ((effect.name, getattr(effect, "shape", "")) for effect in parameters.model.effects if effect.block)
+    blocks = dict.fromkeys(f"{name} ({shape})" if shape else name for name, shape in shapes)
+    uncounted = f" without {' and '.join(blocks)}" if blocks else ""
+    precision = one.numbers.precision
+    return [
+        "",
+        *([about] if about else []),
+        f"Model: {_model(one)}; arithmetic {options.arithmetic}; engine {options.engine}; operator {options.operator}; "
+        f"layout {options.layout}",
+        *(f"Not compensated: {words}" for words in options.left_out),
+        *reading(one),
+        *doubts,
+        *([""] if precision else []),
+        *precision,
+        "",
+        "Cost (32-bit target):",
+        f"    code at -O2       about {estimate.code_words}, as measured for such a model with 10 plays"
+        f"{uncounted}",
+        f"    constant tables   {estimate.memory.tables} bytes",
+        *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.memory.instances),
+        *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),
+        *(f"    {op} step, dearest: about {estimate.dearest_words(op)}, as measured for such a model{uncounted}"
+          for op in options.operators),
+        *avr,
+        "",
+        use,
+    ]
+
+
+def _model(one: Compensator) -> str:
+    n = one.cascade.pi.n
+    kinds = ["tanh envelope" if isinstance(stage, TanhEnvelope) else "dead zone" for stage in one.cascade.stages]
+    names = dict.fromkeys(effect.name for effect in one.parameters.model.effects)
+    behind = f" behind {', '.join(kinds)}" if kinds else ""
+    effects = f"; effects {', '.join(names)}" if names else ""
+    return f"{n} play{'' if n == 1 else 's'}{behind}{effects}"
+
+
+def selftest_cost(options: Options, found: Cost, samples: int) -> list[str]:
+    """What the self-test takes."""
+    real = ARITHMETICS[options.arithmetic].bytes
+    constants, instance = cost.selftest_bytes(real, found.memory, samples, cost.CORE_32)
+    lines = ["", f"Cost (32-bit target): {constants} bytes of constants, {instance} bytes of RAM for its own instance"]
+    if found.avr is not None:
+        both = sum(cost.selftest_bytes(real, found.avr, samples, cost.AVR))
+        lines.append(f"On an 8-bit AVR constants lie in RAM too: {both} bytes of RAM in all")
+    return lines
+
+
+# Macros and types
+
+
+def version_number() -> int:
+    """The version as a number that the preprocessor can compare; what is not final counts as its release."""
+    major, minor, patch = map(int, re.findall(r"\d+", __version__)[:3])
+    return 10000 * major + 100 * minor + patch
+
+
+def _defined(one: Compensator, macros: Iterable[Macro]) -> list[str]:
+    return [define(f"{one.names.NAME}_{name}", value, comment) for name, value, comment in macros]
+
+
+def typedefs(one: Compensator) -> list[str]:
+    """The types of a model's numbers, those of plays and sums too unless a shared run time has them."""
+    units, names, types = one.units, one.names, one.family.types
+    real = f"typedef {one.family.real} {names.name}_real_t;"
+    if not one.numbers.lsb:
+        drive = f"Drive in {units.drive or 'the units of the parameter file'}"
+        output = f"output and reference {f'in {units.output}' if units.output else 'likewise'}"
+        return [f"/* {drive}; {output} */", real]
+    codes = (
+        f"/* Codes: a drive code is {names.NAME}_DRIVE_LSB{units.behind('drive')}, an output code "
+        f"{names.NAME}_OUTPUT_LSB{units.behind('output')} */"
+    )
+    words = "/* Inputs of the plays, where plays start to follow, and outputs before they are rounded */"
+    own = [words, *(f"typedef {kind} {names.name}_{each};" for each, kind in types.items())]
+    return [codes, real, *(own if names.rt == names.name else [])]
+
+
+def limits(one: Compensator) -> list[str]:
+    """The macros of the header that a model's numbers are in."""
+    numbers, errors, form, units = one.numbers, one.numbers.errors, one.form, one.units
+    bound, suffix = "against the double model, ", form.suffix
+    drive, output = form.counted("drive", units.drive), form.counted("output", units.output)
+    found: list[Macro] = [("N_PLAYS", str(one.cascade.pi.n), ""), *_timing(one)]
+    words = ("physical units a code; code 0 is 0", "")
+    found += [
+        (f"{side}_LSB", literal(lsb), comment)
+        for side, lsb, comment in zip(("DRIVE", "OUTPUT"), numbers.lsb, words, strict=False)
+    ]
+    found += [
+        ("DRIVE_MIN", numbers.drive[0], drive),
+        ("DRIVE_MAX", numbers.drive[1], ""),
+        ("OUTPUT_MIN", numbers.output[0], f"{output}, over every drive history in range"),
+        ("OUTPUT_MAX", numbers.output[1], ""),
+    ]
+    if one.options.forward:
+        found.append((f"FORWARD_MAX_ERROR{suffix}", operand(errors.forward), bound + output))
+    branch, condition = conditions(one)
+    if one.options.inverse:
+        found.append((f"INVERSE_MAX_ERROR{suffix}", operand(errors.inverse), bound + drive))
+        if one.variant.branches or (condition and errors.rounding != errors.inverse):
+            same = f"the same while {together(branch, condition)}"
+            found.append((f"INVERSE_ROUNDING_ERROR{suffix}", operand(errors.rounding), same))
+    return _defined(one, found)
+
+
+def _timing(one: Compensator) -> list[Macro]:
+    """Macros about time: its sample time, and of a model with effects what follows from it."""
+    kind, period, compiled = one.family.arithmetic.real, one.parameters.sample_time, one.compiled
+    found: list[Macro] = [] if period is None else [("SAMPLE_TIME", literal(kind(period)), "s, from step to step")]
+    if compiled is None:
+        return found
+    from hystgen.compensator.chain.layout import LEAST_LATE
+
+    ahead = "samples that the argument of step is ahead of the motion"
+    if compiled.late > LEAST_LATE:
+        ahead += f", which is {compiled.late:.4g} late"
+    return [
+        *found,
+        ("PREVIEW", str(compiled.ahead), ahead),
+        ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest gain from reference to drive over that at rest"),
+        ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, a second, for which the errors below hold"),
+        *one.form.code_sizes(compiled.tables),
+    ]
+
+
+def status(one: Compensator) -> list[str]:
+    """The bits of the status functions."""
+    limited = "inverse: the drive was limited to the drive range"
+    envelope = "inverse: the argument of an envelope was limited"
+    found = [
+        ("INPUT_CLAMPED", "the input was out of range and was limited"),
+        ("OUTPUT_CLAMPED", limited + "; forward: the output to its codes" * one.numbers.saturates),
+        ("HELD", one.form.held),
+        ("DOMAIN", envelope if one.numbers.envelopes else "never set: no envelope limits an argument"),
+    ]
+    if one.variant.chain:
+        slewed = "the drive was kept within its rate"
+        found += [
+            ("SLEW_LIMITED", slewed if one.variant.slew else "never set: nothing limits the drive's rate"),
+            ("LIMITED_SETTING", "an offset, gain or temperature was limited"),
+        ]
+    return _defined(one, ((f"STATUS_{name}", f"{1 << bit}u", words) for bit, (name, words) in enumerate(found)))
+
+
+# Calls
 
 _FIRST = "after init; at any time"
 ORDER = {
@@ -65,8 +357,8 @@ BITS = {
 _PROTOTYPE = re.compile(r"(?P<answer>[\w ]+?) hystgen_(?P<op>forward|inverse)_(?P<call>\w+)\((?P<given>[^)]*)\);")
 
 
-def documented(pieces: Sequence[Piece], values: SimpleNamespace) -> Iterator[Piece]:
-    """Prototypes of the interface, each below what there is to know of it; `values`: of the model."""
+def documented(pieces: Sequence[Piece], one: Compensator, cost: Cost) -> Iterator[Piece]:
+    """Prototypes of the interface of a model, each below what there is to know of it."""
     for piece in pieces:
         found = _PROTOTYPE.search(" ".join(piece.code.split()))
         assert found, piece.text
@@ -75,13 +367,13 @@ def documented(pieces: Sequence[Piece], values: SimpleNamespace) -> Iterator[Pie
         names = [re.findall(r"\w+", each)[-1] for each in found["given"].split(", ")]
         lines = [("", " ".join(words.split())), ("", "")]
         meaning = {"x": "u" if op == "inverse" else "v"}
-        lines += [(f"@param {name}", _parameter(meaning.get(name, name), call, values)) for name in names]
+        lines += [(f"@param {name}", _parameter(meaning.get(name, name), call, one)) for name in names]
         if found["answer"] != "void":
-            lines.append(("@return", _answer(call, op, values)))
+            lines.append(("@return", _answer(call, op, one)))
         lines += [
             ("@pre", ORDER[call]),
-            ("@note", f"Status bits: {_bits(call, op, values)}"),
-            ("@note", f"Cost: {_cost(call, op, values)}"),
+            ("@note", f"Status bits: {_bits(call, op, one)}"),
+            ("@note", f"Cost: {_cost(call, op, one, cost)}"),
         ]
         above = "\n".join(["/**", *(line for mark, text in lines for line in _line(mark, text)), " */"])
         yield Piece(piece.name, f"{above}\n{piece.code.lstrip()}\n", piece.uses)
@@ -95,72 +387,105 @@ def _line(mark: str, text: str) -> list[str]:
     whole = f"{mark} {text}".strip()
     return textwrap.wrap(
         whole, WIDTH, initial_indent=" * ", subsequent_indent=" *     " if mark else " * ", break_on_hyphens=False
-    ) or [" *"]  # fmt: skip
+    ) or [" *"]
 
 
-def _unit(what: str, values: SimpleNamespace) -> str:
+def _unit(what: str, one: Compensator) -> str:
     """A quantity with its unit: of the drive or the output, as a code in fixed point."""
     side = "drive" if what == "drive" else "output"
     words = {"drive": "drive", "output": "displacement", "reference": "reference"}[what]
-    unit: str = getattr(values.units, side)
-    if values.fixed:
-        return f"{words}, in codes of {values.NAME}_{side.upper()}_LSB{unit.replace(',', '')}"
-    return words + unit
+    macro = f"{one.names.NAME}_{side.upper()}_LSB"
+    return one.form.quantity(words, macro, getattr(one.units, side))
 
 
-def _parameter(name: str, call: str, values: SimpleNamespace) -> str:
-    held = "" if values.fixed else f"; NaN and infinite: {'held' if call in ('step', 'reset') else 'ignored'}"
-    kept = f"; limited to {values.NAME}_OUTPUT_MIN .. MAX" if name == "u" else ""
-    fixed: Mapping[str, str] = {
-        "temperature": f"temperature, in codes of {values.NAME}_TEMPERATURE_LSB",
-        "gain": f"gain over that of the parameter file, in codes of {values.NAME}_GAIN_LSB",
-        "share": "0 to the largest code, which stands for 1",
-    }
-    floating = {
-        "temperature": "temperature, degC",
-        "gain": "gain over that of the parameter file",
-        "share": "0 to 1",
-    }
-    if name in floating:
-        return (fixed if values.fixed else floating)[name] + held
+def _parameter(name: str, call: str, one: Compensator) -> str:
+    form, macros = one.form, one.names.NAME
+    if name == "self":
+        return "the instance"
+    held = form.unless_held(call)
+    if name in form.settings:
+        return form.settings[name].replace("MODEL", macros) + held
+    drive = _unit("drive", one) + f"; limited to {macros}_DRIVE_MIN .. MAX"
     what = {
-        "self": "the instance",
-        "v": _unit("drive", values) + f"; limited to {values.NAME}_DRIVE_MIN .. MAX",
-        "u": _unit("reference", values) + kept,
-        "applied": _unit("drive", values) + f"; limited to {values.NAME}_DRIVE_MIN .. MAX",
-        "d": _unit("output", values),
-        "measured": _unit("output", values),
+        "v": drive,
+        "u": _unit("reference", one) + f"; limited to {macros}_OUTPUT_MIN .. MAX",
+        "applied": drive,
+        "d": _unit("output", one),
+        "measured": _unit("output", one),
         "travel": "sum of the drive's ways, in the unit of a drive",
     }[name]
-    return what + held * (name != "self")
+    return what + held
 
 
-def _answer(call: str, op: str, values: SimpleNamespace) -> str:
+def _answer(call: str, op: str, one: Compensator) -> str:
     if call == "status":
-        return f"{values.NAME}_STATUS_* bits, 0 for none"
+        return f"{one.names.NAME}_STATUS_* bits, 0 for none"
     if call == "travel":
         return "sum of the drive's ways, in the unit of a drive"
-    return _unit("drive" if op == "inverse" and call == "step" else "output", values)
+    return _unit("drive" if op == "inverse" and call == "step" else "output", one)
 
 
-def _bits(call: str, op: str, values: SimpleNamespace) -> str:
+def _bits(call: str, op: str, one: Compensator) -> str:
     if call == "reset":
         return "cleared, then those of the step"
     if call == "status":
         return "all of them are cleared"
     there = {
-        "HELD": not values.fixed,
-        "OUTPUT_CLAMPED": op == "inverse" or values.saturates,
-        "DOMAIN": op == "inverse" and values.envelopes,
-        "SLEW_LIMITED": values.variant.slew,
+        "HELD": bool(one.form.unless_held(call)),
+        "OUTPUT_CLAMPED": op == "inverse" or one.numbers.saturates,
+        "DOMAIN": op == "inverse" and one.numbers.envelopes,
+        "SLEW_LIMITED": one.variant.slew,
     }
-    found = [f"{values.NAME}_STATUS_{bit}" for bit in BITS.get(call, ()) if there.get(bit, True)]
+    found = [f"{one.names.NAME}_STATUS_{bit}" for bit in BITS.get(call, ()) if there.get(bit, True)]
     return ", ".join(found) or "none"
 
 
-def _cost(call: str, op: str, values: SimpleNamespace) -> str:
+def _cost(call: str, op: str, one: Compensator, cost: Cost) -> str:
     if call == "step":
-        return f"at most {dict(values.cost.worst_case)[op]}"
-    if call == "commit" and values.engine == "corners" and not values.variant.chain:
+        return f"at most {dict(cost.worst_case)[op]}"
+    if call == "commit" and one.corners and not one.variant.chain:
         return "at most that of a step"
     return COSTS[call]
+
+
+# Words
+
+_CORNERS = "_corner_t"
+"""What only the corner engine names."""
+
+WORDS = (
+    ("play", r"\bplays?\b",
+     "holds its value until its input is a threshold away, and then follows at that distance"),
+    ("move", _CORNERS,
+     "what the input does from one turning point to the next: it rises, or it falls. Lengths are taken along the move, "
+     "so that a falling one is a rising one with all signs changed"),
+    ("corner", _CORNERS,
+     "a turning point that some plays still hold their values from; corners are a stack, the newest one on top"),
+    ("block", _CORNERS,
+     "the plays that one corner holds: those with larger thresholds than the corner above it has, up to its `top`"),
+    ("way", _CORNERS, "how far the input has gone from a turning point"),
+    ("reach", _CORNERS,
+     "how far the output has gone from there; a reach_t also holds inputs and drives beyond every code"),
+    ("segment", _CORNERS, "the curve of output over input from where one more play follows to where the next does"),
+    ("pass", r"\bpass\[",
+     "the input at which a move has taken a whole block along: the corner is passed, and forgotten"),
+    ("kink", r"\bkink\b", "a place along the move where another play begins to follow"),
+    ("effect", r"_(?:creep|lag|gain|mode|heat|ageing|clock)_\w*table",
+     "a block of the chain from drive to displacement. rest: it has settled at an input; absorb: one sample passes "
+     "through it; solve: the input that gives an output now; resting: the one that gives it at rest"),
+    ("pending", r"\bpending\b",
+     "the drive answered last: part of the memory only when the next call absorbs it, or the drive committed in its "
+     "place"),
+)
+"""A word, what a text has that uses it, and what it means."""
+
+
+def overview(text: str) -> str:
+    """A comment with the words that a C text uses; nothing for a text that uses none."""
+    found = [f"{word}: {meaning}" for word, sign, meaning in WORDS if re.search(sign, text)]
+    if not found:
+        return ""
+    lines = [line for each in found for line in textwrap.wrap(
+        f"{each}.", WIDTH, initial_indent="   ", subsequent_indent="       ", break_on_hyphens=False
+    )]
+    return "\n".join(["/* Words of this file", "", *lines, "*/", ""])

@@ -42,6 +42,11 @@ class Options:
     left_out: tuple[str, ...] = ()
 
     @property
+    def operators(self) -> tuple[str, ...]:
+        """The operators that are part of it."""
+        return ("forward", "inverse") if self.operator == "both" else (self.operator,)
+
+    @property
     def forward(self) -> bool:
         """Whether the forward operator is part of it."""
         return self.operator in ("forward", "both")

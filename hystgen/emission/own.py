@@ -11,14 +11,17 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from hystgen.basics.problems import EffectsError, printable
-from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.effects import own
 from hystgen.effects.base import Effect
 from hystgen.effects.kinds import VERBS, Kind
 from hystgen.emission.runtime import Piece
 from hystgen.emission.text import WIDTH
+
+if TYPE_CHECKING:
+    from hystgen.compensator.chain.layout import ChainTables
 
 MOST_BYTES = 1 << 16
 """Of a C file of the user's; the largest block of the package itself has 6 kB."""
@@ -32,7 +35,7 @@ CALLED = frozenset(["if", "for", "while", "switch", "return", "sizeof"])
 REFUSED = {
     "float": "hystgen_signal_t", "double": "hystgen_signal_t", "extern": "nothing", "volatile": "nothing",
     "asm": "C", "union": "struct", "goto": "a loop", "register": "nothing", "auto": "a type",
-}  # fmt: skip
+}
 """Words that a file may not contain, and what to write instead."""
 
 GIVEN = frozenset(["hystgen_signal_t", "hystgen_number_t", "hystgen_product"])
@@ -41,7 +44,7 @@ GIVEN = frozenset(["hystgen_signal_t", "hystgen_number_t", "hystgen_product"])
 
 def pieces(t: ChainTables) -> tuple[list[Piece], list[Piece]]:
     """Types and functions of the blocks of a model that are the user's own; raises as `of_effect`."""
-    effects = dict.fromkeys(t.own_effects if isinstance(t, OwnChainTables) else ())
+    effects = dict.fromkeys(getattr(t, "own_effects", ()))
     found = [of_effect(effect) for effect in effects]
     types, functions = ([each for pair in found for each in pair[way]] for way in (0, 1))
     twice = [name for name, count in Counter(each.name for each in (*types, *functions)).items() if count > 1]

@@ -9,16 +9,19 @@ name.
 from __future__ import annotations
 
 import functools
+import math
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import ClassVar
 
-from hystgen.arithmetic import ARITHMETICS, Arithmetic
+import jinja2
+
+from hystgen.arithmetic import FIXED, FLOATING, Arithmetic
 from hystgen.emission import folding
-
-VERSION = 3  # of the interface between emitted models and a shared run time
 
 FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")
 """Macros that say what a model has. Conditions on them are decided when C is emitted; others are carried."""
@@ -80,15 +83,18 @@ FIXED_CHAIN_BLOCKS = (
 
 SIGNALS = {
     "hystgen_signal_t": "hystgen_sum_t", "hystgen_fine_t": "hystgen_play_t", "hystgen_travel_t": "hystgen_sum_t",
-}  # fmt: skip
+}
 """Types between the blocks of a model with effects in fixed point; elsewhere they are those of codes, but in engine
 loop without effects signals are as wide as sums of the plays."""
 
 FINE = {
     "HYSTGEN_FINE_MIN": "HYSTGEN_DRIVE_MIN", "HYSTGEN_FINE_MAX": "HYSTGEN_DRIVE_MAX",
     "hystgen_clamp_fine": "hystgen_clamp_drive",
-}  # fmt: skip
+}
 """Names of numbers finer than a drive code in such a model, and what they stand for elsewhere."""
+
+SUMS = ("play_t", "reach_t", "sum_t")
+"""Types of plays, which in floating point are that of every number."""
 
 NUMBER = "hystgen_number_t"
 """What a block of the user's own multiplies with, in floating point a number like any other."""
@@ -102,14 +108,41 @@ FIXED_KERNELS = (
 )
 
 
+APART = "HYSTGEN_APART "
+
+
 @dataclass(frozen=True)
-class Family:
+class Family(ABC):
     """An arithmetic in C: its files of the run time and its types; `chain`: in a model with effects, `loop`: in one
-    without, in engine loop."""
+    without, in engine loop.
+
+    `kind`: the kind of arithmetic, in names of files, and `ending` of those that have none for floating point;
+    `chain_types`, `chain_blocks`: files of effects; `curves`: those of a memoryless part whose stages no function calls
+    one by one, `codes`: those of codes; `moves_apart`: plays that are moved and bent take less of the stack in
+    functions of their own; `opening`: headers before all code of a file; in a single header between `opening_apart` and
+    `closing`, so that its user's code is compiled as before.
+    """
 
     arithmetic: Arithmetic
     chain: bool = False
     loop: bool = False
+
+    kind: ClassVar[str]
+    ending: ClassVar[str]
+    moves_apart: ClassVar[bool]
+    chain_types: ClassVar[tuple[str, ...]]
+    chain_blocks: ClassVar[tuple[str, ...]]
+    curves: ClassVar[tuple[str, ...]]
+    codes: ClassVar[tuple[str, ...]]
+    opening: ClassVar[tuple[str, ...]] = ()
+    opening_apart: ClassVar[tuple[str, ...]] = ()
+    closing: ClassVar[tuple[str, ...]] = ()
+    kernels: ClassVar[tuple[str, ...]] = ("kernels.h",)
+    """Headers of the run time that have the prototypes of its kernels."""
+    build: ClassVar[tuple[str, ...]] = ("arithmetic/build.h",)
+    """Headers that check how code is built."""
+    shared_version: ClassVar[int] = 3
+    """Of the interface between emitted models and a shared run time."""
 
     @property
     def bits(self) -> str:
@@ -117,52 +150,50 @@ class Family:
         return self.arithmetic.short
 
     @property
+    def shared_file(self) -> str:
+        """The name of a shared run time's files."""
+        return f"hystgen_runtime_{self.bits}"
+
+    @property
     def real(self) -> str:
         """The type of inputs and answers."""
         return self.arithmetic.c_type
 
     @property
-    def fixed(self) -> bool:
-        """Whether it is fixed point."""
-        return self.arithmetic.fixed
-
-    @property
     def facts(self) -> frozenset[str]:
         """What is true of every model of it."""
-        found = {"FIXED": self.fixed, "CHAIN": self.chain, "REAL_IS_DOUBLE": self.real == "double",
-                 "REAL_IS_SHORT": self.real == "int16_t"}  # fmt: skip
-        return frozenset(f"HYSTGEN_{fact}" for fact, holds in found.items() if holds)
+        return frozenset([*self.arithmetic.facts, *["HYSTGEN_CHAIN"] * self.chain])
 
     @property
-    def constants(self) -> dict[str, str]:
-        """What `hystgen_runtime.h` defines and emitted code names directly."""
-        if self.fixed:
-            low = self.arithmetic.low_bits
-            return {"HYSTGEN_LOW_BITS": str(low), "hystgen_low_t": f"uint{low}_t"}
-        return {"HYSTGEN_REAL_MAX": f"{self.arithmetic.float_h}_MAX"}
-
-    @property
-    def types(self) -> dict[str, str]:
+    def types(self) -> Mapping[str, str]:
         """Types of the run time beside `real_t`."""
-        return {"play_t": "int32_t", "reach_t": self.arithmetic.reach, "sum_t": "int64_t"} if self.fixed else {}
+        return self.arithmetic.types
 
     @property
     def signals(self) -> dict[str, str]:
         """Names in code that models with and without effects share, and their meaning here."""
-        if self.chain and self.fixed:
-            return SIGNALS
-        sums = {"hystgen_signal_t": "hystgen_sum_t"} if self.loop and self.fixed else {}
-        return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE | sums
+        return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE
 
     @property
-    def chain_types(self) -> tuple[str, ...]:
-        """The headers with the types of effects."""
-        return FIXED_CHAIN_TYPES if self.fixed else CHAIN_TYPES
+    def casts(self) -> bool:
+        """Whether conversions stay that lead to the type of inputs and answers."""
+        return False
 
-    @property
-    def includes(self) -> tuple[str, ...]:
-        """Headers of the language that code needs."""
-        return (*(() if self.fixed else ("float",)), "stdbool", "stddef", "stdint")
+    @abstractmethod
+    def storage(self, corners: bool) -> dict[str, str]:
+        """Words before functions, and what stands there in this arithmetic, in engine corners or loop."""
+
+    def corners(self, plays: int) -> int:
+        """How many corners the corner engine takes for so many plays."""
+        return max(plays, 1)
+
+    def alike(self, kind: str) -> str:
+        """The name of a type, or that of the type that it is."""
+        return kind
+
+    def meaning(self, kind: str) -> str:
+        """The type that a name stands for here, both without prefix."""
+        return self.alike(self.signals.get(f"hystgen_{kind}", kind).removeprefix("hystgen_"))
 
     @property
     def tables(self) -> tuple[str, ...]:
@@ -175,46 +206,83 @@ class Family:
         return (f"plays/state_{self.kind}.h",)
 
     @property
-    def kind(self) -> str:
-        """The kind of arithmetic in names of files."""
-        return "fixed" if self.fixed else "float"
-
-    @property
+    @abstractmethod
     def kernel_files(self) -> tuple[str, ...]:
         """The files with its kernels, callees before callers."""
-        return tuple(file.format(bits=self.bits) for file in (FIXED_KERNELS if self.fixed else FLOAT_KERNELS))
-
-    @property
-    def kernels(self) -> tuple[str, ...]:
-        """The headers of the run time that have the prototypes of its kernels."""
-        return ("kernels.h",)
-
-    @property
-    def build(self) -> tuple[str, ...]:
-        """The headers that check how code is built."""
-        return ("arithmetic/build.h",)
 
     def soft(self, kernels: str) -> tuple[str, ...]:
         """The header with what the corner engine asks of floating point, where it is among these kernels."""
         return ("arithmetic/soft_float.h",) if "_SOFT_FLOAT" in kernels else ()
 
-    @property
-    def opening(self) -> tuple[str, ...]:
-        """Headers before all code of a file; in a single header between `opening_apart` and `closing`."""
-        return () if self.fixed else ("arithmetic/rounding_begin.h",)
+
+def _apart(holds: bool, otherwise: str = "static ") -> str:
+    return APART if holds else otherwise
+
+
+class FloatFamily(Family):
+    """Floating point: one type for every number."""
+
+    kind, ending, moves_apart = "float", "", False
+    chain_types, chain_blocks, curves, codes = CHAIN_TYPES, CHAIN_BLOCKS, (), ()
+    opening = ("arithmetic/rounding_begin.h",)
+    opening_apart = ("arithmetic/rounding_push.h",)
+    closing = ("arithmetic/rounding_end.h",)
 
     @property
-    def opening_apart(self) -> tuple[str, ...]:
-        """Headers before those if the user's own code follows."""
-        return () if self.fixed else ("arithmetic/rounding_push.h",)
+    def kernel_files(self) -> tuple[str, ...]:
+        return tuple(file.format(bits=self.bits) for file in FLOAT_KERNELS)
+
+    def corners(self, plays: int) -> int:
+        return plays + 1
+
+    def alike(self, kind: str) -> str:
+        return "real_t" if kind in SUMS else kind
+
+    def storage(self, corners: bool) -> dict[str, str]:
+        return {
+            "HYSTGEN_APART_IN_FLOAT_CORNERS ": _apart(corners),
+            "HYSTGEN_APART_IN_FIXED_CHAIN ": "static inline ",
+            "HYSTGEN_APART_IN_CHAIN ": _apart(self.chain),
+            "HYSTGEN_APART_IN_FIXED ": "static inline ",
+            "HYSTGEN_APART_IN_FLOAT ": APART,
+            "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ": _apart(corners),
+            "HYSTGEN_FIXED_KERNEL ": "HYSTGEN_API ",
+        }
+
+
+class FixedFamily(Family):
+    """Fixed point."""
+
+    kind, ending, moves_apart = "fixed", "_fixed", True
+    chain_types, chain_blocks = FIXED_CHAIN_TYPES, FIXED_CHAIN_BLOCKS
+    curves, codes, kernel_files = ("front/front.c",), ("compensator/code.c",), FIXED_KERNELS
 
     @property
-    def closing(self) -> tuple[str, ...]:
-        """Headers after all code of a single header, so that its user's code is compiled as before."""
-        return () if self.fixed else ("arithmetic/rounding_end.h",)
+    def signals(self) -> dict[str, str]:
+        if self.chain:
+            return SIGNALS
+        return super().signals | ({"hystgen_signal_t": "hystgen_sum_t"} if self.loop else {})
+
+    @property
+    def casts(self) -> bool:
+        return self.loop
+
+    def storage(self, corners: bool) -> dict[str, str]:
+        return {
+            "HYSTGEN_APART_IN_FLOAT_CORNERS ": "static ",
+            "HYSTGEN_APART_IN_FIXED_CHAIN ": _apart(self.chain, "static inline "),
+            "HYSTGEN_APART_IN_CHAIN ": _apart(self.chain),
+            "HYSTGEN_APART_IN_FIXED ": APART,
+            "HYSTGEN_APART_IN_FLOAT ": "static ",
+            "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ": APART,
+            "HYSTGEN_FIXED_KERNEL ": "HYSTGEN_KERNEL ",
+        }
 
 
-FAMILIES = {name: Family(arithmetic) for name, arithmetic in ARITHMETICS.items()}
+FAMILIES: dict[str, Family] = {
+    **{name: FloatFamily(each) for name, each in FLOATING.items()},
+    **{name: FixedFamily(each) for name, each in FIXED.items()},
+}
 
 
 @dataclass(frozen=True)
@@ -231,7 +299,7 @@ class Variant:
     """
 
     engine: str
-    fixed: bool
+    family: Family
     fronts: bool
     branches: bool
     finer: bool = False
@@ -249,12 +317,9 @@ class Variant:
 
     @property
     def apart(self) -> tuple[str, ...]:
-        """How functions begin that the compiler keeps apart here, as `render_operators` has it."""
-        corners = self.engine == "corners"
-        found = ["HYSTGEN_APART ", "HYSTGEN_APART_IN_FIXED " if self.fixed else "HYSTGEN_APART_IN_FLOAT "]
-        found += ["HYSTGEN_APART_IN_CHAIN ", *["HYSTGEN_APART_IN_FIXED_CHAIN "] * self.fixed] * self.chain
-        found += ["HYSTGEN_APART_IN_FLOAT_CORNERS "] * (corners and not self.fixed)
-        return (*found, *["HYSTGEN_APART_BUT_IN_FLOAT_LOOP "] * (corners or self.fixed))
+        """How functions begin that the compiler keeps apart here."""
+        storage = self.family.storage(self.engine == "corners")
+        return (APART, *(word for word, here in storage.items() if here == APART))
 
     @property
     def facts(self) -> frozenset[str]:
@@ -268,8 +333,8 @@ class Variant:
             "QUIET_DRIVE": self.quiet, "STEADY_LAG": self.turning, "DELAY": self.waits,
             "RELAXING_PLAYS": self.moves == "relaxing", "DILATED_PLAYS": self.moves == "dilated",
             "DASHPOT_PLAYS": self.moves == "dashpot", "BENT_PLAYS": bent, "BUMP": self.bends == "centre",
-            "MOVES_APART": self.fixed and bent and self.moves in ("relaxing", "dilated"),  # they need less of the stack
-        }  # fmt: skip
+            "MOVES_APART": self.family.moves_apart and bent and self.moves in ("relaxing", "dilated"),
+        }
         return frozenset(f"HYSTGEN_HAS_{fact}" for fact, holds in found.items() if holds)
 
     @property
@@ -280,10 +345,9 @@ class Variant:
     def sources(self) -> tuple[str, ...]:
         """The files with the functions of both operators, callees before callers."""
         files = ["compensator/clamp.c"]
-        if self.fixed and not self.chain:
-            files.append("compensator/code.c")
-        if self.fixed or not self.fronts:
-            files.append("front/front.c")
+        if not self.chain:
+            files += self.family.codes
+        files += self.family.curves if self.fronts else ("front/front.c",)
         own = self._chain() if self.chain or self.engine == "loop" else self._corners()
         return (*files, "compensator/drive.c", *own, "compensator/status.c")
 
@@ -292,7 +356,7 @@ class Variant:
         chain, moving = "compensator/chain/", "effects/rate_dependence/"
         loops, solve, refined = self.engine == "loop", f"{chain}plays_solve.c", f"{chain}refined_input.c"
         if not loops:
-            plays: tuple[str, ...] = (refined, f"{chain}corners_{'fixed' if self.fixed else 'float'}.c")
+            plays: tuple[str, ...] = (refined, f"{chain}corners_{self.family.kind}.c")
         elif not self.moves:
             plays = (solve, f"{chain}plays.c", refined)
         elif not self.bends:
@@ -301,7 +365,7 @@ class Variant:
             before = {"relaxing": (f"{moving}stretch.c",), "dashpot": (f"{moving}yield.c",)}.get(self.moves, ())
             moved = f"{moving}{'dashpot' if self.moves == 'dashpot' else 'moved'}.c"
             plays = (*before, "effects/noncongruent/bent.c", moved, f"{chain}moving_plays.c", f"{chain}moving_search.c",
-                     refined)  # fmt: skip
+                     refined)
         brake = ("effects/slew_limit/brake.c",) if self.braked else ()
         entered = () if self.chain else (f"{chain}drive_signal.c",)
         limits = ("effects/delay/forward.c", "effects/slew_limit/slewed.c")
@@ -313,7 +377,7 @@ class Variant:
         return (*signals, *plays, *calls)
 
     def _corners(self) -> tuple[str, ...]:
-        corners, kind = "compensator/corners/", "_front" * self.fronts + "_fixed" * self.fixed
+        corners, kind = "compensator/corners/", "_front" * self.fronts + self.family.ending
         return (f"{corners}forward.c", f"{corners}inverse{kind}.c", f"{corners}start.c")
 
 
@@ -322,6 +386,34 @@ def data_folder(name: str) -> Path:
     package = Path(__file__).resolve().parent.parent
     installed = package / "_data" / name
     return installed if installed.is_dir() else package.parent / name
+
+
+@functools.cache
+def _environment() -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.FileSystemLoader(data_folder("templates")),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+
+
+def template(template: str, /, **values: object) -> str:
+    """The text of a template with these values."""
+    return _environment().get_template(template).render(values)
+
+
+@dataclass(frozen=True)
+class Member:
+    """A member of a structure: its type without the prefix, lengths of an array, and how many bits it takes of a whole
+    number, 0 for one by itself."""
+
+    kind: str
+    pointer: bool
+    lengths: tuple[str, ...]
+    bits: int
 
 
 @dataclass(frozen=True)
@@ -336,6 +428,32 @@ class Piece:
     def code(self) -> str:
         """Its text without comments."""
         return _COMMENT.sub("", self.text)
+
+    @property
+    def members(self) -> tuple[Member, ...]:
+        """What it declares, if it is a structure."""
+        head, _, body = self.code.partition("{")
+        if "typedef struct" not in head:
+            return ()
+        declared = (_MEMBER.match(" ".join(each.split())) for each in body.rpartition("}")[0].split(";")[:-1])
+        return tuple(
+            Member(each["kind"], bool(each["pointer"]), tuple(re.findall(r"\[(.+?)\]", each["sizes"])),
+                   int(each["bits"] or 0))
+            for each in declared if each
+        )
+
+    @property
+    def contents(self) -> tuple[tuple[str, int], ...]:
+        """Type and number of what it defines, if it is a constant."""
+        found = _CONSTANT.search(self.code)
+        return ((found[1], math.prod(map(int, re.findall(r"\d+", found[2])))),) if found else ()
+
+
+_MEMBER = re.compile(
+    r"(?:const )?(?:hystgen_)?(?P<kind>unsigned int|\w+) (?P<pointer>\(?\*)?\w+\)?(?P<sizes>(?:\[[^\]]+\])*)"
+    r"(?: : (?P<bits>\d+))?$"
+)
+_CONSTANT = re.compile(r"^static const (?:hystgen_)?(\w+) \w+((?:\[\d+\])*) = ", re.MULTILINE)
 
 
 _COMMENT = re.compile(r"/\*.*?\*/", flags=re.DOTALL)
@@ -467,7 +585,6 @@ def memory_pieces(family: Family) -> list[Piece]:
 
 def operator_pieces(
     variant: Variant,
-    family: Family,
     operators: Iterable[str],
     glue: str,
     calls: Mapping[str, Iterable[str]] = MappingProxyType({}),
@@ -475,7 +592,8 @@ def operator_pieces(
 ) -> list[Piece]:
     """The functions of a model's operators, with those that `glue` defines for it, without what does nothing; `calls`
     as for `api`; `own`: of blocks that are the user's own, which stay as they are."""
-    blocks = (FIXED_CHAIN_BLOCKS if variant.fixed else CHAIN_BLOCKS) if variant.chain else ()
+    family = variant.family
+    blocks = family.chain_blocks if variant.chain else ()
     roots = [piece.name for op in operators for piece in _calls(op, calls.get(op, ()))]
     facts = family.facts | variant.facts
     every = [*_pieces(blocks, facts), *own, *split_pieces(glue), *_pieces(variant.sources(), facts)]
@@ -487,13 +605,13 @@ def operator_pieces(
         made = [
             piece if each is None or each == functions.get(piece.name) else _piece(functions[piece.name].text())
             for piece, each in parsed if each is None or piece.name in functions
-        ]  # fmt: skip
+        ]
         return needed(made, roots)
 
     functions = folding.folded(
         [each for _, each in parsed if each], kernels, lambda functions: {each.name for each in put(functions)},
-        family.fixed, variant.apart, family.signals,
-    )  # fmt: skip
+        variant.apart, lambda kind: family.meaning(kind.removeprefix("hystgen_")),
+    )
     return put(functions)
 
 
@@ -563,10 +681,17 @@ def _joined(pieces: Iterable[Piece]) -> str:
 def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -> str:
     """Kernels as C text under `prefix`; `static` for files that carry them as their own."""
     text = _joined(pieces)
-    text = text.replace("HYSTGEN_FIXED_KERNEL ", "HYSTGEN_KERNEL " if family.fixed else "HYSTGEN_API ")
+    text = _stored(text, family, corners=False)
     text = text.replace("HYSTGEN_API ", "static " if static else "")
     text = text.replace("HYSTGEN_KERNEL ", "HYSTGEN_APART " if static else "")
     return _named(text, prefix, family, prefix)
+
+
+def _stored(text: str, family: Family, corners: bool) -> str:
+    """The text with what stands before functions in this arithmetic."""
+    for word, here in family.storage(corners).items():
+        text = text.replace(word, here)
+    return text
 
 
 def render_carried(pieces: Sequence[Piece], name: str, prefix: str, family: Family) -> str:
@@ -582,17 +707,8 @@ def render_operators(
 
     `corners`: how many the corner engine takes, 0 for engine loop; `carried`: as in `render_carried`.
     """
-    text = _joined(pieces)
-    apart = corners > 0 and not family.fixed
-    text = text.replace("HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART " if apart else "static ")
-    chained = "HYSTGEN_APART " if family.fixed and family.chain else "static inline "
-    text = text.replace("HYSTGEN_APART_IN_FIXED_CHAIN ", chained)
-    text = text.replace("HYSTGEN_APART_IN_CHAIN ", "HYSTGEN_APART " if family.chain else "static ")
+    text = _stored(_joined(pieces), family, corners > 0)
     text = text if family.chain else text.replace("HYSTGEN_ALONE ", "")
-    text = text.replace("HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART " if family.fixed else "static inline ")
-    text = text.replace("HYSTGEN_APART_IN_FLOAT ", "static " if family.fixed else "HYSTGEN_APART ")
-    loop = corners == 0 and not family.fixed
-    text = text.replace("HYSTGEN_APART_BUT_IN_FLOAT_LOOP ", "static " if loop else "HYSTGEN_APART ")
     known = frozenset(piece.name for piece in carried)
     return _named(text.replace("HYSTGEN_CORNERS", str(corners)), prefix, family, name, known)
 
@@ -633,13 +749,13 @@ def _named(
     """The text with the names of a model and of its run time; `carried`: those that the model has in its place."""
     for shared, here in family.signals.items():
         cast = f"({shared})"
-        if here == "hystgen_real_t" and not (family.loop and family.fixed):
+        if here == "hystgen_real_t" and not family.casts:
             text = text.replace(cast, "")
         text = re.sub(rf"\b{shared}\b", here, text)
-    if not family.fixed:  # one type for everything
-        text = re.sub(r"\(hystgen_(play|reach|sum)_t\)", "", text)
-        text = re.sub(r"hystgen_(play|reach|sum)_t", "hystgen_real_t", text)
-    for constant, value in family.constants.items():
+    for kind in SUMS:
+        if (here := family.alike(kind)) != kind:
+            text = text.replace(f"(hystgen_{kind})", "").replace(f"hystgen_{kind}", f"hystgen_{here}")
+    for constant, value in family.arithmetic.constants.items():
         text = text.replace(constant, value)
     own = _own(family) - carried
 

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hystgen.compensator import reference
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission.chain import SETTINGS
-from hystgen.emission.options import Options
+from hystgen.emission.compensator import Compensator, Form
 from hystgen.emission.text import literal
 from hystgen.plays import slots
 
@@ -23,7 +24,7 @@ CALLS = {slots.OP_STEP: "s", slots.OP_COMMIT: "c", slots.OP_RESET: "r"}
 
 LETTERS = {
     "push": "p", "settle": "q", "set_offset": "o", "set_temperature": "t", "set_gain": "g", "set_travel": "d",
-}  # fmt: skip
+}
 """Letters of the settings of models with effects."""
 
 WIDE = ("set_travel",)
@@ -48,87 +49,83 @@ def _fractions(length: int) -> list[float]:
     return path
 
 
-def operators(
-    numbers: Tables | FixedTables | ChainTables, options: Options, calls: Mapping[str, Sequence[str]]
-) -> list[dict[str, Any]]:
-    """One entry per operator: its name, its settings with their letters, and its samples as C text.
+@dataclass(frozen=True)
+class Sample:
+    """A call with its letter, what it is given, and the answer and the status that are expected of it, as C text."""
 
-    `calls`: by operator, the functions that a model with effects has beside those of every model.
-    """
+    call: str
+    argument: str
+    answer: str
+    status: int
+
+
+@dataclass(frozen=True)
+class Operator:
+    """What is run of an operator: its settings with their letters, and its samples."""
+
+    name: str
+    settings: list[tuple[str, str]]
+    samples: list[Sample]
+
+
+def operators(one: Compensator) -> list[Operator]:
+    """What is run of each operator of a model."""
+    wide = WIDE if one.family.arithmetic.travels > 1 else ()
     found = []
-    for name in ("forward", "inverse"):
-        if getattr(options, name):
-            own = [call for call in SETTINGS if call in calls.get(name, ()) and not (numbers.fixed and call in WIDE)]
-            settings = [(LETTERS[call], call) for call in own]
-            found.append({"name": name, "settings": settings, "samples": _samples(numbers, name == "inverse", own)})
+    for name in one.options.operators:
+        own = [call for call in SETTINGS if call in one.calls.get(name, ()) and call not in wide]
+        settings = [(LETTERS[call], call) for call in own]
+        found.append(Operator(name, settings, _samples(one, name == "inverse", own)))
     return found
 
 
-def _setting(numbers: ChainTables, call: str, turn: int) -> float:
+def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
     """An argument of a setting, in fixed point before it is rounded to a code; every third one is beyond its limits,
     where there are any."""
-    from hystgen.compensator.chain.fixed_tables import setting_codes
     from hystgen.effects.ageing import compensator as ageing
-    from hystgen.effects.thermal import compensator as thermal
-    from hystgen.effects.thermal import fixed
 
-    degree, one = setting_codes(numbers) if numbers.fixed else (1.0, 1.0)
-    drive_low, drive_high, low, high = (float(end) for end in numbers.limits[: slots.OUTPUT_MAX + 1])
+    degree, one = form.setting_codes(t)
+    drive_low, drive_high, low, high = (float(end) for end in t.limits[: slots.OUTPUT_MAX + 1])
     way = (1.0, -1.0, 50.0)[turn % 3] * SHARE
     if call == "settle":
         return drive_low + (0.5 + way) * (drive_high - drive_low)
     if call == "set_offset":
         return way * (high - low)
     if call == "set_temperature":
-        place, bits = (fixed.REFERENCE, fixed.TEMPERATURE_BITS) if numbers.fixed else (thermal.REFERENCE, 0)
-        return degree * (float(numbers.of("gain")[0, place]) / 2.0**bits + 40.0 * way)
+        return degree * (form.reference_temperature(t) + 40.0 * way)
     if call == "set_gain":
         return one * (1.0 + way)
     if call == "set_travel":
-        return abs(way) * float(numbers.of("ageing").number[0, ageing.LAST])
+        return abs(way) * float(t.of("ageing").number[0, ageing.LAST])
     return low + (0.5 + way) * (high - low)
 
 
-def _samples(
-    numbers: Tables | FixedTables | ChainTables, inverse: bool, settings: Sequence[str]
-) -> list[dict[str, Any]]:
-    def code(x: float) -> int:
-        """The nearest code."""
-        most = int(numbers.limits[slots.CODE_MAX])
-        return min(max(round(x), -most - 1), most)
-
-    def at(low: Any, high: Any, part: float) -> Any:
-        """The argument at this fraction of a range: in the arithmetic's own operations, or the nearest code."""
-        if numbers.fixed:
-            return code(int(low) + (int(high) - int(low)) * part)
-        real = numbers.threshold.dtype.type
-        return low + (high - low) * real(part)
-
+def _samples(one: Compensator, inverse: bool, settings: Sequence[str]) -> list[Sample]:
+    numbers, between = one.numbers.tables, one.form.between
     first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
     low, high = numbers.limits[first], numbers.limits[first + 1]
     drive_low, drive_high = numbers.limits[slots.DRIVE_MIN], numbers.limits[slots.DRIVE_MAX]
     calls, arguments = [], []
     for i, part in enumerate(_fractions(180)):
         calls.append(slots.OP_STEP)
-        arguments.append(at(low, high, part))
+        arguments.append(between(low, high, part))
         if inverse and i % 23 == 22:
             calls.append(slots.OP_COMMIT)
-            arguments.append(at(drive_low, drive_high, 0.3 + i / 1000.0))
+            arguments.append(between(drive_low, drive_high, 0.3 + i / 1000.0))
         if i == 120:
             calls.append(slots.OP_RESET)
-            arguments.append(at(low, high, 0.25))
+            arguments.append(between(low, high, 0.25))
         if settings and not isinstance(numbers, Tables | FixedTables) and i % 11 == 5:
             call = settings[i // 11 % len(settings)]
             calls.append(SETTINGS[call])
-            argument = _setting(numbers, call, i // 11 // len(settings))
-            arguments.append(code(argument) if numbers.fixed else argument)
-    x = np.array(arguments, dtype=numbers.threshold.dtype)
+            argument = _setting(numbers, one.form, call, i // 11 // len(settings))
+            arguments.append(argument)
+    x = one.form.arguments(numbers, arguments)
     op = np.array(calls, dtype=np.uint8)
     op[:-1:2] |= slots.OP_UNREAD  # so that bits have to stay until they are read
     answers, status = reference.answers(numbers, inverse, op, x, compiled=False)
     status[op >= slots.OP_UNREAD] = slots.OP_UNREAD
     letters = {**CALLS, **{SETTINGS[call]: LETTERS[call] for call in settings}}
     return [
-        {"call": letters[c], "argument": literal(a), "answer": literal(y), "status": int(s)}
-        for c, a, y, s in zip(calls, x, answers, status, strict=True)
+        Sample(letters[c], literal(a), literal(y), int(s)) for c, a, y, s in zip(calls, x, answers, status, strict=True)
     ]

@@ -12,11 +12,14 @@ import re
 import textwrap
 import unicodedata
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TypeAlias
 
 import numpy as np
 
 WIDTH = 100
+
+Number: TypeAlias = "float | np.integer | np.floating"
+"""A number of a table."""
 
 _WAYS = [
     re.compile(form)
@@ -33,7 +36,7 @@ _ASSIGNED = re.compile(r"(?<= =) |(?<=return) ")
 """Where a line is broken as a last resort, or to keep a sum or a choice together."""
 
 
-def literal(x: Any) -> str:
+def literal(x: Number) -> str:
     """The C literal that gives exactly this float32, float64 or whole number back, the shortest one.
 
     Whole numbers keep their value in every dialect: without the suffix C90 and C++98 take one beyond `long` as
@@ -52,13 +55,13 @@ def _whole(x: int) -> str:
     return f"{x}LL" if abs(x) >= 1 << 31 else str(x)
 
 
-def operand(x: Any) -> str:
+def operand(x: Number) -> str:
     """A literal that can stand in an expression."""
     text = literal(x)
     return f"({text})" if text.startswith("-") else text
 
 
-def _wrapped(values: Sequence[Any], suffix: str, indent: str) -> list[str]:
+def _wrapped(values: Sequence[Number], suffix: str, indent: str) -> list[str]:
     """Lines of literals."""
     lines = [indent]
     for i, value in enumerate(values):
@@ -74,16 +77,21 @@ def constant(declared: str, lines: Sequence[str]) -> str:
     whole = f"static const {declared} = {{{lines[0].strip()}}};"
     if len(lines) == 1 and len(whole) <= WIDTH:
         return whole + "\n"
+    return braces(declared, lines)
+
+
+def braces(declared: str, lines: Sequence[str]) -> str:
+    """A constant with these lines between its braces."""
     return "\n".join([f"static const {declared} = {{", *lines, "};"]) + "\n"
 
 
-def table(kind: str, name: str, values: Sequence[Any]) -> str:
+def table(kind: str, name: str, values: Sequence[Number]) -> str:
     """A constant array of literals."""
     lines = _wrapped(values, "u" if kind == "uint32_t" else "", "   ")
     return constant(f"{kind} {name}[{len(values)}]", lines)
 
 
-def structure(kind: str, name: str, columns: Sequence[tuple[str, Sequence[Any]]]) -> str:
+def structure(kind: str, name: str, columns: Sequence[tuple[str, Sequence[Number]]]) -> str:
     """Constant arrays of literals in one structure, so that compilers reach all of them from one address."""
     members = [f"    {kind} {own}[{len(values)}];" for own, values in columns]
     lines = []
@@ -320,7 +328,7 @@ def _comment(lines: list[str]) -> Iterator[str]:
         yield from textwrap.wrap(
             body[mark.end() :], WIDTH, initial_indent=indent + mark[0], subsequent_indent=hang,
             break_long_words=False, break_on_hyphens=False,
-        )  # fmt: skip
+        )
 
 
 def _directive(line: str) -> Iterator[str]:

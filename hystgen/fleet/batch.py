@@ -63,7 +63,7 @@ class Unit:
     file: str
     done: bool
     message: str
-    figures: Mapping[str, Any]
+    figures: Mapping[str, object]
     sha256: str
     outlier: str = ""
     kept: bool = False
@@ -200,7 +200,7 @@ def identify_batch(
     return fleet
 
 
-def _complete(options: Mapping[str, Any]) -> dict[str, Any]:
+def _complete(options: Mapping[str, object]) -> dict[str, Any]:
     """All options of `identify` that are the same for every unit, with defaults for those not given."""
     own = {"holdout": (), "name": "", "progress": False}
     arguments.known_options("identify_batch", identification.identify, options)
@@ -259,7 +259,7 @@ def _expanded(source: str) -> list[Path]:
 # -- what is done already ---------------------------------------------------------------------------------------------
 
 
-def _keyed(job: _Job, options: Mapping[str, Any], emission: Mapping[str, str | None] | None) -> _Job:
+def _keyed(job: _Job, options: Mapping[str, object], emission: Mapping[str, str | None] | None) -> _Job:
     content = {
         "tool": __version__,
         "unit": job.unit,
@@ -352,7 +352,7 @@ def _keep(folder: Path, job: _Job, result: Result) -> Unit:
 # -- the work ---------------------------------------------------------------------------------------------------------
 
 
-def _task(job: _Job, options: Mapping[str, Any], emission: Mapping[str, str | None] | None) -> Task:
+def _task(job: _Job, options: Mapping[str, object], emission: Mapping[str, str | None] | None) -> Task:
     held = tuple((path, _bytes(path)) for path in job.holdout)
     return Task(job.unit, ((job.file, _bytes(job.file)),), held, options, emission, job.settings)
 
@@ -365,7 +365,7 @@ def _bytes(path: str) -> bytes | None:
 
 
 def _here(
-    tasks: Iterator[Task], number: int, jobs: int | None, options: Mapping[str, Any]
+    tasks: Iterator[Task], number: int, jobs: int | None, options: Mapping[str, object]
 ) -> Generator[Result, None, None]:
     """Results from this machine, once its cache of compiled functions is filled."""
     import joblib
@@ -393,7 +393,7 @@ def _judged(units: Sequence[Unit]) -> Fleet:
     return Fleet(tuple(replace(unit, outlier=marks.get(unit.name, "")) for unit in units), found is not None)
 
 
-def _cell(value: Any) -> str:
+def _cell(value: object) -> str:
     if value is None:
         return ""
     if isinstance(value, float):

@@ -19,11 +19,17 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hystgen.basics import extras, writing
 from hystgen.basics.version import __version__
 from hystgen.identification.settings import Settings
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+    from hystgen.identification.fit import Fit
+    from hystgen.model import Model
 
 LOST = "the Dask scheduler was lost; the same command resumes from here"
 DIED = "the process that fitted it kept dying; is there too little memory for its records?"
@@ -66,7 +72,7 @@ class Result:
     message: str = ""
     parameters: str = ""
     files: Mapping[str, str] = field(default_factory=dict)
-    figures: Mapping[str, Any] = field(default_factory=dict)
+    figures: Mapping[str, object] = field(default_factory=dict)
 
 
 Work = Callable[[Task], Result]
@@ -132,7 +138,7 @@ def _line(failure: Exception) -> str:
     return first + (f" (and {len(more)} more)" if more else "")
 
 
-def _figures(fit: Any, model: Any) -> dict[str, Any]:
+def _figures(fit: Fit, model: Model) -> dict[str, object]:
     """The unit's columns of the summary."""
     cascade = model.cascade
     low, high = cascade.output_range
@@ -195,8 +201,8 @@ def _pooled(tasks: Iterable[Task], jobs: int, work: Work, folder: str) -> Genera
             sent[task.unit] = task
             yield delayed(work)(task)
 
-    def pool(**how: Any) -> Any:
-        apart: dict[str, Any] = {"inner_max_num_threads": 1, "idle_worker_timeout": IDLE}
+    def pool(**how: object) -> Any:
+        apart: dict[str, object] = {"inner_max_num_threads": 1, "idle_worker_timeout": IDLE}
         apart |= {"initializer": _begin, "initargs": (folder, os.getpid())}
         with parallel_config("loky", **apart) if jobs > 1 else parallel_config("sequential"):
             return Parallel(n_jobs=jobs, batch_size=1, return_as="generator_unordered", **how)
@@ -236,7 +242,7 @@ def _quiet() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def cluster(address: str) -> Iterator[Any]:
+def cluster(address: str) -> Iterator[Client]:
     """A client of the Dask scheduler at `address`, which has a worker. Raises SchedulerError."""
     try:
         from distributed import Client
@@ -266,7 +272,7 @@ async def _answer(address: str) -> None:
     comm.abort()
 
 
-def on_cluster(tasks: Iterable[Task], client: Any, work: Work = fit_unit) -> Generator[Result, None, None]:
+def on_cluster(tasks: Iterable[Task], client: Client, work: Work = fit_unit) -> Generator[Result, None, None]:
     """Results in order of completion, from the workers of a Dask scheduler.
 
     Only as many tasks as the workers soon need are in flight, so that few records are in memory. Dask repeats the tasks
@@ -276,7 +282,7 @@ def on_cluster(tasks: Iterable[Task], client: Any, work: Work = fit_unit) -> Gen
     from distributed.scheduler import KilledWorker
 
     waiting = iter(tasks)
-    under_way: dict[Any, str] = {}
+    under_way: dict[Future, str] = {}
     finished = as_completed(loop=client.loop)
 
     def refill() -> None:

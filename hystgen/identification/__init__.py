@@ -145,17 +145,18 @@ def identify(
     passes = (1.0 if model == "pi" else PASSES * len(kinds)) * (1.0 if held else 2.0 - HELD_OUT)
     samples = sum(len(item.v) for item in courses)
     with parallel.one_thread(), Progress(passes * samples, progress, "fitting") as bar:
+        how = replace(how, tick=bar.tick)
         prepared.mask_outliers(courses, held, how.wanted, p0_floor)
         if held:
-            tried = [_best(courses, held, kind, how, bar.tick) for kind in kinds]
+            tried = [_best(courses, held, kind, how) for kind in kinds]
             done = tried[_choose(tried)]
             rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
             fitted, compared, held_errors = done.fitted, done.compared, done.errors
         else:
-            rows, kind, held_errors, reason = _trial([] if loading_curve else courses, kinds, how, bar)
+            rows, kind, held_errors, reason = _trial([] if loading_curve else courses, kinds, how)
             if reason:
                 reported.append(reason)
-            fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, p0_floor, bar.tick)
+            fitted, compared = gpi.solve(courses, kind, how)
     masks = used_of(fit_records, compared, False)
     if held:
         masks += used_of(held_records, done.held, True)
@@ -195,11 +196,11 @@ def check_options(
     loading_curve: bool = False,
     units: Mapping[str, str] | None = None,
     **_: object,
-) -> tuple[_How, tuple[float, ...] | None]:
+) -> tuple[gpi.How, tuple[float, ...] | None]:
     """The request for a fit, and the history, from options of `identify`. Raises ValueError and TypeError."""
     arguments.choice("model", model, MODELS)
     p0_floor = arguments.real("p0_floor", p0_floor, "the sum of weights, as a share")
-    how = _How(_checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor)
+    how = gpi.How(_checked_thresholds(thresholds), _checked_breaks(breaks, model), p0_floor)
     before = None if history is None else visited(history)
     if loading_curve:
         if before:
@@ -212,15 +213,6 @@ def check_options(
     if not 0.0 <= p0_floor < 1.0:
         raise ValueError(f"p0_floor is a share of the sum of weights from 0 to below 1, not {p0_floor}")
     return how, before
-
-
-@dataclass(frozen=True)
-class _How:
-    """The options of a fit."""
-
-    wanted: int | tuple[float, ...] | None
-    breaks: int | tuple[float, ...] | None
-    floor: float
 
 
 @dataclass(frozen=True)
@@ -240,23 +232,21 @@ class _Tried:
 
 def auto(courses: Sequence[Course], held: Sequence[Course]) -> FittedModel:
     """The model that `identify` chooses among all kinds by held-out courses. Raises IdentificationError."""
-    tried = [_best(courses, held, kind, _How(None, None, P0_FLOOR)) for kind in gpi.KINDS]
+    tried = [_best(courses, held, kind, gpi.How(None, None, P0_FLOOR)) for kind in gpi.KINDS]
     return tried[_choose(tried)].fitted
 
 
-def _best(
-    courses: Sequence[Course], held: Sequence[Course], kind: str, how: _How, tick: gpi.Tick = None
-) -> _Tried:
+def _best(courses: Sequence[Course], held: Sequence[Course], kind: str, how: gpi.How) -> _Tried:
     """Fit one kind to courses and compare it with held-out ones, which choose if `gpi.to_judge` leaves them a
     choice."""
-    found = gpi.to_judge(courses, kind, how.wanted, how.breaks, how.floor, tick)
+    found = gpi.to_judge(courses, kind, how)
     tried = [_compared(fitted, compared, fitted.begun(held)) for fitted, compared in found]
     return tried[_choose(tried)]
 
 
-def _try(courses: Sequence[Course], ends: Sequence[Course], kind: str, how: _How, bar: Progress) -> _Tried:
+def _try(courses: Sequence[Course], ends: Sequence[Course], kind: str, how: gpi.How) -> _Tried:
     """Fit one kind to the first parts of records and compare it with their remainders."""
-    fitted, compared = gpi.solve(courses, kind, how.wanted, how.breaks, how.floor, bar.tick)
+    fitted, compared = gpi.solve(courses, kind, how)
     begun = [replace(other, start=item.start) for item, other in zip(compared, ends, strict=True)]
     return _compared(fitted, compared, begun)
 
@@ -362,7 +352,7 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
 
 
 def _trial(
-    courses: Sequence[Course], kinds: Sequence[str], how: _How, bar: Progress
+    courses: Sequence[Course], kinds: Sequence[str], how: gpi.How
 ) -> tuple[list[Row], str, list[pi.Errors], str]:
     """Rows of models fitted to the first part of each record and compared with the remainder, the kind they select, its
     errors, and the reason if there are no rows."""
@@ -380,7 +370,7 @@ def _trial(
         fronts.append(front)
         ends.append(end)
     try:
-        tried = [_try(fronts, ends, kind, how, bar) for kind in kinds]
+        tried = [_try(fronts, ends, kind, how) for kind in kinds]
     except IdentificationError as failure:
         return [], kinds[0], [], f"nothing was held out: {failure}{instead}"
     chosen = _choose(tried)

@@ -8,7 +8,7 @@ import warnings as python_warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,8 @@ from hystgen.identification.reduction import Course, StartMemory
 from hystgen.records import Record, Source, in_units, read_record, write_atomically
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from hystgen.model import Model
     from hystgen.parameters.files import Parameters
 
@@ -46,7 +48,7 @@ class Fit:
     used: tuple[Used, ...]
     history: tuple[float, ...] | None = None
     records: tuple[Record, ...] = field(default=(), compare=False)
-    draw: Callable[[Fit], Any] | None = field(default=None, compare=False)
+    draw: Callable[[Fit], Figure] | None = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         row = next((row for row in self.rows if row.part == "held out"), self.rows[-1])
@@ -64,7 +66,7 @@ class Fit:
 
         return Model(self.parameters)
 
-    def plot(self, path: str | os.PathLike[str] | None = None) -> Any:
+    def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
         """A picture: the loop of a record (a held-out one if any) with the model's; residuals over time; weights.
 
         Returns matplotlib's Figure, which a notebook shows; with `path`, a .png or .svg file, it is also written there.

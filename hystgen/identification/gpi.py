@@ -40,6 +40,17 @@ LEAST_SLOPE = 0.1
 
 
 @dataclass(frozen=True)
+class How:
+    """The options of a fit: `wanted` plays, their number or thresholds, and `breaks`, None for those that records bear;
+    `floor`: least share of p_0 in the sum of weights; `tick`: counts samples as they are fitted."""
+
+    wanted: int | tuple[float, ...] | None
+    breaks: int | tuple[float, ...] | None
+    floor: float
+    tick: Tick = None
+
+
+@dataclass(frozen=True)
 class FittedModel:
     """A front, its shape and the play sum behind it."""
 
@@ -61,30 +72,16 @@ class FittedModel:
         return start.of_model(courses, self.stages, self.solution.thresholds, self.solution.weights)
 
 
-def solve(
-    courses: Sequence[Course],
-    kind: str,
-    wanted: int | tuple[float, ...] | None,
-    breaks: int | tuple[float, ...] | None,
-    floor: float,
-    tick: Tick = None,
-) -> tuple[FittedModel, list[Course]]:
+def solve(courses: Sequence[Course], kind: str, how: How) -> tuple[FittedModel, list[Course]]:
     """Fit a model of one kind; also returns the courses, with the measured drive, over the compared samples.
 
     Of several fronts of a kind, it takes the one with the fewest shape numbers whose prediction of blocks left out of
     the fit is close to the best. Raises IdentificationError.
     """
-    return _solved(courses, kind, wanted, breaks, floor, tick, lambda found: [_by_blocks(found)])[0]
+    return _solved(courses, kind, how, lambda found: [_by_blocks(found)])[0]
 
 
-def to_judge(
-    courses: Sequence[Course],
-    kind: str,
-    wanted: int | tuple[float, ...] | None,
-    breaks: int | tuple[float, ...] | None,
-    floor: float,
-    tick: Tick = None,
-) -> list[tuple[FittedModel, list[Course]]]:
+def to_judge(courses: Sequence[Course], kind: str, how: How) -> list[tuple[FittedModel, list[Course]]]:
     """The fits of one kind from which held-out records choose, the simplest first; otherwise the same as `solve`.
 
     Tanh envelopes with one branch and with two: two branches form a loop of their own, as wide in a small swing as in a
@@ -95,7 +92,7 @@ def to_judge(
     def chosen(found: Sequence[_Found]) -> Sequence[_Found]:
         return found if kind == "gpi-tanh" else [_by_blocks(found)]
 
-    return _solved(courses, kind, wanted, breaks, floor, tick, chosen)
+    return _solved(courses, kind, how, chosen)
 
 
 @dataclass(frozen=True)
@@ -117,49 +114,37 @@ def _by_blocks(found: Sequence[_Found]) -> _Found:
 
 
 def _solved(
-    courses: Sequence[Course],
-    kind: str,
-    wanted: int | tuple[float, ...] | None,
-    breaks: int | tuple[float, ...] | None,
-    floor: float,
-    tick: Tick,
-    choose: Callable[[Sequence[_Found]], Sequence[_Found]],
+    courses: Sequence[Course], kind: str, how: How, choose: Callable[[Sequence[_Found]], Sequence[_Found]]
 ) -> list[tuple[FittedModel, list[Course]]]:
     """The fits with the fronts that `choose` selects."""
     # a start memory found without the front is not exact behind it, but better than too few samples to compare
-    courses = start.needed(courses, (), wanted if kind == "pi" else None)
-    plain, compared = pi.solve(courses, wanted, floor, tick)
+    courses = start.needed(courses, (), how.wanted if kind == "pi" else None)
+    plain, compared = pi.solve(courses, how.wanted, how.floor, how.tick)
     if kind == "pi":
         return [(FittedModel(Kept(), np.empty(0), plain), compared)]
     # the missing front distorts the choice of a plain play sum: search the shape with a dense list of plays
     fine = plain.thresholds
-    if not isinstance(wanted, tuple) and plain.reach > 0.0:
+    if not isinstance(how.wanted, tuple) and plain.reach > 0.0:
         fine = np.array(pi.dense(plain.reach, sum(item.used for item in compared)).thresholds)
     found: list[_Found] = []
-    for front in fronts_of(kind, compared, breaks):
-        shaped = _shaped(compared, front, fine, found[-1].shape if found else None, tick)
+    for front in fronts_of(kind, compared, how.breaks):
+        shaped = _shaped(compared, front, fine, found[-1].shape if found else None, how.tick)
         found.append(_Found(front, shaped.shape, validation(shaped, front)))
-    return [_finished(courses, compared, each, plain, wanted, floor, tick) for each in choose(found)]
+    return [_finished(courses, compared, each, plain, how) for each in choose(found)]
 
 
 def _finished(
-    courses: Sequence[Course],
-    compared: Sequence[Course],
-    found: _Found,
-    plain: Solution,
-    wanted: int | tuple[float, ...] | None,
-    floor: float,
-    tick: Tick,
+    courses: Sequence[Course], compared: Sequence[Course], found: _Found, plain: Solution, how: How
 ) -> tuple[FittedModel, list[Course]]:
     """The fit with a front: plays placed behind it, and its shape refitted for them."""
     front, shape = found.front, found.shape
-    courses = start.needed(courses, front.stages(shape, DIGITS), wanted)
-    fitted = _solve_behind(courses, front, shape, wanted, floor, tick)
+    courses = start.needed(courses, front.stages(shape, DIGITS), how.wanted)
+    fitted = _solve_behind(courses, front, shape, how)
     # the plays may have moved: find the best shape for them again
     r = fitted.solution.thresholds
-    shape = joint.refine(compared, front, shape, r, tick).shape
-    fitted = _solve_behind(courses, front, shape, tuple(float(x) for x in r), floor, tick)
-    if wanted is None:
+    shape = joint.refine(compared, front, shape, r, how.tick).shape
+    fitted = _solve_behind(courses, front, shape, replace(how, wanted=tuple(float(x) for x in r)))
+    if how.wanted is None:
         fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
     fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # whatever the front
     largest = float(fitted.solution.thresholds[-1])
@@ -167,16 +152,10 @@ def _finished(
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]
 
 
-def _solve_behind(
-    courses: Sequence[Course],
-    front: Front,
-    shape: Array,
-    wanted: int | tuple[float, ...] | None,
-    floor: float,
-    tick: Tick,
-) -> FittedModel:
+def _solve_behind(courses: Sequence[Course], front: Front, shape: Array, how: How) -> FittedModel:
     stages = front.stages(shape, DIGITS)
-    solution, _ = pi.solve([joint.through_front(item, stages) for item in courses], wanted, floor, tick)
+    behind = [joint.through_front(item, stages) for item in courses]
+    solution, _ = pi.solve(behind, how.wanted, how.floor, how.tick)
     return FittedModel(front, shape, solution)
 
 

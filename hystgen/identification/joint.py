@@ -77,8 +77,16 @@ class Front(Protocol):
         """
 
 
+class _Bounded:
+    """Fronts that rise everywhere within their bounds."""
+
+    def slack(self, shape: Array) -> Array:
+        """No further constraints."""
+        return np.empty(0)
+
+
 @dataclass(frozen=True)
-class Kept:
+class Kept(_Bounded):
     """A fixed memoryless part; by default it has no stages, and the model is a plain play sum."""
 
     given: tuple[Stage, ...] = ()
@@ -94,17 +102,13 @@ class Kept:
         """None."""
         return np.empty(0), np.empty(0)
 
-    def slack(self, shape: Array) -> Array:
-        """No constraints."""
-        return np.empty(0)
-
     def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
         """The given stages."""
         return self.given
 
 
 @dataclass(frozen=True)
-class DeadZones:
+class DeadZones(_Bounded):
     """Dead-zone sums with given breaks (41); the shape is the logarithm of each piece's slope relative to the first.
 
     `drive`: the fitted range; `breaks`: points inside it where the slope may change, strictly increasing and none of
@@ -125,10 +129,6 @@ class DeadZones:
         """Every piece rises, and none is far steeper than another."""
         most = np.full(len(self.breaks), STEEPEST)
         return -most, most
-
-    def slack(self, shape: Array) -> Array:
-        """The logarithms keep all slopes positive."""
-        return np.empty(0)
 
     def slopes(self, shape: Array) -> Array:
         """Slopes of the pieces, beginning at the lowest drive."""
@@ -156,7 +156,7 @@ class DeadZones:
 
 
 @dataclass(frozen=True)
-class Ends:
+class Ends(_Bounded):
     """A limiter: a straight line that becomes flatter near the ends of the drive range, with two dead zones (41).
 
     The shape is the distance from each end at which that begins, as a share of the range, and the logarithm of the
@@ -176,10 +176,6 @@ class Ends:
         """A distance may be zero, where it has no effect; the two bends do not meet."""
         return np.array([1e-3, 1e-3, -FLATTER]), np.array([0.45, 0.45, 0.0])
 
-    def slack(self, shape: Array) -> Array:
-        """Every piece rises."""
-        return np.empty(0)
-
     def widest(self, shape: Array) -> float:
         """The longer of the two flat ends, as a share of the range."""
         return float(np.max(shape[:2]))
@@ -193,7 +189,7 @@ class Ends:
 
 
 @dataclass(frozen=True)
-class Bent:
+class Bent(_Bounded):
     """A front whose slope changes smoothly over the drive range, as a dead-zone sum (41) of many equal pieces.
 
     The shape is the coefficients of u, u^2, .. up to `degree` in the logarithm of the slope; u runs from -1 to 1.
@@ -213,10 +209,6 @@ class Bent:
         """Ratios of slopes are limited as in a piecewise search."""
         most = np.full(self.degree, 0.5 * STEEPEST / self.degree)
         return -most, most
-
-    def slack(self, shape: Array) -> Array:
-        """The logarithms keep all slopes positive."""
-        return np.empty(0)
 
     @cached_property
     def _pieces(self) -> DeadZones:

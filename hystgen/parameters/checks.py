@@ -72,7 +72,7 @@ _WRITTEN = {
 
 
 def check(
-    data: Mapping[str, Any], document: Document | None = None, user: Mapping[str, Shapes] | None = None
+    data: Mapping[str, object], document: Document | None = None, user: Mapping[str, Shapes] | None = None
 ) -> tuple[schema.Parameters | None, list[Problem]]:
     """Parameters made from `data` (lists as tuples), or None, and every problem.
 
@@ -96,7 +96,7 @@ def check(
 
 
 class _Checker:
-    def __init__(self, data: Mapping[str, Any], document: Document | None, user: Mapping[str, Shapes]) -> None:
+    def __init__(self, data: Mapping[str, object], document: Document | None, user: Mapping[str, Shapes]) -> None:
         self.data = data
         self.document = document
         self.user = user
@@ -133,7 +133,7 @@ class _Checker:
 
     def at(self, path: Path) -> Any:
         """Value in the data; None if it is missing."""
-        value: Any = self.data
+        value: object = self.data
         for part in path:
             if isinstance(part, int):
                 value = value[part] if isinstance(value, tuple) and part < len(value) else None
@@ -163,7 +163,7 @@ class _Checker:
     def _path(self, location: Sequence[str | int]) -> Path:
         """Pydantic's location as a path in the data: without union members, and without 0 for a single stage."""
         path: list[str | int] = []
-        value: Any = self.data
+        value: object = self.data
         for part in location:
             if isinstance(part, int):
                 if isinstance(value, Mapping):
@@ -428,7 +428,7 @@ class _Checker:
             advice = _nearest(given, names) or f"known are {', '.join(names)}"
             self.add(name, f"unknown effect {printable(given)}; {advice}")
 
-    def _shaped(self, path: Path, effect: Mapping[str, Any], shapes: Shapes) -> None:
+    def _shaped(self, path: Path, effect: Mapping[str, object], shapes: Shapes) -> None:
         """An effect with a known name: the class of its shape, its own checks, and whether it is there already."""
         chosen, selector = shapes[0], shapes[0].selector
         if selector in effect and selector in chosen.model_fields:
@@ -500,7 +500,7 @@ def _nearest(word: str, known: Sequence[str]) -> str:
     return f"did you mean {' or '.join(sorted(nearest))}?" if nearest else ""
 
 
-def _choice(value: Any, known: Sequence[Any]) -> str:
+def _choice(value: object, known: Sequence[object]) -> str:
     """Message for an unknown value."""
     listed = ", ".join(str(choice) for choice in known[:-1]) + (" or " if len(known) > 1 else "") + str(known[-1])
     words = [choice for choice in known if isinstance(choice, str)]

@@ -132,7 +132,7 @@ def parse_parameters(text: str, file: str = "<string>", user_effects: Sequence[t
 
 
 def make_parameters(
-    data: Mapping[str, Any], file: str = "<data>", user_effects: Sequence[type[Effect]] = ()
+    data: Mapping[str, object], file: str = "<data>", user_effects: Sequence[type[Effect]] = ()
 ) -> Parameters:
     """The checked parameters from plain data in the form of the file (lists or tuples; None means left out).
 
@@ -159,7 +159,7 @@ def _too_large(size: int | None, file: str) -> ParameterError:
     return ParameterError(file, [Problem("", f"the file has {has} (1 MiB); keep one model per file")])
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> Any:
     """Lists as tuples, NumPy values as Python's, keys without a value left out."""
     if hasattr(value, "model_dump"):
         value = value.model_dump()
@@ -226,7 +226,7 @@ def dump_parameters(parameters: Parameters, comments: Mapping[str, str] | None =
 
 
 @cache
-def _defaults() -> dict[str, Any]:
+def _defaults() -> dict[str, object]:
     """Keys that are left out when they have this value."""
     pi = PIParameters(weights=(1.0,))
     data = Parameters(hystgen=1, name="x", input_range=(0.0, 1.0), model=ModelParameters(pi=pi)).model_dump()
@@ -272,7 +272,7 @@ def _block(
             yield from _entry(key, value, indent)
 
 
-def _entry(key: str, value: Any, indent: str) -> Iterator[str]:
+def _entry(key: str, value: object, indent: str) -> Iterator[str]:
     """Lines of one key with its value in flow form, wrapped between the numbers of a list."""
     flow = _flow(value)
     line = f"{indent}{key}:"
@@ -284,7 +284,7 @@ def _entry(key: str, value: Any, indent: str) -> Iterator[str]:
     yield line
 
 
-def _flow(value: Any) -> str:
+def _flow(value: object) -> str:
     """A value in flow form."""
     if isinstance(value, dict):
         return "{" + ", ".join(f"{key}: {_flow(entry)}" for key, entry in value.items()) + "}"

@@ -39,7 +39,7 @@ MEMBERS = frozenset(_MEMBER + name for name in ("number", "list", *STAGE_KINDS))
 """Names of union members: steps of pydantic's locations that are not keys of the file."""
 
 
-def _whole(value: Any) -> Any:
+def _whole(value: object) -> object:
     if type(value) is not int:  # true and 1.0 are equal to 1
         raise PydanticCustomError("literal_error", "must be 1")
     return value
@@ -99,7 +99,7 @@ class DensityParameters(_Part):
     )
 
 
-def _number_or_list(value: Any) -> str:
+def _number_or_list(value: object) -> str:
     return _MEMBER + ("list" if isinstance(value, tuple) else "number")
 
 
@@ -184,7 +184,7 @@ class TanhParameters(_Part):
         return self
 
 
-def _kind(value: Any) -> str | None:
+def _kind(value: object) -> str | None:
     kind = value.get("kind") if isinstance(value, Mapping) else getattr(value, "kind", None)
     return _MEMBER + kind if kind in STAGE_KINDS else None
 
@@ -195,7 +195,7 @@ StageParameters = Annotated[
 ]
 
 
-def _as_list(value: Any) -> Any:
+def _as_list(value: object) -> object:
     return (value,) if isinstance(value, Mapping) else value
 
 
@@ -215,7 +215,7 @@ class ModelParameters(_Part):
     """Instances of `hystgen.effects.Effect`; their classes are imported when a file names them."""
 
 
-def _auto(value: Any) -> Any:
+def _auto(value: object) -> object:
     return None if value == "auto" else value
 
 
@@ -338,11 +338,11 @@ def schema() -> dict[str, Any]:
     return made
 
 
-def _effects(definitions: dict[str, Any]) -> list[dict[str, Any]]:
+def _effects(definitions: dict[str, object]) -> list[dict[str, object]]:
     """Schemas of the shapes of all effects, added to the definitions; a user's own may have any keys."""
     from hystgen import effects
 
-    found: list[dict[str, Any]] = []
+    found: list[dict[str, object]] = []
     for name in effects.CATALOGUE:
         for shape in effects.shapes(name):
             definitions[shape.__name__] = _tidy(shape.model_json_schema())

@@ -14,10 +14,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError
+from ruamel.yaml.error import MarkedYAMLError, StreamMark
 from ruamel.yaml.events import (
     AliasEvent,
     DocumentStartEvent,
+    Event,
     MappingEndEvent,
     MappingStartEvent,
     ScalarEvent,
@@ -94,7 +95,7 @@ class _OpenNode:
     path: Path
     live: bool
     """False inside an entry that will be dropped: positions there are not kept."""
-    entries: dict[str, Any] | list[Any]
+    entries: dict[str, object] | list[object]
     is_key: bool = False
     key: str | _Unusable | None = None
 
@@ -142,7 +143,7 @@ def read(text: str) -> Document:
     return document
 
 
-def _next(events: Iterator[Any], text: str, builder: _TreeBuilder) -> Any:
+def _next(events: Iterator[Event], text: str, builder: _TreeBuilder) -> Event | None:
     """The parser's next event, None at the end; a text that is not YAML is refused."""
     try:
         return next(events, None)
@@ -192,7 +193,7 @@ def _clean(said: str) -> str:
     return said if len(said) <= 120 else printable(said)
 
 
-def _start(mark: Any) -> Position:
+def _start(mark: StreamMark) -> Position:
     return mark.line + 1, mark.column + 1
 
 
@@ -201,7 +202,7 @@ def _position(text: str, index: int) -> Position:
     return before.count("\n") + 1, len(before) - before.rfind("\n")
 
 
-def _value(event: Any) -> str | int | float | bool | None:
+def _value(event: ScalarEvent) -> str | int | float | bool | None:
     """Value of a scalar: plain ones are resolved, quoted and block ones are text."""
     return resolve(event.value) if event.style is None else str(event.value)
 
@@ -214,7 +215,7 @@ class _TreeBuilder:
         self.count = 0
         self.documents = 0
 
-    def take(self, event: Any, position: Position) -> None:
+    def take(self, event: Event, position: Position) -> None:
         """Take the parser's next event; raise _LimitError if the rest is not to be read."""
         self.position = position
         if isinstance(event, DocumentStartEvent):
@@ -229,7 +230,7 @@ class _TreeBuilder:
         elif isinstance(event, AliasEvent | ScalarEvent | MappingStartEvent | SequenceStartEvent):
             self._node(event, position)
 
-    def _node(self, event: Any, position: Position) -> None:
+    def _node(self, event: Event, position: Position) -> None:
         document = self.document
         self.count += 1
         if self.count > MAX_VALUES:
@@ -253,10 +254,10 @@ class _TreeBuilder:
             if len(self.levels) == MAX_DEPTH:
                 document.refuse((), position, f"nested more than {MAX_DEPTH} deep; remove the extra nesting")
                 raise _LimitError
-            entries: dict[str, Any] | list[Any] = {} if isinstance(event, MappingStartEvent) else []
+            entries: dict[str, object] | list[object] = {} if isinstance(event, MappingStartEvent) else []
             self.levels.append(_OpenNode(path, live and not is_key, entries, is_key))
         elif not is_key:
-            self._put(_value(event) if accepted else None, path)
+            self._put(_value(event) if accepted and isinstance(event, ScalarEvent) else None, path)
         elif isinstance(event, ScalarEvent):
             self._key(event, position, path)
 
@@ -279,7 +280,7 @@ class _TreeBuilder:
             return (*level.path, len(level.entries))
         return (*level.path, level.key) if isinstance(level.key, str) else level.path
 
-    def _key(self, event: Any, position: Position, path: Path) -> None:
+    def _key(self, event: ScalarEvent, position: Position, path: Path) -> None:
         level = self.levels[-1]
         key = _value(event)
         if not isinstance(key, str):
@@ -295,7 +296,7 @@ class _TreeBuilder:
             if level.live:
                 self.document.keys[*path, key] = position
 
-    def _put(self, value: Any, path: Path) -> None:
+    def _put(self, value: object, path: Path) -> None:
         """Hand a finished value to the open mapping or list, or to the document."""
         level = self.levels[-1] if self.levels else None
         if path in self.document.poisoned:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from types import SimpleNamespace
 
 import numpy as np
 
-from hystgen.basics.version import __version__
-from hystgen.emission import module, text
+from hystgen.emission import interface, runtime, text
 from hystgen.parameters.files import Parameters, parameters_sha256
 from hystgen.planning.converter import Codes, Dac
-from hystgen.planning.session import PlayedSession
+from hystgen.planning.session import Session
 
 
 def file(parameters: Parameters) -> str:
@@ -26,7 +24,7 @@ def nodes(stretches: Sequence[tuple[int, int]]) -> Codes:
 
 def header(
     parameters: Parameters,
-    session: PlayedSession,
+    session: Session,
     dac: Dac,
     codes: Codes,
     stretches: Sequence[tuple[int, int]],
@@ -39,17 +37,18 @@ def header(
     """
     name, unit = parameters.name, parameters.units.input
     kind = f"{'' if dac.zero else 'u'}int{8 * dac.bytes}_t"
-    values = SimpleNamespace(
-        NAME=name.upper(), rate=repr(session.rate), samples=session.samples, stretches=len(stretches),
-        sha256=parameters_sha256(parameters), version=__version__,
-        command=f"hystgen diagnose --plan {name}.yaml {words} -o plan/",
+    top, bottom = session.history
+    return runtime.template(
+        "session.h.j2", name=name, NAME=name.upper(), rate=repr(session.rate), samples=session.samples,
+        stretches=len(stretches),
+        banner=interface.banner(
+            file(parameters), f"drives of a diagnosis of {name}",
+            f"hystgen diagnose --plan {name}.yaml {words} -o plan/", parameters_sha256(parameters),
+            [dac.sentence(f" {unit}" if unit else "", top - bottom)],
+        ),
         lengths=text.constant(
             f"{name}_session_stretch_t {name}_session_stretches[{len(stretches)}]",
             [f"    {{ {steps}u, {every}u }}," for steps, every in stretches],
         ),
         codes=text.table(kind, f"{name}_session_codes", codes[nodes(stretches)].tolist()),
     )
-    top, bottom = session.history
-    details = [dac.sentence(f" {unit}" if unit else "", top - bottom)]
-    banner = module.banner_of(values, file(parameters), f"drives of a diagnosis of {name}", details)
-    return module.render("session.h.j2", values, name=name, banner=banner)

@@ -12,7 +12,7 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,11 @@ from hystgen.basics.problems import PlanError
 from hystgen.planning import converter, header, session
 from hystgen.planning.converter import Codes, Dac
 from hystgen.planning.grid import FULL_SCALE, SLOW_SAMPLES, Grid, Tempo
-from hystgen.planning.session import Part, PlayedSession
+from hystgen.planning.session import Part, Session
 from hystgen.planning.waveforms import RECORDS, lead_in, written
 
 if TYPE_CHECKING:
+    from hystgen.model import Model
     from hystgen.parameters.files import Parameters
 
 Array = NDArray[np.float64]
@@ -86,7 +87,7 @@ class PlannedDrives:
     max_rate: float
     sample_time: float
     defaults: tuple[str, ...]
-    session: PlayedSession | None = None
+    session: Session | None = None
     whole: Drive | None = None
     dac: Dac | None = None
     stretches: tuple[tuple[int, int], ...] = ()
@@ -174,7 +175,7 @@ class PlannedDrives:
 
 @arguments.checked
 def plan(
-    source: Any,
+    source: Model | str | os.PathLike[str],
     *,
     max_rate: float | None = None,
     sample_time: float | None = None,
@@ -348,7 +349,7 @@ class _Player:
         rise = session.crossing(t, v, 0.5 * (top + bottom))
         assert rise is not None
         dac = None if self.dac is None else asdict(self.dac)
-        where = PlayedSession(self.rate, len(v), (top, bottom), plan.rest, rise, tuple(parts), dac)
+        where = Session(self.rate, len(v), (top, bottom), plan.rest, rise, tuple(parts), dac)
         whole = Drive(WHOLE, "", (), False, plan.sample_time, plan.sample_time, t, v, codes)
         return replace(
             plan, history=(top, bottom), session=where, whole=whole, dac=self.dac, stretches=tuple(stretches)

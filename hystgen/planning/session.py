@@ -35,7 +35,7 @@ class Part:
 
 
 @dataclass(frozen=True)
-class PlayedSession:
+class Session:
     """The signal played: `samples` at `rate`, Hz, containing `records`.
 
     `history`: drives visited before the first record and at the end of each, the highest and the lowest of all; `rest`:
@@ -49,14 +49,14 @@ class PlayedSession:
     rest: float
     rise: float
     records: tuple[Part, ...]
-    dac: Mapping[str, Any] | None = None
+    dac: Mapping[str, object] | None = None
 
     def to_json(self) -> str:
         """`session.json`."""
         return json.dumps({"hystgen": 1, **asdict(self)}, indent=2, allow_nan=False) + "\n"
 
     @classmethod
-    def read(cls, path: str | os.PathLike[str]) -> PlayedSession:
+    def read(cls, path: str | os.PathLike[str]) -> Session:
         """Read the session from a file written by `--plan`. Raises ParameterError with every problem in it, OSError."""
         file = os.fspath(path)
         with open(file, "rb") as stream:
@@ -136,34 +136,36 @@ class PlayedSession:
 GIVE = f"give the {FILE} that hystgen diagnose --plan --rate wrote"
 
 
-def _number(low: float, strict: bool = False) -> Callable[[Any], str]:
+def _number(low: float, strict: bool = False) -> Callable[[object], str]:
     """The problem with a value that has to be a finite number from `low` on, or above it; empty if there is none."""
     wanted = f"a number {'above' if strict else 'from'} {low:g}{'' if strict else ' on'}"
 
-    def wrong(value: Any) -> str:
-        number = isinstance(value, int | float) and not isinstance(value, bool) and -HUGE < value < HUGE
-        return "" if number and (value > low or (value == low and not strict)) else f"{wanted}, not {shown(value)}"
+    def wrong(value: object) -> str:
+        right = isinstance(value, int | float) and not isinstance(value, bool) and -HUGE < value < HUGE and (
+            value > low or (value == low and not strict)
+        )
+        return "" if right else f"{wanted}, not {shown(value)}"
 
     return wrong
 
 
-def _whole(low: int) -> Callable[[Any], str]:
-    def wrong(value: Any) -> str:
+def _whole(low: int) -> Callable[[object], str]:
+    def wrong(value: object) -> str:
         right = isinstance(value, int) and not isinstance(value, bool) and low <= value < HUGE
         return "" if right else f"a whole number, at least {low}, not {shown(value)}"
 
     return wrong
 
 
-def _history(value: Any) -> str:
-    pair = isinstance(value, tuple) and len(value) == 2 and not any(map(_number(-HUGE), value))
-    return "" if pair and value[0] > value[1] else "the highest and the lowest drive, [highest, lowest]"
+def _history(value: object) -> str:
+    pair = isinstance(value, tuple) and len(value) == 2 and not any(map(_number(-HUGE), value)) and value[0] > value[1]
+    return "" if pair else "the highest and the lowest drive, [highest, lowest]"
 
 
 HUGE = 1e30
 """Numbers of a session stay below this, like those of a parameter file."""
 
-FIELDS: Mapping[str, Callable[[Any], str]] = {
+FIELDS: Mapping[str, Callable[[object], str]] = {
     "hystgen": lambda value: "" if value == 1 and isinstance(value, int) else f"1, not {shown(value)}",
     "rate": _number(0.0, strict=True),
     "samples": _whole(2),
@@ -175,14 +177,14 @@ FIELDS: Mapping[str, Callable[[Any], str]] = {
 }
 """Keys of the file, each with a function that returns the problem with a value."""
 
-PART_FIELDS: Mapping[str, Callable[[Any], str]] = {
+PART_FIELDS: Mapping[str, Callable[[object], str]] = {
     "name": lambda value: "" if isinstance(value, str) and value else f"text, not {shown(value)}",
     "first": _whole(0),
     "samples": _whole(2),
     "held_out": lambda value: "" if isinstance(value, bool) else f"true or false, not {shown(value)}",
 }
 
-DAC_FIELDS: Mapping[str, Callable[[Any], str]] = {
+DAC_FIELDS: Mapping[str, Callable[[object], str]] = {
     "bits": _whole(1),
     "low": _number(-HUGE),
     "high": _number(-HUGE),
@@ -193,7 +195,9 @@ Wrong = tuple[Place, str, bool]
 """Where a problem is, what it is, and whether it concerns the key rather than its value."""
 
 
-def _of_fields(place: Place, content: Mapping[str, Any], fields: Mapping[str, Callable[[Any], str]]) -> Iterator[Wrong]:
+def _of_fields(
+    place: Place, content: Mapping[str, object], fields: Mapping[str, Callable[[object], str]]
+) -> Iterator[Wrong]:
     """Keys of a mapping that are unknown, missing, or have a wrong value."""
     for key in content.keys() - fields.keys():
         yield (*place, key), f"this key is unknown; {GIVE}", True

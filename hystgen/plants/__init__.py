@@ -8,7 +8,7 @@ plant, and goes from there to the first sample in one move.
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 PLANTS = {
     "BoucWen": "bouc_wen",
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from hystgen.plants.preisach import Preisach as Preisach
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(importlib.import_module(f"{__name__}.{_PLACES[name]}"), name)

@@ -17,7 +17,7 @@ import io
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, cast
 
 from hystgen.basics import arguments, console
 from hystgen.basics.problems import RecordError, printable
@@ -169,7 +169,7 @@ def several(sources: Source | Iterable[Source]) -> list[Source]:
     if not listed and in_memory(sources):
         return [sources]
     stream = isinstance(sources, bytes) or hasattr(sources, "readline")  # iterating over it would give lines
-    found: list[Any] = [] if stream or not isinstance(sources, Iterable) else list(sources)
+    found = [] if stream or not isinstance(sources, Iterable) else cast(list[Source], list(sources))
     strange = [each for each in found if not (isinstance(each, Record | str | os.PathLike) or in_memory(each))]
     if stream or strange or not isinstance(sources, Iterable):
         of = f" with {arguments.kind(strange[0])} in it" if strange else ""

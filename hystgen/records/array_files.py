@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hystgen.basics import extras
 from hystgen.records import mat_nesting
 from hystgen.records.columns import Column, Step, column, from_number, is_named
-from hystgen.records.reading import Reading, Table, in_matrix, one_dimension
+from hystgen.records.reading import Matrix, Reading, Table, in_matrix, one_dimension
 
 MATLAB_NUMBERS = frozenset(
     ("double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
@@ -33,7 +33,7 @@ def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
         columns = []
         ignored = []
         steps: list[Step] = []
-        matrices: dict[str, Any] = {}
+        matrices: dict[str, Matrix] = {}
         members = frozenset(archive.zip.namelist())
         for name in archive.files:
             shape = _npy_shape(archive, name if name in members else f"{name}.npy")
@@ -47,7 +47,9 @@ def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
         return reading.table(columns, ignored, steps=steps, matrices=matrices)
 
 
-def _scalar(name: str, of: str, read: Callable[[], NDArray[Any]], shape: tuple[int, ...], steps: list[Step]) -> bool:
+def _scalar(
+    name: str, of: str, read: Callable[[], NDArray[np.generic]], shape: tuple[int, ...], steps: list[Step]
+) -> bool:
     """Whether the number is the sample rate of the vectors; it is then added to `steps`."""
     if int(np.prod(shape)) != 1 or not is_named(name):
         return False
@@ -60,7 +62,8 @@ def _npy_shape(archive: Any, file: str) -> tuple[int, ...]:
     """Shape of an archived array of numbers, from its header alone; (0,) for anything else."""
     with archive.zip.open(file) as member:
         header: Mapping[tuple[int, int], Callable[..., Any]] = {
-            (1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0,
+            (1, 0): npy.read_array_header_1_0,
+            (2, 0): npy.read_array_header_2_0,
         }
         if member.read(len(npy.MAGIC_PREFIX)) != npy.MAGIC_PREFIX:
             return (0,)
@@ -72,7 +75,7 @@ def _npy_shape(archive: Any, file: str) -> tuple[int, ...]:
     return tuple(shape) if dtype.kind in "fiub" else (0,)
 
 
-def _npy_vector(archive: Any, name: str) -> NDArray[Any]:
+def _npy_vector(archive: Any, name: str) -> NDArray[np.generic]:
     return np.asarray(archive[name]).ravel()
 
 
@@ -91,7 +94,7 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
         columns: list[Column] = []
         ignored: list[str] = []
         steps: list[Step] = []
-        matrices: dict[str, Any] = {}
+        matrices: dict[str, Matrix] = {}
         vectors = _MatVectors(stream)
         for name, shape, kind in whosmat(stream):
             if kind == "struct":
@@ -104,20 +107,24 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
             ):
                 ignored.append(name)
                 if kind in MATLAB_NUMBERS and in_matrix(shape):
-                    matrices[name] = shape, lambda name=name: _mat_variables(stream, [name])[name]
+                    matrices[name] = shape, partial(_mat_matrix, stream, name)
         return reading.table(columns, ignored, steps=steps, matrices=matrices)
 
 
-def _mat_variables(stream: IO[bytes], names: Sequence[str]) -> dict[str, Any]:
+def _mat_variables(stream: IO[bytes], names: Sequence[str]) -> dict[str, NDArray[np.generic]]:
     from scipy.io import loadmat
 
     stream.seek(0)
-    found: dict[str, Any] = loadmat(stream, variable_names=names)
+    found: dict[str, NDArray[np.generic]] = loadmat(stream, variable_names=names)
     return found
 
 
-def _mat_variable(stream: IO[bytes], name: str) -> NDArray[Any]:
-    return np.asarray(_mat_variables(stream, [name])[name]).ravel()
+def _mat_matrix(stream: IO[bytes], name: str) -> NDArray[np.generic]:
+    return _mat_variables(stream, [name])[name]
+
+
+def _mat_variable(stream: IO[bytes], name: str) -> NDArray[np.generic]:
+    return np.asarray(_mat_matrix(stream, name)).ravel()
 
 
 class _MatVectors:
@@ -129,7 +136,7 @@ class _MatVectors:
         self._groups: list[list[str]] = []
         self._group: dict[str, int] = {}
         self._samples = 0
-        self._loaded: tuple[int, dict[str, Any]] = (-1, {})
+        self._loaded: tuple[int, dict[str, NDArray[np.generic]]] = (-1, {})
 
     def add(self, name: str, length: int) -> None:
         """A vector of the file, in file order."""
@@ -140,7 +147,7 @@ class _MatVectors:
         self._group[name] = len(self._groups) - 1
         self._samples += length
 
-    def read(self, name: str) -> NDArray[Any]:
+    def read(self, name: str) -> NDArray[np.generic]:
         """The vector of that name."""
         group = self._group[name]
         if self._loaded[0] != group:
@@ -148,7 +155,7 @@ class _MatVectors:
         return np.asarray(self._loaded[1].pop(name)).ravel()
 
 
-Parts = tuple[dict[str, str], dict[str, tuple[int, Callable[[], NDArray[Any]]]]]
+Parts = tuple[dict[str, str], dict[str, tuple[int, Callable[[], NDArray[np.generic]]]]]
 """Fields of a struct in a list: its texts, and its vectors with length and numbers."""
 
 _LABELS, _UNITS = ("label", "name"), ("unit", "units")
@@ -179,7 +186,7 @@ def list_of_structs(folder: str, structs: Sequence[Parts]) -> list[Column]:
     return columns
 
 
-def _parts(struct: NDArray[Any], place: int) -> Parts:
+def _parts(struct: NDArray[np.generic], place: int) -> Parts:
     parts: Parts = {}, {}
     texts, vectors = parts
     for name in struct.dtype.names or ():
@@ -194,7 +201,7 @@ def _parts(struct: NDArray[Any], place: int) -> Parts:
 
 
 def _fields(
-    struct: NDArray[Any], folder: str, columns: list[Column], ignored: list[str], steps: list[Step]
+    struct: NDArray[np.generic], folder: str, columns: list[Column], ignored: list[str], steps: list[Step]
 ) -> None:
     """The vectors among the fields of a struct, and of the structs inside it."""
     alone = struct.shape == (1, 1)
@@ -204,7 +211,7 @@ def _fields(
         ignored += [] if listed else [folder[:-1]]
         return
     for name in struct.dtype.names or ():
-        value = struct[name][0, 0]
+        value = struct[0, 0][name]
         if isinstance(value, np.ndarray) and value.dtype.names:
             _fields(value, f"{folder}{name}.", columns, ignored, steps)
             continue

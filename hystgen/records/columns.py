@@ -7,8 +7,8 @@ import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.names import MAX_UNIT
@@ -281,7 +281,7 @@ class Column:
     label: str
     unit: str = ""
     length: int = 0
-    read: Callable[[], NDArray[Any]] | None = None
+    read: Callable[[], NDArray[np.generic]] | None = None
     also: str = ""
 
     @property
@@ -295,7 +295,7 @@ def column(
     folder: str = "",
     unit: str = "",
     length: int = 0,
-    read: Callable[[], NDArray[Any]] | None = None,
+    read: Callable[[], NDArray[np.generic]] | None = None,
     also: str = "",
 ) -> Column:
     """A column called `name` in `folder` (with its separator); a `unit` that the file stores separately takes

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,10 @@ from numpy.typing import NDArray
 from hystgen.basics import extras
 from hystgen.records.array_files import HOLDING, MATLAB_NUMBERS, Parts, list_of_structs
 from hystgen.records.columns import Column, Step, column, from_number, is_named
-from hystgen.records.reading import Reading, Table, in_matrix, one_dimension
+from hystgen.records.reading import Matrix, Reading, Table, in_matrix, one_dimension
+
+if TYPE_CHECKING:
+    import h5py
 
 SLICE = 1 << 18
 """Samples read at a time."""
@@ -57,14 +60,14 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
         ignored: list[str] = []
         outside: list[str] = []
         steps: list[Step] = []
-        matrices: dict[str, Any] = {}
+        matrices: dict[str, Matrix] = {}
         join = "." if matlab else "/"  # MATLAB writes a field of a struct with a dot
 
-        def link(path: str, found: Any) -> None:
+        def link(path: str, found: object) -> None:
             if isinstance(found, h5py.ExternalLink):
                 outside.append(path.replace("/", join))
 
-        def visit(path: str, found: Any) -> None:
+        def visit(path: str, found: object) -> None:
             if matlab and path.split("/")[0] in _MATLAB_OWN:
                 return
             *folders, name = path.split("/")
@@ -99,7 +102,7 @@ def _read(reading: Reading, kind: str, matlab: bool) -> Table:
         return reading.table(columns, ignored, outside, steps, matrices)
 
 
-def _list_of_structs(reading: Reading, file: Any, group: Any, folder: str) -> list[Column]:
+def _list_of_structs(reading: Reading, file: h5py.File, group: h5py.Group, folder: str) -> list[Column]:
     """The vectors of a list of structs, which MATLAB stores as one dataset per field, with one reference per struct."""
     import h5py
 
@@ -115,7 +118,7 @@ def _list_of_structs(reading: Reading, file: Any, group: Any, folder: str) -> li
     return list_of_structs(folder, [_parts(reading, struct) for struct in structs])
 
 
-def _fields(group: Any) -> dict[str, Any]:
+def _fields(group: h5py.Group) -> dict[str, h5py.Dataset]:
     """The datasets of a group; links to other files or to arbitrary paths are not followed."""
     import h5py
 
@@ -123,7 +126,7 @@ def _fields(group: Any) -> dict[str, Any]:
     return {name: group[name] for name in own if isinstance(group[name], h5py.Dataset)}
 
 
-def _parts(reading: Reading, fields: Mapping[str, Any]) -> Parts:
+def _parts(reading: Reading, fields: Mapping[str, h5py.Dataset]) -> Parts:
     """The texts and vectors among the fields of a struct that are stored in the file itself."""
     import h5py
 
@@ -139,7 +142,7 @@ def _parts(reading: Reading, fields: Mapping[str, Any]) -> Parts:
     return parts
 
 
-def _attributes(found: Any, of: str) -> list[Step]:
+def _attributes(found: h5py.HLObject, of: str) -> list[Step]:
     """The sample rate from the attributes of a file, group or dataset."""
     numbers = {name: np.asarray(found.attrs[name]) for name in found.attrs if is_named(name)}
     steps = [
@@ -150,14 +153,14 @@ def _attributes(found: Any, of: str) -> list[Step]:
     return [step for step in steps if step is not None]
 
 
-def _scalar(dataset: Any, name: str, folder: str, matlab: bool) -> Step | None:
+def _scalar(dataset: h5py.Dataset, name: str, folder: str, matlab: bool) -> Step | None:
     """The sample rate from a single number next to the vectors."""
     if dataset.shape is None or dataset.dtype.kind not in "fiu" or dataset.size != 1 or not is_named(name):
         return None
     return from_number(name, float(np.asarray(dataset[()]).ravel()[0]), folder, "" if matlab else _unit(dataset))
 
 
-def _length(dataset: Any, matlab: bool) -> int:
+def _length(dataset: h5py.Dataset, matlab: bool) -> int:
     """Length of a vector of numbers; 0 for anything else, including MATLAB's text, which is stored as numbers."""
     if dataset.shape is None or dataset.dtype.kind not in "fiub":
         return 0
@@ -167,7 +170,7 @@ def _length(dataset: Any, matlab: bool) -> int:
     return one_dimension(dataset.shape)
 
 
-def _unit(dataset: Any) -> str:
+def _unit(dataset: h5py.Dataset) -> str:
     for name in _UNITS:
         value = dataset.attrs.get(name)
         if isinstance(value, np.ndarray) and value.size == 1:
@@ -179,7 +182,7 @@ def _unit(dataset: Any) -> str:
     return ""
 
 
-def _vector(reading: Reading, dataset: Any) -> NDArray[np.float64]:
+def _vector(reading: Reading, dataset: h5py.Dataset) -> NDArray[np.float64]:
     """A vector, slice by slice, so that HDF5's own buffers stay small and a progress bar can move."""
     axis = int(np.argmax(dataset.shape))
     length = dataset.shape[axis]
@@ -188,7 +191,7 @@ def _vector(reading: Reading, dataset: Any) -> NDArray[np.float64]:
     step = chunk * max(1, SLICE // chunk)
     numbers = np.empty(length, dtype=np.float64)
     for start in range(0, length, step):
-        where: list[Any] = [0] * dataset.ndim
+        where: list[int | slice] = [0] * dataset.ndim
         where[axis] = slice(start, start + step)
         part = dataset[tuple(where)]
         numbers[start : start + step] = part

@@ -33,7 +33,7 @@ class Frame(Protocol):
         """A column by its name."""
 
 
-Columns = Mapping[str, ArrayLike] | Frame | NDArray[Any] | tuple[ArrayLike, ...]
+Columns = Mapping[str, ArrayLike] | Frame | NDArray[np.generic] | tuple[ArrayLike, ...]
 """Samples in memory: a mapping or data frame of named columns; or an array (N, 2) or (N, 3), or a tuple of arrays (N,),
 of drive and displacement, preceded by the time if there are three."""
 
@@ -90,7 +90,7 @@ def _as_call(problem: str) -> str:
     return _OPTION.sub(argument, problem)
 
 
-def _named(source: Columns, name: str, sample_time: float | None) -> dict[str, Any]:
+def _named(source: Columns, name: str, sample_time: float | None) -> dict[str, object]:
     """The columns by name."""
     if isinstance(source, Mapping):
         return {str(key): values for key, values in source.items()}
@@ -110,7 +110,7 @@ def _named(source: Columns, name: str, sample_time: float | None) -> dict[str, A
     return found
 
 
-def _by_place(source: NDArray[Any] | tuple[Any, ...], name: str, sample_time: float | None) -> Sequence[str]:
+def _by_place(source: NDArray[np.generic] | tuple[Any, ...], name: str, sample_time: float | None) -> Sequence[str]:
     """Our names for unnamed columns."""
     number = len(source) if isinstance(source, tuple) else source.shape[1] if source.ndim == 2 else 0
     if number == 3 or (number == 2 and sample_time is not None):
@@ -124,7 +124,7 @@ def _by_place(source: NDArray[Any] | tuple[Any, ...], name: str, sample_time: fl
     )
 
 
-def _table(reading: Reading, named: Mapping[str, Any]) -> Table:
+def _table(reading: Reading, named: Mapping[str, object]) -> Table:
     columns: list[Column] = []
     ignored: list[str] = []
     for name, values in named.items():
@@ -138,7 +138,7 @@ def _table(reading: Reading, named: Mapping[str, Any]) -> Table:
     return reading.table(columns, ignored)
 
 
-def _numbers(values: Any) -> NDArray[Any] | None:
+def _numbers(values: object) -> NDArray[np.generic] | None:
     """An array of real numbers, with times as seconds from the first; None for anything else."""
     try:
         found = np.asarray(values)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,10 @@ from numpy.typing import NDArray
 from hystgen.basics import extras
 from hystgen.records.columns import Column, column
 from hystgen.records.reading import Reading, Table
+
+if TYPE_CHECKING:
+    import pyarrow
+    from pyarrow import parquet
 
 BATCH = 1 << 18
 """Samples read at a time."""
@@ -41,7 +45,7 @@ def read_parquet(reading: Reading, stream: IO[bytes]) -> Table:
         return reading.table(columns, ignored)
 
 
-def _is_number(kind: Any) -> bool:
+def _is_number(kind: pyarrow.DataType) -> bool:
     from pyarrow import types
 
     return any(
@@ -53,7 +57,7 @@ def _is_number(kind: Any) -> bool:
     )
 
 
-def _unit(field: Any) -> str:
+def _unit(field: pyarrow.Field) -> str:
     from pyarrow import types
 
     if types.is_timestamp(field.type) or types.is_duration(field.type):
@@ -62,7 +66,7 @@ def _unit(field: Any) -> str:
     return next((metadata[key].decode("utf-8", "replace").strip() for key in _UNITS if key in metadata), "")
 
 
-def _vector(reading: Reading, file: Any, field: Any) -> NDArray[np.float64]:
+def _vector(reading: Reading, file: parquet.ParquetFile, field: pyarrow.Field) -> NDArray[np.float64]:
     """A column, batch by batch; time stamps count from the first in the column."""
     import pyarrow as pa
     from pyarrow import compute, types

@@ -11,7 +11,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +56,10 @@ class Lines:
         lines = self._lines[stretch]
         after = row - self._rows[stretch]
         return lines + after if isinstance(lines, int) else int(lines[after])
+
+
+Matrix = tuple[tuple[int, ...], Callable[[], NDArray[np.generic]]]
+"""Shape of an array with several dimensions, and how to read it."""
 
 
 @dataclass
@@ -194,7 +197,7 @@ class Reading:
         ignored: Sequence[str],
         outside: Sequence[str] = (),
         steps: Sequence[Step] = (),
-        matrices: Mapping[str, tuple[tuple[int, ...], Callable[[], NDArray[Any]]]] = MappingProxyType({}),
+        matrices: Mapping[str, Matrix] = MappingProxyType({}),
     ) -> Table:
         """The table of a file whose columns are read one by one.
 
@@ -225,7 +228,7 @@ class Reading:
             numbers[name] = np.require(c.read(), np.float64, ("C", "W"))
         return self.finished(numbers, taken)
 
-    def _of_matrix(self, name: str, shape: tuple[int, ...], read: Callable[[], NDArray[Any]]) -> list[Column]:
+    def _of_matrix(self, name: str, shape: tuple[int, ...], read: Callable[[], NDArray[np.generic]]) -> list[Column]:
         """The columns of a matrix, named by number. Raises RecordError if they are not."""
         width = in_matrix(shape)
         if not any(theirs.lstrip("#").isdecimal() for theirs in self.columns.values()):

@@ -4,7 +4,7 @@ sampling."""
 from __future__ import annotations
 
 from functools import partial
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,9 @@ from numpy.typing import NDArray
 from hystgen.basics import extras
 from hystgen.records.columns import Column, Step, column
 from hystgen.records.reading import Reading, Table
+
+if TYPE_CHECKING:
+    from nptdms import TdmsChannel
 
 _UNITS = ("unit_string", "NI_UnitDescription")
 
@@ -44,11 +47,11 @@ def read_tdms(reading: Reading, stream: IO[bytes]) -> Table:
         return reading.table(columns, ignored, steps=steps)
 
 
-def _unit(channel: Any) -> str:
+def _unit(channel: TdmsChannel) -> str:
     return next((str(channel.properties[key]).strip() for key in _UNITS if channel.properties.get(key)), "")
 
 
-def _steps(channel: Any, name: str) -> list[Step]:
+def _steps(channel: TdmsChannel, name: str) -> list[Step]:
     """The sampling of a waveform; for other channels the increment is 0 or missing."""
     seconds = channel.properties.get("wf_increment")
     if not isinstance(seconds, float | int) or not 0.0 < seconds < float("inf"):
@@ -59,7 +62,7 @@ def _steps(channel: Any, name: str) -> list[Step]:
     return [Step(float(seconds), f"wf_increment {seconds:g} s ({name})", name, begins)]
 
 
-def _vector(reading: Reading, channel: Any) -> NDArray[Any]:
+def _vector(reading: Reading, channel: TdmsChannel) -> NDArray[np.generic]:
     numbers = np.asarray(channel[:])
     if numbers.dtype.kind != "M":
         return numbers

@@ -6,7 +6,6 @@ import csv
 import io
 import os
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +29,7 @@ def write_columns(path: str | os.PathLike[str], header: Sequence[str], arrays: S
     write_atomically(path, columns_text(header, arrays))
 
 
-def _texts(values: NDArray[Any]) -> list[str]:
+def _texts(values: NDArray[np.generic]) -> list[str]:
     if values.ndim != 1:
         raise ValueError("a column has one dimension")
     if values.dtype == np.float64 or values.dtype.kind in "iub":

@@ -18,7 +18,7 @@ from hystgen.diagnosis.findings.kinds import VARIABLE_NAMES, Fault, Structured, 
 from hystgen.diagnosis.findings.result import Diagnosis, NamedEffect, Result
 from hystgen.diagnosis.search.acceptance import is_noise
 from hystgen.report.diagnosis_figures import ALTERNATIVES, CAPTIONS, FIGURES, NARROW, WIDE
-from hystgen.report.html import Details, Figure, HtmlTable, Listing, Section, Text, page
+from hystgen.report.html import Details, HtmlTable, Listing, Picture, Section, Text, page
 from hystgen.report.properties import settling
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def html(found: Diagnosis, parameters_text: str) -> str:
     with drawing.styled():
         drawn = dict(zip(each, parallel.each(lambda one: _drawn(found, *one), each, parallel.cores()), strict=True))
     figures = {
-        name: Figure(name, drawn[name, WIDE], drawn[name, NARROW], CAPTIONS[name], ALTERNATIVES[name])
+        name: Picture(name, drawn[name, WIDE], drawn[name, NARROW], CAPTIONS[name], ALTERNATIVES[name])
         for name in FIGURES
     }
     sections = [
@@ -165,7 +165,7 @@ def _kind(effect: NamedEffect, there: Sequence[Effect]) -> type[Effect] | None:
     return next(type(each) for each in reversed(there) if each.name == effect.name)
 
 
-def _numbers(value: Any, sure: Any, name: str = "") -> list[list[str]]:
+def _numbers(value: object, sure: Any, name: str = "") -> list[list[str]]:
     """Rows of name, value, low and high, one per number; the first of equal lists represents them all."""
     if isinstance(value, Mapping):
         known = sure or {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,9 @@ from hystgen.diagnosis.search import acceptance
 from hystgen.report.fit_figures import binned
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from hystgen.diagnosis import Diagnosis, Signals
 
 Array = NDArray[np.float64]
@@ -47,7 +50,7 @@ def steps(found: Diagnosis) -> list[tuple[str, float]]:
     return stages + [(f"+ {effect.name}", effect.holdout_after) for effect in result.effects]
 
 
-def gap(found: Diagnosis, width: float) -> Any:
+def gap(found: Diagnosis, width: float) -> Figure:
     """How much each step removes from the held-out error, down to the noise."""
     stages, noise = steps(found), found.result.noise_floor
     names = [*(name for name, _ in stages), "noise"]
@@ -99,7 +102,7 @@ def worst(found: Diagnosis) -> list[Signals]:
     return sorted(held, key=lambda each: -_rms(each.before))[:SHOWN]
 
 
-def overlay(found: Diagnosis, width: float) -> Any:
+def overlay(found: Diagnosis, width: float) -> Figure:
     """Measured and predicted motion over time, and the error before and after."""
     shown, unit = worst(found), found.result.unit
     named = bool(found.result.effects)
@@ -128,26 +131,25 @@ def overlay(found: Diagnosis, width: float) -> Any:
     return drawn
 
 
-def records(found: Diagnosis, width: float) -> Any:
+def records(found: Diagnosis, width: float) -> Figure:
     """rms of every record before and after."""
     shown = [each for each in found.signals if np.isfinite(each.before).any()]
     drawn = drawing.figure(width, 1.3 + 0.34 * len(shown))
     axes = drawn.subplots()
     places = np.arange(len(shown), dtype=np.float64)
-    values = [[_rms(getattr(each, key)) for each in shown] for key in ("before", "after")]
-    if found.result.effects:
-        axes.plot(values[0], places, "o", color=BEFORE, markersize=6, label="refitted")
-    axes.plot(values[1], places, "o", color=AFTER, markersize=6, label=_last(found))
+    values = {key: [_rms(getattr(each, key)) for each in shown] for key in ("before", "after")}
+    for key, colour, what in _sides(found):
+        axes.plot(values[key], places, "o", color=colour, markersize=6, label=what)
     axes.axvline(found.result.noise_floor, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
     axes.set_yticks(places, [f"{each.name}{' (held out)' if each.held_out else ''}" for each in shown])
     axes.set_ylim(len(shown) - 0.5, -0.5)  # half a slot beyond the first and the last
-    _range(axes, [*values[0], *values[1], found.result.noise_floor])
+    _range(axes, [*values["before"], *values["after"], found.result.noise_floor], "x")
     axes.set(xlabel=label("rms error", found.result.unit))
     drawing.legend_above(axes, 3)
     return drawn
 
 
-def against(found: Diagnosis, width: float) -> Any:
+def against(found: Diagnosis, width: float) -> Figure:
     """Mean and scatter of the error of all records over the variables that it may depend on."""
     shown = [each for each in found.signals if np.isfinite(each.before).any()]
     units, unit = found.parameters.units, found.result.unit
@@ -165,8 +167,7 @@ def against(found: Diagnosis, width: float) -> Any:
     ]
     for axes, (name, of, log) in zip(grid, variables, strict=True):
         x = np.concatenate([of(each) for each in shown])
-        sides = [("before", BEFORE, "refitted")] if found.result.effects else []
-        for key, colour, what in (*sides, ("after", AFTER, _last(found))):
+        for key, colour, what in _sides(found):
             e = np.concatenate([getattr(each, key) * (_direction(each) if log else 1.0) for each in shown])
             _binned(axes, x, e, colour, f"{what}, mean \N{PLUS-MINUS SIGN} 1 sd", log)
         drawing.noise_lines(axes, found.result.noise_floor)
@@ -180,7 +181,7 @@ def against(found: Diagnosis, width: float) -> Any:
     return drawn
 
 
-def _binned(axes: Any, x: Array, e: Array, colour: str, what: str, log: bool) -> None:
+def _binned(axes: Axes, x: Array, e: Array, colour: str, what: str, log: bool) -> None:
     known = np.isfinite(e) & np.isfinite(x)
     if np.count_nonzero(known) < 64 or np.ptp(x[known]) == 0.0:
         axes.text(0.5, 0.5, "not in these records", transform=axes.transAxes, ha="center", color=drawing.QUIET)
@@ -216,7 +217,7 @@ def _direction(each: Signals) -> Array:
     return np.asarray(found[moved[np.maximum(last, 0)]])
 
 
-def time(found: Diagnosis, width: float) -> Any:
+def time(found: Diagnosis, width: float) -> Figure:
     """rms of the error in stretches of the records along the session."""
     shown = sorted((s for s in found.signals if np.isfinite(s.before).any()), key=lambda each: float(each.t[0]))
     one_clock = all(a.t[-1] <= b.t[0] for a, b in itertools.pairwise(shown))
@@ -227,9 +228,7 @@ def time(found: Diagnosis, width: float) -> Any:
         t = each.t if one_clock else each.t - each.t[0] + start
         start = float(t[-1]) + 0.02 * float(np.ptp(t))
         edges = np.linspace(0, len(t), WINDOWS + 1).astype(int)
-        for key, colour, what in (("before", BEFORE, "refitted"), ("after", AFTER, _last(found))):
-            if key == "before" and not found.result.effects:
-                continue
+        for key, colour, what in _sides(found):
             e = getattr(each, key)
             parts = [(0.5 * (t[a] + t[b - 1]), _rms(e[a:b])) for a, b in itertools.pairwise(edges) if b > a]
             parts = [(place, rms) for place, rms in parts if np.isfinite(rms)]
@@ -238,18 +237,14 @@ def time(found: Diagnosis, width: float) -> Any:
                       label=None if number else what)
     noise = found.result.noise_floor
     axes.axhline(noise, color=FLOOR, linestyle="--", linewidth=1.0, label="noise")
-    positive = [value for value in values if value > 0.0]
-    if positive and max(positive) > FAR * min(positive):
-        _decades(axes, "y")
-    else:
-        axes.set_ylim(bottom=0.0)
+    _range(axes, values, "y")
     clock = "session time (s)" if one_clock else "time, one record after another (s)"
     axes.set(xlabel=clock, ylabel=label("rms error", found.result.unit))
     drawing.legend_above(axes, 3)
     return drawn
 
 
-def frequency(found: Diagnosis, width: float) -> Any:
+def frequency(found: Diagnosis, width: float) -> Figure:
     """Spectral density of the error of the worst held-out record."""
     from scipy.signal import welch
 
@@ -257,8 +252,7 @@ def frequency(found: Diagnosis, width: float) -> Any:
     step = float(np.median(np.diff(each.t)))
     drawn = drawing.figure(width, 3.6)
     axes = drawn.subplots()
-    sides = [("before", BEFORE, "refitted")] if found.result.effects else []
-    for key, colour, what in (*sides, ("after", AFTER, _last(found))):
+    for key, colour, what in _sides(found):
         e = getattr(each, key)
         known = np.flatnonzero(np.isfinite(e))
         if len(known) < 64:
@@ -285,16 +279,24 @@ def _last(found: Diagnosis) -> str:
     return "with the effects" if found.result.effects else "refitted model"
 
 
-def _range(axes: Any, values: Sequence[float]) -> None:
-    """A horizontal axis from zero, or a logarithmic one if the values are far apart."""
+def _sides(found: Diagnosis) -> list[tuple[str, str, str]]:
+    """The errors to draw: key, colour and name; those before only if there are effects."""
+    before = [("before", BEFORE, "refitted")] if found.result.effects else []
+    return [*before, ("after", AFTER, _last(found))]
+
+
+def _range(axes: Axes, values: Sequence[float], which: str) -> None:
+    """An axis from zero, or a logarithmic one if the values are far apart."""
     positive = [value for value in values if value > 0.0]
     if positive and max(positive) > FAR * min(positive):
-        _decades(axes, "x")
-    else:
+        _decades(axes, which)
+    elif which == "x":
         axes.set_xlim(left=0.0)
+    else:
+        axes.set_ylim(bottom=0.0)
 
 
-def _decades(axes: Any, which: str) -> None:
+def _decades(axes: Axes, which: str) -> None:
     """A logarithmic axis with few plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from hystgen.identification import faults
 from hystgen.model import cascade_of
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from hystgen.identification import Fit, Used
     from hystgen.records import Record
 
@@ -141,7 +144,7 @@ def units_of(fit: Fit) -> AxisUnits:
 # Panels: one pair of axes each ---------------------------------------------------------------
 
 
-def loop_panel(axes: Any, each: Shown, units: AxisUnits) -> None:
+def loop_panel(axes: Axes, each: Shown, units: AxisUnits) -> None:
     """Measured loop and model over the compared samples."""
     for k, (start, stop) in enumerate(each.used.parts):
         here = slice(start, stop)
@@ -156,7 +159,7 @@ def loop_panel(axes: Any, each: Shown, units: AxisUnits) -> None:
     drawing.legend_above(axes)
 
 
-def _shade(axes: Any, each: Shown, named: bool) -> None:
+def _shade(axes: Axes, each: Shown, named: bool) -> None:
     """Samples that were not compared: the start of each part, samples left out, gaps."""
     t = each.time
     step = each.record.sample_time
@@ -176,7 +179,7 @@ def _shade(axes: Any, each: Shown, named: bool) -> None:
         )
 
 
-def overlay_panel(axes: Any, each: Shown, units: AxisUnits) -> None:
+def overlay_panel(axes: Axes, each: Shown, units: AxisUnits) -> None:
     """Measured and model over time; samples that were not compared are shaded or marked."""
     _shade(axes, each, True)
     good = each.measured[np.isfinite(each.measured)]
@@ -201,7 +204,7 @@ def overlay_panel(axes: Any, each: Shown, units: AxisUnits) -> None:
     drawing.legend_above(axes, 3)
 
 
-def residual_panel(axes: Any, each: Shown, units: AxisUnits, colour: str = drawing.RESIDUAL) -> None:
+def residual_panel(axes: Axes, each: Shown, units: AxisUnits, colour: str = drawing.RESIDUAL) -> None:
     """The residual over time."""
     for k, (start, stop) in enumerate(each.used.parts):
         chosen = drawing.kept(start, stop, each.residual)
@@ -213,7 +216,7 @@ def residual_panel(axes: Any, each: Shown, units: AxisUnits, colour: str = drawi
     axes.set(xlabel="time (s)", ylabel=label("residual", units.output))
 
 
-def _against_panel(axes: Any, x: Array, residual: Array, noise: float | None) -> None:
+def _against_panel(axes: Axes, x: Array, residual: Array, noise: float | None) -> None:
     """Residuals as points, their mean and scatter in bins of x."""
     known = np.isfinite(residual) & np.isfinite(x)
     x, residual = x[known], residual[known]
@@ -254,7 +257,7 @@ def _limits(x: Array) -> tuple[float, float]:
     return (inner_low, inner_high) if high - low > FAR * (inner_high - inner_low) > 0.0 else (low, high)
 
 
-def weight_panel(axes: Any, fit: Fit, units: AxisUnits, places: Sequence[int]) -> None:
+def weight_panel(axes: Axes, fit: Fit, units: AxisUnits, places: Sequence[int]) -> None:
     """Some of the weights as bars, named by their thresholds, with their intervals."""
     part = fit.parameters.model.pi
     at = np.arange(len(places))
@@ -276,7 +279,7 @@ def weight_panel(axes: Any, fit: Fit, units: AxisUnits, places: Sequence[int]) -
 # Figures ---------------------------------------------------------------------------------------------------
 
 
-def loop(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
+def loop(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
     """Measured loops and the model's, of a fitted and of a held-out record."""
     pair, units = drawn_ones(shown), units_of(fit)
     figure = drawing.figure(9.6, 4.4) if wide else drawing.figure(4.4, 4.0 * len(pair))
@@ -286,7 +289,7 @@ def loop(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
     return figure
 
 
-def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
+def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
     """Measured and model over time with the residual below, of a fitted and of a held-out record."""
     pair, units = drawn_ones(shown), units_of(fit)
     figure = drawing.figure(9.6 if wide else 4.4, 4.3 * len(pair))
@@ -303,7 +306,7 @@ def time(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
     return figure
 
 
-def residual(fit: Fit, shown: Sequence[Shown], wide: bool) -> Any:
+def residual(fit: Fit, shown: Sequence[Shown], wide: bool) -> Figure:
     """Residual against drive, rate, time and displacement; of the held-out records if there are any."""
     chosen, units = judged(shown), units_of(fit)
     noise = noise_of(chosen)
@@ -343,7 +346,7 @@ def noise_of(shown: Sequence[Shown]) -> float | None:
     return max(known) if known and len(known) == len(found) else None
 
 
-def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
+def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
     """Initial loading curve with its band; with a front, also the front and its distance from a straight line."""
     units, cascade = units_of(fit), cascade_of(fit.parameters)
     bent = bool(cascade.stages)
@@ -389,7 +392,7 @@ def loading(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
     return figure
 
 
-def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
+def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
     """The weights over their thresholds, p_0 on an axis of its own."""
     units = units_of(fit)
     n = len(fit.parameters.model.pi.thresholds) - 1
@@ -406,7 +409,7 @@ def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Any:
     return figure
 
 
-FIGURES: dict[str, Callable[[Fit, Sequence[Shown], bool], Any]] = {
+FIGURES: dict[str, Callable[[Fit, Sequence[Shown], bool], Figure]] = {
     "loop": loop, "time": time, "residual": residual, "loading": loading, "weights": weights,
 }
 """All figures by the name of their file."""

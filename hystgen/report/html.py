@@ -41,7 +41,7 @@ class HtmlTable:
 
 
 @dataclass(frozen=True)
-class Figure:
+class Picture:
     """A picture as SVG, in one layout for wide pages and one for phones; `alt` describes it in words."""
 
     name: str
@@ -66,7 +66,7 @@ class Section:
     """A heading and its content."""
 
     title: str
-    blocks: Sequence[Text | Listing | HtmlTable | Figure | Details]
+    blocks: Sequence[Text | Listing | HtmlTable | Picture | Details]
 
 
 def page(title: str, lead: Sequence[Text], sections: Sequence[Section]) -> str:

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ParamSpec
+from typing import TYPE_CHECKING, ParamSpec
 
 import numpy as np
 
@@ -25,9 +25,11 @@ from hystgen.parameters.files import parameters_sha256
 from hystgen.records import Record, Source, in_units, read_records, several
 from hystgen.report import fit_figures, plots, properties
 from hystgen.report.fit_figures import Shown
-from hystgen.report.html import Details, Figure, HtmlTable, Listing, Section, Text, page
+from hystgen.report.html import Details, HtmlTable, Listing, Picture, Section, Text, page
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from hystgen.identification import Row
 
 PAGE = "report.html"
@@ -43,7 +45,7 @@ def _with_pictures(find: Callable[P, Fit]) -> Callable[P, Fit]:
     return found
 
 
-def _picture(fit: Fit) -> Any:
+def _picture(fit: Fit) -> Figure:
     return plots.fit_figure(fit, fit.records)
 
 
@@ -102,7 +104,7 @@ def write(
             wide = draw(fit, shown, True)
             svg = drawing.content(wide, "svg")
             made |= {f"{name}.svg": svg, f"{name}.png": drawing.content(wide, "png")}
-            figures[name] = Figure(
+            figures[name] = Picture(
                 name, svg, drawing.content(draw(fit, shown, False), "svg"), CAPTIONS[name](fit, shown),
                 ALTERNATIVES[name](fit, shown),
             )
@@ -175,7 +177,7 @@ def _verdict(fit: Fit, parameter_file: str) -> list[Text]:
     return [*(Text(text) for text in said), Text("Your next step: write the C.", command)]
 
 
-def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Figure]) -> list[Section]:
+def _sections(fit: Fit, shown: Sequence[Shown], figures: dict[str, Picture]) -> list[Section]:
     yaml, model = Details("Parameter file", fit.text()), Model(fit.parameters)
     return [
         Section("How good it is", _table(fit)),

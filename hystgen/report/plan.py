@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import functools
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, ParamSpec
 
 from hystgen.basics import drawing, writing
 from hystgen.basics.drawing import label
@@ -17,7 +18,12 @@ from hystgen.planning import plan as planning
 from hystgen.planning.plan import CODES, MEASURED, RECORDING, WHOLE, Drive, lasting
 from hystgen.planning.session import FILE as SESSION
 from hystgen.planning.waveforms import EDGE
-from hystgen.report.html import Figure, HtmlTable, Listing, Section, Text, page
+from hystgen.report.html import HtmlTable, Listing, Picture, Section, Text, page
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+P = ParamSpec("P")
 
 WIDE, NARROW = (9.0, 5), (4.2, 3)
 """Width in inches and number of panels side by side."""
@@ -38,17 +44,24 @@ class Plan(planning.PlannedDrives):
         return writing.write_files(Path(folder), {name: made[name].encode("utf-8") for name in self.names})
 
 
-@functools.wraps(planning.plan)
-def plan(*given: Any, **options: Any) -> Plan:
-    made = planning.plan(*given, **options)
-    return Plan(**{each.name: getattr(made, each.name) for each in fields(made)})
+def _with_page(make: Callable[P, planning.PlannedDrives]) -> Callable[P, Plan]:
+    @functools.wraps(make)
+    def made(*given: P.args, **options: P.kwargs) -> Plan:
+        plain = make(*given, **options)
+        return Plan(**{each.name: getattr(plain, each.name) for each in fields(plain)})
+
+    return made
+
+
+plan = _with_page(planning.plan)
+"""`hystgen.plan`: the drives, with the page that explains them."""
 
 
 def html(plan: Plan, folder: str | os.PathLike[str]) -> str:
     """The page for drives in `folder`. Raises PlotError without matplotlib."""
     with drawing.styled():
         wide, narrow = (drawing.content(_drives(plan, *size), "svg") for size in (WIDE, NARROW))
-    figure = Figure("drives", wide, narrow, CAPTION, ALTERNATIVE)
+    figure = Picture("drives", wide, narrow, CAPTION, ALTERNATIVE)
     home = os.fspath(folder).rstrip("/\\")
     lead = [
         Text(f"Drives that separate all effects. {plan.sentence()}"),
@@ -168,7 +181,7 @@ def _limits(plan: Plan) -> list[str]:
     return said
 
 
-def _drives(plan: Plan, width: float, columns: int) -> Any:
+def _drives(plan: Plan, width: float, columns: int) -> Figure:
     rows = -(-len(plan.drives) // columns)
     drawn = drawing.figure(width, 1.55 * rows + 0.3)
     grid = drawn.subplots(rows, columns, sharey=True, squeeze=False)

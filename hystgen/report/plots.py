@@ -6,13 +6,15 @@ import itertools
 import os
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hystgen.basics import drawing
 from hystgen.basics.drawing import label
 from hystgen.report import fit_figures
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from hystgen.identification import Fit
     from hystgen.records import Record
     from hystgen.tracking import Tracking
@@ -26,7 +28,7 @@ def show_tracking(tracking: Tracking, path: str | os.PathLike[str]) -> None:
     drawing.picture(partial(_tracking_figure, tracking), path)
 
 
-def _tracking_figure(tracking: Tracking) -> Any:
+def _tracking_figure(tracking: Tracking) -> Figure:
     figure = drawing.figure(9.0, 1.0 + 3.4 * len(tracking.records))
     panels = figure.subplots(2 * len(tracking.records), 1, squeeze=False)[:, 0]
     colours = (drawing.OTHER, drawing.GAP, drawing.MODEL)
@@ -46,7 +48,7 @@ def show_fit(fit: Fit, records: Sequence[Record], path: str | os.PathLike[str]) 
     drawing.picture(partial(fit_figure, fit, records), path)
 
 
-def fit_figure(fit: Fit, records: Sequence[Record]) -> Any:
+def fit_figure(fit: Fit, records: Sequence[Record]) -> Figure:
     """Measured and predicted loop of one record, residuals over time, and the weights.
 
     `records`: those of the fit, then the held-out ones; the loop is that of a held-out record if there is one.

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import decimal
 import math
-from typing import Any
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import ARITHMETICS, FIXED, FLOATING
 from hystgen.basics.problems import EffectsError, FormatError, NotInvertibleError, counted, percent
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.bounds import error_bounds
 from hystgen.compensator.chain.preview import rings
 from hystgen.effects import Effect
 from hystgen.effects.resonance.model import Resonance
-from hystgen.emission import module
+from hystgen.emission import interface, module
 from hystgen.emission.calls import emit_options
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.model import SETTLED, Model
@@ -71,7 +70,7 @@ def properties(model: Model, within: float = SETTLED) -> str:
             f"inverse            exists; references {c.output_range[0]:.6g} to {c.output_range[1]:.6g}{output} "
             f"map to drives inside {c.input_range[0]:.6g} to {c.input_range[1]:.6g}{drive}"
         )
-        for arithmetic in (each.name for each in ARITHMETICS.values() if not each.fixed):
+        for arithmetic in FLOATING:
             bounds = error_bounds(c, arithmetic, model.engine(arithmetic=arithmetic))
             lines.append(
                 f"error, {arithmetic}     forward {_most(bounds.forward)}{output}, inverse "
@@ -85,7 +84,7 @@ def properties(model: Model, within: float = SETTLED) -> str:
     return "\n".join(lines)
 
 
-def facts(model: Model, within: float = SETTLED) -> dict[str, Any]:
+def facts(model: Model, within: float = SETTLED) -> dict[str, object]:
     """The same for programs, without error bounds and cost: `hystgen show --json`."""
     c, p = model.cascade, model.parameters
     problems = c.inverse_problems()
@@ -122,7 +121,7 @@ def cost(model: Model) -> str:
     it."""
     try:
         options = emit_options(model, operator="forward" if model.cascade.inverse_problems() else None)
-        found = module.cost_of(model.parameters, model.cascade, options)
+        found = module.of(model.parameters, model.cascade, options).cost
     except FormatError:
         return ""
     instances = (f"{op} instance {size} bytes of RAM" for op, size in found.memory.instances)
@@ -166,12 +165,12 @@ def _reading(model: Model) -> list[str]:
     """How the inverse treats the reference, in the words of the C banner; empty if `emit` refuses it."""
     try:
         options = emit_options(model, operator="inverse")
-        return module.reading_of(model.parameters, model.cascade, options)
+        return interface.reading(module.compensator(model.parameters, model.cascade, options))
     except (FormatError, NotInvertibleError, EffectsError):
         return []
 
 
-def _shown(value: Any) -> str:
+def _shown(value: object) -> str:
     """The text of a number or a list; a long list is shortened."""
     if isinstance(value, tuple):
         return "[" + ", ".join(_shown(entry) for entry in value[:8]) + (", ..]" if len(value) > 8 else "]")
@@ -181,7 +180,7 @@ def _shown(value: Any) -> str:
 def _fixed(model: Model, drive: str, output: str) -> list[str]:
     """Resolution and bounds of fixed point in physical units, or the reason for a refusal."""
     lines = []
-    for arithmetic in (each.name for each in ARITHMETICS.values() if each.fixed):
+    for arithmetic in FIXED:
         try:
             form = _format(model, arithmetic)
         except FormatError as error:
@@ -223,7 +222,7 @@ def warnings(model: Model) -> list[str]:
 
 def _inverse_error(model: Model, arithmetic: str) -> float:
     """Largest difference between the emitted inverse and the exact one, input units. Raises FormatError."""
-    if not ARITHMETICS[arithmetic].fixed:
+    if arithmetic in FLOATING:
         return error_bounds(model.cascade, arithmetic, model.engine(arithmetic=arithmetic)).rounding
     form = _format(model, arithmetic)
     return 0.0 if form.inverse_rounding is None else form.inverse_rounding * float(form.drive_lsb)

@@ -1,6 +1,6 @@
 """Verification: does the emitted C, compiled and run, give the bits of the Python reference?"""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from hystgen.verification.report import Report as Report
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 __all__ = ["Report", "Reports", "Row", "verify"]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     # Imported late, because the command line only needs the names of targets whenever it starts
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -8,9 +8,8 @@ import subprocess
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import SimpleNamespace
 
-from hystgen.emission import cost, module
+from hystgen.emission import cost, runtime
 from hystgen.verification import compilers
 from hystgen.verification.emulator import EmulatorError
 from hystgen.verification.report import Row, failed, selftest
@@ -133,8 +132,7 @@ def link(board: Board, sources: Sources, objects: Sequence[Path], folder: Path) 
     """Link a firmware in `folder`; its main, which is never shipped, is compiled without warnings. Raises
     CompileError."""
     main = folder / "firmware.c"
-    values = SimpleNamespace(name=sources.name, report=REPORT)
-    main.write_text(module.render("firmware_avr.c.j2", values), encoding="ascii")
+    main.write_text(runtime.template("firmware_avr.c.j2", name=sources.name, report=REPORT), encoding="ascii")
     image = folder / "firmware.elf"
     _gcc(board).run([*compilers.USER, f"-I{sources.harness.parent}", "-o", image, main, *objects])
     return image

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +21,8 @@ class Expected:
 
     name: str
     call: Bytes
-    x: NDArray[Any]
-    answer: NDArray[Any]
+    x: NDArray[np.number]
+    answer: NDArray[np.number]
     status: Bytes
 
 
@@ -38,7 +37,7 @@ class Mismatch:
 
 
 def expected_record(
-    numbers: Tables | FixedTables | ChainTables, real: np.dtype[Any], inverse: bool, calls: signals.Calls
+    numbers: Tables | FixedTables | ChainTables, real: np.dtype[np.number], inverse: bool, calls: signals.Calls
 ) -> Expected:
     """A record of calls, in numbers of type `real`, with the output of the bit reference."""
     name, op, values = calls
@@ -48,14 +47,14 @@ def expected_record(
 
 
 def expected_records(
-    numbers: Tables | FixedTables | ChainTables, real: np.dtype[Any], inverse: bool, length: int
+    numbers: Tables | FixedTables | ChainTables, real: np.dtype[np.number], inverse: bool, length: int
 ) -> list[Expected]:
     """The verification records of an operator with the output of the bit reference."""
     suite = signals.suite(numbers, real, inverse, length)
     return [expected_record(numbers, real, inverse, calls) for calls in suite]
 
 
-def _ulps(a: NDArray[Any], b: NDArray[Any]) -> float:
+def _ulps(a: NDArray[np.number], b: NDArray[np.number]) -> float:
     """Largest distance in units in the last place of `b`, or in codes."""
     if a.dtype.kind == "i":
         return float(np.max(np.abs(a.astype(np.int64) - b.astype(np.int64)), initial=0))
@@ -65,7 +64,7 @@ def _ulps(a: NDArray[Any], b: NDArray[Any]) -> float:
 
 
 def compare(
-    run: Callable[[Bytes, NDArray[Any]], tuple[NDArray[Any], Bytes]], records: Sequence[Expected]
+    run: Callable[[Bytes, NDArray[np.number]], tuple[NDArray[np.number], Bytes]], records: Sequence[Expected]
 ) -> Mismatch:
     """Run every record through `run` (calls and arguments to outputs and status) and compare it bit for bit."""
     samples = different = 0

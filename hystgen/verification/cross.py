@@ -8,10 +8,9 @@ import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 
 from hystgen.basics import extras
-from hystgen.emission import module
+from hystgen.emission import runtime
 from hystgen.verification import compilers
 from hystgen.verification.sources import Sources
 from hystgen.verification.targets import Target
@@ -69,12 +68,13 @@ class CrossCompiler:
             self.compiler.run(["-c", *common, *warnings, "-o", output, source])
             objects.append(output)
         script = folder / "image.ld"
-        values = SimpleNamespace(
+        text = runtime.template(
+            "image.ld.j2",
             **vars(layout),
             module=[f"{path.stem}.o" for path in sources.module],
             harness=[f"{path.stem}.o" for path in (*sources.all, *more) if path not in sources.module],
         )
-        script.write_text(module.render("image.ld.j2", values), encoding="ascii")
+        script.write_text(text, encoding="ascii")
         image = folder / "image.elf"
         linking = ["-nostartfiles", f"-Wl,-T,{script}", f"-Wl,-e,{entry}", "-Wl,--gc-sections"]
         self.compiler.run([*common, *linking, "-o", image, *objects, *self.libraries])

@@ -193,8 +193,8 @@ class Core:
         return "no function"
 
     def run(
-        self, name: str, op: str, call: Bytes, x: NDArray[Any], counted: str = "step"
-    ) -> tuple[NDArray[Any], Bytes]:
+        self, name: str, op: str, call: Bytes, x: NDArray[np.number], counted: str = "step"
+    ) -> tuple[NDArray[np.number], Bytes]:
         """Let the harness of operator `op` make the calls of a record; counts the instructions of NAME_OP_step, or of
         NAME_OP_commit."""
         sizes = (len(x), x.nbytes, x.nbytes, len(x))

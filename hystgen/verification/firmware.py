@@ -6,9 +6,8 @@ import shutil
 import subprocess
 from collections.abc import Sequence
 from pathlib import Path
-from types import SimpleNamespace
 
-from hystgen.emission import module
+from hystgen.emission import runtime
 from hystgen.verification.cross import CrossCompiler, MemoryMap
 from hystgen.verification.emulator import EmulatorError
 from hystgen.verification.sources import Sources
@@ -30,8 +29,8 @@ def build(
 ) -> Path:
     """Compile and link the firmware in the new folder `folder`. Raises CompileError."""
     source = folder.with_name(f"{folder.name}.c")
-    values = SimpleNamespace(name=sources.name, fpu=target.fpu, fault=FAULT)
-    source.write_text(module.render("firmware.c.j2", values), encoding="ascii")
+    text = runtime.template("firmware.c.j2", name=sources.name, fpu=target.fpu, fault=FAULT)
+    source.write_text(text, encoding="ascii")
     layout = MemoryMap(machine.flash, ram=machine.ram, **SIZES)
     return compiler.image(sources, folder, flags, layout, "firmware_reset", [source])
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import cffi
 import numpy as np
@@ -27,7 +26,7 @@ C_TYPES = {each.number: each.c_type for each in ARITHMETICS.values()}
 class _Library:
     """The compiled harness of a model, called through its C interface."""
 
-    def __init__(self, path: Path, sources: Sources, dtype: np.dtype[Any]) -> None:
+    def __init__(self, path: Path, sources: Sources, dtype: np.dtype[np.number]) -> None:
         self._ffi = cffi.FFI()
         self._real = C_TYPES[dtype]
         self._selftest = f"{sources.name}_selftest"
@@ -46,7 +45,7 @@ class _Library:
     def size(self, op: str) -> int:
         return int(getattr(self._lib, f"hystgen_harness_{op}_size")())
 
-    def run(self, op: str, call: Bytes, x: NDArray[Any]) -> tuple[NDArray[Any], Bytes]:
+    def run(self, op: str, call: Bytes, x: NDArray[np.number]) -> tuple[NDArray[np.number], Bytes]:
         answer, status = np.empty_like(x), np.empty(len(x), dtype=np.uint8)
         cast = self._ffi.cast
         getattr(self._lib, f"hystgen_harness_{op}")(
@@ -65,7 +64,7 @@ class _Library:
 def rows(
     sources: Sources,
     records: Callable[[str], Sequence[Expected]],
-    dtype: np.dtype[Any],
+    dtype: np.dtype[np.number],
     compiler: Sequence[str],
     folder: Path,
     progress: Callable[[str], None],

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import cffi
 
 from hystgen.arithmetic import ARITHMETICS
@@ -52,6 +50,7 @@ class Instance:
         """Return to the start memory of the parameter file."""
         self._init(self._context)
 
-    def step(self, x: Any) -> Any:
+    def step(self, x: float) -> float:
         """One sample."""
-        return self._step(self._context, x)
+        answer: float = self._step(self._context, x)
+        return answer

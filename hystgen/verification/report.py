@@ -7,7 +7,6 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
 
 from hystgen.basics import display
 from hystgen.basics.problems import counted
@@ -140,7 +139,7 @@ class Report:
         details = [f"\n{r.target} {r.compiler} {r.build}: {r.error}" for r in self.rows if "\n" in r.error]
         return "\n".join(lines + notes + details)
 
-    def content(self) -> dict[str, Any]:
+    def content(self) -> dict[str, object]:
         """The report as plain data for JSON."""
         file = {"file": self.file} if self.file else {}
         about = {"name": self.name, "arithmetic": self.arithmetic, "engine": self.engine, "layout": self.layout}
@@ -231,7 +230,7 @@ class Reports:
         return _xml(root)
 
 
-def _json(content: dict[str, Any]) -> str:
+def _json(content: dict[str, object]) -> str:
     return json.dumps({"hystgen": 1, **content}, indent=2) + "\n"
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType, SimpleNamespace
+from types import MappingProxyType
 
 from hystgen.arithmetic import ARITHMETICS, FLOAT32, Arithmetic
 from hystgen.basics import writing
 from hystgen.compensator.chain.layout import TRAVEL_BITS, VERIFIED_SHARE
-from hystgen.emission import module
+from hystgen.emission import module, runtime
 from hystgen.emission.chain import SETTINGS
 from hystgen.emission.options import Options
 from hystgen.model import Model
@@ -47,10 +47,10 @@ def harness(
     """The C that runs recorded calls of NAME_OP_step and the like; `more`: by operator, calls in addition to those of
     every model."""
     chain = {op: list(_chain_calls(name, op, more.get(op, ()), arithmetic)) for op in operators}
-    values = SimpleNamespace(
-        name=name, operators=operators, calls=CALLS, call_bits=slots.OP_CALL, unread=slots.OP_UNREAD, chain=chain
+    return runtime.template(
+        "harness.c.j2", name=name, operators=operators, calls=CALLS, call_bits=slots.OP_CALL, unread=slots.OP_UNREAD,
+        chain=chain,
     )
-    return module.render("harness.c.j2", values)
 
 
 def _chain_calls(name: str, op: str, more: Sequence[str], arithmetic: Arithmetic) -> Iterator[tuple[int, str]]:
@@ -59,15 +59,16 @@ def _chain_calls(name: str, op: str, more: Sequence[str], arithmetic: Arithmetic
     In fixed point travels have more bits than codes: values set are multiples of 2^TRAVEL_BITS, and the last bits are
     compared.
     """
-    own, fixed = f"{name}_{op}", arithmetic.fixed
+    own = f"{name}_{op}"
     for call, number in SETTINGS.items():
         if call in more:
-            travel = f" * ((int64_t)1 << {TRAVEL_BITS})" if fixed and call == "set_travel" else ""
+            wide = arithmetic.travels > 1 and call == "set_travel"
+            travel = f" * ((int64_t)1 << {TRAVEL_BITS})" if wide else ""
             yield number, f"{own}_{call}(&self, x[i]{travel})"
     if "travel" in more:
         yield slots.OP_TRAVELLED, f"answer[i] = ({name}_real_t){own}_travel(&self)"
     if "expected" in more:
-        share = int(VERIFIED_SHARE * (arithmetic.code_max + 1)) if fixed else VERIFIED_SHARE
+        share = arithmetic.share(VERIFIED_SHARE)
         yield slots.OP_EXPECTED, f"answer[i] = {own}_expected(&self)"
         yield slots.OP_CORRECT, f"{own}_correct(&self, x[i], ({name}_real_t){share})"
 
@@ -75,13 +76,11 @@ def _chain_calls(name: str, op: str, more: Sequence[str], arithmetic: Arithmetic
 def write(folder: Path, model: Model, options: Options) -> Sources:
     """Write the emitted files and the harness into `folder`."""
     name = model.name
-    texts = module.files(model.parameters, model.cascade, options)
-    operators = tuple(op for op in ("forward", "inverse") if getattr(options, op))
+    emitted = module.of(model.parameters, model.cascade, options)
+    texts = module.files(emitted)
     if options.layout == "single-header":
         texts[f"{name}.c"] = f'#define {name.upper()}_IMPLEMENTATION\n#include "{name}.h"\n'
-    texts["hystgen_harness.c"] = harness(
-        name, operators, module.calls_of(model.parameters, model.cascade, options), ARITHMETICS[options.arithmetic]
-    )
+    texts["hystgen_harness.c"] = harness(name, options.operators, emitted.calls, ARITHMETICS[options.arithmetic])
     paths = {path.name: path for path in writing.write_files(folder, texts) if path.suffix == ".c"}
     selftest, caller = paths.pop(f"{name}_selftest.c"), paths.pop("hystgen_harness.c")
-    return Sources(name, operators, tuple(paths.values()), caller, selftest)
+    return Sources(name, options.operators, tuple(paths.values()), caller, selftest)

@@ -4,33 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hystgen.compensator.chain.catalogue import AHEAD, BEHIND, BESIDE, PARTS, parts_with
 from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
-from hystgen.effects.ageing import compensator as ageing
-from hystgen.effects.creep import compensator as creep
-from hystgen.effects.drift import compensator as drift
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, PARTS, parts_with
 from hystgen.effects.kinds import Constants
-from hystgen.effects.lag import compensator as lag
-from hystgen.effects.part import Part
-from hystgen.effects.resonance import compensator as resonance
-from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal import fixed as thermal_fixed
+from hystgen.effects.part import ChainPart
 
-KINDS = (
-    creep.KIND, lag.KIND, lag.EXACT_KIND, lag.BRAKED_KIND, ageing.KIND, thermal.HEAT_KIND, thermal.KIND, resonance.KIND,
-    drift.KIND, thermal.FRICTION_KIND,
-)  # fmt: skip
+KINDS = tuple(kind for part in PARTS for kind in part.kinds)
 """The kinds of blocks in the catalogue, each with its C in the folder of its effect."""
 
 
-def of(t: ChainTables, parts: Sequence[Part], operator: str = "forward") -> list[Constants]:
+def of(t: ChainTables, parts: Sequence[ChainPart], operator: str = "forward") -> list[Constants]:
     """The blocks of an operator that some parts of the chain have."""
     every = parts_with(*t.own_blocks, t.own_effects) if isinstance(t, OwnChainTables) else PARTS
     pairs = [(every[k], t.blocks[k]) for k in map(PARTS.index, parts)]
     return [
         each for part, tables in pairs if operator == "forward" or not part.forward
         for each in part.arithmetic(t.fixed).constants(tables)
-    ]  # fmt: skip
+    ]
 
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constants]]:
@@ -45,7 +35,8 @@ def every(t: ChainTables, operator: str) -> list[Constants]:
 
 def rubbing(t: ChainTables) -> list[Constants | None]:
     """The plays whose friction warms, of each block of own heat; None where the drive's square does."""
-    return list((thermal_fixed if t.fixed else thermal).friction_constants(t.of("heat")))
+    pairs = zip(PARTS, t.blocks, strict=True)
+    return [each for part, tables in pairs for each in part.arithmetic(t.fixed).beside(tables)]
 
 
 def clocks(t: ChainTables) -> list[Constants]:

@@ -30,16 +30,10 @@ from hystgen.compensator import engines
 from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, ErrorBounds, LoopRoundings, error_bounds, together
 from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, ahead_of, crossing, lead
-from hystgen.compensator.chain.parts import Parts
-from hystgen.effects.ageing import compensator as ageing
-from hystgen.effects.ageing.compensator import TABLE_ERROR
-from hystgen.effects.creep import compensator as creep
-from hystgen.effects.lag import compensator as lag
+from hystgen.compensator.chain.parts import SENT, Parts
+from hystgen.effects.part import Gained, Speed
 from hystgen.effects.rate_dependence import compensator as dashpot
-from hystgen.effects.resonance import compensator as resonance
 from hystgen.effects.saturation.model import TanhSaturation
-from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
 from hystgen.front.tanh import kernels
 from hystgen.plays import slots
 
@@ -64,10 +58,9 @@ def _sizes(compiled: Compiled) -> _Sizes:
     drive = max(abs(end) for end in static.input_range)
     bent = moving.largest_bend(static, compiled.parts.plays)
     plays = LoopRoundings.of(static).level + math.fsum(map(abs, static.pi.weights)) * bent
-    output = plays * math.prod(float(row[creep.REST]) for row in t.of("creep").block)
-    output *= math.prod(each.forward.largest for each in compiled.own_behind)
+    output = plays * math.prod(one.growth for one in compiled.behind)
     ends = [abs(float(t.limits[slots.OUTPUT_MIN])), abs(float(t.limits[slots.OUTPUT_MAX]))]
-    settings = 2.0 * max(ends) * (1 + 3 * len(t.of("clock")))  # a drift has six roundings of its own
+    settings = 2.0 * max(ends) * (1 + 3 * t.number_of("clock"))  # a drift has six roundings of its own
     return _Sizes(drive, plays, output, max(ends) + abs(static.output_offset) + settings)
 
 
@@ -98,60 +91,14 @@ def _saturation(compiled: Compiled, u: float, kind: str) -> tuple[float, float, 
     return slope, back, there
 
 
-def _creep(compiled: Compiled, j: int, size: float, u: float) -> tuple[float, float]:
-    """Roundings of the output of a block whose input is at most `size`, and the gain of its inverse."""
-    one = compiled.ones["creep"][j]
-    rest, terms = one.rest, one.terms
-    rate, late, weight = terms[:, creep.RATE], terms[:, creep.LATE], terms[:, creep.WEIGHT]
-    total = float(np.sum(weight))
-    states = (16.0 + len(terms)) * total + u * float(np.sum(weight / rate))
-    around = rest - 2.0 * total + 2.0 * float(np.sum(late))
-    slope = rest - total + float(np.sum(late))
-    return u * size * (states + 4.0 * rest), 1.0 / around if around > 0.0 else 2.0 / slope - 1.0 / rest
-
-
-def _late(compiled: Compiled) -> float:
-    """Largest change of the ageing gain in a step at the fastest rate, share of the output, plus its table's error."""
-    effects = compiled.parts.blocks["ageing"]
-    return max(ageing.most_at_once(each, compiled.largest_step) for each in effects) + TABLE_ERROR
-
-
-def _warmed(compiled: Compiled) -> float:
-    """Change of the output by the heat of one sample at the fastest rate."""
-    ends, output = compiled.static.input_range, _sizes(compiled).output
-    return math.fsum(
-        thermal.most_at_once(each, ends, compiled.largest_step, compiled.seconds)
-        * (abs(each.gain_per_degree) * output + abs(each.offset_per_degree))
-        for each in compiled.parts.blocks["heat"]
-    )
-
-
-def _misjudged(compiled: Compiled, u: float, emitted: bool) -> float:
-    """Change of the output by what the plays that rub are wrong about the heat at the fastest rate."""
-    ends, output, step = compiled.static.input_range, _sizes(compiled).output, compiled.largest_step
-    found = 0.0
-    for each in compiled.parts.blocks["heat"]:
-        rubbing = thermal.thresholds(each, ends)
-        if not rubbing:
-            continue
-        # each play stands by a rounding off, and one that stays because another one does by three
-        amount = len(rubbing) ** 2 * 4.0 * u * (max(map(abs, ends)) + rubbing[-1])
-        amount += (len(rubbing) + 3.0) * u * thermal.most_amount(each, ends, step)
-        degrees = amount * thermal.per_amount(each, ends, compiled.seconds)
-        if emitted:
-            degrees += thermal.coarseness(each, ends, step, compiled.seconds)
-        found += degrees * (abs(each.gain_per_degree) * output + abs(each.offset_per_degree))
-    return found
-
-
-def _gain_ends(compiled: Compiled) -> tuple[float, float]:
-    """Least and largest product of the gains: those that are set, and those of own heat at the fastest rate."""
-    set_ones = len(compiled.tables.of("gain")) + len(compiled.tables.of("ageing").turns)
-    least, largest = LEAST_GAIN**set_ones, LARGEST_GAIN**set_ones
-    for each in compiled.parts.blocks["heat"]:
-        _, low, high = thermal.reached(each, compiled.static.input_range, compiled.largest_step, compiled.seconds)
-        least, largest = least * low, largest * high
-    return least, largest
+def _gains(compiled: Compiled, u: float, emitted: bool) -> Gained:
+    """All gains in one, those of own heat at the fastest rate; `emitted` as for `_moving`."""
+    speed = Speed(compiled.static.input_range, compiled.largest_step, compiled.seconds)
+    output = _sizes(compiled).output
+    found = [one.gained(speed, output, u, emitted) for one in compiled.behind]
+    ends = math.prod(each.least for each in found), math.prod(each.largest for each in found)
+    there, back = sum(each.there for each in found), sum(each.back for each in found)
+    return Gained(sum(each.roundings for each in found), *ends, there, back)
 
 
 def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float, float]:
@@ -191,89 +138,49 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
     have seen the same drives.
     """
     u = float(np.finfo(kind).eps) / 2
-    t, sizes = compiled.tables, _sizes(compiled)
+    sizes = _sizes(compiled)
     slope, back, there = _saturation(compiled, u, kind)
-    gains = sum(map(t.number_of, ("gain", "ageing"))) + 9 * t.number_of("heat")  # own heat: the temperature's too
-    least, gain = _gain_ends(compiled)
+    gains, least, gain, misjudged, late = _gains(compiled, u, emitted)
     taps = float(np.sum(np.abs(compiled.taps.weights))) if compiled.taps else 1.0
     inverse = 4.0 * u * sizes.displacement * slope + back
     if compiled.taps:
         inverse = taps * (inverse + u * (len(compiled.taps.weights) + 1) * sizes.displacement * slope)
     inverse = inverse / least + 3.0 * u * gains * taps * sizes.output / least
-    late = 0.0
-    if t.of("ageing").turns.size and emitted:  # the C takes the gain at the travel one sample before, from a table
-        late = _late(compiled) * sizes.output
-        inverse += late / least
-    if t.of("heat").turns.size and emitted:  # the C leaves out the heat of one sample
-        inverse += _warmed(compiled) / least
-    misjudged = _misjudged(compiled, u, emitted)
-    inverse += misjudged / least
-    moved = sum(u * sizes.drive * (8.0 + u / float(row[lag.RATE])) for row in t.of("lag").block)
-    moved += 4.0 * u * sizes.drive * (t.of("delay").samples > 0)
+    inverse += late / least
+    ahead, behind, ones = ahead_of(compiled.ones), compiled.behind, compiled.ones
+    moved = max((one.rounding(sizes.drive, u)[0] for part in SENT for one in ones[part.name]), default=0.0)
     moved += _slewed(compiled, kind)
     if not emitted:  # in double precision each step of such a drive is rounded
         moved += u * sizes.drive * crossing(compiled.static, compiled.parts, compiled.seconds)
-    moved += sum(each.rounding(sizes.drive, u)[0] for each in compiled.own_ahead)
+    moved += sum(one.rounding(sizes.drive, u)[0] for one in ahead)
     static = compiled.static
     forward = static.front_slopes[1] * math.fsum(abs(p) for p in static.pi.weights) * moved
-    followed = len(t.of("lag").exact) or compiled.own_ahead
-    if emitted and followed and static.branches_differ:  # the input of the front may come to rest on either branch
+    if emitted and ahead and static.branches_differ:  # the input of the front may come to rest on either branch
         forward += static.pi.slopes[-1] * static.branch_gap
-    size = sizes.plays * math.prod(float(row[creep.REST]) for row in t.of("creep").block)
-    roundings = []
-    for each in compiled.own_behind:
-        roundings.append(each.rounding(size, u))
-        size *= each.forward.largest
-    for each, (_, back) in zip(reversed(compiled.own_behind), reversed(roundings), strict=True):
-        inverse = each.passed(inverse) + back
-    size = sizes.plays
-    for j in range(len(t.of("creep").block)):
-        rounding, back_gain = _creep(compiled, j, size, u)
-        forward = forward * float(t.of("creep").block[j, creep.REST]) + rounding
-        inverse = (1.0 / float(t.of("creep").block[j, creep.SLOPE]) if same else back_gain) * (inverse + rounding)
-        size *= float(t.of("creep").block[j, creep.REST])
-    for each, (there_own, _) in zip(compiled.own_behind, roundings, strict=True):
-        forward = forward * each.forward.largest + there_own
-    forward = gain * (forward + 3.0 * u * sizes.output * gains) + misjudged + TABLE_ERROR * sizes.output * (late > 0.0)
+    given = sizes.plays * np.cumprod([1.0, *(one.growth for one in behind)])
+    for one, size in zip(behind, given.tolist(), strict=False):
+        forward = forward * one.growth + one.rounding(size, u)[0]
+    for one, size in zip(reversed(behind), given[-2::-1].tolist(), strict=True):
+        inverse = one.solved(inverse, size, u, same)
+    forward = gain * (forward + 3.0 * u * sizes.output * gains) + misjudged
     size, ringing = gain * sizes.output + sizes.displacement, 1.0
-    for mode in compiled.ones["mode"]:
-        forward = mode.largest * forward + resonance.rounding(mode, size, u)
-        size, ringing = mode.largest * size, ringing * mode.largest
+    for mode in compiled.last:
+        forward = mode.growth * forward + mode.rounding(size, u)[0]
+        size, ringing = mode.growth * size, ringing * mode.growth
     return forward + ringing * there + 3.0 * u * ringing * sizes.displacement, inverse
 
 
-def _lags(compiled: Compiled, error: float, u: float, same: bool) -> float:
-    """The error of the drive for an error in front of the plays; `same` as for `_one`.
-
-    States that have seen the same drives pass on `goal/rate`, and the target before, which follows from earlier
-    targets, `W = theta^2 e + theta (1 - theta) W`.
-    """
+def _led(compiled: Compiled, error: float, u: float, same: bool) -> float:
+    """The error of the drive for an error in front of the plays; `same` as for `_one`."""
     drive, turning = _sizes(compiled).drive, bool(compiled.tables.turning)
-    for each in reversed(compiled.own_ahead):
-        error = each.passed(error) + each.rounding(drive, u)[1]
-    for exact, row in zip(compiled.tables.of("lag").exact, compiled.tables.of("lag").block.astype(float), strict=True):
-        rate = float(row[lag.RATE])
-        if exact:
-            error = ((2.0 - rate) * error + 8.0 * u * drive) / float(row[lag.LATE] - row[lag.EARLY])
-            continue
-        theta = float(row[lag.THETA])
-        states = u * drive * (5.0 + u / rate)
-        farthest = (1.0 + 2.0 * theta) / (1.0 - theta)
-        before = lag.shifted(theta, turning) if same else farthest
-        goal = before * error + farthest * states + 6.0 * u * drive
-        error = (goal + states) * (1.0 if same else 2.0 - rate) / rate + u * drive * (2.0 + 6.0 / rate)
+    for one in reversed(ahead_of(compiled.ones)):
+        error = one.led(error, drive, u, same, turning)
     return error + _kept(compiled) * turning
 
 
 def _seen(compiled: Compiled) -> float:
-    """Factor by which the states of creep and of the user's own blocks, which see the sum of the plays, multiply an
-    error of the plays."""
-    t, found = compiled.tables.of("creep"), 1.0
-    for j, slope in enumerate(t.block[:, creep.SLOPE].astype(float).tolist()):
-        found *= slope * _creep(compiled, j, 0.0, 0.0)[1]
-    for each in compiled.own_behind:
-        found *= each.passed(0.0, 1.0)
-    return max(found, 1.0)
+    """Factor by which the states of blocks that see the sum of the plays multiply an error of the plays."""
+    return max(math.prod(one.seen() for one in compiled.behind), 1.0)
 
 
 def _kept(compiled: Compiled) -> float:
@@ -304,7 +211,7 @@ def kept_branch(compiled: Compiled) -> float:
     that their values there bound those in between.
     """
     static, t = compiled.static, compiled.tables
-    theta = compiled.ones["lag"][0].row[lag.THETA] if t.turning else 0.0
+    theta = ahead_of(compiled.ones)[0].row[1] if t.turning else 0.0
     unit = 1.0
     if compiled.codes is not None:
         unit = float(compiled.codes.drive_lsb) / 2.0 ** float(t.number[DRIVE_BITS])
@@ -319,9 +226,8 @@ def kept_branch(compiled: Compiled) -> float:
         far = last + theta * (last - other) + math.copysign(more, last - first)
         worst = max(worst, abs(float(static.front(far, up)) - begin))
     steep = 1.0 + abs(moving.steepest_bend(static, compiled.parts.plays))
-    rest = math.prod(one.rest for one in compiled.ones["creep"])
-    rest *= math.prod(each.forward.largest for each in compiled.own_behind)
-    return worst * static.pi.slopes[-1] * steep * rest * _gain_ends(compiled)[1]
+    rest = math.prod(one.growth for one in compiled.behind)
+    return worst * static.pi.slopes[-1] * steep * rest * _gains(compiled, 0.0, True).largest
 
 
 def swing(static: StaticModel, parts: Parts, seconds: float) -> float:
@@ -347,8 +253,8 @@ def condition(compiled: Compiled) -> str:
     still = STILL * (compiled.tables.quiet > 0)
     if compiled.tables.braked:
         return together(SAME, UNSLEWED, still)
-    missed = not all(compiled.tables.of("lag").exact) or len(compiled.own_ahead) > 0
-    remembered = compiled.static.pi.n > 0 or len(compiled.tables.of("creep").block) > 0
+    missed = any(one.misses for one in ahead_of(compiled.ones))
+    remembered = compiled.static.pi.n > 0 or any(one.remembers for one in compiled.behind)
     dilated = compiled.tables.moving.moves == moving.DILATED
     return together(SAME, still) if dilated or compiled.tables.turning or (missed and remembered) else ""
 
@@ -391,13 +297,10 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
         apart = gain * pi.slopes[-1] * static.front_slopes[1] * kept
         plays = ErrorBounds(plays.forward, plays.inverse + kept + apart, plays.rounding + kept + apart)
     inverse, rounding = (
-        min(SECOND_ORDER * _lags(compiled, seen * own + (seen - 1.0) * only_seen + gain * asked, u, same), whole)
+        min(SECOND_ORDER * _led(compiled, seen * own + (seen - 1.0) * only_seen + gain * asked, u, same), whole)
         for own in (plays.inverse, plays.rounding)
     )
-    if same or (compiled.tables.slew and (len(compiled.tables.of("lag").exact) or compiled.own_ahead)):
+    if same or (compiled.tables.slew and ahead_of(compiled.ones)):
         inverse = whole
-    rest = math.prod(float(row[creep.REST]) for row in compiled.tables.of("creep").block)
-    rest *= math.prod(each.forward.largest for each in compiled.own_behind)
-    most = _gain_ends(compiled)[1] * rest
-    most *= math.prod(mode.largest for mode in compiled.ones["mode"])
+    most = _gains(compiled, u, True).largest * math.prod(one.growth for one in (*compiled.behind, *compiled.last))
     return ErrorBounds(SECOND_ORDER * (forward + most * plays.forward), inverse, rounding)

@@ -6,14 +6,14 @@ from collections import Counter
 
 from hystgen.compensator import engines
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.catalogue import NAMES
 from hystgen.compensator.chain.layout import ChainTables
+from hystgen.compensator.chain.parts import NAMES
 from hystgen.plays import slots
 
 PARTS = (
     "any", "creep", "lag", "lag_exact", "ageing", "heat", "friction", "gain", "clock", "preview", "slew", "braked",
     "tanh", "dead_zone", "relaxing", "dilated", "dashpot", "polynomial", "centre", "mode", "delay", "quiet",
-)  # fmt: skip
+)
 """Parts of the code: `any` (with engine corners `any_corners`) once for a model with effects, the others once for
 each kind of block in it; `friction` beside `heat` for the heat of plays that rub, `dilated` for all plays whose input
 is found by a search, `braked` for a lag and a slew limit together, `quiet` for a drive that stands still at rest."""
@@ -29,15 +29,16 @@ def parts(t: ChainTables, operator: str) -> list[str]:
     """The parts that an operator of a model has; two blocks of one kind share their code."""
     exact = t.of("lag").exact.tolist()
     kinds = [int(kind) for kind in (t.behind.kind if t.fixed else t.behind.stage_kind)]
-    found = Counter(dict(zip(NAMES, t.count.tolist(), strict=True)) | {
-        "lag": exact.count(0), "lag_exact": exact.count(1), "friction": t.of("heat").plays.any(), "preview": len(t.tap),
+    found = Counter(dict(zip(NAMES, t.counts.tolist(), strict=True)) | {
+        "delay": t.number_of("wait"), "lag": exact.count(0), "lag_exact": exact.count(1),
+        "friction": t.of("heat").plays.any(), "preview": len(t.tap),
         "slew": t.slew, "braked": t.braked,
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),
         "relaxing": t.moving.scanned, "dilated": t.moving.used and not t.moving.scanned,
         "dashpot": t.moving.moves == moving.DASHPOT,
         "quiet": t.quiet,
         "polynomial": t.moving.bends == moving.POLYNOMIAL, "centre": t.moving.bends == moving.CENTRE,
-    })  # fmt: skip
+    })
     common = "any" if t.plays.engine == slots.LOOP else "any_corners"
     return [common, *(part for part in PARTS[1:] if found[part] and OPERATORS.get(part, operator) == operator)]
 

@@ -23,12 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic.factors import MANTISSA_BITS, lifted
 from hystgen.arithmetic.factors import error as missed
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, together
 from hystgen.compensator.chain.bounds import SAME, STILL
-from hystgen.compensator.chain.layout import DITHER, ChainTables, largest_way
+from hystgen.compensator.chain.layout import DITHER, ChainTables, ahead_of, largest_way
 from hystgen.compensator.chain.moving import (
     DASHPOT,
     DILATED,
@@ -40,37 +39,14 @@ from hystgen.compensator.chain.moving import (
     steepest_bend,
     yield_error,
 )
-from hystgen.compensator.chain.own_fixed import Formats
-from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.parts import BEHIND, LED, NAMES, Parts
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, upward
-from hystgen.effects.ageing import compensator as ageing
-from hystgen.effects.creep import compensator as creep
-from hystgen.effects.creep import fixed as creep_fixed
-from hystgen.effects.creep.compensator import CreepNumbers
-from hystgen.effects.lag import compensator as lag
-from hystgen.effects.lag import fixed as lag_fixed
-from hystgen.effects.lag.compensator import LagNumbers
+from hystgen.effects.part import Coded, CodedGain, Coding, Sought, Speed
 from hystgen.effects.rate_dependence import compensator as dashpot
-from hystgen.effects.resonance import fixed as resonance_fixed
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
-from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
-from hystgen.effects.thermal.fixed import GAIN_BITS, TEMPERATURE_BITS
-from hystgen.effects.thermal.model import OwnHeat
-
-GAINS = ("ageing", "heat", "gain")
-"""Parts whose blocks are gains, in the order of the chain."""
 
 DOUBLE = 2.0**-40
 """Relative error of double precision itself: a thousand roundings."""
-
-CUBIC_ERROR, LINEAR_ERROR, RECIPROCAL_ERROR = (last_bits * 2.0**-GAIN_BITS for last_bits in (8.0, 1.0, 4.0))
-"""[share of what passes] Errors of a gain from a piece of a cubic: four coefficients and products, and a share that is
-rounded to 20 bits, where the gain changes by a hundredth; of one linear in a temperature: a product; and of the
-reciprocal of a gain of at least 1/2: that of a linear one's error twice, and a step of Newton's."""
-
-FACTOR_ERROR, DEGREES = 2.0**-MANTISSA_BITS, 2.0 ** -(TEMPERATURE_BITS + 1)
-"""[share of a product, degrees] Errors of a factor and of the reference of a temperature: half of their last bits."""
 
 
 @dataclass(frozen=True)
@@ -102,17 +78,6 @@ class Sizes:
 
 
 @dataclass(frozen=True)
-class Gain:
-    """A gain behind the plays: its ends, and in output codes what it adds to errors of its output and of its input that
-    is solved for, beside the rounding of either."""
-
-    least: float
-    largest: float
-    there: float
-    back: float
-
-
-@dataclass(frozen=True)
 class Bend:
     """The curve of a saturation, with the bits of a signal that arguments and values leave out."""
 
@@ -130,11 +95,10 @@ class Bend:
 class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
-    `ones`, `formats`: the blocks of each part; `in_front`: sizes of those in front of the plays; `bends`: the curve and
-    inverse curve of each tanh; `ends`: of the output; `slewed`: drive codes that rounding takes from a drive at a
-    limited rate; `reached`: whether the lag can be led to every input asked of the
-    plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in front of the plays below their input;
-    `bumps`: of bent plays.
+    `formats`: the blocks of each part; `bends`: the curve and inverse curve of each tanh; `ends`: of the output;
+    `slewed`: drive codes that rounding takes from a drive at a limited rate; `reached`: whether the block in front can
+    be led to every input asked of the plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in front of
+    the plays below their input; `bumps`: of bent plays.
     """
 
     static: StaticModel
@@ -144,9 +108,7 @@ class Bounds:
     sizes: Sizes
     bits: int
     drop: int
-    ones: dict[str, list[Any]]
     formats: dict[str, list[Any]]
-    in_front: dict[str, list[tuple[float, float]]]
     taps: list[float]
     bends: list[Bend]
     ends: tuple[float, float]
@@ -156,26 +118,6 @@ class Bounds:
     finer: int
     seconds: float
     bumps: Bumps
-
-    @property
-    def lags(self) -> list[LagNumbers]:
-        """The lags."""
-        return self.ones["lag"]
-
-    @property
-    def creeps(self) -> list[CreepNumbers]:
-        """The creep blocks."""
-        return self.ones["creep"]
-
-    @property
-    def ahead(self) -> list[Formats]:
-        """Blocks of the user's own in front of the plays."""
-        return self.formats["own_ahead"]
-
-    @property
-    def behind(self) -> list[Formats]:
-        """Blocks of the user's own behind the plays."""
-        return self.formats["own_behind"]
 
     @property
     def drifted(self) -> float:
@@ -200,90 +142,30 @@ class Bounds:
     @property
     def _way(self) -> float:
         """As `Compiled.largest_way`."""
-        return largest_way(self.static, [each.linear for each in self.ahead], self.largest_step)
+        return largest_way(self.static, [each.one for each in self._ahead], self.largest_step)
 
     # ------------------------------------------------------------ blocks
 
-    def _creep(self, j: int) -> float:
-        """Roundings of the output of creep j, in output codes."""
-        numbers, size = self.creeps[j], self.sizes.given["creep"][j]
-        bits, drop = (int(x) for x in self.tables.of("creep").block[j, [creep_fixed.BITS, creep_fixed.DROP]])
-        state = 2.0**-bits * self._signal
-        found = 0.0
-        for rate, _, late, weight in numbers.terms.tolist():
-            scale = 2.0 ** (bits - lifted(late, bits))
-            found += state * (0.5 / rate + 2.0**drop) + 0.5 * self._signal / scale / rate
-            found += 0.5 * self._signal + missed(weight) * size + 2.0 * size * missed(late * scale) / scale / rate
-            found += 2.0 * weight * size * missed(rate * 2.0**drop) / 2.0**drop / rate
-        direct = numbers.rest - float(sum(numbers.terms[:, creep.WEIGHT]))
-        return found + missed(direct) * size + self._signal
-
-    def _creep_back(self, j: int) -> float:
-        """Roundings of its inverse, as errors of the output."""
-        numbers, size = self.creeps[j], self.sizes.given["creep"][j]
-        moved = self.sizes.asked + size * numbers.rest
-        return numbers.slope * (missed(1.0 / numbers.slope) * moved + 0.5 * self._signal)
-
-    def _creep_gain(self, numbers: CreepNumbers) -> float:
-        """Largest gain of its inverse, as in `hystgen.compensator.chain.bounds`."""
-        if self.condition:
-            return 1.0 / numbers.slope
-        total, late = (float(sum(numbers.terms[:, column])) for column in (creep.WEIGHT, creep.LATE))
-        around = numbers.rest - 2.0 * total + 2.0 * late
-        return 1.0 / around if around > 0.0 else 2.0 / numbers.slope - 1.0 / numbers.rest
-
-    def _lag(self, j: int, given: float, asked: float) -> tuple[float, float, float]:
-        """Roundings of the output of lag j, of its state in the inverse, and of the answer, in units of signals.
-
-        `given`, `asked`: sizes of the input, and of the output asked for.
-        """
-        exact, (rate, second, late, inverse) = self.lags[j].exact, self.lags[j].row
-        bits, drop = (int(x) for x in self.tables.of("lag").block[j, [lag_fixed.BITS, lag_fixed.DROP]])
-        state, scale = 2.0**-bits, 2.0**drop
-        sizes = self.lags[j].sizes(given, asked, bool(self.tables.turning))
-        kept = state * (0.5 / rate + scale) + 2.0 * given * missed(rate * scale) / scale / rate
-        if exact:
-            kept += (0.5 * state + 2.0 * given * missed(late * 2.0**bits) / 2.0**bits) / rate
-            answer = sizes.state * missed(inverse * 2.0 ** (drop - bits)) * 2.0 ** (bits - drop) + state * scale / late
-            return kept + 0.5, kept, answer + 0.5
-        product = state * (0.5 + scale * second) + sizes.state * missed(second * scale) / scale
-        answer = sizes.state * missed(inverse * 2.0 ** (drop - bits)) * 2.0 ** (bits - drop) + state * scale * inverse
-        return 3.0 * kept + product + 0.5, kept + 3.0 * product, answer + 1.0
-
-    def _passed(self, each: Formats, error: float, own: float) -> float:
-        """Error of the input that a user's own block is solved for, by an error of its output and a rounding `own`."""
-        if self.condition:
-            return error / abs(each.linear.forward.d) + own
-        return each.linear.passed(error, own)
-
     @cached_property
-    def _gains(self) -> list[Gain]:
-        """The gains behind the plays, from there on."""
-        lsb, step, ends = float(self.inner.output_lsb), self.largest_step, self.static.input_range
-        span = (self.ends[1] - self.ends[0]) / lsb
-        size = next((sizes[0] for part in GAINS if (sizes := self.sizes.given[part])), 0.0)
-        found = []
-        for each in self.parts.blocks["ageing"]:
-            begun = 0.5 * float(self.inner.drive_lsb) * abs(ageing.steepness(each, 0.0))  # pieces begin at whole codes
-            wrong = ageing.TABLE_ERROR + begun + CUBIC_ERROR
-            late = ageing.most_at_once(each, step) + wrong / LEAST_GAIN + RECIPROCAL_ERROR
-            found.append(Gain(LEAST_GAIN, LARGEST_GAIN, wrong * size, late * size))
-            size *= LARGEST_GAIN
-        heats = [one.error for one in self.formats["heat"]]
-        linear = [*zip(self.parts.blocks["heat"], heats, strict=True)]
-        linear += [(each, DEGREES) for each in self.parts.blocks["gain"]]
-        for each, wrong in linear:
-            least, largest, offset, at_once = LEAST_GAIN, LARGEST_GAIN, span, 0.0
-            if isinstance(each, OwnHeat):
-                wrong += thermal.coarseness(each, ends, step, self.seconds)
-                at_once = thermal.most_at_once(each, ends, step, self.seconds)
-                warmest, least, largest = thermal.reached(each, ends, step, self.seconds)
-                offset = warmest * abs(each.offset_per_degree) / lsb
-            degree = abs(each.gain_per_degree) * size + abs(each.offset_per_degree) / lsb
-            there = wrong * degree + LINEAR_ERROR * size + FACTOR_ERROR * offset
-            back = (wrong + at_once) * degree / least + RECIPROCAL_ERROR * size + FACTOR_ERROR * offset / least
-            found.append(Gain(least, largest, there, back))
-            size = size * largest + offset
+    def _ahead(self) -> list[Any]:
+        """Blocks in front of the plays."""
+        return ahead_of(self.formats)
+
+    def _behind(self, forward: bool) -> list[tuple[Coded, float, CodedGain | None]]:
+        """Blocks behind the plays, with the size of their input, and as gains; those of the `forward` operator or of
+        the inverse."""
+        parts = [part.name for part in BEHIND if forward or not part.forward]
+        speed = Speed(self.static.input_range, self.largest_step, self.seconds)
+        lsb = float(self.inner.output_lsb)
+        coding = Coding(float(self.inner.drive_lsb), lsb, (self.ends[1] - self.ends[0]) / lsb)
+        found: list[tuple[Coded, float, CodedGain | None]] = []
+        reached = 0.0  # of gains one after the other, whose ends are nearer than those that signals have room for
+        for name in parts:
+            for each, size in zip(self.formats[name], self.sizes.given[name], strict=True):
+                gain = each.gain(reached or size, speed, coding)
+                found.append((each, size, gain))
+                if gain:
+                    reached = (reached or size) * gain.largest + gain.offset
         return found
 
     def _saturation(self) -> tuple[float, float, float]:
@@ -317,17 +199,14 @@ class Bounds:
     def _arrival(self) -> tuple[float, float]:
         """Roundings of the signal in front of the plays for the drive as sent, and its change by rounding the drive to
         a code, in units of signals."""
-        here = sum(self._lag(j, *sizes)[0] for j, sizes in enumerate(self.in_front["lag"]))
-        here += sum(each.output for each in self.ahead)
+        here = sum(each.arrived for each in self._ahead)
         here += 0.5 * 2.0**self.finer if self.finer else 0.0
         code = 0.5 * 2.0**self._fine
         if self._kept:
             return here, code + self._kept
-        if self.lags:
-            rate, theta, _, _ = self.lags[0].row
-            return here, code * (1.0 if self.lags[0].exact else rate * (1.0 + 2.0 * theta))
-        rounded = bool(self.static.stages or self.ahead) or self._fine > 0
-        return here, code * rounded
+        if self._ahead:
+            return here, code * self._ahead[0].follows
+        return here, code * (bool(self.static.stages) or self._fine > 0)
 
     @property
     def _kept(self) -> float:
@@ -402,19 +281,14 @@ class Bounds:
     def forward(self) -> float:
         """Bound of the forward operator, in output codes."""
         short = float(self.inner.drive_short() / self.inner.drive_lsb) * 2.0**self._fine
-        waited = 0.5 * 2.0**self._fine * bool(self.tables.of("delay").samples and self.tables.of("delay").share[0])
+        waited = 0.5 * 2.0**self._fine * bool(self.tables.of("wait").samples and self.tables.of("wait").share[0])
         error = self._plays(self._arrival()[0] + short + waited + self.slewed * 2.0**self._fine)
-        if (self.lags or self.ahead) and self.static.branches_differ:  # the front may settle on either branch
+        if self._ahead and self.static.branches_differ:  # the front may settle on either branch
             error += self.static.pi.slopes[-1] * self.static.branch_gap / float(self.inner.output_lsb)
-        for j, numbers in enumerate(self.creeps):
-            error = error * numbers.rest + self._creep(j)
-        for each in self.behind:
-            error = error * each.linear.forward.largest + each.output * self._signal
-        for gain in self._gains:
-            error = gain.largest * error + gain.there + self._signal
-        for mode, size, row in zip(self.ones["mode"], self.sizes.given["mode"], self.tables.of("mode"), strict=True):
-            scale = 2.0**self.bits
-            error = error * mode.largest + resonance_fixed.rounding(mode, row, size * scale) / scale
+        for each, size, gain in self._behind(True):
+            error = error * each.one.growth + each.there(size, self._signal)
+            if gain:
+                error = gain.largest * error + gain.there + self._signal
         beside = self._saturation()[2] + 0.5 + (1.0 + self.drifted) * self._signal
         return upward(Fraction(SECOND_ORDER * (error + beside) + DOUBLE * self.sizes.output))
 
@@ -429,27 +303,21 @@ class Bounds:
             size = max(self.sizes.undone)
             own = sum(missed(weight) * size + 0.5 * self._signal for weight in self.taps)
             error = error * math.fsum(map(abs, self.taps)) + own
-        for gain in reversed(self._gains):
-            error = error / gain.least + gain.back + 0.5 * self._signal * (1.0 + 1.0 / gain.least)
         apart = self._plays(self.slewed * 2.0**self._fine) if self.slewed else 0.0  # states behind a slew limit
-        seen = apart * math.prod(numbers.rest for numbers in self.creeps)
-        seen *= math.prod(max(each.linear.forward.largest, 1.0) for each in self.behind)
-        for each in reversed(self.behind):
-            states = seen * each.linear.forward.before() + each.output * self._signal
-            error = self._passed(each, error + states, each.answer * self._signal)
-        for j, numbers in reversed(list(enumerate(self.creeps))):
-            states = apart * float(sum(numbers.terms[:, creep.WEIGHT]))
-            error = self._creep_gain(numbers) * (error + self._creep(j) + self._creep_back(j) + states)
+        behind = self._behind(False)
+        seen = apart * math.prod(max(each.one.growth, 1.0) for each, *_ in behind)
+        for each, size, gain in reversed(behind):
+            if gain:
+                error = error / gain.least + gain.back + 0.5 * self._signal * (1.0 + 1.0 / gain.least)
+            error = each.solved(error, Sought(size, self.sizes.asked, self._signal, apart, seen, bool(self.condition)))
         return error
 
     def _residual(self, way: float, solved: float) -> float:
         """Error of the sum of the plays at the input that the inverse finds, in output units, for an error `solved` of
         that input in units of signals; `way` as `_way`."""
         missed_by = self._plays(0.0, way) * float(self.inner.output_lsb) + self._steepest * solved * self._arriving
-        for numbers in self.creeps:  # their states have seen the sum of the plays
-            missed_by *= numbers.slope * self._creep_gain(numbers)
-        for each in self.behind:
-            missed_by = self._passed(each, 0.0, missed_by)
+        for each, *_ in self._behind(False):  # their states have seen the sum of the plays
+            missed_by = each.residual(missed_by, bool(self.condition))
         return self._asked() * float(self.inner.output_lsb) + missed_by
 
     def _solution(self) -> float:
@@ -510,22 +378,11 @@ class Bounds:
 
     def _led(self, error: float) -> float:
         """The error of the drive for an error in front of the plays, both in units of signals."""
-        for j in range(len(self.ahead) - 1, -1, -1):
-            code = 0.5 * 2.0**self._fine if j == 0 and not self.lags else 0.5
-            error = self._passed(self.ahead[j], error + self.ahead[j].output, self.ahead[j].answer + code)
-        for j in range(len(self.lags) - 1, -1, -1):
-            exact, (rate, second, late, _) = self.lags[j].exact, self.lags[j].row
-            _, kept, answer = self._lag(j, *self.in_front["lag"][j])
-            code = 0.5 * 2.0**self._fine if j == 0 else 0.5
-            if not exact:  # its states have seen the same drives
-                turning = bool(self.tables.turning)
-                goal = lag.shifted(second, turning) * error + (1.0 + 2.0 * second) / (1.0 - second) * kept
-                error = (goal + kept) / rate + answer + code + 2.0 * float(self.tables.number[DITHER]) * turning
-            elif self.condition:
-                error = (error + kept) / late + answer + code
-            else:
-                error = ((2.0 - rate) * (error + kept) + answer * late + late * code) / (late - second)
-        return error
+        turning = bool(self.tables.turning)
+        for each in reversed(self._ahead):
+            code = 0.5 * 2.0**self._fine if each is self._ahead[0] else 0.5
+            error = each.led(error, code, bool(self.condition), turning)
+        return error + 2.0 * float(self.tables.number[DITHER]) * turning
 
     def _codes(self, error: float) -> float:
         """The error of the drive in drive codes, for an error in front of the plays in units of signals."""
@@ -543,9 +400,9 @@ class Bounds:
     @property
     def condition(self) -> str:
         """The condition of `rounding` in words, if only the range bounds the difference of two drives; else ""."""
-        missed = self.ahead or any(not one.exact for one in self.lags)
+        missed = any(each.one.misses for each in self._ahead)
         dilated = self.tables.moving.moves == DILATED
-        if not (missed or dilated or (self.lags and (not self.reached or self.parts.slew))):
+        if not (missed or dilated or (self.formats[NAMES[LED]] and (not self.reached or self.parts.slew))):
             return ""
         still = STILL * (self.tables.quiet > 0)
         if not self.reached:

@@ -10,6 +10,7 @@ can overflow, whatever is called in whatever order; a model that does not fit is
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable
 from fractions import Fraction
@@ -18,12 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic import ARITHMETICS
+from hystgen.arithmetic import FIXED
 from hystgen.arithmetic.factors import LARGEST, factor
 from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.catalogue import AHEAD, BEHIND, LED, NAMES, PARTS
 from hystgen.compensator.chain.fixed_bounds import Bend, Bounds, Sizes
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
@@ -61,11 +61,11 @@ from hystgen.compensator.chain.layout import (
     too_slow,
 )
 from hystgen.compensator.chain.moving import Bumps
-from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, LED, NAMES, PARTS, Parts
 from hystgen.compensator.fixed_tables import TABLE_MAX, Builder, FixedCurve, lsbs, nearest
 from hystgen.effects import bend
 from hystgen.effects.lag.fixed import COARSE
-from hystgen.effects.part import Fixed, Margin, Part
+from hystgen.effects.part import ChainPart, FixedSurroundings, Margin
 from hystgen.effects.saturation.fixed import Saturations
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.front.tanh.model import TanhEnvelope
@@ -119,7 +119,7 @@ class _Builder:
         engine: str,
     ) -> None:
         self.arithmetic, self.seconds, self.how, self.engine = arithmetic, seconds, how, engine
-        self.about = ARITHMETICS[arithmetic]
+        self.about = FIXED[arithmetic]
         self.static, self.parts = chain.cascade, Parts.of(chain.effects)
         self.low, self.high = output_range(self.static, self.parts, seconds)
         self.drive_lsb, self.output_lsb = lsbs(self.static, arithmetic, *lsb, (self.low, self.high))
@@ -155,7 +155,7 @@ class _Builder:
             limits,
             self._need(lambda: self._moving(plays), "effects on plays"),
             self._tables(),
-            self.parts.count,
+            self.parts.counts,
             saturations,
             self._need(self._tap, "the preview"),
             np.array(self._numbers(), dtype=np.int64),
@@ -171,16 +171,16 @@ class _Builder:
         max_rate = fastest(static, self.parts, self.seconds, self.how)
         weights = self.taps.weights.tolist() if self.taps else []
         bounds = Bounds(
-            static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.ones, self.formats,
-            self.in_front, weights, self.bends, (self.low, self.high), slewed, self.reached, self._largest_step(),
-            self.finer, self.seconds, self.bumps,
-        )  # fmt: skip
+            static, self.parts, self.inner, tables, self.sizes, self.bits, self.drop, self.formats, weights,
+            self.bends, (self.low, self.high), slewed, self.reached, self._largest_step(), self.finer, self.seconds,
+            self.bumps,
+        )
         if static.branches_differ:
             plays.limits[slots.HOLD] = hold(bounds.hold(), tables.number[DITHER], self.turning)
         codes = Codes(
             self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
             bounds.condition, math.ceil(self.sizes.largest * 2**self.bits),
-        )  # fmt: skip
+        )
         about = (self.parts, self.seconds, static, max_rate, self.how.preview, *self.reading[1:])
         return Compiled(tables, self.taps, *about, codes)
 
@@ -197,7 +197,7 @@ class _Builder:
                 ("model", "effects"),
                 f"{what}: states and constants do not fit {self.arithmetic}, whose signals have "
                 f"{self.bits} bits below an output code; use {self.about.finer}",
-            )) from error  # fmt: skip
+            )) from error
 
     # ------------------------------------------------------------ ranges
 
@@ -368,14 +368,14 @@ class _Builder:
     def _tables(self) -> tuple[Any, ...]:
         """Those of all parts, in their order; what is in front of the plays with as many bits as there is room for."""
         margin = Margin(1.0, turning=self.turning)
-        about = Fixed(
+        about = FixedSurroundings(
             self.seconds, self.static.input_range, self.high - self.low, self.reading.ahead(self.how.preview),
             braked(self.parts, self.ones), self.drive_lsb, self.output_lsb, self.bits, self.about.code_bits,
             self.about.code_max, TEMPERATURE_BITS[self.about.code_bits], max(map(abs, self.inner.drive)),
             self.signal(self.high - self.low), margin,
-        )  # fmt: skip
+        )
 
-        def made(part: Part) -> Any:
+        def made(part: ChainPart) -> Any:
             pairs = zip(self.in_front.get(part.name) or self._behind(part), self.ones[part.name], strict=True)
             self.formats[part.name] = [part.fixed.formats(one, about, *sizes) for sizes, one in pairs]
             return part.fixed.tables(self.formats[part.name], about)
@@ -395,10 +395,10 @@ class _Builder:
         for part in PARTS:
             if part not in AHEAD:
                 names = " and ".join(dict.fromkeys(getattr(each, "name", "") for each in self.parts.blocks[part.name]))
-                found[part.name] = self._need(lambda part=part: made(part), part.words or names)
+                found[part.name] = self._need(functools.partial(made, part), part.words or names)
         return tuple(found[name] for name in NAMES)
 
-    def _behind(self, part: Part) -> list[tuple[float, float]]:
+    def _behind(self, part: ChainPart) -> list[tuple[float, float]]:
         """Sizes of the input and of the output asked for of each block, in output codes."""
         if part not in BEHIND:
             return [(0.0, 0.0)] * len(self.ones[part.name])
@@ -457,7 +457,7 @@ class _Builder:
                 lower, upper, give = (
                     (-effect.level, effect.level, 0.0) if isinstance(effect, HardSaturation)
                     else (effect.lower, effect.upper, effect.give)
-                )  # fmt: skip
+                )
                 most = LARGEST // 2
                 ends = [min(max(self.signal(end), -most), most) for end in (lower, upper)]
                 over = self._need(lambda give=give: factor(1.0 / give if give else 0.0), "stops")  # type: ignore[misc]

@@ -14,7 +14,6 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics.problems import FormatError
 from hystgen.chain.chain import Chain
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.catalogue import BEHIND, LED, NAMES, PARTS
 from hystgen.compensator.chain.layout import (
     MOST_SLEWED,
     VERIFIED_SHARE,
@@ -34,9 +33,9 @@ from hystgen.compensator.chain.layout import (
     read,
     too_slow,
 )
-from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.parts import BEHIND, LED, NAMES, PARTS, Parts
 from hystgen.compensator.float_tables import build_float, inward
-from hystgen.effects.part import Floating
+from hystgen.effects.part import FloatSurroundings
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.front.tanh import kernels
 from hystgen.parameters.schema import Compensation
@@ -140,7 +139,7 @@ def build(
     dither = max(rounded * max(lead(leading), 1.0), drive_lsb or 0.0)
     if static.branches_differ:
         plays.limits[slots.HOLD] = hold(plays.limits[slots.HOLD], dither, turning)
-    about = Floating(
+    about = FloatSurroundings(
         seconds, static.input_range, span, ahead, braked(parts, ones), reals, float(np.finfo(dtype).eps) / 2
     )
     tables = ChainTables(
@@ -148,7 +147,7 @@ def build(
         plays.limits,
         moving.build(static, parts.plays, seconds, min(max_rate * seconds, drive_span), dtype),
         tuple(part.floating.tables(ones[part.name], about) for part in PARTS),
-        parts.count,
+        parts.counts,
         _behind(parts, arithmetic),
         reals(taps.weights if taps else [], "weights of the preview"),
         reals([static.output_offset, span, *slew[::2], *slew[1::2], VERIFIED_SHARE, dither], "offset or rates"),

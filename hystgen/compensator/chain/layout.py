@@ -13,10 +13,8 @@ import numpy as np
 
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import noise, preview
-from hystgen.compensator.chain.catalogue import AHEAD, LED, NAMES, PARTS
 from hystgen.compensator.chain.noise import Smoothing
-from hystgen.compensator.chain.own import Linear
-from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, LED, NAMES, PARTS, Parts
 from hystgen.compensator.chain.preview import Shaped, Taps
 from hystgen.effects.base import Effect
 from hystgen.effects.kinds import OwnBlock
@@ -80,8 +78,8 @@ class ChainTables(NamedTuple):
     plays: Any  # `Tables` or `FixedTables`
     limits: Reals
     moving: Any  # `MovingTables` or `FixedMovingTables`
-    blocks: tuple[Any, ...]  # tables of each of `catalogue.PARTS`
-    count: Counts  # of their blocks
+    blocks: tuple[Any, ...]  # tables of each of `parts.PARTS`
+    counts: Counts  # of their blocks
     behind: Any  # `Stages`, or in fixed point `hystgen.effects.saturation.fixed.Saturations`
     tap: Reals  # (L,), in fixed point factors (L, 2); none without a preview
     number: Reals
@@ -100,7 +98,7 @@ class ChainTables(NamedTuple):
 
     def number_of(self, part: str) -> int:
         """Of blocks of a part of the chain."""
-        return int(self.count[NAMES.index(part)])
+        return int(self.counts[NAMES.index(part)])
 
     @property
     def calls(self) -> set[str]:
@@ -179,7 +177,7 @@ class Compiled:
     @property
     def largest_way(self) -> float:
         """Largest move of the plays' input in such a step."""
-        return largest_way(self.static, self.own_ahead, self.largest_step)
+        return largest_way(self.static, ahead_of(self.ones), self.largest_step)
 
     @property
     def ahead(self) -> int:
@@ -192,14 +190,14 @@ class Compiled:
         return Read(self.taps, self.smoothing, self.shaped).late(self.asked)
 
     @property
-    def own_ahead(self) -> list[Linear]:
-        """Blocks of the user's own in front of the plays."""
-        return self.ones["own_ahead"]
+    def behind(self) -> list[One]:
+        """The blocks of the inverse behind the plays."""
+        return [one for part in BEHIND if not part.forward for one in self.ones[part.name]]
 
     @property
-    def own_behind(self) -> list[Linear]:
-        """Blocks of the user's own behind the plays."""
-        return self.ones["own_behind"]
+    def last(self) -> list[One]:
+        """The blocks behind these that the forward operator has alone."""
+        return [one for part in BEHIND if part.forward for one in self.ones[part.name]]
 
     @cached_property
     def ones(self) -> dict[str, list[Any]]:
@@ -290,11 +288,11 @@ def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation
     return float(min([asked, *slew, *(move / seconds for move in moves)]))
 
 
-def largest_way(static: StaticModel, ahead: Sequence[Linear], step: float) -> float:
+def largest_way(static: StaticModel, ahead: Sequence[One], step: float) -> float:
     """Largest move of the plays' input in a step in which the drive moves by at most `step`, through blocks of the
     user's own `ahead`, up the steepest slope of the front and from one of its branches to the other. A lag makes it no
     larger."""
-    grown = math.prod(each.forward.largest for each in ahead)
+    grown = math.prod(one.growth for one in ahead)
     low, high = static.play_range
     return min(static.front_slopes[1] * grown * step + static.branch_gap, max(grown, 1.0) * (high - low))
 

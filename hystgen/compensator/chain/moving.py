@@ -391,7 +391,7 @@ def build_fixed(
         np.array(bump.of, dtype=np.int64), bump.bits,
         np.array(rows, dtype=np.int64).reshape(-1, YIELD_LIFT + 1), bits, stretch_end,
         np.array(factor(float(own.number[SEEN])), dtype=np.int64),
-    )  # fmt: skip
+    )
 
 
 def _yields(

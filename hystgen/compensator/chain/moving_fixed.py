@@ -161,4 +161,4 @@ PLAYS = operators(
         level, asked, loop_solve, relaxing_follow, relaxing_input, share_of, yields, seen, moved_by, yield_of, bent,
         search,
     )
-)  # fmt: skip
+)

@@ -148,4 +148,4 @@ PLAYS = operators(
         same, same, loop_solve, relaxing_follow, relaxing_input, share_of, yields, seen, unchanged, unchanged, bent,
         search,
     )
-)  # fmt: skip
+)

@@ -22,11 +22,10 @@ from numpy.typing import NDArray
 from hystgen.basics.problems import UnsupportedEffectsError
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.catalogue import AHEAD, BEHIND
-from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, Parts
 from hystgen.compensator.chain.preview import Taps, averages, whole
 from hystgen.effects.base import decays
-from hystgen.effects.part import One, Response
+from hystgen.effects.part import One, Responses
 from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.rate_dependence.compensator import Movement
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate
@@ -97,7 +96,7 @@ class Gain:
         rest and the response (N,) by which the lead is divided."""
         z = np.exp(-1j * at)
         led = np.polynomial.polynomial.polyval(z, self.taps.weights[::-1].astype(complex))
-        found = Response(led, np.ones_like(z), np.ones_like(z), 1.0, 1.0)
+        found = Responses(led, np.ones_like(z), np.ones_like(z), 1.0, 1.0)
         for one in self._blocks:
             found = one.respond(z, found)
         answers = []

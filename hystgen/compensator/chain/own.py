@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from hystgen.basics.jit import jit
 from hystgen.effects import own
 from hystgen.effects.base import Array, Effect, Place
-from hystgen.effects.kinds import VERBS, Constants, OwnBlock
-from hystgen.effects.part import Arithmetic, Function, Margin, One, Response, Verbs
+from hystgen.effects.kinds import Constants, OwnBlock
+from hystgen.effects.part import Function, Margin, One, Realized, Responses, Verbs
 from hystgen.plays.slots import Counts, Reals
 
 Glue = tuple[Function, Function, Function]
@@ -116,7 +116,7 @@ class System:
         return abs(self.d) + self.before()
 
     def response(self, z: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Response (N,) at `z` (N,), the factor z^-1 of a delay by one sample."""
+        """Responses (N,) at `z` (N,), the factor z^-1 of a delay by one sample."""
         states = np.linalg.solve(np.eye(len(self.b)) - z[:, None, None] * self.a, self.b[:, None])[:, :, 0]
         return np.asarray(self.d + z * (states @ self.c))
 
@@ -144,11 +144,33 @@ class Linear(One):
         return max(self.backward.largest, 1.0)
 
     @property
+    def growth(self) -> float:
+        """Largest output for inputs within 1."""
+        return self.forward.largest
+
+    def solved(self, error: float, size: float, u: float, same: bool) -> float:  # noqa: ARG002  as of every block
+        """Error of the input that it is solved for, by an error of the output."""
+        return self.passed(error) + self.rounding(size, u)[1]
+
+    def led(self, error: float, drive: float, u: float, same: bool, turning: bool) -> float:  # noqa: ARG002
+        """The same in front of the plays."""
+        return self.solved(error, drive, u, same)
+
+    def seen(self) -> float:
+        """Factor by which states that see its input multiply an error of that."""
+        return self.passed(0.0, 1.0)
+
+    @property
+    def misses(self) -> bool:
+        """Whether what arrives may differ from what it was solved for."""
+        return True
+
+    @property
     def ringing(self) -> Array:
         """Frequencies (k,) in rad a sample at which its inverse may ring."""
         return np.asarray(np.abs(np.angle(np.linalg.eigvals(self.backward.a))))
 
-    def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
+    def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
         """What it makes of frequencies, behind other blocks."""
         found = found._replace(rest=found.rest * self.rest)
         if not self.exact:
@@ -385,15 +407,17 @@ def memory(t: OwnTables, dtype: Any) -> Reals:
 
 def arithmetic(
     blocks: Sequence[OwnBlock], effects: Sequence[type[Effect]], made: Glue, *tables: Callable[..., Any]
-) -> Arithmetic:
+) -> Realized:
     """Blocks on one side of the plays, one after the other, as one of the chain; `tables` and formats as it has."""
 
     def through(verb: str) -> Function:
         calls = [_one(made, block, verb, j) for j, block in enumerate(blocks)]
         return functools.reduce(_both, calls[::-1] if verb in ("solve", "resting") else calls)
 
-    verbs = {verb: through(verb) for verb in VERBS} if blocks else {}
-    return Arithmetic(Verbs(memory, **verbs), lambda t: constants(t, effects), *tables)
+    verbs = Verbs(memory)
+    if blocks:
+        verbs = Verbs(memory, through("rest"), through("absorb"), through("resting"), through("solve"))
+    return Realized(verbs, lambda t: constants(t, effects), *tables)
 
 
 def _both(first: Function, behind: Function) -> Function:

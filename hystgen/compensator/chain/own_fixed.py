@@ -20,14 +20,14 @@ from hystgen.compensator.chain import own
 from hystgen.compensator.chain.own import Linear, OwnTables
 from hystgen.effects.base import Effect, Place
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.part import Fixed, Part
+from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Sought
 from hystgen.plays.fixed import nearest
 
 MANTISSA, SHIFT, DROP, LIFT = range(4)
 
 
 @dataclass(frozen=True)
-class Formats:
+class Formats(Coded):
     """A block in fixed point: `table` (n, 4) of its numbers, each a factor and the bits that a product leaves out of
     its argument and of its result; `bits` of its signals below those of the chain; `output` and `answer`: roundings of
     the results of absorb and solve, in units of the chain's signals."""
@@ -37,6 +37,37 @@ class Formats:
     bits: int
     output: float
     answer: float
+
+    @property
+    def one(self) -> Linear:
+        """The block in double precision."""
+        return self.linear
+
+    @property
+    def arrived(self) -> float:
+        """Roundings of the output in front of the plays."""
+        return self.output
+
+    def led(self, error: float, code: float, same: bool, turning: bool) -> float:  # noqa: ARG002  as of every block
+        """Error of the input for one of the output asked for; `code`: rounding of the input."""
+        return self._passed(error + self.output, self.answer + code, same)
+
+    def there(self, size: float, signal: float) -> float:  # noqa: ARG002  as of every block
+        """Roundings of the output, with signals of this unit."""
+        return self.output * signal
+
+    def solved(self, error: float, at: Sought) -> float:
+        """Error of the input that it is solved for, by one of the output."""
+        states = at.seen * self.linear.forward.before() + self.output * at.signal
+        return self._passed(error + states, self.answer * at.signal, at.same)
+
+    def residual(self, missed: float, same: bool) -> float:
+        """The error of an output that the inverse makes of one of the sum of the plays."""
+        return self._passed(0.0, missed, same)
+
+    def _passed(self, error: float, own: float, same: bool) -> float:
+        """Error of the input for an error of the output, and a rounding `own`."""
+        return error / abs(self.linear.forward.d) + own if same else self.linear.passed(error, own)
 
 
 @dataclass
@@ -171,21 +202,21 @@ def left(t: OwnTables, j: int, x: Any) -> Any:
     return nearest(x, t.bits[j])
 
 
-def part(name: str, place: Place, blocks: Sequence[OwnBlock] = (), effects: Sequence[type[Effect]] = ()) -> Part:
+def part(name: str, place: Place, blocks: Sequence[OwnBlock] = (), effects: Sequence[type[Effect]] = ()) -> ChainPart:
     """Blocks on one side of the plays as a part of the chain."""
     ahead = place is Place.DRIVE
 
     def takes(effect: Effect) -> bool:
         return effect.block is not None and (effect.place is Place.DRIVE) == ahead
 
-    def format_of(one: Linear, about: Fixed, given: float, asked: float) -> Formats:
+    def format_of(one: Linear, about: FixedSurroundings, given: float, asked: float) -> Formats:
         bits = 0 if ahead else about.bits  # of the sizes in front of the plays below those that are given
         return formats(one, given * 2.0**bits, asked * 2.0**bits, bits)
 
-    return Part(
+    return ChainPart(
         name, "effects in front of the plays" if ahead else "", takes,
         lambda effect, seconds, _: own.linear(effect, seconds),
         own.arithmetic(blocks, effects, own.GLUE, lambda every, about: own.build(every, about.reals)),
         own.arithmetic(blocks, effects, (product, entered, left), lambda rows, _: build(rows), format_of),
         joined=True,
-    )  # fmt: skip
+    )

@@ -1,4 +1,4 @@
-"""The effects of a model by their part in the chain."""
+"""The parts of the chain in their order, and the effects of a model by their part in it."""
 
 from __future__ import annotations
 
@@ -9,10 +9,49 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.compensator.chain.catalogue import AHEAD, BEHIND, PARTS
+from hystgen.compensator.chain import own_fixed
+from hystgen.effects.ageing.fixed import AGEING
 from hystgen.effects.base import Effect, Place
-from hystgen.effects.part import Part
+from hystgen.effects.creep.fixed import CREEP
+from hystgen.effects.delay.compensator import DELAY
+from hystgen.effects.drift.fixed import CLOCK
+from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.lag.fixed import LAG
+from hystgen.effects.part import ChainPart
+from hystgen.effects.resonance.fixed import MODE
+from hystgen.effects.thermal.fixed import GAIN_PART, HEAT_PART
 from hystgen.plays.slots import Counts
+
+OWN_AHEAD, OWN_BEHIND = own_fixed.part("own_ahead", Place.DRIVE), own_fixed.part("own_behind", Place.LINEAR)
+
+SENT = (DELAY,)
+"""What a drive passes on its way to the amplifier."""
+
+AHEAD = (LAG, OWN_AHEAD)
+"""In front of the plays, from the amplifier on. Only the first one is led in front of two branches."""
+
+BEHIND = (CREEP, OWN_BEHIND, AGEING, HEAT_PART, GAIN_PART, MODE)
+"""Behind the plays, from their sum on."""
+
+BESIDE = (CLOCK,)
+"""What is added to the displacement."""
+
+PARTS = (*SENT, *AHEAD, *BEHIND, *BESIDE)
+"""All of them, in the order of `ChainTables.blocks`."""
+
+NAMES = [part.name for part in PARTS]
+LED = PARTS.index(AHEAD[0])
+
+
+def parts_with(
+    ahead: Sequence[OwnBlock], behind: Sequence[OwnBlock], effects: Sequence[type[Effect]] = ()
+) -> list[ChainPart]:
+    """The parts of a model with blocks of the user's own; `effects`: the classes of all of these."""
+    given = {
+        OWN_AHEAD.name: own_fixed.part(OWN_AHEAD.name, Place.DRIVE, ahead, effects[: len(ahead)]),
+        OWN_BEHIND.name: own_fixed.part(OWN_BEHIND.name, Place.LINEAR, behind, effects[len(ahead) :]),
+    }
+    return [given.get(part.name, part) for part in PARTS]
 
 
 @dataclass(frozen=True)
@@ -39,7 +78,7 @@ class Parts:
     @property
     def delay(self) -> float:
         """Of a drive on its way, in s."""
-        return math.fsum(each.dead_time for each in self.blocks["delay"])
+        return math.fsum(each.dead_time for each in self.blocks[DELAY.name])
 
     @property
     def modes(self) -> list[Any]:
@@ -57,13 +96,13 @@ class Parts:
         return self.blocks["own_behind"]
 
     @property
-    def count(self) -> Counts:
+    def counts(self) -> Counts:
         """As in `ChainTables`."""
         found = [len(self.blocks[part.name]) for part in PARTS]
         most = [1 if part.joined else len(self.blocks[part.name]) for part in PARTS]
         return np.minimum(np.array(found, dtype=np.int64), most)
 
-    def ones(self, seconds: float, turning: bool = False, parts: Sequence[Part] = PARTS) -> dict[str, list[Any]]:
+    def ones(self, seconds: float, turning: bool = False, parts: Sequence[ChainPart] = PARTS) -> dict[str, list[Any]]:
         """The blocks of some parts at steps of `seconds`."""
         return {
             part.name: [part.one(effect, seconds, turning) for effect in self.blocks[part.name]] for part in parts

@@ -6,20 +6,19 @@ and time-invariant, so that their order makes no difference.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.chain.catalogue import AHEAD, BEHIND, PARTS, SENT
 from hystgen.compensator.chain.layout import ChainTables
-from hystgen.effects.part import Function, Part, Verbs
+from hystgen.compensator.chain.parts import AHEAD, BEHIND, PARTS, SENT
+from hystgen.effects.part import ChainPart, Function, Verbs
 
 
 class Blocks(NamedTuple):
     """The blocks of a chain in one arithmetic, and functions."""
 
-    verbs: Callable[[Part], Verbs]
+    verbs: Callable[[ChainPart], Verbs]
     bent: tuple[Function, Function]  # what saturates: forward, inverse
     target: Function  # of the preview's line
     front: tuple[Function, Function]  # forward, inverse
@@ -54,7 +53,7 @@ def _then(first: Function, k: int, verb: Function) -> Function:
 
     @jit(inline=True)
     def through(t: ChainTables, s: Any, x: Any) -> Any:
-        return each(t.blocks[k], s.blocks[k], s.count[k], first(t, s, x))
+        return each(t.blocks[k], s.blocks[k], s.counts[k], first(t, s, x))
 
     return through
 
@@ -70,7 +69,7 @@ def _back(first: Function, k: int, verb: Function) -> Function:
 
     @jit(inline=True)
     def through(t: ChainTables, s: Any, x: Any) -> Any:
-        return each(t.blocks[k], s.blocks[k], s.count[k], first(t, s, x))
+        return each(t.blocks[k], s.blocks[k], s.counts[k], first(t, s, x))
 
     return through
 
@@ -84,11 +83,13 @@ def _nothing(t: ChainTables, s: Any, x: Any) -> Any:  # noqa: ARG001  as of any 
 def sides_of(every: Sequence[Verbs]) -> Sides:
     """The sides of a chain, with the verbs of all its parts."""
 
-    def through(side: Sequence[Part], verb: str) -> Function:
+    def through(side: Sequence[ChainPart], verb: str) -> Function:
         back = verb in ("resting", "solve")
         places = [PARTS.index(part) for part in (reversed(side) if back else side)]
         found = [(k, function) for k in places if (function := every[k].verb(verb))]
-        made = functools.reduce(lambda first, one: (_back if back else _then)(first, *one), found, _nothing)
+        made: Function = _nothing
+        for k, function in found:
+            made = (_back if back else _then)(made, k, function)
 
         @jit
         def call(t: ChainTables, s: Any, x: Any) -> Any:
@@ -105,18 +106,20 @@ def sides_of(every: Sequence[Verbs]) -> Sides:
 
 def _all(every: Sequence[Verbs], verb: str, and_then: Function, nothing: Function) -> Function:
     """A verb by all blocks that have it, from `nothing` on by one part after the other."""
-    found = [(k, function) for k, verbs in enumerate(every) if (function := getattr(verbs, verb))]
-    return functools.reduce(lambda first, one: and_then(first, *one), found, nothing)
+    for k, verbs in enumerate(every):
+        if function := getattr(verbs, verb):
+            nothing = and_then(nothing, k, function)
+    return nothing
 
 
 def told(every: Sequence[Verbs], verb: str) -> Function:
     """A verb with a number from the caller; whether any block had to limit it."""
 
     def and_then(first: Function, k: int, function: Function) -> Function:
-        @jit(inline=True)
+        @jit
         def both(t: ChainTables, s: Any, x: Any) -> bool:
             limited = first(t, s, x)
-            for j in range(s.count[k]):
+            for j in range(s.counts[k]):
                 limited = function(t.blocks[k], s.blocks[k], j, x) or limited
             return bool(limited)
 
@@ -133,10 +136,10 @@ def resetting(every: Sequence[Verbs]) -> Function:
     """All blocks as in the parameter file."""
 
     def and_then(first: Function, k: int, function: Function) -> Function:
-        @jit(inline=True)
+        @jit
         def both(t: ChainTables, s: Any) -> None:
             first(t, s)
-            for j in range(s.count[k]):
+            for j in range(s.counts[k]):
                 function(t.blocks[k], s.blocks[k], j)
 
         return both
@@ -152,10 +155,10 @@ def moves(every: Sequence[Verbs]) -> Function:
     """All blocks that see how the drive moves, as it does."""
 
     def and_then(first: Function, k: int, function: Function) -> Function:
-        @jit(inline=True)
+        @jit
         def both(t: ChainTables, s: Any, before: Any, v: Any) -> None:
             first(t, s, before, v)
-            for j in range(s.count[k]):
+            for j in range(s.counts[k]):
                 function(t.blocks[k], s.blocks[k], j, before, v)
 
         return both

@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.chain.catalogue import BESIDE, LED, PARTS, parts_with
 from hystgen.compensator.chain.layout import (
     DITHER,
     FALLING,
@@ -26,6 +25,7 @@ from hystgen.compensator.chain.layout import (
     ChainTables,
     OwnChainTables,
 )
+from hystgen.compensator.chain.parts import BESIDE, LED, PARTS, parts_with
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat
 from hystgen.compensator.chain.sides import Blocks, moves, resetting, sides_of, told
 from hystgen.compensator.layout import clamp_drive, inverse_clamp
@@ -86,8 +86,8 @@ class ChainState(NamedTuple):
     plays: State
     lost: Reals  # (n + 1,), what rounding took from each play that a nonlinear dashpot moves
     bent: Reals  # (n + 1,), what each play contributes, if an effect moves or bends them
-    blocks: tuple[Any, ...]  # memory of each of `catalogue.PARTS`
-    count: Counts  # of their blocks in this operator
+    blocks: tuple[Any, ...]  # memory of each of `parts.PARTS`
+    counts: Counts  # of their blocks in this operator
     line: Line
     real: Reals
     flags: Counts
@@ -108,7 +108,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         np.zeros(len(t.threshold), dtype),
         np.zeros(len(t.threshold), dtype),
         tuple(each.memory(tables, dtype) for each, tables in zip(verbs, t.blocks, strict=True)),
-        np.where([inverse and part.forward for part in parts], 0, t.count),
+        np.where([inverse and part.forward for part in parts], 0, t.counts),
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
         np.zeros(9, dtype),
         np.array([0, int(inverse), 0, 1], np.int64),
@@ -138,9 +138,9 @@ def made_of(
     every = [blocks.verbs(part) for part in parts_with(drives, outputs)]
     blocks_reset, blocks_move = resetting(every), moves(every)
     temperature_set, gain_set, travel_set = (told(every, f"set_{what}") for what in ("temperature", "gain", "travel"))
-    travelled_by = every[AGED].travelled
-    clock_reset, clock_added = every[CLOCK].reset, every[CLOCK].added
-    clock_lead, clock_ahead = every[CLOCK].lead, every[CLOCK].ahead
+    clock: Any = every[CLOCK]
+    clock_reset, clock_added, clock_lead, clock_ahead = clock.reset, clock.added, clock.lead, clock.ahead
+    travelled_by: Any = every[AGED].travelled
     bent, unbent = blocks.bent
     preview_target = blocks.target
     front_forward, front_inverse = blocks.front
@@ -162,7 +162,7 @@ def made_of(
     def displacement(t: ChainTables, s: ChainState, y: Any) -> Any:
         """The displacement: the result of the output side after saturation, plus the offsets."""
         offset = t.number[OFFSET] + s.real[SET]
-        for j in range(s.count[CLOCK]):
+        for j in range(s.counts[CLOCK]):
             offset = offset + clock_added(t.blocks[CLOCK], s.blocks[CLOCK], j)
         return bent(t.behind, y) + offset
 
@@ -170,7 +170,7 @@ def made_of(
     def undisplaced(t: ChainTables, s: ChainState, u: Any) -> tuple[Any, int]:
         """The result that the output side has to give for the displacement u, and whether none gives it."""
         offset = t.number[OFFSET] + s.real[SET]
-        for j in range(s.count[CLOCK]):
+        for j in range(s.counts[CLOCK]):
             filled, moving = s.line.filled[0], s.flags[MOVING]
             offset = offset + clock_ahead(t.blocks[CLOCK], s.blocks[CLOCK], j, filled, moving)
         y, limited = unbent(t.behind, u - offset)
@@ -474,7 +474,7 @@ def made_of(
             s.plays.counts[STATUS] |= DOMAIN
         if len(t.tap) == 0:
             return wanted
-        for j in range(s.count[CLOCK]):
+        for j in range(s.counts[CLOCK]):
             clock_lead(t.blocks[CLOCK], s.blocks[CLOCK], j, s.line.filled[0])
         preview_put(s.line, wanted)
         return preview_target(t.tap, s.line)
@@ -541,7 +541,7 @@ def made_of(
         """Set the offset of the displacement; drift starts again."""
         put_offset(t, s, d)
         if finite(t, d):
-            for j in range(s.count[CLOCK]):
+            for j in range(s.counts[CLOCK]):
                 clock_reset(t.blocks[CLOCK], s.blocks[CLOCK], j)
 
     @jit

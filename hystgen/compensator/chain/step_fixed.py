@@ -11,7 +11,6 @@ from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_fixed
 from hystgen.compensator.chain import corners_fixed, moving_fixed
-from hystgen.compensator.chain.catalogue import LED, PARTS
 from hystgen.compensator.chain.layout import (
     ARRIVING_BITS,
     BRAKED_DROP,
@@ -28,6 +27,7 @@ from hystgen.compensator.chain.layout import (
     TRAVEL_BITS,
     ChainTables,
 )
+from hystgen.compensator.chain.parts import LED, PARTS
 from hystgen.compensator.chain.preview import Line
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import ChainState, Codes
@@ -157,8 +157,9 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:
 
 # ---------------------------------------------------------------- chain_braked.c
 
-assert PARTS[LED].fixed.verbs.led
-led_braked = PARTS[LED].fixed.verbs.led.braked
+led = PARTS[LED].fixed.verbs.led
+assert led
+led_braked = led.braked
 
 
 @jit
@@ -169,7 +170,7 @@ def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
     drive = led_braked(
         t.blocks[LED], s.blocks[LED], near << bits, beyond << bits, t.number[FALLING] << bits, t.number[RISING] << bits,
         1 << bits, t.number[BRAKED_DROP],
-    )  # fmt: skip
+    )
     return drive_code(t, drive)
 
 
@@ -188,8 +189,8 @@ def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
 BLOCKS = Blocks(
     lambda part: part.fixed.verbs, (saturated, unsaturated), preview_target, (front_forward, front_inverse),
     moving_fixed.PLAYS, finer, braked, ramp,
-)  # fmt: skip
+)
 CORNERS = BLOCKS._replace(plays=corners_fixed.PLAYS, finer=corners_fixed.finer)
 CODES = Codes(
     step_fixed.finite, drive_signal, arriving, level_signal, drive_code, output_code, entered_travel, shared
-)  # fmt: skip
+)

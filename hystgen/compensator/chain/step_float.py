@@ -7,8 +7,8 @@ from typing import Any
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_float
 from hystgen.compensator.chain import corners_float, moving_float
-from hystgen.compensator.chain.catalogue import LED, PARTS
 from hystgen.compensator.chain.layout import FALLING, RISING, ChainTables, Stages
+from hystgen.compensator.chain.parts import LED, PARTS
 from hystgen.compensator.chain.preview import preview_target
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import ChainState, Codes
@@ -55,8 +55,9 @@ def shared(t: ChainTables, share: Any, x: Any) -> Any:  # noqa: ARG001  as in fi
 
 # ---------------------------------------------------------------- chain_braked.c
 
-assert PARTS[LED].floating.verbs.led
-led_braked, HALVES = PARTS[LED].floating.verbs.led[-2:]
+led = PARTS[LED].floating.verbs.led
+assert led
+led_braked, HALVES = led.braked, led.halves
 
 
 @jit
@@ -83,6 +84,6 @@ def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
 BLOCKS = Blocks(
     lambda part: part.floating.verbs, (bent, unbent), preview_target, (front_forward, front_inverse),
     moving_float.PLAYS, finer, braked, ramp,
-)  # fmt: skip
+)
 CORNERS = BLOCKS._replace(plays=corners_float.PLAYS)
 CODES = Codes(step_float.finite, entered, entered, entered, entered, output_code, entered, shared)

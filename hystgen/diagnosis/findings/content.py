@@ -17,7 +17,6 @@ from hystgen.diagnosis.data.preparing import Prepared
 from hystgen.diagnosis.data.signals import NoiseFloor, repetition, reversals, still
 from hystgen.diagnosis.findings.kinds import Fault, Finding, Line, Ripple, Structured, times_noise
 from hystgen.diagnosis.findings.result import (
-    AtEnd,
     Contender,
     FitErrors,
     Gap,
@@ -30,7 +29,6 @@ from hystgen.diagnosis.findings.result import (
 from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search.acceptance import is_noise
 from hystgen.diagnosis.search.fits import Fitted
-from hystgen.diagnosis.search.ranges import End
 from hystgen.diagnosis.search.selection import Found, Outcome, Ranked, Refusal
 from hystgen.plays import operators
 
@@ -123,13 +121,9 @@ def _withdrawn(found: Outcome, unit: str | None) -> Withdrawn | None:
         FitErrors(to_fit.before, held.before),
         FitErrors(to_fit.after, held.after),
         (left[0], left[1]),
-        tuple((each.name, _at_end(each)) for each in them.ends),
+        tuple((each.name, each.found) for each in them.ends),
         reason(them.refused, unit),
     )
-
-
-def _at_end(end: End) -> AtEnd:
-    return AtEnd(end.key, end.value, end.end, end.usual, end.reached, end.leaves, end.why)
 
 
 REFUSALS = {
@@ -153,7 +147,7 @@ REFUSALS = {
 """Why an effect that was tried has no name, in words."""
 
 
-def _in_digits(value: Any) -> Any:
+def _in_digits(value: object) -> Any:
     """The value with eight digits in all its numbers, so that the same input gives the same text."""
     if is_dataclass(value) and not isinstance(value, type):
         return type(value)(**{each.name: _in_digits(getattr(value, each.name)) for each in fields(value)})
@@ -201,7 +195,7 @@ def _effects(found: Outcome, to_fit: Sequence[Item], refitted: float, noise: flo
         later = sum(other.name == each.name for other in found.found[k + 1 :])
         parameters = _parameters_of(found.fitted, each.name, later)
         part = fits.place(found.fitted, each.name, later)
-        ends = tuple(_at_end(end) for end in found.ends if end.part == part)
+        ends = tuple(end.found for end in found.ends if end.part == part)
         effects.append(
             NamedEffect(
                 each.name,

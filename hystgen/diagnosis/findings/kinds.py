@@ -24,7 +24,7 @@ class Finding(ABC):
 
     def entry(self) -> dict[str, Any]:
         """The entry as in `diagnosis.json`."""
-        entry: dict[str, Any] = {"kind": self.kind}
+        entry: dict[str, object] = {"kind": self.kind}
         for each in fields(self):
             value = getattr(self, each.name)
             if each.name not in self.optional or (value is not None and value is not False):

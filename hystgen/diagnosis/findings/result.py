@@ -20,6 +20,8 @@ from hystgen.diagnosis.findings.kinds import Fault, Finding, NotAPlaySum, Struct
 from hystgen.diagnosis.search import acceptance
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from hystgen.model import Model
     from hystgen.parameters.files import Parameters
 
@@ -118,8 +120,8 @@ class NamedEffect:
     """
 
     name: str
-    parameters: Mapping[str, Any]
-    intervals: Mapping[str, Any]
+    parameters: Mapping[str, object]
+    intervals: Mapping[str, object]
     share_of_gap: float
     holdout_before: float
     holdout_after: float
@@ -213,7 +215,7 @@ class Diagnosis:
     signals: tuple[Signals, ...] = field(compare=False)
     page: Callable[[Diagnosis, str], str] | None = field(default=None, compare=False, repr=False)
 
-    figures: Mapping[str, Callable[[Diagnosis], Any]] = field(default_factory=dict, compare=False)
+    figures: Mapping[str, Callable[[Diagnosis], Figure]] = field(default_factory=dict, compare=False)
 
     FILES: ClassVar[tuple[str, ...]] = ("diagnosis.json", "report.html", "params.yaml")
 
@@ -232,7 +234,7 @@ class Diagnosis:
 
         return Model(self.parameters)
 
-    def plot(self, which: str = "gap", path: str | os.PathLike[str] | None = None) -> Any:
+    def plot(self, which: str = "gap", path: str | os.PathLike[str] | None = None) -> Figure:
         """A figure of the report, by default how each effect shrinks the held-out error.
 
         `which`: gap, overlay, records, time, against or frequency. Returns matplotlib's Figure, which a notebook shows;
@@ -242,9 +244,9 @@ class Diagnosis:
         return drawing.picture(partial(self.figures[which], self), path)
 
     @cached_property
-    def content(self) -> dict[str, Any]:
+    def content(self) -> dict[str, object]:
         """The result as in `diagnosis.json`."""
-        content: dict[str, Any] = plain(self.result)
+        content: dict[str, object] = plain(self.result)
         return {"hystgen": 1, **content}
 
     @property
@@ -407,7 +409,7 @@ def _capital(text: str) -> str:
     return text[0].upper() + text[1:]
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """The value for JSON: mappings, lists, text and finite numbers; None for other numbers."""
     if isinstance(value, Finding):
         return plain(value.entry())

@@ -396,17 +396,17 @@ HALVINGS = 20
 WEAKEST = 1e-9
 """Singular values below this share of the largest are raised to it, since their directions are not determined."""
 
-Numbers = Mapping[str, Any]
+Numbers = Mapping[str, object]
 
 
 @dataclass(frozen=True)
 class Sure:
     """Low and high end for every number, under the keys of the entries: for the front's stage, and for each part."""
 
-    front: dict[str, Any]
-    parts: tuple[dict[str, Any], ...]
+    front: dict[str, object]
+    parts: tuple[dict[str, object], ...]
 
-    def of(self, fitted: Fitted, name: str, later: int) -> dict[str, Any]:
+    def of(self, fitted: Fitted, name: str, later: int) -> dict[str, object]:
         """The intervals of an effect; `later`: number of effects of its name found after it."""
         k = place(fitted, name, later)
         return self.front if k is None else self.parts[k]
@@ -448,11 +448,11 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
     drawn = np.random.default_rng(SEED).standard_normal((DRAWS, len(root))) @ root
     low, high = fitted.structure.bounds
     shapes = [_admissible(fitted, one) for one in np.clip(shape + sigma * drawn, low, high)]
-    of_front: dict[str, Any] = {}
+    of_front: dict[str, object] = {}
     if front:
         made = [stage(fitted, one) for one in shapes]
         of_front = _spread(made, stage(fitted, shape))
-    found: list[dict[str, Any]] = []
+    found: list[dict[str, object]] = []
     for k, part in enumerate(fitted.structure.parts):
         if not len(part.candidate.start):
             found.append({})
@@ -479,24 +479,24 @@ def _admissible(fitted: Fitted, drawn: Array) -> Array:
     return np.asarray(found + inside * (drawn - found))
 
 
-def stage(fitted: Fitted, shape: Array) -> dict[str, Any]:
+def stage(fitted: Fitted, shape: Array) -> dict[str, object]:
     """The last stage of the front as in a parameter file; empty without a front."""
     stages = fitted.structure.front.stages(fitted.structure.pieces(shape)[0])
     return dict(stage_content(stages[-1])) if stages else {}
 
 
-def entry(effect: Effect) -> dict[str, Any]:
+def entry(effect: Effect) -> dict[str, object]:
     """The keys of an effect as in a parameter file, without the name."""
     return {key: value for key, value in effect.model_dump(exclude_defaults=True).items() if key != "name"}
 
 
-def _spread(made: Sequence[Numbers], at: Numbers) -> dict[str, Any]:
+def _spread(made: Sequence[Numbers], at: Numbers) -> dict[str, object]:
     """`[low, high]` for each key that varies; for a list or a mapping, the same for its entries."""
     found = {key: _interval([each.get(key) for each in made], value) for key, value in at.items()}
     return {key: sure for key, sure in found.items() if sure}
 
 
-def _interval(values: Sequence[Any], at: Any) -> Any:
+def _interval(values: Sequence[Any], at: Any) -> object:
     if isinstance(at, bool | str) or any(value is None for value in values):
         return None
     if isinstance(at, Mapping):

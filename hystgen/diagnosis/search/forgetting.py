@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import ClassVar, Literal
 
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from hystgen.diagnosis.data import signals
 from hystgen.diagnosis.data.items import Item, rms
+from hystgen.diagnosis.findings.kinds import NotAPlaySum
 from hystgen.diagnosis.search import acceptance, fits, ranges, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Part, Structure
@@ -76,24 +77,7 @@ class Forgetting(Effect):
         return np.asarray(self.width * made.hysteretic(run.v))
 
 
-@dataclass(frozen=True)
-class Forgets:
-    """An element that forgets, fitted beside the plays, in place of names or beside them.
-
-    `before`, `after`: held-out rms without it and with it; `way`: of the drive over which it forgets, and `open`: how
-    far a minor loop over a tenth of the drive range is from closing, of its height, both as shares; `in_place_of`:
-    names that it explains better, or as well where the records show no speed; `shows_speed`: whether they do.
-    """
-
-    before: float
-    after: float
-    way: float
-    open: float
-    in_place_of: tuple[str, ...]
-    shows_speed: bool
-
-
-def forgets(outcome: Outcome, records: Records) -> Forgets | None:
+def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
     """The element, where records bear it out beside the effects that were found, or better than these; else None.
 
     The element is first tried in place of all names of the `outcome`, then of those that depend on time, then beside
@@ -146,7 +130,7 @@ def _without(now: Fitted, names: Sequence[str], records: Records) -> Fitted:
     return now
 
 
-def withheld(outcome: Outcome, found: Forgets | None, records: Records) -> Outcome:
+def withheld(outcome: Outcome, found: NotAPlaySum | None, records: Records) -> Outcome:
     """The outcome without the names in whose place the element stands."""
     if found is None or not found.in_place_of:
         return outcome
@@ -230,11 +214,11 @@ def _replaces(alone: Tried, named: Fitted, records: Records, shown: bool) -> boo
     return selection.difference(mine, theirs) > acceptance.P_DIFFERENT
 
 
-def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, records: Records) -> Forgets:
+def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, records: Records) -> NotAPlaySum:
     element = tried.fitted.structure.effects(tried.fitted.shape)[-1]
     assert isinstance(element, Forgetting)
     low, high = records.known.drive
-    return Forgets(
+    return NotAPlaySum(
         records.residual(now), tried.held_out, element.width / (high - low), _open(tried.fitted, element, low, high),
         names, shown,
     )

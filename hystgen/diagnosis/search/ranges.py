@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hystgen.diagnosis.findings.result import AtEnd
 from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search.fits import Fitted, ends_of
 from hystgen.diagnosis.search.hypothesis import Part
@@ -32,22 +33,11 @@ not widened; only noise is left, so that none was tried."""
 
 @dataclass(frozen=True)
 class End:
-    """A number of an effect at an end of its range or, where a wider one was better, beyond it.
-
-    `part`: of the structure, with its `name`; `key`, `value`: as in the parameter file; `end`: `least` or `largest`;
-    `usual`: value at that end of the usual range; `reached`: the same of the widest range that was tried, and `leaves`
-    the held-out rms that it left, None for none; `why`: `beyond`, `no less`, `limit`, `firm` or `noise`.
-    """
+    """A number at an end of its range or beyond it, as `AtEnd` says; `part`: of the structure, with its `name`."""
 
     part: int
     name: str
-    key: str
-    value: float
-    end: str
-    usual: float
-    reached: float | None
-    leaves: float | None
-    why: str
+    found: AtEnd
 
 
 def wider(now: Fitted, records: Records) -> Fitted | None:
@@ -107,7 +97,7 @@ def _allowed(candidate: Candidate, numbers: Array, j: int, way: float, threshold
     return inside
 
 
-def _made(candidate: Candidate, numbers: Array, thresholds: tuple[float, ...]) -> dict[str, Any] | None:
+def _made(candidate: Candidate, numbers: Array, thresholds: tuple[float, ...]) -> dict[str, object] | None:
     """The keys of the effect of some numbers; None if the schema does not allow it."""
     try:
         made = candidate.build(numbers)
@@ -133,12 +123,11 @@ def ends(now: Fitted, leaves: float | None, only_noise: bool) -> tuple[End, ...]
             tried = j in there and leaves is not None and far[j] != x[j]
             beyond = bool(x[j] > end[j]) if largest else bool(x[j] < end[j])
             why = BEYOND if beyond else NOISE if only_noise else FIRM if part.firm else NO_LESS if tried else LIMIT
-            found.append(
-                End(
-                    k, part.name, key, value, LARGEST if largest else LEAST, _number(build, x, j, largest, end[j])[1],
-                    _number(build, x, j, largest, far[j])[1] if tried else None, leaves if tried else None, why,
-                )
+            at_end = AtEnd(
+                key, value, LARGEST if largest else LEAST, _number(build, x, j, largest, end[j])[1],
+                _number(build, x, j, largest, far[j])[1] if tried else None, leaves if tried else None, why,
             )
+            found.append(End(k, part.name, at_end))
     return tuple(found)
 
 

@@ -14,7 +14,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Floating, Margin, One, Verbs
+from hystgen.effects.part import FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -109,6 +109,11 @@ class Aged(One):
 
     effect: Ageing
 
+    def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
+        """It as a gain; the C takes the gain at the travel one sample before, from a table."""
+        late = most_at_once(self.effect, speed.step) + TABLE_ERROR if emitted else 0.0
+        return Gained(1.0, LEAST_GAIN, LARGEST_GAIN, TABLE_ERROR * output * emitted, late * output)
+
     def grown(self, size: float, margin: Margin) -> float:
         """Largest output for inputs within a size."""
         return size * LARGEST_GAIN
@@ -135,7 +140,7 @@ KIND = Kind(
     "ageing", ("least", "largest", "last"), ("high", "low", "gain", "inverse"),
     rows=Rows("piece", ("begin", "inverse_length", "c0", "c1", "c2", "c3")), counts=("n", "turns"), flags=("own",),
     reading=(), own=("solve", "absorb"),
-)  # fmt: skip
+)
 
 
 class AgeingTables(NamedTuple):
@@ -147,7 +152,7 @@ class AgeingTables(NamedTuple):
     turns: Counts
 
 
-def tables(blocks: Sequence[Aged], about: Floating) -> AgeingTables:
+def tables(blocks: Sequence[Aged], about: FloatSurroundings) -> AgeingTables:
     """The tables of several blocks in floating point."""
     rows = [pieces(one.effect) for one in blocks]
     last = [float(each[-1, BEGIN] + 1.0 / each[-1, INVERSE_LENGTH]) for each in rows]
@@ -271,10 +276,10 @@ def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # no
     return s.block[j, GAIN] * x
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(
         memory, absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move, set_gain=ageing_set,
         set_travel=ageing_set_travel, travelled=ageing_travelled,
     ),
     constants, tables,
-)  # fmt: skip
+)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,12 +24,17 @@ from hystgen.effects.ageing.compensator import (
 )
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Fixed, Verbs
-from hystgen.effects.thermal.fixed import GAIN_BITS, LARGEST, LEAST, ONE, followed, reciprocal
+from hystgen.effects.part import ChainPart, Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
+from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
+from hystgen.effects.thermal.fixed import GAIN_BITS, LARGEST, LEAST, ONE, RECIPROCAL_ERROR, followed, reciprocal
 from hystgen.plays.slots import zero
 
 SHARE_BITS = 20
 """Fraction bits of the share of a piece: a gain changes along one by a hundredth, so that it has 27."""
+
+CUBIC_ERROR = 8.0 * 2.0**-GAIN_BITS
+"""[share of what passes] Error of a gain from a piece of a cubic: four coefficients and products, and a share that is
+rounded to 20 bits, where the gain changes by a hundredth."""
 
 LONGEST = 2**61
 """Drive codes that a travel is counted to at most, 5e8 times a range in q31; beyond, the gain keeps its last value."""
@@ -38,7 +43,7 @@ LONGEST = 2**61
 KIND = Kind(
     "ageing", rows=Rows("piece", letters="wfbc"), counts=("n", "turns", "bits"), flags=("own",), reading=(),
     own=("solve", "absorb"), letters="w", memory="wii",
-)  # fmt: skip
+)
 
 
 def constants(t: AgeingTables) -> Iterator[Constants]:
@@ -77,14 +82,31 @@ def tables(rows: Sequence[tuple[Array, int]], lsb: float, bits: int) -> AgeingTa
     )
 
 
-def formats(one: Aged, about: Fixed, *_: float) -> tuple[Array, int]:
-    """Pieces of the gain and Newton steps of a block."""
-    span = about.ends[1] - about.ends[0]
-    return floating.pieces(one.effect), floating.turns(one.effect, span, 2.0**-GAIN_BITS)
+@dataclass(frozen=True)
+class AgeingFormats(Coded):
+    """A block: pieces of the gain, and Newton steps."""
+
+    one: Aged
+    pieces: Array
+    turns: int
+
+    def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
+        """It as a gain, for inputs within a size."""
+        begun = 0.5 * at.drive_lsb * abs(floating.steepness(self.one.effect, 0.0))  # pieces begin at whole codes
+        wrong = floating.TABLE_ERROR + begun + CUBIC_ERROR
+        late = floating.most_at_once(self.one.effect, speed.step) + wrong / LEAST_GAIN + RECIPROCAL_ERROR
+        return CodedGain(LEAST_GAIN, LARGEST_GAIN, wrong * size, late * size)
 
 
-def made(rows: Sequence[tuple[Array, int]], about: Fixed) -> AgeingTables:
+def formats(one: Aged, about: FixedSurroundings, *_: float) -> AgeingFormats:
+    """A block of a model."""
+    turns = floating.turns(one.effect, about.ends[1] - about.ends[0], 2.0**-GAIN_BITS)
+    return AgeingFormats(one, floating.pieces(one.effect), turns)
+
+
+def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> AgeingTables:
     """As `tables`."""
+    rows = [(each.pieces, each.turns) for each in blocks]
     return tables(rows, float(about.drive_lsb), GAIN_BITS - (about.code_bits - 2))
 
 
@@ -176,10 +198,17 @@ def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # no
     return times(x, s.block[j, GAIN], GAIN_BITS)
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(
         floating.memory, absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
         set_gain=ageing_set, set_travel=ageing_set_travel, travelled=ageing_travelled,
     ),
     constants, made, formats,
-)  # fmt: skip
+)
+
+AGEING = ChainPart(
+    "ageing", "ageing", lambda effect: effect.name == "ageing", lambda effect, *_: floating.Aged(effect),
+    floating.ARITHMETIC, ARITHMETIC, calls=("set_gain", "travel", "set_travel"),
+    kinds=(floating.KIND,),
+)
+"""Ageing as a part of the chain: a gain over the travel, which the caller may set."""

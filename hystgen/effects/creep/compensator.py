@@ -14,7 +14,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.base import Array, Block, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Margin, One, Response, Verbs
+from hystgen.effects.part import Margin, One, Realized, Responses, Verbs
 from hystgen.plays.slots import Counts, Reals, zero
 
 EFFECTS = (ExponentialCreep, LogarithmicCreep)
@@ -51,7 +51,39 @@ class CreepNumbers(One):
         """The settled output for an input."""
         return x * self.rest
 
-    def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
+    @property
+    def growth(self) -> float:
+        """Largest output for inputs within 1."""
+        return self.rest
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it has states that see what it gets."""
+        return True
+
+    @property
+    def backward(self) -> float:
+        """Largest gain of the inverse through all states."""
+        total, late = float(np.sum(self.terms[:, WEIGHT])), float(np.sum(self.terms[:, LATE]))
+        around = self.rest - 2.0 * total + 2.0 * late
+        return 1.0 / around if around > 0.0 else 2.0 / self.slope - 1.0 / self.rest
+
+    def rounding(self, size: float, u: float) -> tuple[float, float]:
+        """Roundings of the output for inputs within `size`, and of the inverse as such."""
+        rate, weight = self.terms[:, RATE], self.terms[:, WEIGHT]
+        states = (16.0 + len(self.terms)) * float(np.sum(weight)) + u * float(np.sum(weight / rate))
+        found = u * size * (states + 4.0 * self.rest)
+        return found, found
+
+    def solved(self, error: float, size: float, u: float, same: bool) -> float:
+        """Error of the input that it is solved for, by one of the output; `same`: its states have seen the same."""
+        return (1.0 / self.slope if same else self.backward) * (error + self.rounding(size, u)[1])
+
+    def seen(self) -> float:
+        """Factor by which states that see its input multiply an error of that."""
+        return self.slope * self.backward
+
+    def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
         """What it makes of frequencies, behind other blocks."""
         rate, early, late, _ = self.terms.T[:, :, None]
         states = np.sum((early * z + late) / (1.0 - (1.0 - rate) * z), axis=0)
@@ -101,7 +133,7 @@ HIGH, LOW = 0, 1
 KIND = Kind(
     "creep", ("slope", "inverse_slope", "rest", "inverse_rest"), ("ahead",),
     rows=Rows("term", ("rate", "share"), ("high", "low")), counts=("n",),
-)  # fmt: skip
+)
 
 
 class CreepTables(NamedTuple):
@@ -184,10 +216,10 @@ def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     return y
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
     lambda blocks, about: tables(blocks, about.reals),
-)  # fmt: skip
+)
 
 # ---------------------------------------------------------------- at steps of any length
 

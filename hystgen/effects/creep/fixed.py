@@ -9,17 +9,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
+from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.effects.creep import compensator as floating
 from hystgen.effects.creep.compensator import AHEAD, BEFORE, HIGH, CreepNumbers, CreepState, CreepTables
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Verbs
+from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Realized, Sought, Verbs
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import zero
 
@@ -49,20 +50,61 @@ def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
     return bits, max(0, math.ceil(math.log2(states)) + bits + 2 - (LARGEST.bit_length() - 1))
 
 
-def tables(blocks: Sequence[tuple[CreepNumbers, float]], code: int) -> CreepTables:
-    """All creep blocks of a model, each with the largest size of its input; `code` as for `guard`, which may raise."""
+@dataclass(frozen=True)
+class CreepFormats(Coded):
+    """A block: bits of its states below a signal's, and those dropped before a product."""
+
+    one: CreepNumbers
+    bits: int
+    drop: int
+
+    @property
+    def direct(self) -> float:
+        """The share of a step that arrives at once."""
+        return self.one.rest - math.fsum(self.one.terms[:, 3].tolist())
+
+    def there(self, size: float, signal: float) -> float:
+        """Roundings of the output for inputs within a size, with signals of this unit."""
+        state, found = 2.0**-self.bits * signal, 0.0
+        for rate, _, late, weight in self.one.terms.tolist():
+            scale = 2.0 ** (self.bits - lifted(late, self.bits))
+            found += state * (0.5 / rate + 2.0**self.drop) + 0.5 * signal / scale / rate
+            found += 0.5 * signal + missed(weight) * size + 2.0 * size * missed(late * scale) / scale / rate
+            found += 2.0 * weight * size * missed(rate * 2.0**self.drop) / 2.0**self.drop / rate
+        return found + missed(self.direct) * size + signal
+
+    def solved(self, error: float, at: Sought) -> float:
+        """Error of the input that it is solved for, by one of the output."""
+        one = self.one
+        moved = at.asked + at.size * one.rest
+        own = one.slope * (missed(1.0 / one.slope) * moved + 0.5 * at.signal)
+        states = at.apart * float(sum(one.terms[:, 3]))
+        gain = 1.0 / one.slope if at.same else one.backward
+        return gain * (error + self.there(at.size, at.signal) + own + states)
+
+    def residual(self, missed: float, same: bool) -> float:
+        """The error of an output that the inverse makes of one of the sum of the plays."""
+        return missed * (self.one.slope * (1.0 / self.one.slope if same else self.one.backward))
+
+
+def formats(one: CreepNumbers, about: FixedSurroundings, given: float, _: float) -> CreepFormats:
+    """A block for inputs up to `given` output codes. Raises OverflowError where states have no room."""
+    return CreepFormats(one, *guard(one, given * 2.0**about.bits, about.bits))
+
+
+def tables(blocks: Sequence[CreepFormats], _: FixedSurroundings) -> CreepTables:
+    """All creep blocks of a model."""
     block: list[list[int]] = []
     term: list[list[int]] = []
-    for numbers, size in blocks:
-        bits, drop = guard(numbers, size, code)
-        direct = numbers.rest - math.fsum(numbers.terms[:, 3].tolist())
-        given = (direct, 1.0 / numbers.slope, 1.0 / numbers.rest)
+    for each in blocks:
+        bits, drop = each.bits, each.drop
+        given = (each.direct, 1.0 / each.one.slope, 1.0 / each.one.rest)
         block.append([*(part for x in given for part in factor(x)), bits, drop])
-        for rate, _, late, weight in numbers.terms.tolist():
+        for rate, _early, late, weight in each.one.terms.tolist():
             lift = lifted(late, bits)
             scaled = (rate * 2.0**drop, late * 2.0 ** (bits - lift), weight)
             term.append([*(part for x in scaled for part in factor(x)), lift])
-    first = np.cumsum([0, *(len(numbers.terms) for numbers, _ in blocks)]).astype(np.int64)
+    first = np.cumsum([0, *(len(each.one.terms) for each in blocks)]).astype(np.int64)
     return CreepTables(np.array(block, dtype=np.int64).reshape(-1, 8), first, np.array(term, np.int64).reshape(-1, 7))
 
 
@@ -119,7 +161,15 @@ def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
     return direct + nearest(total, t.block[j, BITS])
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(floating.memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
-    lambda blocks, about: tables(blocks, about.bits), lambda one, about, given, _: (one, given * 2.0**about.bits),
-)  # fmt: skip
+    tables, formats,
+)
+
+CREEP = ChainPart(
+    "creep", "creep", lambda effect: effect.name == "creep",
+    lambda effect, seconds, _: floating.numbers(effect, seconds),
+    floating.ARITHMETIC, ARITHMETIC,
+    kinds=(floating.KIND,),
+)
+"""Creep as a part of the chain."""

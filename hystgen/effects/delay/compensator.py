@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
-from hystgen.effects.part import Arithmetic, Function, Surroundings, Verbs
+from hystgen.effects.part import ChainPart, Function, One, Realized, Surroundings, Verbs
 from hystgen.plays.slots import Counts, Reals
 
 MOST_SAMPLES = 2**15
@@ -33,6 +34,17 @@ class Waiting(NamedTuple):
 
     sample: Reals
     oldest: Counts
+
+
+@dataclass(frozen=True)
+class Wait(One):
+    """A delay, in s."""
+
+    time: float
+
+    def rounding(self, size: float, u: float) -> tuple[float, float]:
+        """Roundings of the drive that leaves it."""
+        return 4.0 * u * size, 0.0
 
 
 def numbers(seconds: float, step: float) -> tuple[float, int]:
@@ -104,17 +116,23 @@ def verbs(delayed: Function) -> Verbs:
     return Verbs(memory, rest, absorb)
 
 
-def tables(seconds: Sequence[float], about: Surroundings, share: Callable[[float], Any]) -> DelayTables:
+def tables(waits: Sequence[Wait], about: Surroundings, share: Callable[[float], Any]) -> DelayTables:
     """The tables of all delays of a model, which follow one another; `share`: that of an arithmetic."""
-    waited, waiting = numbers(math.fsum(seconds), about.seconds)
+    waited, waiting = numbers(math.fsum(one.time for one in waits), about.seconds)
     return DelayTables(share(waited) if waiting else share(0.0)[:0], waiting)
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     verbs(delayed), lambda _: (),
     lambda blocks, about: tables(blocks, about, lambda share: about.reals([share], "the delay")),
-)  # fmt: skip
-FIXED_ARITHMETIC = Arithmetic(
+)
+FIXED_ARITHMETIC = Realized(
     verbs(fixed_delayed), lambda _: (),
     lambda blocks, about: tables(blocks, about, lambda share: np.array(factor(share), dtype=np.int64)),
-)  # fmt: skip
+)
+
+DELAY = ChainPart(
+    "wait", "a delay", lambda effect: effect.name == "delay" and effect.time > 0.0,
+    lambda effect, *_: Wait(effect.time), ARITHMETIC, FIXED_ARITHMETIC, forward=True, joined=True,
+)
+"""A delay as a part of the chain: what the amplifier of the forward operator gets of the drive."""

@@ -10,7 +10,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import Arithmetic, Floating, Function, Verbs
+from hystgen.effects.part import FloatSurroundings, Function, Realized, Verbs
 from hystgen.plays.slots import Reals, zero
 
 # ---------------------------------------------------------------- clock.c
@@ -20,7 +20,7 @@ CARRY_SAMPLES = 2.0**24
 
 KIND = Kind(
     "clock", ("sample", "block", "carry", "rate", "half_change", "farthest"), ("high", "low", "lead"), own=(),
-)  # fmt: skip
+)
 
 SAMPLE, BLOCK, CARRY, RATE, HALF_CHANGE, FARTHEST, ONE, MOST_AHEAD = range(8)
 HIGH, LOW, LEAD = range(3)
@@ -76,7 +76,7 @@ def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
 def verbs(memory: Function, start: Function, tick: Function, drift: Function, one: int, most: int) -> Verbs:
     """What a clock does, by its functions in an arithmetic and the places of 1 and of the farthest lead in tables."""
 
-    @jit(inline=True)
+    @jit
     def added(t: Reals, s: Reals, j: int) -> Any:
         """The drift now."""
         return drift(t, s, j, zero(t[j, one]))
@@ -89,7 +89,7 @@ def verbs(memory: Function, start: Function, tick: Function, drift: Function, on
             following = following + s[j, LEAD]
         s[j, LEAD] = t[j, most] if following > t[j, most] else following
 
-    @jit(inline=True)
+    @jit
     def ahead(t: Reals, s: Reals, j: int, filled: int, moving: int) -> Any:
         """The drift by the time of the newest reference."""
         late = s[j, LEAD] if filled else zero(t[j, one])
@@ -98,11 +98,11 @@ def verbs(memory: Function, start: Function, tick: Function, drift: Function, on
     return Verbs(memory, reset=start, move=tick, added=added, lead=lead, ahead=ahead)
 
 
-def tables(effects: Sequence[LinearDrift | CurvedDrift], about: Floating) -> Reals:
+def tables(effects: Sequence[LinearDrift | CurvedDrift], about: FloatSurroundings) -> Reals:
     """The tables (k, 8) of the clock of a model."""
     rows = [numbers(each, about.seconds, about.span, about.ahead) for each in effects]
     found: Reals = about.reals(rows, "drift").reshape(-1, 8)
     return found
 
 
-ARITHMETIC = Arithmetic(verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants, tables)
+ARITHMETIC = Realized(verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants, tables)

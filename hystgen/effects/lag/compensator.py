@@ -15,7 +15,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.base import Block, decays
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag.model import Lag
-from hystgen.effects.part import Arithmetic, Led, Margin, One, Response, Verbs
+from hystgen.effects.part import Led, Margin, One, Realized, Responses, Verbs
 from hystgen.plays.slots import Counts, Reals, zero
 
 LONG_STEP = 2.0
@@ -50,7 +50,31 @@ class LagNumbers(One):
         """The same, for results on the way."""
         return 2.0 / self.row[LATE if self.exact else RATE]
 
-    def respond(self, z: NDArray[np.complex128], found: Response) -> Response:
+    @property
+    def misses(self) -> bool:
+        """Whether what arrives differs from what it was solved for."""
+        return not self.exact
+
+    def rounding(self, size: float, u: float) -> tuple[float, float]:
+        """Roundings of the output for inputs within `size`; those of the inverse are in `led`."""
+        return u * size * (8.0 + u / self.row[RATE]), 0.0
+
+    def led(self, error: float, drive: float, u: float, same: bool, turning: bool) -> float:
+        """The error of the input for an error of the output asked for.
+
+        States that have seen the same drives pass on `goal/rate`, and the target before, which follows from earlier
+        targets, `W = theta^2 e + theta (1 - theta) W`.
+        """
+        rate, theta, late, _ = self.row
+        if self.exact:
+            return ((2.0 - rate) * error + 8.0 * u * drive) / (late - theta)
+        states = u * drive * (5.0 + u / rate)
+        farthest = (1.0 + 2.0 * theta) / (1.0 - theta)
+        before = shifted(theta, turning) if same else farthest
+        goal = before * error + farthest * states + 6.0 * u * drive
+        return (goal + states) * (1.0 if same else 2.0 - rate) / rate + u * drive * (2.0 + 6.0 / rate)
+
+    def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
         """What it makes of frequencies, behind other blocks."""
         rate, second, late, _ = self.row
         if self.exact:
@@ -67,12 +91,12 @@ class LagNumbers(One):
         """Largest input that it is solved for, by outputs within a size and after inputs `given`."""
         return self.sizes(given, asked, margin.turning).answer
 
-    def sizes(self, given: float, asked: float, turning: bool) -> Sizes:
+    def sizes(self, given: float, asked: float, turning: bool) -> LagSizes:
         """Those of its signals."""
-        return Sizes(self.exact, self.row[RATE], self.row[LATE], given, asked, turning)
+        return LagSizes(self.exact, self.row[RATE], self.row[LATE], given, asked, turning)
 
 
-class Sizes:
+class LagSizes:
     """Largest sizes of a lag's signals: its input, the output asked of it, its states, the answer of its inverse;
     `turning`: in front of two branches."""
 
@@ -134,14 +158,14 @@ and never overshoots; the tests of overshoot hold it."""
 KIND = Kind(
     "lag", ("rate", "theta", "late", "inverse_rate"), ("high", "low", "wanted", "asked", "answer"),
     reading=("solve", "absorb"), own=("rest", "solve", "absorb"),
-)  # fmt: skip
+)
 BRAKED_KIND = Kind(
     "braked", KIND.table, (*KIND.state, "earlier"), reading=KIND.reading, own=KIND.own, like=KIND.name,
-)  # fmt: skip
+)
 EXACT_KIND = Kind(
     "lag_exact", ("rate", "early", "late", "inverse_late"), ("reached", "before"),
     reading=("solve", "absorb"), own=("rest", "solve", "absorb"),
-)  # fmt: skip
+)
 
 
 class LagTables(NamedTuple):
@@ -340,10 +364,10 @@ def steady_state(s: Reals) -> Any:
 
 
 LED = Led(steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked, HALVES)
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
     lambda blocks, about: tables(blocks, about.reals, about.braked),
-)  # fmt: skip
+)
 
 # ---------------------------------------------------------------- at steps of any length
 

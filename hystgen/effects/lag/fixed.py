@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, times
+from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag import compensator as floating
-from hystgen.effects.lag.compensator import HALVES, LagNumbers, LagTables, Sizes, steady_led
-from hystgen.effects.part import Arithmetic, Led, Verbs
+from hystgen.effects.lag.compensator import HALVES, LagNumbers, LagSizes, LagTables, shifted, steady_led
+from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Led, Realized, Verbs
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
@@ -41,27 +43,75 @@ def memory(t: LagTables, dtype: Any) -> Reals:
     return np.zeros((len(t.exact), 5), dtype)
 
 
-def tables(rows: Sequence[tuple[LagNumbers, Sizes]], braked: int) -> LagTables:
-    """All lags of a model, with the sizes of their signals. Raises OverflowError where states have no room."""
-    block: list[list[int]] = []
-    for one, sizes in rows:
-        exact, numbers = one.exact, one.row
-        room = STATE_BITS - math.ceil(math.log2(sizes.state))
-        wanted = EXACT_BITS if exact else max(math.ceil(-math.log2(numbers[floating.RATE])), 0) + GUARD
-        bits = min(wanted, room)
-        if bits < (EXACT_BITS if exact else wanted - GUARD):
-            raise OverflowError("no room")
-        drop = max(0, math.ceil(math.log2(sizes.state)) + bits + 1 - (LARGEST.bit_length() - 1))
-        rate, second, late, inverse = numbers
-        given: tuple[float, ...]
+@dataclass(frozen=True)
+class LagFormats(Coded):
+    """A lag with the sizes of its signals: bits of its states below a signal's, and those dropped before a product."""
+
+    one: LagNumbers
+    sizes: LagSizes
+    bits: int
+    drop: int
+
+    @cached_property
+    def _roundings(self) -> tuple[float, float, float]:
+        """Of the output, of the state in the inverse, and of the answer, in units of signals."""
+        exact, (rate, second, late, inverse) = self.one.exact, self.one.row
+        state, scale, given = 2.0**-self.bits, 2.0**self.drop, self.sizes.given
+        kept = state * (0.5 / rate + scale) + 2.0 * given * missed(rate * scale) / scale / rate
+        finer = 2.0 ** (self.bits - self.drop)
+        answer = self.sizes.state * missed(inverse / finer) * finer
         if exact:
-            given = (rate * 2.0**drop, late * 2.0**bits, inverse * 2.0 ** (drop - bits))
-        else:
-            given = (rate * 2.0**drop, second * 2.0**drop, inverse * 2.0 ** (drop - bits))
+            kept += (0.5 * state + 2.0 * given * missed(late * 2.0**self.bits) / 2.0**self.bits) / rate
+            return kept + 0.5, kept, answer + state * scale / late + 0.5
+        product = state * (0.5 + scale * second) + self.sizes.state * missed(second * scale) / scale
+        return 3.0 * kept + product + 0.5, kept + 3.0 * product, answer + state * scale * inverse + 1.0
+
+    @property
+    def arrived(self) -> float:
+        """Roundings of the output in front of the plays."""
+        return self._roundings[0]
+
+    @property
+    def follows(self) -> float:
+        """What a change of its input in one sample is of the output."""
+        rate, theta, *_ = self.one.row
+        return 1.0 if self.one.exact else rate * (1.0 + 2.0 * theta)
+
+    def led(self, error: float, code: float, same: bool, turning: bool) -> float:
+        """Error of the input for one of the output asked for; `code`: rounding of the input."""
+        rate, second, late, _ = self.one.row
+        _, kept, answer = self._roundings
+        if not self.one.exact:  # its states have seen the same drives
+            goal = shifted(second, turning) * error + (1.0 + 2.0 * second) / (1.0 - second) * kept
+            return (goal + kept) / rate + answer + code
+        if same:
+            return (error + kept) / late + answer + code
+        return ((2.0 - rate) * (error + kept) + answer * late + late * code) / (late - second)
+
+
+def formats(one: LagNumbers, about: FixedSurroundings, given: float, asked: float) -> LagFormats:
+    """A lag for signals up to these sizes. Raises OverflowError where states have no room."""
+    sizes = one.sizes(given, asked, about.margin.turning)
+    room = STATE_BITS - math.ceil(math.log2(sizes.state))
+    wanted = EXACT_BITS if one.exact else max(math.ceil(-math.log2(one.row[floating.RATE])), 0) + GUARD
+    bits = min(wanted, room)
+    if bits < (EXACT_BITS if one.exact else wanted - GUARD):
+        raise OverflowError("no room")
+    drop = max(0, math.ceil(math.log2(sizes.state)) + bits + 1 - (LARGEST.bit_length() - 1))
+    return LagFormats(one, sizes, bits, drop)
+
+
+def tables(blocks: Sequence[LagFormats], about: FixedSurroundings) -> LagTables:
+    """All lags of a model."""
+    block: list[list[int]] = []
+    for each in blocks:
+        rate, second, late, inverse = each.one.row
+        bits, drop = each.bits, each.drop
+        middle = late * 2.0**bits if each.one.exact else second * 2.0**drop
+        given = (rate * 2.0**drop, middle, inverse * 2.0 ** (drop - bits))
         block.append([*(part for x in given for part in factor(x)), bits, drop])
-    return LagTables(
-        np.array([int(one.exact) for one, _ in rows], dtype=np.int64), np.array(block, np.int64).reshape(-1, 8), braked
-    )
+    exact = np.array([int(each.one.exact) for each in blocks], dtype=np.int64)
+    return LagTables(exact, np.array(block, np.int64).reshape(-1, 8), about.braked)
 
 
 # ---------------------------------------------------------------- lag_fixed.c, lag_exact_fixed.c
@@ -245,8 +295,14 @@ def coarsely(t: LagTables, x: Any, drop: Any) -> Any:
 
 
 LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked)
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
-    lambda blocks, about: tables(blocks, about.braked),
-    lambda one, about, given, asked: (one, one.sizes(given, asked, about.margin.turning)),
-)  # fmt: skip
+    tables, formats,
+)
+
+LAG = ChainPart(
+    "lag", "a lag", lambda effect: effect.name == "lag" and effect.time_constant > 0.0, floating.numbers,
+    floating.ARITHMETIC, ARITHMETIC,
+    kinds=(floating.KIND, floating.EXACT_KIND, floating.BRAKED_KIND),
+)
+"""A lag as a part of the chain, in front of the plays."""

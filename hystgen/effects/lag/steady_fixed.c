@@ -81,7 +81,10 @@ static int64_t hystgen_steady_braked(hystgen_steady_t *self, const hystgen_lag_t
 }
 
 /* The lag has followed. */
-static void hystgen_steady_absorb(hystgen_steady_t *self) {
+static void hystgen_steady_absorb(hystgen_steady_t *self, const hystgen_lag_t *lag,
+                                  int64_t before) {
+    (void)lag; /* its sum is exact */
+    (void)before;
     self->moved = self->way;
     self->way = 0;
 }

@@ -17,7 +17,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import Arithmetic, Margin, One, Verbs
+from hystgen.effects.part import Margin, One, Realized, Verbs
 from hystgen.effects.resonance.model import Resonance
 from hystgen.plays.slots import Reals, zero
 
@@ -56,6 +56,19 @@ class ModeNumbers(One):
     turned: float
     slowed: float
 
+    @property
+    def growth(self) -> float:
+        """Largest output for inputs within 1."""
+        return self.largest
+
+    def rounding(self, size: float, u: float) -> tuple[float, float]:
+        """Roundings of the output, in floating point with roundings `u`, for inputs up to `size`."""
+        keep, turn, swing, lead, push = map(abs, self.table)
+        off, rate = (1.0 + self.largest) * size, self.fastest * size
+        steps = keep * off + turn * rate + 2.0 * lead * size, swing * rate + turn * off + 2.0 * push * size
+        lost = [u * (state + 5.0 * step) for state, step in zip((off, rate), steps, strict=True)]
+        return lost[0] * self.off_after + lost[1] * self.rate_after + u * self.largest * size, 0.0
+
     def grown(self, size: float, margin: Margin) -> float:
         """Largest output for inputs within a size."""
         return size * self.largest * margin.slack + 1.0
@@ -88,22 +101,13 @@ def numbers(effect: Resonance, seconds: float) -> ModeNumbers:
     return ModeNumbers(table, largest, fastest, total(keeping), total(turning), total(turning), total(rates))
 
 
-def rounding(one: ModeNumbers, size: float, u: float) -> float:
-    """Roundings of the output, in floating point with roundings `u`, for inputs up to `size`."""
-    keep, turn, swing, lead, push = map(abs, one.table)
-    off, rate = (1.0 + one.largest) * size, one.fastest * size
-    steps = keep * off + turn * rate + 2.0 * lead * size, swing * rate + turn * off + 2.0 * push * size
-    lost = [u * (state + 5.0 * step) for state, step in zip((off, rate), steps, strict=True)]
-    return lost[0] * one.off_after + lost[1] * one.rate_after + u * one.largest * size
-
-
 # ---------------------------------------------------------------- mode.c
 
 KEEP, TURN, SWING, LEAD, PUSH = range(5)
 BEFORE, OFF, RATE = range(3)
 
 KIND = Kind("mode", ("keep", "turn", "swing", "lead", "push"), ("before", "off", "rate"),
-            reading=("absorb",), own=("rest", "absorb"))  # fmt: skip
+            reading=("absorb",), own=("rest", "absorb"))
 
 
 def constants(t: Reals) -> Iterator[Constants]:
@@ -138,7 +142,7 @@ def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
     return x + s[j, OFF]
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(memory, mode_rest, mode_absorb), constants,
     lambda blocks, about: about.reals([one.table for one in blocks], "the modes").reshape(-1, 5),
-)  # fmt: skip
+)

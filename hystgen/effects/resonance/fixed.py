@@ -7,7 +7,8 @@ below the sample rate a small factor, to 31 bits of its own.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifte
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import Arithmetic, Verbs
+from hystgen.effects.part import ChainPart, Coded, Realized, Verbs
 from hystgen.effects.resonance import compensator
 from hystgen.effects.resonance.compensator import BEFORE, OFF, RATE, ModeNumbers
 from hystgen.plays.fixed import nearest
@@ -68,9 +69,16 @@ def rounding(one: ModeNumbers, table: Any, size: float) -> float:
     return lost + 0.5 * state + 0.5
 
 
-def tables(rows: Sequence[list[int]]) -> Any:
-    """All modes of a model, (k, 13)."""
-    return np.array(rows, dtype=np.int64).reshape(-1, 13)
+@dataclass(frozen=True)
+class ModeFormats(Coded):
+    """A mode by its numbers."""
+
+    one: ModeNumbers
+    row: list[int]
+
+    def there(self, size: float, signal: float) -> float:
+        """Roundings of the output for inputs within a size, with signals of this unit."""
+        return rounding(self.one, self.row, size / signal) * signal
 
 
 # ---------------------------------------------------------------- mode_fixed.c
@@ -100,7 +108,16 @@ def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
     return x + nearest(s[j, OFF], t[j, BITS])
 
 
-ARITHMETIC = Arithmetic(
-    Verbs(compensator.memory, mode_rest, mode_absorb), constants, lambda rows, _: tables(rows),
-    lambda one, about, given, _: row(one, given * 2.0**about.bits),
-)  # fmt: skip
+ARITHMETIC = Realized(
+    Verbs(compensator.memory, mode_rest, mode_absorb), constants,
+    lambda modes, _: np.array([each.row for each in modes], dtype=np.int64).reshape(-1, 13),
+    lambda one, about, given, _: ModeFormats(one, row(one, given * 2.0**about.bits)),
+)
+
+MODE = ChainPart(
+    "mode", "resonance", lambda effect: effect.name == "resonance" and effect.block is None,
+    lambda effect, seconds, _: compensator.numbers(effect, seconds),
+    compensator.ARITHMETIC, ARITHMETIC, forward=True,
+    kinds=(compensator.KIND,),
+)
+"""A mode as a part of the chain, of the forward operator alone."""

@@ -53,4 +53,4 @@ BLOCK = OwnBlock(
     table=("keep", "turn", "swing", "lead", "push", "inverse", "none"),
     state=("before", "off", "rate"),
     rest=rest, resting=resting, solve=solve, absorb=absorb,
-)  # fmt: skip
+)

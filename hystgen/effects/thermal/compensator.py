@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Floating, Margin, One, Verbs
+from hystgen.effects.part import FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -37,7 +37,7 @@ KIND = Kind(
     ("per_degree", "offset_per_degree", "reference", "coldest", "hottest", "least", "largest"),
     ("gain", "inverse", "offset"),
     reading=(), own=("solve", "absorb"),
-)  # fmt: skip
+)
 
 
 def constants(t: Reals) -> Iterator[Constants]:
@@ -52,6 +52,17 @@ class Warm(One):
 
     effect: LoggedThermal | OwnHeat
 
+    def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
+        """It as a gain; the C leaves out the heat of one sample."""
+        effect = self.effect
+        if isinstance(effect, LoggedThermal):
+            return Gained(1.0, LEAST_GAIN, LARGEST_GAIN, 0.0, 0.0)
+        degree = abs(effect.gain_per_degree) * output + abs(effect.offset_per_degree)
+        _, least, largest = reached(effect, *speed)
+        warmed = most_at_once(effect, *speed) * degree if emitted else 0.0
+        wrong = misjudged(effect, speed, u, emitted) * degree
+        return Gained(9.0, least, largest, wrong, warmed + wrong)  # the temperature has roundings too
+
     def farthest(self, ends: tuple[float, float], span: float, seconds: float) -> float:
         """Largest move of a drive within `ends` that may be repeated in every step, where the output spans `span`."""
         return math.inf if isinstance(self.effect, LoggedThermal) else farthest(self.effect, ends, span, seconds)
@@ -65,7 +76,7 @@ class Warm(One):
         return (asked + margin.span) / LEAST_GAIN
 
 
-def tables(blocks: Sequence[Warm], about: Floating) -> Any:
+def tables(blocks: Sequence[Warm], about: FloatSurroundings) -> Any:
     """The tables (k, 8) of several gains in floating point."""
     effects: list[Any] = [one.effect for one in blocks]
     return about.reals([numbers(each, about.span) for each in effects], "temperatures").reshape(-1, 8)
@@ -88,7 +99,7 @@ def numbers(effect: LoggedThermal, span: float) -> tuple[float, ...]:
         effect.gain_per_degree, effect.offset_per_degree, effect.reference,
         effect.reference + max(down, -largest), effect.reference + min(up, largest),
         LEAST_GAIN, LARGEST_GAIN, 1.0,
-    )  # fmt: skip
+    )
 
 
 def memory(t: Reals, dtype: Any) -> Reals:
@@ -148,7 +159,7 @@ def gain_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as 
 HEAT_KIND = Kind(
     "heat", ("rate", "per_amount", "per_degree", "offset_per_degree", "hottest"),
     ("high", "low", "gain", "inverse", "offset"), counts=("turns",), reading=(), own=("solve", "absorb"),
-)  # fmt: skip
+)
 
 HEAT_RATE, PER_AMOUNT, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, HEAT_ONE, HEAT_TWO = range(7)
 HIGH, LOW, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET, BEGUN, AT = range(7)
@@ -266,6 +277,18 @@ def coarseness(effect: OwnHeat, ends: tuple[float, float], move: float, seconds:
     return effect.heating * (0.0873 * cell * cell * move + begun) / seconds
 
 
+def misjudged(effect: OwnHeat, speed: Speed, u: float, emitted: bool) -> float:
+    """How wrong the plays that rub are about the rise, degrees; `emitted`: as of all plays that rub."""
+    rubbing = thresholds(effect, speed.ends)
+    if not rubbing:
+        return 0.0
+    # each play stands by a rounding off, and one that stays because another one does by three
+    amount = len(rubbing) ** 2 * 4.0 * u * (max(map(abs, speed.ends)) + rubbing[-1])
+    amount += (len(rubbing) + 3.0) * u * most_amount(effect, speed.ends, speed.step)
+    found = amount * per_amount(effect, speed.ends, speed.seconds)
+    return found + coarseness(effect, *speed) if emitted else found
+
+
 def heat_numbers(effect: OwnHeat, ends: tuple[float, float], span: float, seconds: float) -> tuple[float, ...]:
     """Constants of a block behind which the output spans `span`, at steps of `seconds`, of drives within `ends`."""
     hot = [1e6]  # degrees; where a temperature does nothing
@@ -293,7 +316,7 @@ def heat_turns(effect: OwnHeat, ends: tuple[float, float], seconds: float, round
     return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
 
 
-def heat_tables(blocks: Sequence[Warm], about: Floating) -> HeatTables:
+def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
     """The tables of several blocks in floating point."""
     effects: list[Any] = [one.effect for one in blocks]
     ends, seconds = about.ends, about.seconds
@@ -371,7 +394,7 @@ def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001
 
 FRICTION_KIND = Kind(
     "friction", (), (), Rows("play", ("threshold",), ("at",)), counts=("n",), flags=("begun",), reading=(), own=(),
-)  # fmt: skip
+)
 
 
 def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
@@ -407,11 +430,11 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
     return amount
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
     constants, tables,
-)  # fmt: skip
-HEAT_ARITHMETIC = Arithmetic(
+)
+HEAT_ARITHMETIC = Realized(
     Verbs(heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
-    heat_constants, heat_tables,
-)  # fmt: skip
+    heat_constants, heat_tables, beside=friction_constants,
+)

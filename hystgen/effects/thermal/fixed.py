@@ -1,4 +1,4 @@
-"""Gain and offset behind the plays in fixed point."""
+"""CodedGain and offset behind the plays in fixed point."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from hystgen.arithmetic.factors import factor, times
+from hystgen.arithmetic.factors import MANTISSA_BITS, factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Arithmetic, Fixed, Verbs
+from hystgen.effects.part import ChainPart, Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
 from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
     AT,
@@ -25,6 +25,7 @@ from hystgen.effects.thermal.compensator import (
     HeatTables,
     Warm,
 )
+from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
@@ -33,6 +34,13 @@ GAIN_BITS = 29
 
 ONE = 1 << GAIN_BITS
 LEAST, LARGEST = int(LEAST_GAIN * ONE), int(LARGEST_GAIN * ONE)
+
+LINEAR_ERROR, RECIPROCAL_ERROR = (last_bits * 2.0**-GAIN_BITS for last_bits in (1.0, 4.0))
+"""[share of what passes] Errors of a gain linear in a temperature: a product; and of the reciprocal of a gain of at
+least 1/2: that of a linear one's error twice, and a step of Newton's."""
+
+FACTOR_ERROR = 2.0**-MANTISSA_BITS
+"""[share of a product] Error of a factor: half of its last bit. That of a temperature's reference is the same."""
 
 TEMPERATURE_BITS = 37
 """Fraction bits of a temperature inside, so that temperatures of 512 degC are multiplied like any signal."""
@@ -59,15 +67,39 @@ def tables(rows: Sequence[tuple[float, ...]], level: float, bits: int, degrees: 
     return np.array(found, dtype=np.int64).reshape(-1, 8)
 
 
-def formats(one: Warm, about: Fixed, *_: float) -> tuple[float, ...]:
-    """The numbers of a gain."""
-    return floating.numbers(one.effect, about.span)  # type: ignore[arg-type]
+@dataclass(frozen=True)
+class GainFormats(Coded):
+    """A gain by its numbers in floating point."""
+
+    one: Warm
+    numbers: tuple[float, ...]
+
+    def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
+        """It as a gain, for inputs within a size."""
+        return linear(self.one.effect, size, at, 2.0 ** -(TEMPERATURE_BITS + 1), 0.0, LEAST_GAIN, LARGEST_GAIN, at.span)
 
 
-def made(rows: Sequence[tuple[float, ...]], about: Fixed) -> Reals:
+def linear(
+    effect: LoggedThermal | OwnHeat, size: float, at: Coding, wrong: float, at_once: float, least: float,
+    largest: float, offset: float,
+) -> CodedGain:
+    """A gain linear in a temperature that is `wrong` and moves `at_once` by so many degrees."""
+    degree = abs(effect.gain_per_degree) * size + abs(effect.offset_per_degree) / at.output_lsb
+    there = wrong * degree + LINEAR_ERROR * size + FACTOR_ERROR * offset
+    back = (wrong + at_once) * degree / least + RECIPROCAL_ERROR * size + FACTOR_ERROR * offset / least
+    return CodedGain(least, largest, there, back, offset)
+
+
+def formats(one: Warm, about: FixedSurroundings, *_: float) -> GainFormats:
+    """A gain of a model."""
+    effect: Any = one.effect
+    return GainFormats(one, floating.numbers(effect, about.span))
+
+
+def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> Reals:
     """As `tables`."""
     degrees = about.code_max / 2.0**about.temperature
-    return tables(rows, about.level, TEMPERATURE_BITS - about.temperature, degrees)
+    return tables([each.numbers for each in blocks], about.level, TEMPERATURE_BITS - about.temperature, degrees)
 
 
 # ---------------------------------------------------------------- gain_fixed.c
@@ -145,14 +177,14 @@ AMOUNT_BITS = 50
 HEAT_KIND = Kind(
     "heat", counts=("turns", "coarse", "lift", "drop"), reading=(), own=("solve", "absorb"), letters="ffffw",
     memory="wiiw",
-)  # fmt: skip
+)
 
 RATE, PER_AMOUNT, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, COARSE, LIFT, DROP, BITS_BELOW = 0, 2, 4, 6, 8, 9, 10, 11, 12
 RISE, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET = range(4)
 
 
 @dataclass(frozen=True)
-class Heat:
+class Heat(Coded):
     """Own heat in fixed point: its table, thresholds of plays that rub, and how far the temperature can be from that of
     the same recursion without rounding, degrees."""
 
@@ -161,6 +193,17 @@ class Heat:
     error: float
     turns: int = 0
     """Newton steps"""
+    one: Warm | None = None
+
+    def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
+        """It as a gain, for inputs within a size."""
+        assert self.one is not None
+        effect: Any = self.one.effect
+        wrong = self.error + floating.coarseness(effect, *speed)
+        warmest, least, largest = floating.reached(effect, *speed)
+        offset = warmest * abs(effect.offset_per_degree) / at.output_lsb
+        at_once = floating.most_at_once(effect, *speed)
+        return linear(effect, size, at, wrong, at_once, least, largest, offset)
 
 
 def heat(
@@ -193,17 +236,17 @@ def heat(
     return Heat((*factors, hot, coarse, lift, drop, bits), tuple(rows), error)
 
 
-def heat_formats(one: Warm, about: Fixed, *_: float) -> Heat:
+def heat_formats(one: Warm, about: FixedSurroundings, *_: float) -> Heat:
     """Own heat of a block."""
     effect: Any = one.effect
     numbers = floating.heat_numbers(effect, about.ends, about.span, about.seconds)
     rubbing = floating.thresholds(effect, about.ends)
     turns = floating.heat_turns(effect, about.ends, about.seconds, 2.0**-GAIN_BITS)
     found = heat(numbers, rubbing, about.drive, float(about.drive_lsb), about.level, about.code_bits)
-    return replace(found, turns=turns)
+    return replace(found, turns=turns, one=one)
 
 
-def heat_tables(rows: Sequence[Heat], about: Fixed) -> HeatTables:  # noqa: ARG001  as of every block
+def heat_tables(rows: Sequence[Heat], about: FixedSurroundings) -> HeatTables:  # noqa: ARG001  as of every block
     """The tables of several blocks."""
     return HeatTables(
         np.array([one.table for one in rows], dtype=np.int64).reshape(-1, BITS_BELOW + 1),
@@ -276,7 +319,7 @@ STATE_BITS = 31
 FRICTION_KIND = Kind(
     "friction", (), (), Rows("play", letters="w", memory="i"), counts=("n", "bits"), flags=("begun",),
     reading=(), own=(),
-)  # fmt: skip
+)
 
 
 def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
@@ -311,11 +354,23 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
     return amount
 
 
-ARITHMETIC = Arithmetic(
+ARITHMETIC = Realized(
     Verbs(floating.memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
     constants, made, formats,
-)  # fmt: skip
-HEAT_ARITHMETIC = Arithmetic(
+)
+HEAT_ARITHMETIC = Realized(
     Verbs(floating.heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
-    heat_constants, heat_tables, heat_formats,
-)  # fmt: skip
+    heat_constants, heat_tables, heat_formats, beside=friction_constants,
+)
+
+GAIN_PART = ChainPart(
+    "gain", "a temperature", lambda effect: effect.name == "thermal" and bool(effect.columns),
+    lambda effect, *_: floating.Warm(effect), floating.ARITHMETIC, ARITHMETIC, calls=("set_temperature",),
+    kinds=(floating.KIND,),
+)
+HEAT_PART = ChainPart(
+    "heat", "own heat", lambda effect: effect.name == "thermal" and not effect.columns,
+    lambda effect, *_: floating.Warm(effect), floating.HEAT_ARITHMETIC, HEAT_ARITHMETIC,
+    kinds=(floating.HEAT_KIND, floating.FRICTION_KIND),
+)
+"""Temperatures as parts of the chain: those that the caller sets, and those of own heat."""

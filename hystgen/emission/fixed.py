@@ -1,0 +1,402 @@
+"""A model's numbers as C text, in fixed point."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from hystgen.chain.static import StaticModel
+from hystgen.compensator import fixed_tables
+from hystgen.compensator.layout import FixedTables
+from hystgen.emission.compensator import (
+    AnyTables,
+    Effects,
+    Errors,
+    Field,
+    Form,
+    Macro,
+    Numbers,
+    Stage,
+    Table,
+    Writer,
+    drives,
+    entries,
+    limits,
+    macros,
+    pointers,
+    units,
+)
+from hystgen.emission.options import Options
+from hystgen.emission.text import Number, literal, operand
+from hystgen.front.curve import FORWARD, INVERSE
+from hystgen.front.tanh.model import TanhEnvelope
+from hystgen.parameters.files import Parameters
+from hystgen.plays import slots
+from hystgen.plays.slots import Reals
+
+if TYPE_CHECKING:
+    from hystgen.compensator.chain.layout import ChainTables, Codes
+    from hystgen.compensator.chain.moving import FixedMovingTables
+    from hystgen.effects.bend import Bends
+
+COLUMNS = (("threshold", "play_t", True), ("weight", "int32_t", True), ("slope", "int32_t", False),
+           ("reciprocal", "uint32_t", False), ("shift", "uint8_t", False))
+"""Fields of the tables of engine loop, their types, and whether both operators read them."""
+
+RELAXING = COLUMNS[2:]
+"""Those that engine loop has for plays that relax."""
+
+
+class Fixed(Form):
+    """Fixed point."""
+
+    apart = "HYSTGEN_APART"
+    suffix = "_LSB"
+    held = "never set: every code is a number"
+    settings: ClassVar[Mapping[str, str]] = {
+        "temperature": "temperature, in codes of MODEL_TEMPERATURE_LSB",
+        "gain": "gain over that of the parameter file, in codes of MODEL_GAIN_LSB",
+        "share": "0 to the largest code, which stands for 1",
+    }
+
+    def counted(self, side: str, unit: str) -> str:
+        return f"{side} codes"
+
+    def unit(self, unit: str, side: str = "") -> str:
+        return f" {side} codes" if side else " codes"
+
+    def quantity(self, words: str, macro: str, unit: str) -> str:
+        return f"{words}, in codes of {macro}{f' {unit}' if unit else ''}"
+
+    def unless_held(self, call: str) -> str:
+        return ""
+
+    def between(self, low: Number, high: Number, part: float) -> Number:
+        return int(low) + (int(high) - int(low)) * part
+
+    def arguments(self, t: AnyTables, values: Sequence[Number]) -> Reals:
+        most = int(t.limits[slots.CODE_MAX])
+        return np.array([min(max(round(x), -most - 1), most) for x in values], dtype=t.threshold.dtype)
+
+    def numbers(self, parameters: Parameters, cascade: StaticModel, options: Options, writer: Writer) -> Numbers:
+        emit = parameters.emit
+        t, form = fixed_tables.build(cascade, options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb)
+        ends = t.limits
+        drive, output = limits(t)
+        curves, counts = _curves(t, options, writer)
+        rounding = form.inverse_rounding if options.inverse else None
+        return Numbers(
+            t, drive, output, (*macros(t), *_macros(t), *counts), tuple(_plays(t, options, writer, chain=False)),
+            (*_pointers(t, options, writer), *curves),
+            _errors(options, (form.forward_error, form.inverse_error, rounding)),
+            fronts=bool(t.fronts), envelopes=_envelopes(cascade), finer=int(ends[slots.FINE]) > 0,
+            saturates=bool(ends[slots.SATURATED] == ends[slots.CODE_MAX]),
+            lsb=(float(form.drive_lsb), float(form.output_lsb)),
+            precision=(
+                *_precision(parameters, form, " on the same branch" * bool(t.branches)),
+                f"Range: every sum of products stays below 2^{(form.largest_sum - 1).bit_length()} in magnitude (64 "
+                "bits hold 2^63),",
+                f"    inputs of plays between {ends[slots.PLAY_MIN]} and {ends[slots.PLAY_MAX]}, "
+                f"{form.sum_bits} fraction bits of an output code",
+            ),
+        )
+
+    def chained(
+        self, parameters: Parameters, effects: Effects, stages: Sequence[Stage], options: Options, writer: Writer
+    ) -> Numbers:
+        from hystgen.compensator.chain import layout
+
+        compiled, tables, codes = effects.compiled, effects.compiled.tables, effects.compiled.codes
+        plays: FixedTables = tables.plays
+        assert codes is not None
+        curves, counts = _curves(plays, options, writer)
+        drive, output = limits(tables)
+        where = f" where {codes.condition}" if codes.condition else " on the same branch" * bool(plays.branches)
+        return Numbers(
+            tables, drive, output, (*macros(plays), *_macros(plays), *counts, *effects.macros),
+            tuple(_plays(plays, options, writer, chain=True)),
+            (*curves, *effects.tables, *_pointers(plays, options, writer), *_relaxing(tables, options, writer),
+             *effects.behind),
+            _errors(options, (codes.forward_error, codes.inverse_error, codes.inverse_rounding), codes.condition),
+            fronts=bool(plays.fronts),
+            envelopes=_envelopes(compiled.static) or any(one.kind == "bend" for one in stages),
+            finer=bool(tables.number[layout.ARRIVING_BITS]), saturates=True,
+            lsb=(float(codes.drive_lsb), float(codes.output_lsb)),
+            precision=(
+                *_precision(parameters, codes, where),
+                f"Range: every signal behind the plays stays below 2^{codes.largest.bit_length()}, with "
+                f"{tables.number[layout.LEVEL_BITS]} bits below an output code; states of effects below 2^62 (64 bits "
+                "hold 2^63)",
+            ),
+        )
+
+    def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[Stage]:
+        return [_saturation(t, j, writer.own) for j in range(len(t.behind.kind))]
+
+    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[Table], list[Macro]]:
+        from hystgen.compensator.chain import moving
+
+        plays: FixedMovingTables = t.moving
+        numbers: list[Macro] = [("LARGEST_INPUT", operand(plays.farthest), "of the plays, for a search")]
+        if plays.scanned:
+            arrays = [
+                writer.line("factor_t", f"relaxing_{name}", _factor(rows[1]))
+                for name, rows in (("late", plays.first), ("kept", plays.second))
+            ]
+            if inverse:
+                arrays += [
+                    writer.array(kind, f"relaxing_{field}", list(getattr(plays.relaxed, field)))
+                    for field, kind, _ in RELAXING
+                ]
+            return arrays, numbers
+        names = {moving.RELAXING: ("late", "kept"), moving.DILATED: ("wider",)}.get(plays.moves, ())
+        arrays = [
+            _factors(name, rows, writer) for name, rows in zip(names, (plays.first, plays.second), strict=False)
+        ]
+        if plays.moves == moving.DASHPOT:
+            rows = [entries(row, "rcrr") for row in plays.yields]
+            arrays.append(writer.rows("yield_t", "yields", rows, len(rows)))
+            arrays.append(writer.line("factor_t", "standing_share", _factor(plays.seen)))
+            numbers += [
+                ("YIELDS", f"{len(rows)}u", "pieces of what a dashpot yields"),
+                ("YIELD_BITS", f"{plays.yield_bits}u", "of a yield below a step of the plays' input"),
+                ("STRETCH", operand(plays.stretch), "of a play, up to which there are any"),
+            ]
+        if plays.bends != moving.STRAIGHT:
+            arrays += _bumps(plays, writer)
+            numbers += [
+                ("BUMP_END", operand(plays.bump.domain[0, 1]), "largest input of what a bent play adds"),
+                ("BUMP_DEGREE", f"{plays.bump.coefficient.shape[1] - 1}u", ""),
+                ("BUMP_LIFT", f"{plays.bump.scaled[0, 1]}u", "bits that its polynomials leave out"),
+                ("BUMP_BITS", f"{plays.bump_bits}u", "and those of it below a step of the plays' input"),
+            ]
+        return arrays, numbers
+
+    def effects(self, t: ChainTables) -> list[Macro]:
+        from hystgen.compensator.chain import layout as at
+
+        number = t.number
+        low, high = t.plays.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
+        return [
+            ("FINE_MIN", operand(low), "what the ends of the drive's range are in front of the plays"),
+            ("FINE_MAX", operand(high), ""),
+            ("LEAST_CODE", operand(number[at.LEAST_CODE]), "between which a drive is kept before it is limited"),
+            ("MOST_CODE", operand(number[at.MOST_CODE]), ""),
+            ("DRIVE_BITS", f"{number[at.DRIVE_BITS]}u", "bits of a signal in front of the plays below a drive code"),
+            ("ARRIVING_BITS", f"{number[at.ARRIVING_BITS]}u", "and below an input of the plays"),
+            ("LEVEL_BITS", f"{number[at.LEVEL_BITS]}u", "bits of a signal behind the plays below an output code"),
+            ("LEVEL_DROP", f"{number[at.LEVEL_DROP]}u", "and those that a sum of the plays has beyond that"),
+            ("LARGEST_LEVEL", operand(number[at.LARGEST_LEVEL]), "sum that is asked of the plays"),
+            ("SHARE_BITS", f"{number[at.SHARE_BITS]}u", "bits of a mantissa below a code"),
+            ("BRAKED_DROP", f"{number[at.BRAKED_DROP]}u", "bits of a signal beyond those of a search for a lead"),
+        ]
+
+    def code_sizes(self, t: ChainTables) -> list[Macro]:
+        from hystgen.compensator.chain import layout
+        from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
+
+        bits = int(31 - t.number[layout.SHARE_BITS])
+        degree = ("TEMPERATURE_LSB", repr(2.0 ** -TEMPERATURE_BITS[bits]), "degC a code of set_temperature")
+        gain = ("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")
+        return [*[degree] * ("set_temperature" in t.calls), *[gain] * ("set_gain" in t.calls)]
+
+    def drive_bits(self, t: ChainTables) -> int:
+        from hystgen.compensator.chain import layout
+
+        return int(t.number[layout.DRIVE_BITS])
+
+    def setting_codes(self, t: ChainTables) -> tuple[float, float]:
+        from hystgen.compensator.chain.fixed_tables import setting_codes
+
+        return setting_codes(t)
+
+    def reference_temperature(self, t: ChainTables) -> float:
+        from hystgen.effects.thermal import fixed as thermal
+
+        degrees: float = t.of("gain")[0, thermal.REFERENCE].item() / 2.0**thermal.TEMPERATURE_BITS
+        return degrees
+
+    def tap(self, t: ChainTables, writer: Writer) -> Table:
+        return _factors("tap", t.tap, writer)
+
+    def waited(self, t: ChainTables, writer: Writer) -> tuple[list[Table], list[Macro]]:
+        return [writer.line("factor_t", "waited", _factor(t.of("wait").share))], []
+
+    def corners(self, inverse: bool, plays: int) -> list[Field]:
+        return [
+            Field("place_t", "here"),
+            Field("signal_t", "next", "output, along the move, at which another play begins to follow"),
+            Field("kink_t", "kink", "of the present step; here rather than on the stack"),
+            Field("corner_t", "corner", "", max(plays, 1)),
+        ]
+
+
+def _factor(pair: Iterable[int]) -> str:
+    """A factor without its braces."""
+    return entries(pair, "f")[1:-1]
+
+
+def _factors(own: str, rows: Reals, writer: Writer) -> Table:
+    return writer.lines("factor_t", own, [f"    {entries(row, 'f')}," for row in rows], len(rows))
+
+
+def _errors(options: Options, bounds: tuple[float, float | None, float | None], condition: str = "") -> Errors:
+    """The bounds in a few digits, rounded up."""
+    forward, inverse, rounding = (_upward(bound) if bound else 0.0 for bound in bounds)
+    return Errors(forward, inverse, rounding, condition) if options.inverse else Errors(forward, 0.0, 0.0, condition)
+
+
+def _upward(x: float) -> float:
+    digits = max(0, 5 - math.ceil(math.log10(x)))
+    scale: int = 10**digits
+    return math.ceil(x * scale) / scale
+
+
+def _envelopes(cascade: StaticModel) -> bool:
+    return any(isinstance(stage, TanhEnvelope) for stage in cascade.stages)
+
+
+def _precision(parameters: Parameters, form: fixed_tables.Format | Codes, branch: str) -> list[str]:
+    """The size of codes, and how far answers are from the exact model."""
+    drive, output = units(parameters)
+    drive_lsb, output_lsb = float(form.drive_lsb), float(form.output_lsb)
+    forward, inverse = form.forward_error, form.inverse_rounding
+    found = [
+        f"Precision: a drive code is {drive_lsb:.6g}{drive}, an output code {output_lsb:.6g}{output}; "
+        "against the exact model",
+        f"    forward within {forward:.4g} output codes = {forward * output_lsb:.4g}{output}",
+    ]
+    if inverse is not None:
+        found.append(f"    inverse within {inverse:.4g} drive codes = {inverse * drive_lsb:.4g}{drive}{branch}")
+    return found
+
+
+def _macros(t: FixedTables) -> list[Macro]:
+    """Numbers that functions name in fixed point alone."""
+    step = int(len(t.start) > 1)
+    shy = "output codes that rounding can add: half a drive code, and an inexact reciprocal"
+    return [
+        ("START_STEP", str(step), "entries from play to play; reset takes 0 for each"),
+        ("CODE_MAX", literal(t.limits[slots.CODE_MAX]), "the largest code of either sign"),
+        ("FRACTION", f"{t.limits[slots.FRACTION]}u", "bits of a sum below an output code"),
+        ("FINE", f"{t.limits[slots.FINE]}u", "bits of an input of the plays below a drive code"),
+        ("SHY", literal(t.limits[slots.SHY]), shy),
+    ]
+
+
+def _plays(t: FixedTables, options: Options, writer: Writer, chain: bool) -> list[Table]:
+    """The tables of an engine and the start memory; `chain`: of a model with effects."""
+    if options.engine == "corners":
+        return _corner_tables(t, options, writer, chain)
+    start = [writer.array("play_t", "model_start", list(t.start))] * (len(t.start) > 1)
+    columns = [(field, kind) for field, kind, both in COLUMNS if both or options.inverse]
+    return [*(writer.array(kind, field, list(getattr(t, field))) for field, kind in columns), *start]
+
+
+def _pointers(t: FixedTables, options: Options, writer: Writer) -> list[Table]:
+    """Pointers to the tables of engine loop, NULL for those that nothing reads, and the ends of the plays' input."""
+    read = {field for field, _, both in COLUMNS if both or options.inverse}
+    places = [f"{writer.name}_{field}" if field in read else "NULL" for field, _, _ in COLUMNS]
+    return [pointers(t, [*places, *_ends(t)], writer)] * (options.engine == "loop")
+
+
+def _relaxing(t: ChainTables, options: Options, writer: Writer) -> list[Table]:
+    """The same for the inverse of plays that relax."""
+    own = [f"{writer.name}_{'relaxing_' * ((field, kind, both) in RELAXING)}{field}" for field, kind, both in COLUMNS]
+    wanted = t.moving.scanned and options.inverse
+    return [pointers(t.plays, [*own, *_ends(t.plays)], writer, "relaxing")] * bool(wanted)
+
+
+def _ends(t: FixedTables) -> list[str]:
+    margin = t.limits[slots.MARGIN]
+    return [literal(t.limits[slots.PLAY_MIN] - margin), literal(t.limits[slots.PLAY_MAX] + margin)]
+
+
+def _corner_tables(t: FixedTables, options: Options, writer: Writer, chain: bool) -> list[Table]:
+    """The tables of engine corners: one curve for both operators, and what a start memory is made of."""
+    never = (t.reach[-1], t.way[-1], 0, 0, 1)
+    plays = zip(t.reach[:-1], t.way[:-1], t.slope[1:], t.reciprocal[1:], t.shift[1:], strict=True)
+    low, high = t.limits[slots.PLAY_MIN], t.limits[slots.PLAY_MAX]
+    ends = f"{{{entries([t.limits[slots.MARGIN] - low, high + t.limits[slots.MARGIN]])}}}"
+    parts = [f"{writer.name}_model_segment", literal(t.limits[slots.OFFSET]), ends, str(len(t.threshold) - 1)]
+    found = [
+        writer.rows("segment_t", "model_segment", map(entries, [*plays, never]), len(t.way), last=""),
+        writer.entries("curve_t", "model_curve", parts),
+        writer.array("int32_t", "model_start", list(t.start)),
+        writer.array("int32_t", "model_zero", list(t.zero)),
+    ]
+    fronts = options.operators if t.fronts and not chain else ()
+    return [*found, *(drives(t, (t.applied,), operator, writer) for operator in fronts)]
+
+
+def _curves(t: FixedTables, options: Options, writer: Writer) -> tuple[list[Table], list[Macro]]:
+    """The curves of the memoryless part in use: forward and, for an inverse, back; and their sizes."""
+    if not t.fronts:
+        return [], []
+    arrays: list[Table] = []
+    counts: list[Macro] = [("DEGREE", f"{t.coefficient.shape[1] - 1}u", "of the polynomials of every curve")]
+    directions = (("_ascending", 0), ("_descending", 1)) if t.branches else (("", 0),)
+    kinds = (("front", FORWARD), ("back", INVERSE)) if options.inverse else (("front", FORWARD),)
+    for kind, first in kinds:
+        for direction, branch in directions:
+            which, own = first + branch, f"{kind}{direction}"
+            words = "/* w = G[v] */\n" if kind == "front" else "/* v = G^-1[w] */\n"
+            arrays += _pieces(t, which, own, writer, words)
+            counts.append((f"{own}_PIECES".upper(), f"{t.pieces[which]}u", ""))
+            if kind == "back":
+                (low, high), (under, over) = t.domain[which], t.edge[which]
+                ends = [*t.argument[which], low - under, high + over, low, high]
+                arrays.append(writer.entries("ends_t", f"{own}_ends", map(literal, ends)))
+    if options.inverse:
+        counts.append(("BELOW", f"{int(t.below[INVERSE])}u", "bits of a curve back below a drive code"))
+    return arrays, counts
+
+
+def _pieces(t: FixedTables | Bends, which: int, own: str, writer: Writer, words: str = "") -> list[Table]:
+    """The tables of a curve's pieces."""
+    here = int(t.first[which])
+    rows = slice(here, here + int(t.pieces[which]))
+    return [
+        writer.array("int32_t", f"{own}_knot", list(t.knot[rows]), words),
+        writer.array("uint8_t", f"{own}_scale", list(t.scale[rows])),
+        writer.array("int32_t", f"{own}_coefficient", list(t.coefficient[rows].ravel())),
+    ]
+
+
+def _names(tables: Sequence[Table]) -> str:
+    return ", ".join(each.name for each in tables)
+
+
+def _bumps(t: FixedMovingTables, writer: Writer) -> list[Table]:
+    """What bent plays add to themselves."""
+    curves = [_pieces(t.bump, k, f"bump_{k + 1}", writer) for k in range(len(t.bump.pieces))]
+    rows = [f"{_names(curve)}, {n}" for curve, n in zip(curves, t.bump.pieces, strict=True)]
+    return [
+        *(text for curve in curves for text in curve),
+        writer.rows("bump_t", "bump", rows, len(curves)),
+        writer.array("uint16_t", "bump_of", list(t.bump_of)),
+    ]
+
+
+def _saturation(t: ChainTables, j: int, writer: Writer) -> Stage:
+    """What saturates behind the plays."""
+    behind, own = t.behind, f"behind_{j + 1}"
+    if behind.kind[j] == slots.DEAD_ZONE:
+        lower, upper, *over = behind.piece[j]
+        row = f"    {literal(lower)}, {literal(upper)}, {entries(over, 'ff')},"
+        return Stage("stops", (writer.lines("stops_t", own, [row]),), f"&hystgen_{own}")
+    curves = [
+        _pieces(behind.bends, which, f"{own}_{direction}", writer)
+        for which, direction in ((2 * j, "there"), (2 * j + 1, "back"))
+    ]
+    bends: Bends = behind.bends
+    rows = [
+        f"{_names(curve)},\n     "
+        + entries((*bends.domain[k], bends.pieces[k], bends.coefficient.shape[1] - 1, *bends.scaled[k]))
+        for k, curve in enumerate(curves, 2 * j)
+    ]
+    arrays = (*(text for curve in curves for text in curve), writer.rows("bend_t", own, rows))
+    return Stage("bend", arrays, f"&hystgen_{own}", ", limited")

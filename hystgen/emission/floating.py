@@ -1,0 +1,247 @@
+"""A model's numbers as C text, in floating point."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from hystgen.chain.static import StaticModel
+from hystgen.compensator import float_tables
+from hystgen.compensator.bounds import error_bounds
+from hystgen.compensator.layout import Tables
+from hystgen.emission.compensator import (
+    Effects,
+    Errors,
+    Field,
+    Form,
+    Macro,
+    Numbers,
+    Stage,
+    Table,
+    Writer,
+    drives,
+    entries,
+    filled,
+    limits,
+    macros,
+    pointers,
+)
+from hystgen.emission.options import Options
+from hystgen.emission.text import Number, literal, operand
+from hystgen.front.stage import StageTables
+from hystgen.parameters.files import Parameters
+from hystgen.plays import slots
+from hystgen.plays.corners.corners_float import Curve, Start
+
+if TYPE_CHECKING:
+    from hystgen.compensator.chain.layout import ChainTables
+    from hystgen.compensator.chain.moving import MovingTables
+
+COLUMNS = (("threshold", "threshold", True), ("inverse_slope", "reciprocal", False), ("weight", "weight", True),
+           ("lift", "lift", False))
+"""Fields of the tables of engine loop, what their arrays are called, and whether both operators read them."""
+
+DEAD_ZONE = (("break_x", 0, True), ("break_y", 0, False), ("anchor_x", 1, True), ("anchor_y", 1, True),
+             ("slope", 1, True), ("inverse_slope", 1, False))
+"""Arrays of a dead zone, how many more entries than break points they have, and whether both operators read them."""
+
+class Floating(Form):
+    """Floating point."""
+
+    held = "NaN or infinite input: the last answer was held"
+    warning = (
+        " Not for targets that flush denormal numbers to zero or round other than to nearest, nor for flags that "
+        "reorder sums (-fassociative-math) or contract products whatever the source says (clang's "
+        "-ffp-contract=fast): there the answers can differ from the reference in the last bits."
+    )
+    settings: ClassVar[Mapping[str, str]] = {
+        "temperature": "temperature, degC",
+        "gain": "gain over that of the parameter file",
+        "share": "0 to 1",
+    }
+
+    def unless_held(self, call: str) -> str:
+        return f"; NaN and infinite: {'held' if call in ('step', 'reset') else 'ignored'}"
+
+    def between(self, low: Number, high: Number, part: float) -> Number:
+        return low + (high - low) * type(high)(part)
+
+    def numbers(self, parameters: Parameters, cascade: StaticModel, options: Options, writer: Writer) -> Numbers:
+        t = float_tables.build_float(cascade, options.arithmetic, options.engine, True, True)
+        bounds = error_bounds(cascade, options.arithmetic, options.engine)
+        errors = _errors(t, options, (bounds.forward, bounds.inverse, bounds.rounding))
+        return _numbers(t, errors, options, writer, chain=False)
+
+    def chained(
+        self, parameters: Parameters, effects: Effects, stages: Sequence[Stage], options: Options, writer: Writer
+    ) -> Numbers:
+        from hystgen.compensator.chain.bounds import chain_bounds, condition
+
+        tables = effects.compiled.tables
+        bounds = chain_bounds(effects.compiled, options.arithmetic)
+        errors = _errors(tables, options, (bounds.forward, bounds.inverse, bounds.rounding))
+        plays = _numbers(tables.plays, errors, options, writer, chain=True)
+        drive, output = limits(tables)
+        return dataclasses.replace(
+            plays, tables=tables, drive=drive, output=output, macros=(*plays.macros, *effects.macros),
+            beside=(*plays.beside, *effects.tables, *effects.behind),
+            errors=dataclasses.replace(errors, condition=condition(effects.compiled)),
+            envelopes=plays.envelopes or any(one.kind == "envelope" for one in stages),
+        )
+
+    def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[Stage]:
+        return [_stage(t.behind, j, f"behind_{j + 1}", options, writer) for j in range(len(t.behind.stage_kind))]
+
+    def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[Table], list[Macro]]:
+        from hystgen.compensator.chain import moving
+
+        plays: MovingTables = t.moving
+        if plays.scanned:
+            columns = [("share", list(plays.share)), ("inverse", list(plays.inverse))]
+            return [writer.columns("real_t", "relaxing", columns)], [
+                ("LATE", operand(plays.first[1]), "of a stretch, what a play gains at the end of a step"),
+                ("KEPT", operand(plays.second[1]), "and on the way to the next"),
+            ]
+        numbers = (
+            ("SCALE", moving.SCALE, "largest threshold"), ("INVERSE_SCALE", moving.INVERSE_SCALE, ""),
+            ("CENTRE", moving.MIDDLE, "of the loops that count more or less"),
+            ("INVERSE_WIDTH", moving.INVERSE_WIDTH, ""), ("BUMP", moving.BUMP, "how much, times the width"),
+            ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
+            ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
+            ("LARGEST_INPUT", moving.LARGEST_INPUT, ""),
+            ("STANDING_SHARE", moving.SEEN, "share of a step's way at which the input counts as standing still"),
+        )
+        names = {moving.RELAXING: ("late", "kept"), moving.DILATED: ("wider",)}.get(plays.moves, ())
+        arrays = [
+            writer.array("real_t", name, list(row))
+            for name, row in zip(names, (plays.first, plays.second), strict=False)
+        ]
+        for name, rows, wanted in (
+            ("yields", plays.yields, plays.moves == moving.DASHPOT),
+            ("curve", plays.curve, plays.bends == moving.POLYNOMIAL),
+        ):
+            if wanted:
+                arrays.append(writer.rows("real_t", name, map(entries, rows), *rows.shape))
+        return arrays, [
+            *((name, operand(plays.number[place]), comment) for name, place, comment in numbers),
+            ("TERMS", f"{plays.curve.shape[1]}u", "of a polynomial"),
+            ("HALVES", f"{plays.halves}u", "steps of the search"),
+            ("YIELDS", f"{len(plays.yields)}u", "pieces of what a dashpot yields"),
+        ]
+
+    def reference_temperature(self, t: ChainTables) -> float:
+        from hystgen.effects.thermal import compensator as thermal
+
+        return float(t.of("gain")[0, thermal.REFERENCE])
+
+    def tap(self, t: ChainTables, writer: Writer) -> Table:
+        return writer.array("real_t", "tap", list(t.tap))
+
+    def waited(self, t: ChainTables, writer: Writer) -> tuple[list[Table], list[Macro]]:
+        return [], [("WAITED", operand(t.of("wait").share[0]), "part of the step after the oldest that is over")]
+
+    def corners(self, inverse: bool, plays: int) -> list[Field]:
+        undo = [Field("place_t", "undo", "where the plays were before the solution")] * inverse
+        return [Field("plays_t", "plays"), *undo, Field("corner_t", "corner", "", plays + 1)]
+
+
+def _errors(t: Tables | ChainTables, options: Options, bounds: tuple[float, float, float]) -> Errors:
+    """The bounds, rounded up to numbers of the arithmetic."""
+    forward, inverse, rounding = (float_tables.upward(bound, t.threshold.dtype.type) for bound in bounds)
+    return Errors(forward, inverse, rounding) if options.inverse else Errors(forward, 0.0, 0.0)
+
+
+def _numbers(t: Tables, errors: Errors, options: Options, writer: Writer, chain: bool) -> Numbers:
+    """`chain`: of the plays in a model with effects."""
+    stages = [_stage(t, j, f"stage_{j + 1}", options, writer) for j in range(len(t.stage_kind))]
+    beside = [array for stage in stages for array in stage.arrays]
+    if options.engine == "corners":
+        plays = _corner_tables(t, options, writer, front=bool(stages) and not chain)
+    else:
+        plays = _loop_tables(t, options, writer)
+        read = {field: f"{writer.name}_play.{own}" for field, own, both in COLUMNS if both or options.inverse}
+        places = [read.get(field, "NULL") for field in ("threshold", "weight", "lift", "inverse_slope")]
+        beside = [pointers(t, places, writer), *beside]
+    drive, output = limits(t)
+    return Numbers(
+        t, drive, output, tuple(macros(t)), tuple(plays), tuple(beside), errors, fronts=bool(stages),
+        envelopes=any(stage.kind == "envelope" for stage in stages), stages=tuple(stages),
+    )
+
+
+def _loop_tables(t: Tables, options: Options, writer: Writer) -> list[Table]:
+    """The tables of engine loop: arrays in one structure, and the start memory."""
+    columns = [(own, list(getattr(t, field))) for field, own, both in COLUMNS if both or options.inverse]
+    start = [writer.array("real_t", "model_start", list(t.start))] * (len(t.start) > 1)
+    return [writer.columns("real_t", "play", columns), *start]
+
+
+def _corner_tables(t: Tables, options: Options, writer: Writer, front: bool) -> list[Table]:
+    """The tables of engine corners, one operator after the other."""
+    found = []
+    for operator, curve, starts in (
+        ("forward", t.forward, (t.forward_first, t.forward_zero)),
+        ("inverse", t.inverse, (t.inverse_first, t.inverse_zero)),
+    ):
+        if operator in options.operators:
+            found += _curve_tables(curve, starts, operator, writer)
+            found += [drives(t, (t.applied, t.begin), operator, writer)] * front
+    return found
+
+
+def _curve_tables(curve: Curve, starts: tuple[Start, Start], operator: str, writer: Writer) -> list[Table]:
+    """Segments, curve and start memories of one operator."""
+    rows = zip(curve.way, curve.reach, curve.gain, curve.slope, strict=True)
+    segments = filled(f"{{{entries(row)}}}" for row in rows).splitlines()
+    pairs = [f"{{{entries(pair[:2])}}}" for pair in (curve.limit, curve.inside, curve.range)]
+    found = [
+        writer.lines("segment_t", f"{operator}_segment", segments, len(curve.way)),
+        writer.entries("curve_t", f"{operator}_curve", [f"{writer.name}_{operator}_segment", *pairs]),
+    ]
+    before: dict[str, str] = {}
+    memories = []
+    for start, memory in zip(starts, ("init", "reset"), strict=True):
+        points = [f"{{{entries(point[:2])}}}" for point in start.center]
+        text = points[0] if len(points) == 1 else f"\n{filled(points)}\n"
+        if text not in before:  # after init and after reset plays may hold the same
+            before[text] = f"{writer.name}_{operator}_{memory}_center"
+            found.append(writer.line("real_t", f"{operator}_{memory}_center", text, len(points), 2))
+        output, falling, rising = map(literal, start.bottom)
+        memories.append(
+            f"{{{before[text]}, {start.step}, {start.risen}, "
+            f"{{{output}, {{{falling}, {rising}}}, {start.top}, {writer.prefix.upper()}_BOTTOM}}}}"
+        )
+    lines = ",\n".join(filled([memory]) for memory in memories).splitlines()
+    return [*found, writer.lines("start_t", f"{operator}_start", lines, 2)]
+
+
+def _stage(t: StageTables, j: int, own: str, options: Options, writer: Writer) -> Stage:
+    """A stage of the memoryless part, or of saturation."""
+    data = t.stage_data[int(t.stage_first[j]) :]
+    if t.stage_kind[j] == slots.TANH:
+        branches, place = {own: data[:7]}, f"&hystgen_{own}"
+        if not np.array_equal(data[:7], data[7:14]):
+            branches = {f"{own}_ascending": data[:7], f"{own}_descending": data[7:14]}
+            place = f"ascending ? &hystgen_{own}_ascending : &hystgen_{own}_descending"
+        words = "/* a0 tanh(a1 x + a2) + a3, then 1/a0, 1/a1 and the largest argument of atanh */\n"
+        arrays = [
+            writer.lines("envelope_t", branch, filled(map(literal, row)).splitlines(), words=words)
+            for branch, row in branches.items()
+        ]
+        return Stage("envelope", tuple(arrays), place, ", limited")
+    n, first = int(t.stage_size[j]), 0
+    arrays, places = [], []
+    for part, more, both in DEAD_ZONE:
+        values = list(data[first : first + n + more])
+        first += n + more
+        if values and (both or options.inverse):
+            arrays.append(writer.array("real_t", f"{own}_{part}", values))
+            places.append(arrays[-1].name)
+        else:
+            places.append("NULL")
+    words = "/* the straight pieces of the dead-zone sum */\n"
+    lines = filled([*places, str(n)]).splitlines()
+    return Stage("dead_zone", (*arrays, writer.lines("dead_zone_t", own, lines, words=words)), f"&hystgen_{own}")
