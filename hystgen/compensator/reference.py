@@ -36,15 +36,9 @@ from hystgen.plays.slots import (
     DRIVE_MAX,
     DRIVE_MIN,
     LOOP,
-    OP_CALL,
-    OP_COMMIT,
-    OP_INIT,
-    OP_RESET,
     OP_STEP,
     ZERO,
     Bytes,
-    Reals,
-    read,
 )
 
 if TYPE_CHECKING:
@@ -92,7 +86,6 @@ def _corner_operations(
     forward_init, forward_reset, forward_step = forward.forward_init, forward.forward_reset, forward.forward_step
     inverse_init, inverse_reset, inverse_step = inverting.inverse_init, inverting.inverse_reset, inverting.inverse_step
     forward_visit, inverse_visit = forward.forward_visit, inverting.inverse_visit
-    inverse_commit = inverting.inverse_commit
 
     @jit.jit
     def init(t: Any, m: Any, inverse: int) -> None:
@@ -103,6 +96,14 @@ def _corner_operations(
             forward_init(t, m)
 
     @jit.jit
+    def reset(t: Any, m: Any, inverse: int) -> None:
+        """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
+        if inverse:
+            inverse_reset(t, m)
+        else:
+            forward_reset(t, m)
+
+    @jit.jit
     def visit(t: Any, m: Any, inverse: int, v: Any) -> None:
         """Let the actuator be at drive v before the next sample."""
         if inverse:
@@ -110,28 +111,17 @@ def _corner_operations(
         else:
             forward_visit(t, m, v)
 
-    @jit.jit
-    def run(t: Any, m: Any, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
-        """Run op[i] with argument x[i]. answers[i] is the answer of a step, else 0; status[i] is read and cleared, or
-        left for a later call."""
-        for i in range(len(op)):
-            call = op[i] & OP_CALL
-            answers[i] = t.limits[ZERO]
-            if call == OP_INIT:
-                init(t, m, inverse)
-            elif call == OP_COMMIT:
-                inverse_commit(t, m, x[i])
-            elif inverse:
-                if call == OP_RESET:
-                    inverse_reset(t, m, x[i])
-                else:
-                    answers[i] = inverse_step(t, m, x[i])
-            elif call == OP_RESET:
-                forward_reset(t, m, x[i])
-            else:
-                answers[i] = forward_step(t, m, x[i])
-            status[i] = read(m.counts, STATUS, op[i])
+    @jit.jit(inline=True)
+    def itself(m: Any) -> Any:
+        """The memory of the plays is all there is."""
+        return m
 
+    @jit.jit(inline=True)
+    def other(t: Any, m: Any, inverse: int, call: int, x: Any) -> Any:  # noqa: ARG001  the same call for every chain
+        """There are no other calls."""
+        return t.limits[ZERO]
+
+    run = step.run_of(init, reset, forward_step, inverse_step, inverting.inverse_commit, itself, STATUS, other)
     return Operations(init, visit, run, forward_step, inverse_step, front_forward, front_inverse)
 
 

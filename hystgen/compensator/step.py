@@ -192,6 +192,43 @@ class Hooks(NamedTuple):
     other: Callable[..., Any]  # a call that models without effects do not have
 
 
+def run_of(
+    init: Callable[..., Any],
+    reset: Callable[..., Any],
+    forward_step: Callable[..., Any],
+    inverse_step: Callable[..., Any],
+    inverse_commit: Callable[..., Any],
+    plays: Callable[..., Any],
+    place: int,
+    other: Callable[..., Any],
+) -> Callable[..., Any]:
+    """`Operations.run` of any engine; `place`: of the status in the counts of its memory."""
+
+    @jit
+    def run(t: Any, s: Any, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
+        """Run op[i] with argument x[i]. answers[i] is the answer of a call that has one, else 0, and that of a reset is
+        left out; status[i] is read and cleared, or left for a later call."""
+        m = plays(s)
+        for i in range(len(op)):
+            call = op[i] & OP_CALL
+            answers[i] = t.limits[ZERO]
+            if call == OP_INIT:
+                init(t, s, inverse)
+            elif call == OP_COMMIT:
+                inverse_commit(t, s, x[i])
+            elif call in (OP_STEP, OP_RESET):
+                if call == OP_RESET:
+                    reset(t, s, inverse)
+                answer = inverse_step(t, s, x[i]) if inverse else forward_step(t, s, x[i])
+                if call == OP_STEP:
+                    answers[i] = answer
+            else:
+                answers[i] = other(t, s, inverse, call, x[i])
+            status[i] = read(m.counts, place, op[i])
+
+    return run
+
+
 def operations_of(
     init: Callable[..., Any],
     reset: Callable[..., Any],
@@ -261,31 +298,7 @@ def operations_of(
         m.real[PENDING] = v
         m.counts[HAS_PENDING] = 1
 
-    @jit
-    def run(t: Any, s: Any, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
-        """Run op[i] with argument x[i]. answers[i] is the answer of a call that has one, else 0, and that of a reset is
-        left out; status[i] is read and cleared, or left for a later call."""
-        m = plays(s)
-        for i in range(len(op)):
-            call = op[i] & OP_CALL
-            answers[i] = t.limits[ZERO]
-            if call == OP_INIT:
-                init(t, s, inverse)
-            elif call == OP_COMMIT:
-                inverse_commit(t, s, x[i])
-            elif call in (OP_STEP, OP_RESET):
-                if call == OP_RESET:
-                    reset(t, s, inverse)
-                if inverse:
-                    inverse_step(t, s, x[i])
-                else:
-                    forward_step(t, s, x[i])
-                if call == OP_STEP:
-                    answers[i] = m.real[ANSWER]
-            else:
-                answers[i] = other(t, s, inverse, call, x[i])
-            status[i] = read(m.counts, STATUS, op[i])
-
+    run = run_of(init, reset, forward_step, inverse_step, inverse_commit, plays, STATUS, other)
     return Operations(init, visit, run, forward_step, inverse_step, *front)
 
 

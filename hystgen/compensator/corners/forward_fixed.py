@@ -53,10 +53,9 @@ def forward_init(t: FixedTables, m: FixedMemory) -> None:
 
 
 @jit
-def forward_reset(t: FixedTables, m: FixedMemory, v: Any) -> None:
-    """All plays 0, status cleared, then one ordinary step."""
+def forward_reset(t: FixedTables, m: FixedMemory) -> None:
+    """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
     forward_begin(t, m, t.zero, 1)
-    forward_step(t, m, v)
 
 
 @jit

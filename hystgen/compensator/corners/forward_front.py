@@ -50,10 +50,9 @@ def forward_init(t: Tables, m: Memory) -> None:
 
 
 @jit
-def forward_reset(t: Tables, m: Memory, v: Any) -> None:
-    """All plays 0, status cleared, then one ordinary step."""
+def forward_reset(t: Tables, m: Memory) -> None:
+    """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
     forward_begin(t, m, t.forward_zero, 1)
-    forward_step(t, m, v)
 
 
 @jit

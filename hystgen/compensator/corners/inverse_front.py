@@ -200,10 +200,9 @@ def inverse_init(t: Tables, m: Memory) -> None:
 
 
 @jit
-def inverse_reset(t: Tables, m: Memory, u: Any) -> None:
-    """All plays 0, status cleared, then one ordinary step."""
+def inverse_reset(t: Tables, m: Memory) -> None:
+    """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
     inverse_begin(t, m, t.inverse_zero, 3)
-    inverse_step(t, m, u)
 
 
 @jit

@@ -106,10 +106,9 @@ def inverse_init(t: FixedTables, m: FixedMemory) -> None:
 
 
 @jit
-def inverse_reset(t: FixedTables, m: FixedMemory, u: Any) -> None:
-    """All plays 0, status cleared, then one ordinary step."""
+def inverse_reset(t: FixedTables, m: FixedMemory) -> None:
+    """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
     inverse_begin(t, m, t.zero, 3)
-    inverse_step(t, m, u)
 
 
 @jit
