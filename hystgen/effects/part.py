@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import importlib
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -11,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.effects.base import Array
+from hystgen.effects.base import Array, Place
 from hystgen.effects.kinds import Constants, Kind
 
 Function = Callable[..., Any]
@@ -302,22 +304,48 @@ class Realized:
     beside: Callable[[Any], Iterable[Constants | None]] = lambda _: ()
 
 
+def late(module: str, name: str = "ARITHMETIC") -> Callable[[], Realized]:
+    """What a module realizes, which is imported where it is asked for."""
+
+    def realized() -> Realized:
+        found: Realized = getattr(importlib.import_module(module), name)
+        return found
+
+    return realized
+
+
+def called(name: str, only: Callable[[Any], bool] | None = None) -> Callable[[Any], bool]:
+    """Whether an effect has a name, and if so is `only` one of these."""
+    return lambda effect: effect.name == name and (only is None or only(effect))
+
+
+def given(place: Place) -> Callable[[Any], bool]:
+    """Whether an effect brings a block of its own, in front of the plays or else behind them."""
+    return lambda effect: effect.block is not None and (effect.place is Place.DRIVE) == (place is Place.DRIVE)
+
+
 @dataclass(frozen=True)
 class ChainPart:
-    """One kind of block. `name`: as in C; `words`: in messages; `takes`: whether an effect is one; `one`: a block of an
-    effect at a step length, where it may be `turning`; `calls`: of the interface that it answers; `forward`: only the
-    forward operator has it; `joined`: all of them are one block; `kinds`: of its C, in floating point."""
+    """One kind of block. `name`: as in C; `words`: in messages; `takes`: whether an effect is one; `one`: a block of
+    an effect at a step length, where it may be `turning`; `calls`: of the interface that it answers; `forward`: only
+    the forward operator has it; `joined`: all of them are one block; `kinds`: of its C, in floating point; `coded`:
+    it in fixed point, which is imported where a model is in fixed point."""
 
     name: str
     words: str
     takes: Callable[[Any], bool]
     one: Callable[[Any, float, bool], Any]
     floating: Realized
-    fixed: Realized
+    coded: Callable[[], Realized]
     calls: tuple[str, ...] = ()
     forward: bool = False
     joined: bool = False
     kinds: tuple[Kind, ...] = ()
+
+    @functools.cached_property
+    def fixed(self) -> Realized:
+        """It in fixed point."""
+        return self.coded()
 
     def arithmetic(self, fixed: bool) -> Realized:
         """It in fixed point, or else in floating point."""

@@ -20,7 +20,7 @@ from hystgen.compensator.chain import own
 from hystgen.compensator.chain.own import Linear, OwnTables
 from hystgen.effects.base import Effect, Place
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Sought
+from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Sought, given
 from hystgen.plays.fixed import nearest
 
 MANTISSA, SHIFT, DROP, LIFT = range(4)
@@ -206,17 +206,14 @@ def part(name: str, place: Place, blocks: Sequence[OwnBlock] = (), effects: Sequ
     """Blocks on one side of the plays as a part of the chain."""
     ahead = place is Place.DRIVE
 
-    def takes(effect: Effect) -> bool:
-        return effect.block is not None and (effect.place is Place.DRIVE) == ahead
-
-    def format_of(one: Linear, about: FixedSurroundings, given: float, asked: float) -> Formats:
+    def format_of(one: Linear, about: FixedSurroundings, size: float, asked: float) -> Formats:
         bits = 0 if ahead else about.bits  # of the sizes in front of the plays below those that are given
-        return formats(one, given * 2.0**bits, asked * 2.0**bits, bits)
+        return formats(one, size * 2.0**bits, asked * 2.0**bits, bits)
 
     return ChainPart(
-        name, "effects in front of the plays" if ahead else "", takes,
+        name, "effects in front of the plays" if ahead else "", given(place),
         lambda effect, seconds, _: own.linear(effect, seconds),
         own.arithmetic(blocks, effects, own.GLUE, lambda every, about: own.build(every, about.reals)),
-        own.arithmetic(blocks, effects, (product, entered, left), lambda rows, _: build(rows), format_of),
+        lambda: own.arithmetic(blocks, effects, (product, entered, left), lambda rows, _: build(rows), format_of),
         joined=True,
     )

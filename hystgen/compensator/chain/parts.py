@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 
 from hystgen.compensator.chain import own_fixed
-from hystgen.effects.ageing.fixed import AGEING
+from hystgen.effects.ageing.compensator import AGEING
 from hystgen.effects.base import Effect, Place
-from hystgen.effects.creep.fixed import CREEP
+from hystgen.effects.creep.compensator import CREEP
 from hystgen.effects.delay.compensator import DELAY
-from hystgen.effects.drift.fixed import CLOCK
+from hystgen.effects.drift.compensator import CLOCK
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.lag.fixed import LAG
+from hystgen.effects.lag.compensator import LAG
 from hystgen.effects.part import ChainPart
-from hystgen.effects.resonance.fixed import MODE
-from hystgen.effects.thermal.fixed import GAIN_PART, HEAT_PART
+from hystgen.effects.resonance.compensator import MODE
+from hystgen.effects.thermal.compensator import GAIN_PART, HEAT_PART
 from hystgen.plays.slots import Counts
 
 OWN_AHEAD, OWN_BEHIND = own_fixed.part("own_ahead", Place.DRIVE), own_fixed.part("own_behind", Place.LINEAR)

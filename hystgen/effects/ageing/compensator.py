@@ -14,7 +14,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs
+from hystgen.effects.part import ChainPart, FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs, called, late
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -283,3 +283,10 @@ ARITHMETIC = Realized(
     ),
     constants, tables,
 )
+
+AGEING = ChainPart(
+    "ageing", "ageing", called("ageing"), lambda effect, *_: Aged(effect),
+    ARITHMETIC, late("hystgen.effects.ageing.fixed"), calls=("set_gain", "travel", "set_travel"),
+    kinds=(KIND,),
+)
+"""Ageing as a part of the chain: a gain over the travel, which the caller may set."""

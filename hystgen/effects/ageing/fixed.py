@@ -24,7 +24,7 @@ from hystgen.effects.ageing.compensator import (
 )
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import ChainPart, Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
+from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
 from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
 from hystgen.effects.thermal.fixed import GAIN_BITS, LARGEST, LEAST, ONE, RECIPROCAL_ERROR, followed, reciprocal
 from hystgen.plays.slots import zero
@@ -205,10 +205,3 @@ ARITHMETIC = Realized(
     ),
     constants, made, formats,
 )
-
-AGEING = ChainPart(
-    "ageing", "ageing", lambda effect: effect.name == "ageing", lambda effect, *_: floating.Aged(effect),
-    floating.ARITHMETIC, ARITHMETIC, calls=("set_gain", "travel", "set_travel"),
-    kinds=(floating.KIND,),
-)
-"""Ageing as a part of the chain: a gain over the travel, which the caller may set."""

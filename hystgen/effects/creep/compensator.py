@@ -14,7 +14,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.base import Array, Block, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import Margin, One, Realized, Responses, Verbs
+from hystgen.effects.part import ChainPart, Margin, One, Realized, Responses, Verbs, called, late
 from hystgen.plays.slots import Counts, Reals, zero
 
 EFFECTS = (ExponentialCreep, LogarithmicCreep)
@@ -253,3 +253,11 @@ class UnevenCreep(Block):
 
 
 FUNCTIONS: dict[str, Any] = {"rest": creep_rest, "resting": creep_resting, "solve": creep_solve, "absorb": creep_absorb}
+
+CREEP = ChainPart(
+    "creep", "creep", called("creep"),
+    lambda effect, seconds, _: numbers(effect, seconds),
+    ARITHMETIC, late("hystgen.effects.creep.fixed"),
+    kinds=(KIND,),
+)
+"""Creep as a part of the chain."""

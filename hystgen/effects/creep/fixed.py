@@ -20,7 +20,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.creep import compensator as floating
 from hystgen.effects.creep.compensator import AHEAD, BEFORE, HIGH, CreepNumbers, CreepState, CreepTables
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Realized, Sought, Verbs
+from hystgen.effects.part import Coded, FixedSurroundings, Realized, Sought, Verbs
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import zero
 
@@ -165,11 +165,3 @@ ARITHMETIC = Realized(
     Verbs(floating.memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
     tables, formats,
 )
-
-CREEP = ChainPart(
-    "creep", "creep", lambda effect: effect.name == "creep",
-    lambda effect, seconds, _: floating.numbers(effect, seconds),
-    floating.ARITHMETIC, ARITHMETIC,
-    kinds=(floating.KIND,),
-)
-"""Creep as a part of the chain."""

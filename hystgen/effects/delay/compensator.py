@@ -14,7 +14,7 @@ import numpy as np
 
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
-from hystgen.effects.part import ChainPart, Function, One, Realized, Surroundings, Verbs
+from hystgen.effects.part import ChainPart, Function, One, Realized, Surroundings, Verbs, called
 from hystgen.plays.slots import Counts, Reals
 
 MOST_SAMPLES = 2**15
@@ -132,7 +132,7 @@ FIXED_ARITHMETIC = Realized(
 )
 
 DELAY = ChainPart(
-    "wait", "a delay", lambda effect: effect.name == "delay" and effect.time > 0.0,
-    lambda effect, *_: Wait(effect.time), ARITHMETIC, FIXED_ARITHMETIC, forward=True, joined=True,
+    "wait", "a delay", called("delay", lambda effect: effect.time > 0.0),
+    lambda effect, *_: Wait(effect.time), ARITHMETIC, lambda: FIXED_ARITHMETIC, forward=True, joined=True,
 )
 """A delay as a part of the chain: what the amplifier of the forward operator gets of the drive."""

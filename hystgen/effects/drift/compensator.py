@@ -10,7 +10,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import FloatSurroundings, Function, Realized, Verbs
+from hystgen.effects.part import ChainPart, FloatSurroundings, Function, Realized, Verbs, called, late
 from hystgen.plays.slots import Reals, zero
 
 # ---------------------------------------------------------------- clock.c
@@ -106,3 +106,10 @@ def tables(effects: Sequence[LinearDrift | CurvedDrift], about: FloatSurrounding
 
 
 ARITHMETIC = Realized(verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants, tables)
+
+CLOCK = ChainPart(
+    "clock", "drift", called("drift"), lambda effect, *_: effect,
+    ARITHMETIC, late("hystgen.effects.drift.fixed"),
+    kinds=(KIND,),
+)
+"""Drift as a part of the chain: what a clock adds to the displacement."""

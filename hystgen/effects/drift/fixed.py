@@ -17,7 +17,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.drift import compensator as floating
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import ChainPart, FixedSurroundings, Realized
+from hystgen.effects.part import FixedSurroundings, Realized
 from hystgen.plays.slots import Reals, zero
 
 MOST_SAMPLES = 2**44
@@ -137,10 +137,3 @@ ARITHMETIC = Realized(
     floating.verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants,
     lambda clocks, _: np.array([one.table for one in clocks], dtype=np.int64).reshape(-1, 7), formats,
 )
-
-CLOCK = ChainPart(
-    "clock", "drift", lambda effect: effect.name == "drift", lambda effect, *_: effect,
-    floating.ARITHMETIC, ARITHMETIC,
-    kinds=(floating.KIND,),
-)
-"""Drift as a part of the chain: what a clock adds to the displacement."""

@@ -15,7 +15,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.base import Block, decays
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag.model import Lag
-from hystgen.effects.part import Led, Margin, One, Realized, Responses, Verbs
+from hystgen.effects.part import ChainPart, Led, Margin, One, Realized, Responses, Verbs, called, late
 from hystgen.plays.slots import Counts, Reals, zero
 
 LONG_STEP = 2.0
@@ -442,3 +442,10 @@ def _uneven(effect: Lag, seconds: float) -> tuple[bool, LagTables]:
     """Whether a step is long enough for the exact inverse, and the numbers of both."""
     long = numbers(effect, seconds).exact
     return long, tables([numbers(effect, seconds, exact=exact) for exact in (False, True)], lambda x, _: np.array(x))
+
+LAG = ChainPart(
+    "lag", "a lag", called("lag", lambda effect: effect.time_constant > 0.0), numbers,
+    ARITHMETIC, late("hystgen.effects.lag.fixed"),
+    kinds=(KIND, EXACT_KIND, BRAKED_KIND),
+)
+"""A lag as a part of the chain, in front of the plays."""

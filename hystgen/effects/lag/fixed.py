@@ -20,7 +20,7 @@ from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag import compensator as floating
 from hystgen.effects.lag.compensator import HALVES, LagNumbers, LagSizes, LagTables, shifted, steady_led
-from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Led, Realized, Verbs
+from hystgen.effects.part import Coded, FixedSurroundings, Led, Realized, Verbs
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
@@ -299,10 +299,3 @@ ARITHMETIC = Realized(
     Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
     tables, formats,
 )
-
-LAG = ChainPart(
-    "lag", "a lag", lambda effect: effect.name == "lag" and effect.time_constant > 0.0, floating.numbers,
-    floating.ARITHMETIC, ARITHMETIC,
-    kinds=(floating.KIND, floating.EXACT_KIND, floating.BRAKED_KIND),
-)
-"""A lag as a part of the chain, in front of the plays."""

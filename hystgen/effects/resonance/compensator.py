@@ -17,7 +17,7 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import Margin, One, Realized, Verbs
+from hystgen.effects.part import ChainPart, Margin, One, Realized, Verbs, called, late
 from hystgen.effects.resonance.model import Resonance
 from hystgen.plays.slots import Reals, zero
 
@@ -146,3 +146,11 @@ ARITHMETIC = Realized(
     Verbs(memory, mode_rest, mode_absorb), constants,
     lambda blocks, about: about.reals([one.table for one in blocks], "the modes").reshape(-1, 5),
 )
+
+MODE = ChainPart(
+    "mode", "resonance", called("resonance", lambda effect: effect.block is None),
+    lambda effect, seconds, _: numbers(effect, seconds),
+    ARITHMETIC, late("hystgen.effects.resonance.fixed"), forward=True,
+    kinds=(KIND,),
+)
+"""A mode as a part of the chain, of the forward operator alone."""

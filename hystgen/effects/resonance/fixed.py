@@ -17,7 +17,7 @@ from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifte
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import ChainPart, Coded, Realized, Verbs
+from hystgen.effects.part import Coded, Realized, Verbs
 from hystgen.effects.resonance import compensator
 from hystgen.effects.resonance.compensator import BEFORE, OFF, RATE, ModeNumbers
 from hystgen.plays.fixed import nearest
@@ -113,11 +113,3 @@ ARITHMETIC = Realized(
     lambda modes, _: np.array([each.row for each in modes], dtype=np.int64).reshape(-1, 13),
     lambda one, about, given, _: ModeFormats(one, row(one, given * 2.0**about.bits)),
 )
-
-MODE = ChainPart(
-    "mode", "resonance", lambda effect: effect.name == "resonance" and effect.block is None,
-    lambda effect, seconds, _: compensator.numbers(effect, seconds),
-    compensator.ARITHMETIC, ARITHMETIC, forward=True,
-    kinds=(compensator.KIND,),
-)
-"""A mode as a part of the chain, of the forward operator alone."""

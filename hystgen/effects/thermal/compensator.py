@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs
+from hystgen.effects.part import ChainPart, FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs, called, late
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -438,3 +438,17 @@ HEAT_ARITHMETIC = Realized(
     Verbs(heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
     heat_constants, heat_tables, beside=friction_constants,
 )
+
+GAIN_PART = ChainPart(
+    "gain", "a temperature", called("thermal", lambda effect: bool(effect.columns)),
+    lambda effect, *_: Warm(effect), ARITHMETIC, late("hystgen.effects.thermal.fixed"), calls=("set_temperature",),
+    kinds=(KIND,),
+)
+
+HEAT_PART = ChainPart(
+    "heat", "own heat", called("thermal", lambda effect: not effect.columns),
+    lambda effect, *_: Warm(effect), HEAT_ARITHMETIC,
+    late("hystgen.effects.thermal.fixed", "HEAT_ARITHMETIC"),
+    kinds=(HEAT_KIND, FRICTION_KIND),
+)
+"""Temperatures as parts of the chain: those that the caller sets, and those of own heat."""

@@ -12,7 +12,7 @@ import numpy as np
 from hystgen.arithmetic.factors import MANTISSA_BITS, factor, times
 from hystgen.basics.jit import jit
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import ChainPart, Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
+from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
 from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
     AT,
@@ -362,15 +362,3 @@ HEAT_ARITHMETIC = Realized(
     Verbs(floating.heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
     heat_constants, heat_tables, heat_formats, beside=friction_constants,
 )
-
-GAIN_PART = ChainPart(
-    "gain", "a temperature", lambda effect: effect.name == "thermal" and bool(effect.columns),
-    lambda effect, *_: floating.Warm(effect), floating.ARITHMETIC, ARITHMETIC, calls=("set_temperature",),
-    kinds=(floating.KIND,),
-)
-HEAT_PART = ChainPart(
-    "heat", "own heat", lambda effect: effect.name == "thermal" and not effect.columns,
-    lambda effect, *_: floating.Warm(effect), floating.HEAT_ARITHMETIC, HEAT_ARITHMETIC,
-    kinds=(floating.HEAT_KIND, floating.FRICTION_KIND),
-)
-"""Temperatures as parts of the chain: those that the caller sets, and those of own heat."""
