@@ -5,8 +5,8 @@
 
 /* Start memory of the parameter file. */
 void hystgen_operator_init(hystgen_operator_t *self);
-/* All plays 0, status cleared, then one ordinary step with x. */
-void hystgen_operator_reset(hystgen_operator_t *self, hystgen_real_t x);
+/* All plays 0, status cleared, then one ordinary step with operator_x. */
+void hystgen_operator_reset(hystgen_operator_t *self, hystgen_real_t operator_x);
 #ifdef HYSTGEN_FORWARD
 /* One sample: drive v in, output out. Cannot fail. */
 hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t v);

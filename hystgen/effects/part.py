@@ -304,11 +304,11 @@ class Realized:
     beside: Callable[[Any], Iterable[Constants | None]] = lambda _: ()
 
 
-def late(module: str, name: str = "ARITHMETIC") -> Callable[[], Realized]:
-    """What a module realizes, which is imported where it is asked for."""
+def late(effect: str, name: str = "ARITHMETIC") -> Callable[[], Realized]:
+    """What the fixed point of an effect realizes, which is imported where it is asked for."""
 
     def realized() -> Realized:
-        found: Realized = getattr(importlib.import_module(module), name)
+        found: Realized = getattr(importlib.import_module("hystgen.effects." + effect + ".fixed"), name)
         return found
 
     return realized

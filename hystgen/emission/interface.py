@@ -365,8 +365,7 @@ def documented(pieces: Sequence[Piece], one: Compensator, cost: Cost) -> Iterato
         call, op = found["call"], found["op"]
         names = [re.findall(r"\w+", each)[-1] for each in found["given"].split(", ")]
         lines = [("", " ".join(words.split())), ("", "")]
-        meaning = {"x": "u" if op == "inverse" else "v"}
-        lines += [(f"@param {name}", _parameter(meaning.get(name, name), call, one)) for name in names]
+        lines += [(f"@param {name}", _parameter(name, call, one)) for name in names]
         if found["answer"] != "void":
             lines.append(("@return", _answer(call, op, one)))
         lines += [

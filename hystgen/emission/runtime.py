@@ -547,14 +547,16 @@ def _holds(word: str, condition: str, facts: Collection[str]) -> bool:
 
 
 def forms(source: str, facts: Collection[str]) -> list[str]:
-    """The text of a file with what its conditions choose: of one for either operator, that of both."""
+    """The text of a file with what its conditions choose: of one for either operator, that of both. What either is
+    given, `operator_x`, is called as in its step."""
     if "hystgen_operator_" not in source:
         return [chosen(source, facts)]
     return [
         chosen(source, {*facts, f"HYSTGEN_{op.upper()}"})
         .replace("hystgen_operator_", f"hystgen_{op}_").replace("HYSTGEN_OPERATOR_", f"HYSTGEN_{op.upper()}_")
-        for op in OPERATORS
-    ]  # fmt: skip
+        .replace("operator_x", given)
+        for op, given in zip(OPERATORS, ("v", "u"), strict=True)
+    ]
 
 
 def _pieces(files: Iterable[str], facts: Collection[str]) -> list[Piece]:

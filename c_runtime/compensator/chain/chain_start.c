@@ -15,12 +15,12 @@ void hystgen_operator_init(hystgen_operator_t *self) {
     hystgen_operator_begin(self, HYSTGEN_OPERATOR_INIT_DRIVE, HYSTGEN_OPERATOR_INIT_ASCENDING);
 }
 
-void hystgen_operator_reset(hystgen_operator_t *self, hystgen_real_t x) {
+void hystgen_operator_reset(hystgen_operator_t *self, hystgen_real_t operator_x) {
 #ifdef HYSTGEN_HAS_CORNERS
     hystgen_operator_plays_reset(self);
 #else
     hystgen_loop_rest(&hystgen_model_tables, self->play, 0);
 #endif
     hystgen_operator_begin(self, HYSTGEN_OPERATOR_RESET_DRIVE, HYSTGEN_OPERATOR_RESET_ASCENDING);
-    (void)hystgen_operator_step(self, x);
+    (void)hystgen_operator_step(self, operator_x);
 }

@@ -17,7 +17,7 @@ void hystgen_operator_init(hystgen_operator_t *self) {
     hystgen_operator_begin(self, false);
 }
 
-void hystgen_operator_reset(hystgen_operator_t *self, hystgen_real_t x) {
+void hystgen_operator_reset(hystgen_operator_t *self, hystgen_real_t operator_x) {
     hystgen_operator_begin(self, true);
-    (void)hystgen_operator_step(self, x);
+    (void)hystgen_operator_step(self, operator_x);
 }

@@ -286,7 +286,7 @@ ARITHMETIC = Realized(
 
 AGEING = ChainPart(
     "ageing", "ageing", called("ageing"), lambda effect, *_: Aged(effect),
-    ARITHMETIC, late("hystgen.effects.ageing.fixed"), calls=("set_gain", "travel", "set_travel"),
+    ARITHMETIC, late("ageing"), calls=("set_gain", "travel", "set_travel"),
     kinds=(KIND,),
 )
 """Ageing as a part of the chain: a gain over the travel, which the caller may set."""

@@ -257,7 +257,7 @@ FUNCTIONS: dict[str, Any] = {"rest": creep_rest, "resting": creep_resting, "solv
 CREEP = ChainPart(
     "creep", "creep", called("creep"),
     lambda effect, seconds, _: numbers(effect, seconds),
-    ARITHMETIC, late("hystgen.effects.creep.fixed"),
+    ARITHMETIC, late("creep"),
     kinds=(KIND,),
 )
 """Creep as a part of the chain."""

@@ -109,7 +109,7 @@ ARITHMETIC = Realized(verbs(memory, clock_start, clock_tick, clock_drift, ONE, M
 
 CLOCK = ChainPart(
     "clock", "drift", called("drift"), lambda effect, *_: effect,
-    ARITHMETIC, late("hystgen.effects.drift.fixed"),
+    ARITHMETIC, late("drift"),
     kinds=(KIND,),
 )
 """Drift as a part of the chain: what a clock adds to the displacement."""

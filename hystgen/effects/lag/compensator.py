@@ -445,7 +445,7 @@ def _uneven(effect: Lag, seconds: float) -> tuple[bool, LagTables]:
 
 LAG = ChainPart(
     "lag", "a lag", called("lag", lambda effect: effect.time_constant > 0.0), numbers,
-    ARITHMETIC, late("hystgen.effects.lag.fixed"),
+    ARITHMETIC, late("lag"),
     kinds=(KIND, EXACT_KIND, BRAKED_KIND),
 )
 """A lag as a part of the chain, in front of the plays."""

@@ -150,7 +150,7 @@ ARITHMETIC = Realized(
 MODE = ChainPart(
     "mode", "resonance", called("resonance", lambda effect: effect.block is None),
     lambda effect, seconds, _: numbers(effect, seconds),
-    ARITHMETIC, late("hystgen.effects.resonance.fixed"), forward=True,
+    ARITHMETIC, late("resonance"), forward=True,
     kinds=(KIND,),
 )
 """A mode as a part of the chain, of the forward operator alone."""

@@ -441,14 +441,14 @@ HEAT_ARITHMETIC = Realized(
 
 GAIN_PART = ChainPart(
     "gain", "a temperature", called("thermal", lambda effect: bool(effect.columns)),
-    lambda effect, *_: Warm(effect), ARITHMETIC, late("hystgen.effects.thermal.fixed"), calls=("set_temperature",),
+    lambda effect, *_: Warm(effect), ARITHMETIC, late("thermal"), calls=("set_temperature",),
     kinds=(KIND,),
 )
 
 HEAT_PART = ChainPart(
     "heat", "own heat", called("thermal", lambda effect: not effect.columns),
     lambda effect, *_: Warm(effect), HEAT_ARITHMETIC,
-    late("hystgen.effects.thermal.fixed", "HEAT_ARITHMETIC"),
+    late("thermal", "HEAT_ARITHMETIC"),
     kinds=(HEAT_KIND, FRICTION_KIND),
 )
 """Temperatures as parts of the chain: those that the caller sets, and those of own heat."""

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 31ebfd90c4d626ef4912553fbb362799510baac5a6d9731421df53a8400d1015, without this line
+ * Text: sha256 196ddfbbe5bc51546001c813bfe669e77bfcfbac84ffce030316e8ef3ae700ba, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -327,10 +327,10 @@ void bent_forward_init(bent_forward_t *self) {
     bent_forward_begin(self);
 }
 
-void bent_forward_reset(bent_forward_t *self, bent_real_t x) {
+void bent_forward_reset(bent_forward_t *self, bent_real_t v) {
     bent_loop_rest(&bent_model_tables, self->play, 0);
     bent_forward_begin(self);
-    (void)bent_forward_step(self, x);
+    (void)bent_forward_step(self, v);
 }
 
 void bent_inverse_init(bent_inverse_t *self) {
@@ -338,10 +338,10 @@ void bent_inverse_init(bent_inverse_t *self) {
     bent_inverse_begin(self, BENT_INVERSE_INIT_DRIVE);
 }
 
-void bent_inverse_reset(bent_inverse_t *self, bent_real_t x) {
+void bent_inverse_reset(bent_inverse_t *self, bent_real_t u) {
     bent_loop_rest(&bent_model_tables, self->play, 0);
     bent_inverse_begin(self, BENT_INVERSE_RESET_DRIVE);
-    (void)bent_inverse_step(self, x);
+    (void)bent_inverse_step(self, u);
 }
 
 bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {

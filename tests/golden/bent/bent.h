@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 2d3f1b0b55a9cbd567b898af731c5c0de340d1ddc7c91c373e737069d0e63b16, without this line
+ * Text: sha256 904d60c0dc62ea98ad88808153205273af5035a34262826b611fccad54aa6c08, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -121,15 +121,15 @@ typedef struct {
 void bent_forward_init(bent_forward_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with x.
+ * All plays 0, status cleared, then one ordinary step with v.
  *
  * @param self the instance
- * @param x drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: held
+ * @param v drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: held
  * @pre after init; at any time
  * @note Status bits: cleared, then those of the step
  * @note Cost: that of init and of a step
  */
-void bent_forward_reset(bent_forward_t *self, bent_real_t x);
+void bent_forward_reset(bent_forward_t *self, bent_real_t v);
 
 /**
  * One sample: drive v in, output out. Cannot fail.
@@ -165,15 +165,15 @@ unsigned int bent_forward_status(bent_forward_t *self);
 void bent_inverse_init(bent_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with x.
+ * All plays 0, status cleared, then one ordinary step with u.
  *
  * @param self the instance
- * @param x reference, um; limited to BENT_OUTPUT_MIN .. MAX; NaN and infinite: held
+ * @param u reference, um; limited to BENT_OUTPUT_MIN .. MAX; NaN and infinite: held
  * @pre after init; at any time
  * @note Status bits: cleared, then those of the step
  * @note Cost: that of init and of a step
  */
-void bent_inverse_reset(bent_inverse_t *self, bent_real_t x);
+void bent_inverse_reset(bent_inverse_t *self, bent_real_t u);
 
 /**
  * One sample: reference u in, drive out, inside BENT_DRIVE_MIN .. MAX. Cannot fail.

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 0a03e6940c508b822a3483fecfd4bf2972a8b50d323c2dde082752be22ca65b4, without this line
+ * Text: sha256 8a5b266248fe9f62df0a74bbc4c10986701bd04ca9cae9428afb6ffe405b68d3, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -554,9 +554,9 @@ void curved_inverse_init(curved_inverse_t *self) {
     curved_inverse_begin(self, false);
 }
 
-void curved_inverse_reset(curved_inverse_t *self, curved_real_t x) {
+void curved_inverse_reset(curved_inverse_t *self, curved_real_t u) {
     curved_inverse_begin(self, true);
-    (void)curved_inverse_step(self, x);
+    (void)curved_inverse_step(self, u);
 }
 
 unsigned int curved_inverse_status(curved_inverse_t *self) {

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 48420c62b5144758d40c977b35e68f25adcc795811e40d433a529c6ac7c7e817, without this line
+ * Text: sha256 97a57af2a7341e3488bb7b4f755b1752585244e45504086bef13d4e1e0afbb62, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -133,15 +133,15 @@ typedef struct {
 void curved_inverse_init(curved_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with x.
+ * All plays 0, status cleared, then one ordinary step with u.
  *
  * @param self the instance
- * @param x reference, in codes of CURVED_OUTPUT_LSB um; limited to CURVED_OUTPUT_MIN .. MAX
+ * @param u reference, in codes of CURVED_OUTPUT_LSB um; limited to CURVED_OUTPUT_MIN .. MAX
  * @pre after init; at any time
  * @note Status bits: cleared, then those of the step
  * @note Cost: that of init and of a step
  */
-void curved_inverse_reset(curved_inverse_t *self, curved_real_t x);
+void curved_inverse_reset(curved_inverse_t *self, curved_real_t u);
 
 /**
  * One sample: reference u in, drive out, inside CURVED_DRIVE_MIN .. MAX. Cannot fail.

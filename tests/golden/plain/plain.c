@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 5bd8918f80a781e5e6c449e1662859a1d386e8190af089a64d9929ffc4df0dd1, without this line
+ * Text: sha256 6df23b603a3149eb5a95e2913d9baaab8bd7e114ff198f74f66e83de97751b04, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -429,9 +429,9 @@ void plain_inverse_init(plain_inverse_t *self) {
     plain_inverse_begin(self, false);
 }
 
-void plain_inverse_reset(plain_inverse_t *self, plain_real_t x) {
+void plain_inverse_reset(plain_inverse_t *self, plain_real_t u) {
     plain_inverse_begin(self, true);
-    (void)plain_inverse_step(self, x);
+    (void)plain_inverse_step(self, u);
 }
 
 unsigned int plain_inverse_status(plain_inverse_t *self) {

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 a5a698b8f6e1c080ea8d5dcf0e5f0c5ed29345d84b21b6a193fbc6d6bb436723, without this line
+ * Text: sha256 4b57b0028c14b525311cd46c52ea8b8b3d4105abfde12c088767269f57e7e1a2, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -149,15 +149,15 @@ typedef struct {
 void plain_inverse_init(plain_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with x.
+ * All plays 0, status cleared, then one ordinary step with u.
  *
  * @param self the instance
- * @param x reference, um; limited to PLAIN_OUTPUT_MIN .. MAX; NaN and infinite: held
+ * @param u reference, um; limited to PLAIN_OUTPUT_MIN .. MAX; NaN and infinite: held
  * @pre after init; at any time
  * @note Status bits: cleared, then those of the step
  * @note Cost: that of init and of a step
  */
-void plain_inverse_reset(plain_inverse_t *self, plain_real_t x);
+void plain_inverse_reset(plain_inverse_t *self, plain_real_t u);
 
 /**
  * One sample: reference u in, drive out, inside PLAIN_DRIVE_MIN .. MAX. Cannot fail.

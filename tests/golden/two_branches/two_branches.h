@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 7b40b36260742fa41814d1070ca2adde46a88514153c915e151abbf5738043fd, without this line
+ * Text: sha256 0224158a30758f27744b9bdcd04cd2dcb1f7e43607507c1fb62d6ae521abc77e, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -167,15 +167,15 @@ typedef struct {
 void two_branches_inverse_init(two_branches_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with x.
+ * All plays 0, status cleared, then one ordinary step with u.
  *
  * @param self the instance
- * @param x reference, um; limited to TWO_BRANCHES_OUTPUT_MIN .. MAX; NaN and infinite: held
+ * @param u reference, um; limited to TWO_BRANCHES_OUTPUT_MIN .. MAX; NaN and infinite: held
  * @pre after init; at any time
  * @note Status bits: cleared, then those of the step
  * @note Cost: that of init and of a step
  */
-void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_t x);
+void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_t u);
 
 /**
  * One sample: reference u in, drive out, inside TWO_BRANCHES_DRIVE_MIN .. MAX. Cannot fail.
@@ -958,9 +958,9 @@ void two_branches_inverse_init(two_branches_inverse_t *self) {
     two_branches_inverse_begin(self, false);
 }
 
-void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_t x) {
+void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_t u) {
     two_branches_inverse_begin(self, true);
-    (void)two_branches_inverse_step(self, x);
+    (void)two_branches_inverse_step(self, u);
 }
 
 unsigned int two_branches_inverse_status(two_branches_inverse_t *self) {
