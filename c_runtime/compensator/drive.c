@@ -59,7 +59,7 @@ static inline bool hystgen_turns(hystgen_signal_t back, hystgen_signal_t way) {
 HYSTGEN_APART_BUT_IN_FLOAT_LOOP hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self,
                                                                       hystgen_real_t level,
                                                                       hystgen_reach_t w) {
-    bool limited;
+    bool limited = false;
     const bool up = self->ascending;
     hystgen_reach_t v = hystgen_front_inverse(w, up, &limited);
     const hystgen_fine_t on = hystgen_clamp_fine(v);
@@ -132,7 +132,7 @@ HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hyst
 /* The drive that gives w for the limited reference `level`. */
 static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_real_t level,
                                              hystgen_reach_t w) {
-    bool limited;
+    bool limited = false;
     const hystgen_reach_t v = hystgen_inverse_choose(self, level, w, &limited);
     self->last = level;
     if (limited) {
