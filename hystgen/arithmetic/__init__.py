@@ -1,4 +1,4 @@
-"""The arithmetics that compensators are emitted in, each an object that knows its own peculiarities."""
+"""The arithmetics that compensators can be emitted in, each an object that holds everything specific to it."""
 
 from hystgen.arithmetic.description import Arithmetic
 from hystgen.arithmetic.fixed import Fixed

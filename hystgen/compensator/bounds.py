@@ -13,7 +13,7 @@ slope P_k, an output error eta becomes eta / P_k in w, but beyond it that error 
 Engine `loop` stops there; engine `corners` switches to the steeper piece early, by as much as rounding can amount to.
 Neither answers a move with one in the other direction, which would have the same effect on plays that follow after a
 turn. The exact inverse turns a reference error eta into at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the
-sum of |q_i|), and the front divides that by its smallest slope. Clamps and commits give both the same drive: they add
+sum of |q_i|), and the front divides that by its smallest slope. A clamp or commit gives both the same drive and adds
 nothing.
 
 With two branches, two drives can give the same output, one on each branch, and rounding decides between them if the

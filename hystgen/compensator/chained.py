@@ -105,7 +105,7 @@ class Actuator(Block):
         go back by more than rounding, or by more than a lag in front misses in the first sample of the turn.
 
         A lag misses `theta` of the way to the other branch. Holding then never misses more than turning at once would
-        have; no other share of the way misses less than `1 + theta` times what a drive misses that knows how far the
+        have; for any other share the miss can reach at least `1 + theta` times that of a drive that knows how far the
         reference will go back. `rises` says which way the drive is to go.
         """
         w = self._input(y)
@@ -391,7 +391,7 @@ class Compensator:
 
 
 def _even_step(t: Array, asked: NDArray[np.bool_], what: str) -> float:
-    """The time in s between two references. Raises EffectsError if `what` would not get them at even times."""
+    """The time in s between two references. Raises EffectsError if `what` needs even steps and they are uneven."""
     steps = np.diff(t)[asked[1:] & asked[:-1]]
     step = float(np.median(steps)) if len(steps) else 1.0
     if len(steps) and float(np.max(np.abs(steps - step))) > EVEN * step:

@@ -105,7 +105,7 @@ def _corner_operations(
 
     @jit.jit
     def visit(t: Any, m: Any, inverse: int, v: Any) -> None:
-        """Put the actuator at drive v before the next sample."""
+        """Move the actuator to drive v before the next sample."""
         if inverse:
             inverse_visit(t, m, v)
         else:

@@ -1,4 +1,4 @@
-"""Remarks in words on samples that an operator did not simply answer: limited, held, beyond the range."""
+"""Remarks on samples that were limited, held or out of range."""
 
 from __future__ import annotations
 

@@ -331,7 +331,7 @@ def made_of(
 
     @jit
     def visit(t: Tables | FixedTables, s: State, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
-        """Put the actuator at drive v before the next sample."""
+        """Move the actuator to drive v before the next sample."""
         absorb(t, s, v)
         s.real[LEVEL], bits = output(t, s)
         s.counts[STATUS] |= bits

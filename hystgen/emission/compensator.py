@@ -214,9 +214,9 @@ class Effects:
 class Form(ABC):
     """How one kind of arithmetic writes the numbers of a model, and its own words for them if it has codes.
 
-    `apart`: start of functions whose products would otherwise take stack from their callers; `suffix`: of names of
-    macros that count codes; `held`: meaning of the status bit HELD; `warning`: about compiler flags; `settings`:
-    arguments of the calls that set something, where MODEL is the model's name.
+    `apart`: words that begin functions which would cost their callers stack if inlined; `suffix`: of names of macros
+    that count codes; `held`: meaning of the status bit HELD; `warning`: about compiler flags; `settings`: arguments of
+    the calls that set something, where MODEL is the model's name.
     """
 
     apart = "static"

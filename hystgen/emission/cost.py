@@ -123,7 +123,8 @@ def _length(words: str, lengths: Mapping[str, int]) -> int:
 
 
 def _constants(contents: Iterable[tuple[str, int]], known: Mapping[str, Size], family: Family, plays: int = 1) -> int:
-    """Bytes of constants without padding between them; with `plays`, bytes per play of tables by play."""
+    """Bytes of constants without padding between them; with `plays`, of one entry in tables that have one for each
+    play."""
     return sum(known[family.meaning(kind)][0] * (count // plays) for kind, count in contents)
 
 

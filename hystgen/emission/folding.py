@@ -18,7 +18,7 @@ _HEAD = re.compile(r"(?P<before>(?:[\w*]+\s+\**)+?)(?P<name>hystgen_\w+)\((?P<pa
 _OWN = ("static ", "HYSTGEN_APART_IN_FLOAT ", "HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ",
         "HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART_IN_FIXED_CHAIN ", "HYSTGEN_APART_IN_CHAIN ",
         "HYSTGEN_APART ")
-"""Starts of functions that only the model itself calls."""
+"""Words that begin functions which only the model itself calls."""
 _DELIMITED = (re.compile(r"(?:[(,?:]|(?<![=!<>])=|\breturn)\s*$"), re.compile(r"\s*[),;:]"))
 """Text before and after a whole argument, initializer or answer."""
 _MARK = re.compile(r"^ *\(void\)(\w+);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
@@ -114,7 +114,7 @@ def folded(
 
 class _Folding:
     """The functions of a model's operators. `kernels`: other functions that they call, which stay unchanged; `apart`:
-    starts of functions that the compiler keeps apart here to save stack; `meaning`: of names of types, several of which
+    words that begin functions which are not inlined here, to save stack; `meaning`: of names of types, several of which
     may denote the same type here."""
 
     def __init__(

@@ -87,8 +87,9 @@ def _variant(
 
 @dataclass(frozen=True)
 class Code:
-    """Texts: `types` of tables, `states` of instances; the functions in `kernels` and `operators`; their `macros`; and
-    the tables that they name, with an entry for each play or `beside` them. `data`: all of it in memory."""
+    """The C text of a model: types of its tables and of its instances (`states`), functions (`kernels`, `operators`),
+    the macros and tables that they name (`plays`: with an entry for each play, `beside`: others), and `data`, all of it
+    in memory."""
 
     types: str
     states: str

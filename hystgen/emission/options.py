@@ -1,4 +1,4 @@
-"""The options of emission, and the banner of every emitted file, with its origin and any later edit."""
+"""The options of emission, and the banner of every emitted file, which records its origin and any later edit."""
 
 from __future__ import annotations
 

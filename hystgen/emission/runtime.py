@@ -181,7 +181,7 @@ class Family(ABC):
 
     @abstractmethod
     def storage(self, corners: bool) -> dict[str, str]:
-        """Words before functions, and their replacements in this arithmetic, in engine corners or loop."""
+        """Replacements of the storage-class words before functions in this arithmetic, in engine corners or loop."""
 
     def corners(self, plays: int) -> int:
         """Number of corners that the corner engine keeps for so many plays."""
@@ -317,7 +317,7 @@ class Variant:
 
     @property
     def apart(self) -> tuple[str, ...]:
-        """Starts of functions that the compiler keeps apart here."""
+        """Words that begin functions which are not inlined here."""
         storage = self.family.storage(self.engine == "corners")
         return (APART, *(word for word, here in storage.items() if here == APART))
 
@@ -689,7 +689,7 @@ def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -
 
 
 def _stored(text: str, family: Family, corners: bool) -> str:
-    """The text with the words before functions replaced for this arithmetic."""
+    """The text with storage-class words replaced for this arithmetic."""
     for word, here in family.storage(corners).items():
         text = text.replace(word, here)
     return text

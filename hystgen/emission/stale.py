@@ -1,4 +1,5 @@
-"""Emitted files that are out of date or that no model writes, and the commands that resolve this."""
+"""Emitted files that are out of date or that no model writes, and the commands that bring them up to date or delete
+them."""
 
 from __future__ import annotations
 

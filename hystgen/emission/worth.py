@@ -10,8 +10,8 @@ from hystgen.effects.base import Effect
 from hystgen.model import Model
 
 SWEEPS = 8
-"""[sweeps] Number of sweeps over the whole range that measure an effect. The value is then within 2 % of its value over
-64 sweeps if the effect settles (lag, resonance; a slew limit 16 %); creep and ageing never settle. Set by:
+"""[sweeps] Sweeps over the whole range on which an effect is measured. The result is then within 2 % of that over 64
+sweeps for effects that settle (lag, resonance; a slew limit 16 %); creep and ageing never settle. Set by:
 benchmarks/chosen_numbers.py sweeps."""
 
 

@@ -418,9 +418,9 @@ class _Builder:
         return found
 
     def _finest(self) -> int:
-        """Bits below the plays' input at which the lead of the lags amplifies rounding to at most half a code.
+        """Further bits in front of the plays that keep rounding below half a code when the lags' lead amplifies it.
 
-        0 for models with a memoryless part or effects on plays, and if the input of the plays has bits below a drive
+        0 for models with a memoryless part or effects on plays, and if the plays' input already has bits below a drive
         code.
         """
         if self.static.stages or self.parts.plays or self.inner.fine:

@@ -50,7 +50,7 @@ VERIFIED_SHARE = 0.125
 """The share by which verification corrects: exact in every arithmetic."""
 
 LEAST_LATE = 1e-6
-"""[samples] Motion that is less late counts as in time: mean ages are sums with rounding."""
+"""[samples] Smaller delays count as none: mean ages are sums with rounding."""
 
 SAMPLES_A_SWEEP = 50
 """Fewest samples from one end of the drive's range to the other for which bounds are stated: a triangle at a hundredth
@@ -58,7 +58,7 @@ of the sample rate keeps its shape, and errors by ageing and by contacts within 
 
 
 class Stages(NamedTuple):
-    """Memoryless stages, as `hystgen.front.stage.StageTables`."""
+    """Memoryless stages, as in `hystgen.front.stage.StageTables`."""
 
     stage_kind: Counts
     stage_first: Counts
@@ -71,8 +71,8 @@ class Stages(NamedTuple):
 class ChainTables(NamedTuple):
     """The constants of one model with effects in one arithmetic.
 
-    `limits`: as in `Tables`, for the whole chain; `plays`: front and plays without an offset, with the same limits in
-    floating point, and in fixed point with limits of a drive that may have bits below a code; `behind`: saturation.
+    `limits`: as in `Tables`, for the whole chain; `plays`: front and plays without an offset, whose limits are the same
+    in floating point; in fixed point their drive may have bits below a code; `behind`: saturation.
     """
 
     plays: Any  # `Tables` or `FixedTables`
@@ -107,7 +107,7 @@ class ChainTables(NamedTuple):
 
     @property
     def braked(self) -> bool:
-        """Whether a lag behind a slew limit is kept from overshooting."""
+        """Whether a lag behind a slew limit is braked, so that it does not overshoot."""
         return bool(self.blocks[LED].braked)
 
     @property
@@ -164,7 +164,7 @@ class Compiled:
     asked: int | None = None
     smoothing: Smoothing | None = None
     shaped: Shaped | None = None
-    """what the taps contain beside a delay and inverted modes"""
+    """shaped modes in the taps, besides a delay and inverted modes"""
     codes: Codes | None = None
     """only in fixed point"""
 
@@ -232,7 +232,7 @@ def ahead_of(ones: Mapping[str, Sequence[Any]]) -> list[Any]:
 
 
 def lead(ahead: Sequence[One]) -> float:
-    """Largest gain from what arrives in front of the plays to the drive, 0 if the drive itself arrives there."""
+    """Largest gain from the signal in front of the plays to the drive, 0 if there are no blocks between them."""
     return math.prod(one.lead for one in ahead) if ahead else 0.0
 
 

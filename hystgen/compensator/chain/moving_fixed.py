@@ -103,8 +103,8 @@ def relaxing_follow(t: FixedMovingTables, plays: Any, s: State, w: Any) -> Any:
 
 @jit
 def relaxing_input(t: FixedMovingTables, plays: Any, s: State, h: Any) -> Any:  # noqa: ARG001  as in floating point
-    """Input of viscous plays at which their sum is h: none is stretched while the input is where play 1 rests; beyond
-    that they are solved for like plain plays, with smaller slopes."""
+    """Input of viscous plays at which their sum is h. With the input where play 1 rests, none is stretched; beyond that
+    they are solved for like plain plays, with smaller slopes."""
     s.play[0] = s.play[1]
     return loop_solve(t.relaxed, s, h)
 

@@ -225,7 +225,7 @@ class Smoothing:
         return np.asarray((np.abs(one) / self.width) ** self.times)
 
     def loss(self, period: float) -> float:
-        """Share of its size that a sine loses, by its period in samples."""
+        """Share of its amplitude that a sine with a period given in samples loses."""
         return 1.0 - float(self.gain(np.array([2.0 * np.pi / period]))[0])
 
     def before(self, row: Taps) -> Taps:

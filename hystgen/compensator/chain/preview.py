@@ -57,9 +57,9 @@ def taps(
 ) -> Taps:
     """The weights for a delay in s and modes in series at samples `seconds` apart; else the reference itself.
 
-    A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`; 5 undo that up to a fourth
-    difference. `corner`: three centred moving averages over this number of samples smooth the reference. `by`: how a
-    mode that would ring after a step is kept from ringing.
+    A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`; 5 references cancel that
+    smoothing up to a fourth difference. `corner`: three centred moving averages over this number of samples smooth the
+    reference. `by`: how a mode that would ring after a step is kept from ringing.
 
     Raises FormatError if modes that are kept from ringing take more references than the C keeps.
     """
@@ -169,7 +169,7 @@ class Shaped(NamedTuple):
         return float(ages @ self.taps.weights) + own / self.seconds
 
     def missed(self, period: float) -> float:
-        """Error of the motion for a sine with a period in samples, as a share of its size."""
+        """Tracking error for a sine with a period given in samples, as a share of its amplitude."""
         turn = 2j * math.pi / period
         ages = -(self.taps.first + np.arange(len(self.taps.weights)))
         found = complex(np.exp(-turn * ages) @ self.taps.weights)

@@ -43,7 +43,7 @@ class Sides(NamedTuple):
 
 
 def _then(first: Function, k: int, verb: Function) -> Function:
-    """`first`, then a verb of all blocks of part k in series."""
+    """Apply `first`, then a verb of all blocks of part k in series."""
 
     @jit
     def each(t: Any, s: Any, n: int, x: Any) -> Any:
@@ -76,7 +76,7 @@ def _back(first: Function, k: int, verb: Function) -> Function:
 
 @jit(inline=True)
 def _nothing(t: ChainTables, s: Any, x: Any) -> Any:  # noqa: ARG001  as with blocks
-    """x itself, if there are no blocks."""
+    """Return x itself: there are no blocks."""
     return x
 
 
@@ -133,7 +133,7 @@ def told(every: Sequence[Verbs], verb: str) -> Function:
 
 
 def resetting(every: Sequence[Verbs]) -> Function:
-    """Reset all blocks to the parameter file."""
+    """Reset all blocks to their values in the parameter file."""
 
     def and_then(first: Function, k: int, function: Function) -> Function:
         @jit

@@ -118,7 +118,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
 
 
 class Codes(NamedTuple):
-    """Conversion between an operator's arguments and answers and its signals, in one arithmetic."""
+    """Conversions of an operator's arguments into signals, and of signals into its answers, in one arithmetic."""
 
     finite: Callable[..., Any]
     drive_signal: Callable[..., Any]
@@ -178,7 +178,7 @@ def made_of(
 
     @jit
     def settings_reset(t: ChainTables, s: ChainState) -> None:
-        """Reset offset and gains to the parameter file."""
+        """Reset offset and gains to their values in the parameter file."""
         s.real[SET] = t.limits[ZERO]
         s.real[REACHED] = t.limits[ZERO]
         s.real[REST] = t.limits[ZERO]
@@ -601,7 +601,7 @@ def made_of(
 
     @jit
     def visit(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
-        """Put the actuator at drive v before the next sample."""
+        """Move the actuator to drive v before the next sample."""
         seen(t, s, inverse, v)
 
     hooks = Hooks(

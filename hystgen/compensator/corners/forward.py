@@ -43,5 +43,5 @@ def forward_reset(t: Tables, m: Memory) -> None:
 
 @jit
 def forward_visit(t: Tables, m: Memory, v: Any) -> None:
-    """Put the actuator at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     plays_step(t.forward, m, v)

@@ -60,5 +60,5 @@ def forward_reset(t: FixedTables, m: FixedMemory) -> None:
 
 @jit
 def forward_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
-    """Put the actuator at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     forward_arrive(t, m, v)

@@ -57,6 +57,6 @@ def forward_reset(t: Tables, m: Memory) -> None:
 
 @jit
 def forward_visit(t: Tables, m: Memory, v: Any) -> None:
-    """Put the actuator at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     forward_arrive(m, v)
     plays_step(t.forward, m, front_forward(t, v, m.counts[ASCENDING]))

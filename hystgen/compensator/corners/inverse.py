@@ -146,7 +146,7 @@ def inverse_reset(t: Tables, m: Memory) -> None:
 
 @jit
 def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
-    """Put the actuator at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     move_to_output(t.inverse, m, v)
     copy_place(m, UNDO, HERE)
     m.real[BEFORE] = m.real[INPUT]

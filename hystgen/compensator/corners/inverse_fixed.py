@@ -147,7 +147,7 @@ def inverse_reset(t: FixedTables, m: FixedMemory) -> None:
 
 @jit
 def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
-    """Put the actuator at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     move_to_input(t, m, v << t.limits[FINE])
     copy_place(m, UNDO, HERE)
     inverse_stay(m)

@@ -207,7 +207,7 @@ def inverse_reset(t: Tables, m: Memory) -> None:
 
 @jit
 def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
-    """Put the actuator at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     inverse_keep(m)
     inverse_replace(t, m, v)
     inverse_keep(m)

@@ -113,7 +113,7 @@ def inverse_reset(t: FixedTables, m: FixedMemory) -> None:
 
 @jit
 def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
-    """Put the actuator at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     move_to_input(t, m, inverse_arrive(t, m, v))
     inverse_keep(m)
     m.real[LEVEL] = code(t, m.real[OUTPUT])[0]
