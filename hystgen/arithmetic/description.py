@@ -1,4 +1,4 @@
-"""What an arithmetic is, as far as models, tables, C text and verification need to know it."""
+"""The description of an arithmetic that models, tables, C text and verification need."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 class Arithmetic(ABC):
     """A number format in which compensators compute.
 
-    `name`: of the contract; `short`: in names of the run time; `c_type`: NAME_real_t, the type of inputs and answers,
-    of `bytes` bytes, which numpy calls `number_name`; `finer`: the arithmetic to turn to where this one is too coarse,
-    empty for none.
+    `name`: as in the contract; `short`: as in names of the run time; `c_type`: C type of inputs and answers,
+    NAME_real_t, of `bytes` bytes, called `number_name` in numpy; `finer`: the arithmetic to use when this one is too
+    coarse, if any.
 
-    Of all of its kind: `fixed`: numbers are codes; `unused`: sizes of codes in the `emit` section that it has no use
-    for; `includes`: headers of the language that C needs; `travels`: what an argument is multiplied by to be a travel,
-    where a travel has more bits.
+    The same for all of a kind: `fixed`: numbers are codes; `unused`: code sizes in the `emit` section that do not
+    apply; `includes`: C headers needed; `travels`: factor that turns an argument into a travel, where travels have more
+    bits.
     """
 
     name: str
@@ -47,7 +47,7 @@ class Arithmetic(ABC):
     @cached_property
     @abstractmethod
     def computed(self) -> np.dtype[Any]:
-        """What the bit reference computes with."""
+        """The type that the bit reference computes with."""
 
     @cached_property
     @abstractmethod
@@ -57,18 +57,18 @@ class Arithmetic(ABC):
     @cached_property
     @abstractmethod
     def types(self) -> Mapping[str, str]:
-        """Types in C of plays and sums, where these are others than NAME_real_t."""
+        """C types of plays and sums that differ from NAME_real_t."""
 
     @cached_property
     @abstractmethod
     def constants(self) -> Mapping[str, str]:
-        """What `hystgen_runtime.h` defines and emitted code names directly."""
+        """Constants that `hystgen_runtime.h` defines and emitted code names directly."""
 
     @cached_property
     @abstractmethod
     def facts(self) -> tuple[str, ...]:
-        """Macros that choose the forms of the run time that it takes."""
+        """Macros that select variants of the run time."""
 
     @abstractmethod
     def share(self, part: float) -> float:
-        """The argument that stands for a share."""
+        """The argument that represents a share."""

@@ -9,25 +9,26 @@ from typing import Any
 from hystgen.basics.jit import jit
 
 LOW_BITS = 20
-"""Bits of the part of a number that is multiplied apart, so that the rest has 31: products of either fit 64 bits."""
+"""Low bits of a number that are multiplied separately, so that 31 remain: both products fit 64 bits."""
 
 LARGEST = 2**51
-"""Numbers that are multiplied are smaller: their upper part then has 31 bits, as a mantissa has."""
+"""Exclusive bound of the numbers that are multiplied: the upper part then has 31 bits, like a mantissa."""
 
 STATE_BITS = 60
-"""Bits of a state without its sign, of which a product takes 50: ten are left out, and no rate outgrows a factor."""
+"""Bits of a state without its sign. A product takes 50 and drops ten, and no rate outgrows a factor."""
 
 GUARD = 3
-"""Bits of a state below those with which its roundings add up to the last bit of a signal: an eighth of that bit is
-left, and a slow state stalls in a dead band of at most 1/16 of it. Held by `test_slow_states_neither_stall_nor_drift`,
-and for effects of the user's own by `test_fixed_point_stays_within_its_bounds`. The error bound of a mode in q31 and
-q15 is the same to 1e-4 with 0 to 8 bits: it is that of the factors."""
+"""Extra bits of a state, below those with which its roundings add up to the last bit of a signal: they then add up to
+an eighth of it, and a slow state stalls in a dead band of at most 1/16 of it. Held by
+`test_slow_states_neither_stall_nor_drift`, and for a user's own effects by `test_fixed_point_stays_within_its_bounds`.
+The error bound of a mode in q31 and q15 is the same to 1e-4 with 0 to 8 bits: it is set by the factors."""
 
 MANTISSA_BITS, LEAST_SHIFT, MOST_SHIFT = 31, LOW_BITS + 1, LOW_BITS + 62
-"""Bits of a mantissa without its sign, and shifts: a product drops at least a bit, to be rounded, and at most 62."""
+"""Bits of a mantissa without its sign, and range of shifts: a product drops at least one bit, to round, and at most
+62."""
 
 BEYOND = 2.0 ** (MANTISSA_BITS - LEAST_SHIFT)
-"""Factors are smaller."""
+"""Exclusive bound of factors."""
 
 
 def factor(x: float | Fraction) -> tuple[int, int]:
@@ -49,19 +50,19 @@ def factor(x: float | Fraction) -> tuple[int, int]:
 
 
 def error(x: float | Fraction) -> float:
-    """How far a factor is from the number."""
+    """Absolute error of a factor."""
     mantissa, shift = factor(x)
     return float(abs(Fraction(mantissa) / 2**shift - Fraction(x)))
 
 
 def lifted(x: float, bits: int) -> int:
-    """Number of the `bits` of a product with x that have to be dropped so that x becomes a factor."""
+    """How many of the `bits` of a product with x have to be dropped so that x becomes a factor."""
     return max(0, math.frexp(x)[1] + bits - (math.frexp(BEYOND)[1] - 1))
 
 
 @jit
 def times(x: Any, mantissa: Any, shift: Any) -> Any:
-    """x times a factor, to the nearest whole number; for |x| < LARGEST."""
+    """x times a factor, rounded to the nearest whole number; for |x| < LARGEST."""
     high = x >> LOW_BITS
     low = x & ((1 << LOW_BITS) - 1)
     whole = high * mantissa + ((low * mantissa) >> LOW_BITS)

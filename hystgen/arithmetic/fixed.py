@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 class Fixed(Arithmetic):
     """Fixed point.
 
-    `reach` is the C type of where plays start to follow; `code_bits` are those of a code without its sign, `degree` is
-    that of the polynomials of the memoryless part, and `finer_plays` says whether the plays' input may have bits below
-    those of a drive code. `play_bits` are those of the plays' input where it is not the drive code itself, without its
-    sign; a corner keeps a sum in 32 bits and `low_bits` more.
+    `reach`: C type of the input at which a play starts to follow; `code_bits`: bits of a code without its sign;
+    `degree`: degree of the polynomials of the memoryless part; `finer_plays`: whether the plays' input may have bits
+    below a drive code; `play_bits`: bits of the plays' input without its sign, if it is not the drive code itself;
+    `low_bits`: bits that a corner keeps of a sum in addition to 32.
     """
 
     reach: str = ""

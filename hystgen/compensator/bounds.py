@@ -1,26 +1,26 @@
-"""How far a compiled operator can be from the exact model: rounding-error bounds, derived once for every model.
+"""Rounding-error bounds of a compiled operator against the exact model, derived once for every model.
 
 Forward, engine `loop`: rounded thresholds, start memory and stage constants move a play by no more than their own
 error, because a play never amplifies a difference of its input, threshold or start value (3); sums and products add
 their unit roundoffs (`LoopRoundings`).
 
-Engine `corners`: an answer is computed from the corner below it, which was an answer itself, so that the roundings of
-up to n + 1 corners and of the answer add up. `CornerRoundings` counts the roundings of one of them.
+Engine `corners`: an answer is computed from the corner below it, which is itself an earlier answer, so the roundings of
+up to n + 1 corners and of the answer add up. `CornerRoundings` counts the roundings of one answer.
 
 Inverse: the drive as sent is an exact input of the exact model, whose output then differs from the reference by a
-residual eta. This requires that a solution stops where another play would follow: on the straight piece before, of
-slope P_k, an error eta of the output is one of eta / P_k in w, which would count with a steeper slope beyond that
-place. Engine `loop` stops there; engine `corners` changes to the steeper piece as much earlier as rounding can reach.
+residual eta. This requires a solution to stop where another play would follow: on the straight piece up to there, of
+slope P_k, an output error eta becomes eta / P_k in w, but beyond it that error in w would count with a steeper slope.
+Engine `loop` stops there; engine `corners` switches to the steeper piece early, by as much as rounding can amount to.
 Neither answers a move with one in the other direction, which would have the same effect on plays that follow after a
 turn. The exact inverse turns a reference error eta into at most `(2/p_0 - 1/C_n) eta` at the input of the plays (the
 sum of |q_i|), and the front divides that by its smallest slope. A clamp or commit gives both the same drive and adds
 nothing.
 
-With two branches, two drives can give the same output, one on each branch, and rounding decides between them where
-the reference moves by less than a rounding. Both outputs are right to within the bound; the drives then differ by the
-gap between the branches at the input of the plays, now and in what the plays remember. The bound counts that. The
-first move starts from the drive of the start memory, G_R^-1(s_0), which need not be a number of the type. The forward
-operator knows on which side of it every drive lies, up to the rounding of G_R^-1 in double precision.
+With two branches, two drives can give the same output, one on each branch, and rounding decides between them if the
+reference moves by less than a rounding. Both outputs are within the bound; the drives then differ by the gap between
+the branches at the input of the plays, now and in the plays' memory, and the bound includes that. The first move starts
+from the drive of the start memory, G_R^-1(s_0), which need not be a number of the type. The forward operator knows on
+which side of it every drive lies, up to the rounding of G_R^-1 in double precision.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ SECOND_ORDER = 1.01  # products of roundoffs, and the rounding of this computati
 
 @dataclass(frozen=True)
 class ErrorBounds:
-    """Largest differences from the exact model: `forward` in output, `inverse` in drive units (inf: no inverse).
+    """Largest differences from the exact model: `forward` in output units, `inverse` in drive units (inf: no inverse).
 
-    `rounding` is the part of `inverse` that does not come from taking another branch.
+    `rounding` is the part of `inverse` that remains if both take the same branch.
     """
 
     forward: float
@@ -55,13 +55,13 @@ class ErrorBounds:
 
 
 def together(*conditions: str) -> str:
-    """Conditions that all have to hold, in words; empty ones are left out."""
+    """Join conditions that all have to hold, in words; empty ones are dropped."""
     *others, last = [each for each in conditions if each] or [""]
     return f"{', '.join(others)} and {last}" if others else last
 
 
 def largest_sum(cascade: StaticModel) -> float:
-    """Bound of every partial result of a play sum: sum |p_i| max |w| + sum |p_i| r_i."""
+    """Bound on every partial result of a play sum: sum |p_i| max |w| + sum |p_i| r_i."""
     pi = cascade.pi
     total = math.fsum(abs(p) for p in pi.weights)
     lift = math.fsum(abs(p) * r for p, r in zip(pi.weights, pi.thresholds, strict=True))
@@ -72,7 +72,7 @@ def largest_sum(cascade: StaticModel) -> float:
 def _stage_errors(
     stage: Stage, low: float, high: float, eps: float, kind: str, ascending: bool
 ) -> tuple[float, float, float]:
-    """Error of the stage's value, of its inverse (as an error of the value), and its largest |slope|."""
+    """Error of the stage's value, error of its inverse (as an error of the value), and largest |slope|."""
     x = max(abs(low), abs(high))
     y = max(abs(end) for end in stage.image(low, high, ascending))
     slope = max(abs(s) for s in stage.slope_range(low, high, ascending))
@@ -89,13 +89,13 @@ def _stage_errors(
 class CornerRoundings:
     """Roundings of the corner engine, derived operation by operation from `c_runtime/plays/corners_float.c`.
 
-    `forward`, `inverse`: what one answer adds to the error of the sum of the plays, for plays that have seen the same
-    inputs, in output units; `early`: how much too early plays follow in the inverse, in output units; `margin`: how far
-    an answer along a line can lie beyond the exact one, in units of the plays' input.
+    `forward`, `inverse`: error that one answer adds to the sum of the plays, for plays that have seen the same inputs,
+    in output units; `early`: how much too early plays follow in the inverse, in output units; `margin`: how far an
+    answer along a line can lie beyond the exact one, in units of the plays' input.
 
-    With u the unit roundoff, C the sum of |p_i|, W the largest input of the plays, T its travel: no output is larger
-    than C W, no change of it larger than C T. A table entry or an operation adds u times the size of its result; an
-    error of the plays' input counts C times in the output.
+    With u the unit roundoff, C the sum of |p_i|, W the largest input of the plays and T its travel, outputs are at most
+    C W and change by at most C T. A table entry or an operation adds u times the size of its result; an error of the
+    plays' input counts C times in the output.
     """
 
     forward: float
@@ -131,12 +131,12 @@ class CornerRoundings:
 class LoopRoundings:
     """Roundings of the loop engine in unit roundoffs u, derived operation by operation from `c_runtime/plays/loop_*.c`.
 
-    `level`: the largest sum of the plays, in output units; `summed`: errors of that sum, for plays that have seen the
-    same inputs; `solved`: what solving for their input adds to them, in output units.
+    `level`: the largest sum of the plays, in output units; `summed`: error of that sum, for plays that have seen the
+    same inputs; `solved`: error that solving for their input adds, in output units.
 
-    A play is at most Z_i = max |low + r_i|, |high - r_i| or its start away from 0, where it is to within a rounding of
-    its threshold and of the sum with it, u (Z_i + r_i). A rounded weight and its product add 2 u p_i Z_i, each of n
-    sums u times the level.
+    A play is at most Z_i = max(|low + r_i|, |high - r_i|, |start|) away from 0. Rounding its threshold and adding it
+    moves the play by at most u (Z_i + r_i). A rounded weight and its product add 2 u p_i Z_i, and each of n sums adds u
+    times the level.
     """
 
     level: float
@@ -152,15 +152,15 @@ class LoopRoundings:
         far = np.maximum(np.maximum(np.abs(low + r), np.abs(high - r)), start)
         level = float(p @ far)
         summed = 2.0 * level + float(p[1:] @ (far + r)[1:]) + pi.n * level
-        # the sum over those that follow: the level less that of the others and a product (table), two sums, its
-        # reciprocal (table) and product; where the next one would follow, a place that is known as well as a play
+        # sum of the plays that follow: the level less the others' and a product (table), two sums; its reciprocal
+        # (table) and a product; the input where the next play would follow is as accurate as a play
         c = float(np.sum(p))
         solved = 2.0 * float(p @ r) + 2.0 * level + 3.0 * c * float(far[0]) + 2.0 * c * float(np.max(far + r))
         return cls(level, summed, solved)
 
 
 def _one(cascade: StaticModel, kind: str, engine: str) -> tuple[float, float]:
-    """Forward error, and the residual eta of the inverse in output units, for one arithmetic."""
+    """Forward error, and residual eta of the inverse, in output units for one arithmetic."""
     eps = float(np.finfo(kind).eps) / 2
     pi = cascade.pi
     total = math.fsum(abs(p) for p in pi.weights)
@@ -193,7 +193,7 @@ def _one(cascade: StaticModel, kind: str, engine: str) -> tuple[float, float]:
 def error_bounds(cascade: StaticModel, arithmetic: str, engine: str) -> ErrorBounds:
     """Bounds for `arithmetic` 'float32' or 'float64' and `engine` 'corners' or 'loop', against the double model.
 
-    The double model's own rounding is counted too. The inverse bound never exceeds the drive range, which both keep.
+    They include the double model's own rounding. The inverse bound never exceeds the drive range, which both respect.
     """
     forward, residual = _one(cascade, arithmetic, engine)
     own_forward, own_residual = _one(cascade, "float64", "corners")

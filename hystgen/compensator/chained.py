@@ -3,8 +3,8 @@
 The compensator keeps only the actuator's states. In each sample it solves for the drive from the output backwards,
 block by block, limits it, and absorbs the applied drive forwards. A delay and a mode need the reference ahead of time.
 
-The reference is read as the C reads it: the same weights of its samples, at the steps of the record. Only `quiet` and
-`max_rate` are about the C alone, since double precision has no codes between which a drive could dither.
+The reference is read as in the C: with the same weights of its samples, at the steps of the record. Only `quiet` and
+`max_rate` are ignored, since double precision has no codes between which a drive could dither.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from hystgen.effects.thermal.model import HysteresisHeating, OwnHeat, lost_on
 from hystgen.parameters.schema import Compensation
 
 EVEN = 1e-3
-"""Largest relative difference of steps that count as equal: about the error of a mode's inverse, `w0^2 T^2/12`, which
-is 9e-4 with 60 samples in a period."""
+"""Largest relative difference between steps that count as equal: about the error of a mode's inverse, `w0^2 T^2/12`,
+which is 9e-4 with 60 samples in a period."""
 
 ROUNDING = 1e-14
-"""Relative change of a number below which it counts as rounding: some tens of roundings of 1.1e-16."""
+"""Relative change of a number below which it counts as rounding: about a hundred roundings of 1.1e-16."""
 
 TURNS = 8
-"""Most iterations in a sample, if the gain depends on the drive to be found. 500 jumps over a quarter of the range,
-with a loss of 1 % per decade from half the range on, converge to the last bit in 5 iterations on average, 7 at most."""
+"""Most iterations in a sample if the gain depends on the drive sought. 500 jumps over a quarter of the range, with a
+loss of 1 % per decade from half the range on, converge to the last bit in 5 iterations on average, 7 at most."""
 
 STANDARD = Compensation()
 
@@ -61,7 +61,7 @@ def _brentq() -> Any:
 class Actuator(Block):
     """The memoryless front and the plays as one block: the drive behind a lag in, the weighted sum out.
 
-    A move back by no more than `slack` is none.
+    A move back by at most `slack` does not count.
     """
 
     def __init__(self, chain: Chain) -> None:
@@ -82,8 +82,8 @@ class Actuator(Block):
         self.drive = float(self.static.front_inverse(at)) if self.static.start_is_defined else 0.0
         self.advance(math.inf)
 
-    def advance(self, seconds: float, later: float | None = None) -> None:  # noqa: ARG002  as of every block
-        """The plays move for this long."""
+    def advance(self, seconds: float, later: float | None = None) -> None:  # noqa: ARG002  as in every block
+        """Set how long the plays move."""
         self.seconds = seconds
 
     def moved(self, w: float) -> Array:
@@ -97,16 +97,16 @@ class Actuator(Block):
         return float(self.p @ self.chain.bent(rows[:, None], self.r)[:, 0])
 
     def call(self, verb: str, x: float) -> float:
-        """The first move, from the start memory, after which the plays are at rest, is one as any other."""
+        """Solve or absorb, since the first move, from plays at rest in the start memory, is a move like any other."""
         return self.solve(x) if verb == "resting" else self.absorb(x)
 
     def solve(self, y: float) -> float:
-        """The drive on the branch of its own move: stays on the branch that it is on, moving on or holding, and turns
-        only to go back by more than rounding, or than what a lag in front misses in the first sample of the turn.
+        """The drive on the branch of its own move. It stays on its branch while it moves on or holds, and turns only to
+        go back by more than rounding, or by more than a lag in front misses in the first sample of the turn.
 
-        That is `theta` of the way to the other branch. What holding misses is then never more than what turning at once
-        would have missed; no other share of the way misses less than `1 + theta` times what is missed by a drive that
-        knows how far the reference will go back. `rises` says which way the drive is to go.
+        A lag misses `theta` of the way to the other branch. Holding then never misses more than turning at once would
+        have; for any other share the miss can reach at least `1 + theta` times that of a drive that knows how far the
+        reference will go back. `rises` says which way the drive is to go.
         """
         w = self._input(y)
         if not self.static.branches_differ:
@@ -127,7 +127,7 @@ class Actuator(Block):
         return other
 
     def absorb(self, x: float) -> float:
-        """The plays follow; the direction of the move picks the branch."""
+        """Move the plays; the direction of the move picks the branch."""
         back = self.drive - x if self.ascending else x - self.drive
         if back > self.slack:
             self.ascending = not self.ascending
@@ -144,7 +144,7 @@ class Actuator(Block):
         before = self.total(self.moved(w))
         if y == before:
             return w
-        way = (y - before) / float(self.p[0])  # the least slope, unless an effect bends the plays
+        way = (y - before) / float(self.p[0])  # for the least slope, unless an effect bends the plays
         for _ in range(64):
             far = w + way
             if (self.total(self.moved(far)) - y) * (before - y) <= 0.0:
@@ -154,10 +154,10 @@ class Actuator(Block):
         raise EffectsError(f"no input of the plays gives {y:g}")
 
     def _scan(self, y: float) -> float:
-        """The same for plain plays: finds the straight piece of the move's curve on which the sum is `y`."""
+        """As `_input`, for plain plays: finds the straight piece of the move's curve on which the sum is `y`."""
         sign = 1.0 if y >= float(self.p @ self.plays) else -1.0
-        held = np.append(np.cumsum((self.p * self.plays)[:0:-1])[::-1], 0.0)  # by the plays above each
-        inputs = self.plays + sign * self.r  # where each begins to follow
+        held = np.append(np.cumsum((self.p * self.plays)[:0:-1])[::-1], 0.0)  # by the plays above each one
+        inputs = self.plays + sign * self.r  # where each one begins to follow
         levels = self.c * inputs - sign * self.q + held
         k = max(int(np.searchsorted(sign * levels, sign * y, side="right")) - 1, 0)
         w = float((y - held[k] + sign * self.q[k]) / self.c[k])
@@ -172,7 +172,7 @@ class Heating:
         self.first, self.corner, self.depth, self.up = math.nan, np.empty(n), 0, True
 
     def _heat(self, before: float, drive: float, seconds: float) -> tuple[float, int, bool]:
-        """Final rise at the heat of a move, and what friction remembers after it."""
+        """Final rise at the heat of a move, and the state of friction after it."""
         effect = self.effect
         if isinstance(effect, HysteresisHeating):
             energy, depth, up = lost_on(before, drive, self.first, effect.reach, self.corner, self.depth, self.up)
@@ -199,12 +199,12 @@ class Heating:
 
 
 SWITCH = "; to have it all the same, write emit: {compensation: {compensate: [%s]}}"
-"""Advice for effects that nothing measures."""
+"""Advice for effects that are not measured."""
 
 
 def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
-    """Why a compensator cannot include an effect; empty if it can. `compensate`: effects asked for although nothing
-    measures them."""
+    """Why a compensator cannot include an effect; empty if it can. `compensate`: unmeasured effects that are asked for
+    nevertheless."""
     if effect.name == "drift":
         ask = SWITCH % "drift"
         return "" if "drift" in compensate else f"drift (a clock that runs alone; nothing says when it began{ask})"
@@ -228,10 +228,9 @@ def filter_block(effect: Effect) -> Block | None:
 class Compensator:
     """Drives for a reference; leaves out a sensor's own nonlinearity, since the reference is the true displacement.
 
-    `how`: how the reference is read, in samples of the record, and what is compensated although nothing measures it:
-    `drift`, which begins at t = 0, and `self_heating`. `as_emitted`: a lag in front of two branches is led however
-    short it is, as by the C, whose drives are rounded. Raises NotInvertibleError and UnsupportedEffectsError with all
-    reasons.
+    `how`: how the reference is read, in samples of the record, and which unmeasured effects are compensated: `drift`,
+    which begins at t = 0, and `self_heating`. `as_emitted`: lead a lag in front of two branches however short it is, as
+    the C does, whose drives are rounded. Raises NotInvertibleError and UnsupportedEffectsError with all reasons.
     """
 
     def __init__(self, chain: Chain, how: Compensation = STANDARD, as_emitted: bool = False) -> None:
@@ -251,7 +250,7 @@ class Compensator:
         self.actuator = Actuator(chain)
         self.blocks: list[Block] = [*drives, self.actuator, *outputs]
         self.slew = self._called("slew_limit")
-        self.rest = 0.0  # what rounding takes from a drive at a limited rate: millions of steps would add it up
+        self.rest = 0.0  # rounding remainder of a slew-limited drive: it would add up over millions of steps
         self.ends: Sequence[tuple[float, float]] = ()
         lags = [block for block in drives if isinstance(block, lag.UnevenLag)]
         self.braked = lags[0] if self.slew and len(lags) == 1 else None
@@ -274,12 +273,12 @@ class Compensator:
         asked: NDArray[np.bool_] | None = None,
         held: NDArray[np.bool_] | None = None,
     ) -> tuple[Array, Array]:
-        """Drives (N,) within `ends` for the reference in `reference.v`, and how far each was taken back to them.
+        """Drives (N,) within `ends` for the reference in `reference.v`, and how far each was limited to them.
 
-        `asked` (N,): the samples of `reference.v` that are references. Samples before the first of them are drives;
+        `asked` (N,): which samples of `reference.v` are references. Samples before the first reference are drives;
         between references the drive holds. Everything is at rest at the first sample. After the last sample the
-        reference keeps its value. `held` (N,): samples without a reference of their own, at which the drive holds as
-        the C's does: what is read ahead of them is in `reference.v`.
+        reference keeps its value. `held` (N,): samples without a reference of their own, at which the drive holds as in
+        the C; the preview reads on in `reference.v`.
         """
         asked = np.ones(len(reference.t), dtype=bool) if asked is None else asked
         held = np.zeros(len(reference.t), dtype=bool) if held is None else held
@@ -296,7 +295,7 @@ class Compensator:
         for k in range(n):
             seconds = steps[k - 1] if k else 0.0
             for block in self.blocks:
-                if k or block is not self.actuator:  # which starts over without time
+                if k or block is not self.actuator:  # the actuator starts over without time
                     block.advance(steps[max(k - 1, 0)], steps[min(k, len(steps) - 1)])
             before = float(v[k - 1]) if k else math.nan
             drive = before
@@ -337,7 +336,7 @@ class Compensator:
         return y
 
     def _slewed(self, drive: float, before: float, seconds: float) -> float:
-        """The nearest drive that the amplifier can reach in this time, or one from which a lag does not overshoot."""
+        """The nearest drive that the amplifier can reach in this time, or one that keeps a lag from overshooting."""
         falling: float = min(effect.falling_rate for effect in self.slew) * seconds
         rising: float = min(effect.rate for effect in self.slew) * seconds
         low, high = self.ends = [ramp(before, self.rest, move, 0.0) for move in (-falling, rising)]
@@ -347,7 +346,7 @@ class Compensator:
         return min(max(near, low[0]), high[0])
 
     def _gains(self, reference: Run) -> list[tuple[Array, Array]]:
-        """Gain and offset (N,) by each logged temperature, at the time when the drive of a sample takes effect."""
+        """Gain and offset (N,) for each logged temperature, at the time when a sample's drive takes effect."""
         ahead = reference.t + self.parts.delay
         extra = {name: np.interp(ahead, reference.t, column) for name, column in reference.extra.items()}
         later = Run(reference.t, reference.v, extra)
@@ -372,7 +371,7 @@ class Compensator:
         first = found.taps.first - found.missing(how.preview)
         target = np.array(wanted)
         edges = np.flatnonzero(np.diff(np.concatenate([[0], asked.astype(np.int8), [0]])))
-        for begin, end in edges.reshape(-1, 2):  # the reference holds before a record and behind it
+        for begin, end in edges.reshape(-1, 2):  # the reference holds before and after a record
             times, values = t[begin:end], wanted[begin:end]
             target[begin:end] = sum(
                 weight * np.interp(times + (first + i) * step, times, values)
@@ -382,7 +381,7 @@ class Compensator:
         return target
 
     def reading(self, step: float) -> Read:
-        """How the reference is read at samples `step` apart. Raises UnsupportedEffectsError where no averages hold the
+        """How the reference is read at samples `step` apart. Raises UnsupportedEffectsError if no averages hold the
         noise gain."""
         found = read(self.static, self.parts, step, self.how)
         if self.how.noise_gain is not None:
@@ -392,7 +391,7 @@ class Compensator:
 
 
 def _even_step(t: Array, asked: NDArray[np.bool_], what: str) -> float:
-    """The time in s between two references. Raises EffectsError where `what` does not get them at even times."""
+    """The time in s between two references. Raises EffectsError if `what` needs even steps and they are uneven."""
     steps = np.diff(t)[asked[1:] & asked[:-1]]
     step = float(np.median(steps)) if len(steps) else 1.0
     if len(steps) and float(np.max(np.abs(steps - step))) > EVEN * step:

@@ -1,20 +1,19 @@
-"""From a model to whole numbers: formats, ranges and error bounds of fixed point.
+"""Fixed-point form of a model: whole numbers, formats, ranges and error bounds.
 
-Everything is computed with fractions from the parameters as they are, so that the same model gives the same numbers
-anywhere; only the curves of the memoryless part are sampled in double precision, with the package's own tanh.
+Everything is computed in fractions from the exact parameters, so that the same model gives the same numbers anywhere;
+only the curves of the memoryless part are sampled in double precision, with the package's own tanh.
 
-Ranges. The drive is limited to `input_range`, so that the input w of the plays, every play and every corner stay
-between the least and the largest of three things: the image of the range, the start memory, and 0, where a reset
-begins. That bounds every sum. The format is the finest one in which sums leave one of 64 bits unused, table entries one
-of 32, and the outputs that corners keep fit their fields. In q15 those have 47 bits, which the input of the plays and
-the slopes share: 26 and 21 or 22. Compared with 30 and 31 bits, that widens the bounds of 160 models of the oracle
-(seeds 100 to 259) by a median of 0.8 % without a memoryless part and 1.5 % with one, and those of a tenth of the models
-by more than 2.1 and 3.5 %. With 25 bits of input these figures are 0.5 and 1.8 %, 1.4 and 5.5 %; with 27 all are
-larger.
+Ranges. The drive is limited to `input_range`, so the input w of the plays, every play and every corner stay between the
+extremes of three things: the image of the range, the start memory, and 0, where a reset begins. That bounds every sum.
+The format is the finest one in which sums leave one of 64 bits unused, table entries one of 32, and the outputs kept by
+corners fit their fields. In q15 these have 47 bits, which the input of the plays and the slopes share: 26 and 21 or 22.
+Compared with 30 and 31 bits, that widens the bounds of 160 models of the oracle (seeds 100 to 259) by a median of 0.8 %
+without a memoryless part and 1.5 % with one, and for a tenth of the models by more than 2.1 and 3.5 %. With 25 bits of
+input these figures are 0.5 and 1.8 %, 1.4 and 5.5 %; with 27 all are larger.
 
-Errors. With the drive exact, as it is sent: rounded thresholds and start states move a play by no more than their own
+Errors. The drive is exact, as it is sent. Rounded thresholds and start states move a play by no more than their own
 error (3); rounded sums of weights are summed by parts, because neighbouring plays differ by no more than their
-thresholds do; an output is rounded once. The inverse as in `hystgen.compensator.bounds`: the exact model, driven as
+thresholds; an output is rounded once. The inverse is as in `hystgen.compensator.bounds`: the exact model, driven as
 sent, misses the reference by a residual, and the exact inverse amplifies that by at most `2/p_0 - 1/C_n`.
 """
 
@@ -43,16 +42,16 @@ from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.plays import slots
 
 SUM_BITS = 62
-"""Bits of a sum of products without its sign: 64 bits then hold the difference of two."""
+"""Bits of a sum of products without its sign: 64 bits then hold the difference of two such sums."""
 
 TABLE_MAX = 2**31 - 1
-"""Largest number of a table, an int32_t in C."""
+"""Largest number in a table, an int32_t in C."""
 
 MOST_PIECES = 2000
-"""[pieces] Most of a curve: cubic ones of this many take 42 kB of flash, more than the smallest cores have."""
+"""[pieces] Most in a curve: this many cubic ones take 42 kB of flash, more than the smallest cores have."""
 
 FAR = 2.0**40
-"""[steps of the plays' input] Stands for infinity: inputs of plays have 31 bits."""
+"""[steps of the plays' input] Represents infinity: inputs of plays have 31 bits."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +59,8 @@ class Format:
     """The meaning of a model's codes, and its accuracy.
 
     `drive_lsb`, `output_lsb`: physical units per code; `forward_error` in output codes, `inverse_error` in drive codes
-    (None: no inverse), `inverse_rounding` the part of it on the same branch; `largest_sum`: bound of every sum, below
-    2^62; `largest_held`: bound of every output that a corner keeps; `sum_bits`: fraction bits of a sum below an output
-    code.
+    (None: no inverse), `inverse_rounding`: its part on the same branch; `largest_sum`: bound on every sum, below 2^62;
+    `largest_held`: bound on every output that a corner keeps; `sum_bits`: fraction bits of a sum below an output code.
     """
 
     drive_lsb: Fraction
@@ -78,9 +76,9 @@ class Format:
 def build(
     cascade: StaticModel, arithmetic: str, engine: str, drive_lsb: float | None = None, output_lsb: float | None = None
 ) -> tuple[FixedTables, Format]:
-    """Tables of `cascade` in 'q31' or 'q15', and what its codes mean.
+    """Tables of `cascade` in 'q31' or 'q15', and the meaning of its codes.
 
-    Raises FormatError when a given LSB does not fit the type or the model degenerates in the format.
+    Raises FormatError if a given LSB does not fit the type or the model degenerates in the format.
     """
     found = lsbs(cascade, arithmetic, drive_lsb, output_lsb)
     return Builder(cascade, arithmetic, engine, found, (drive_lsb is not None, output_lsb is not None)).build()
@@ -96,7 +94,7 @@ def nearest(x: Fraction | float) -> int:
 
 
 def reciprocal(slope: int) -> tuple[int, int]:
-    """`2^(32 + shift)/slope` and the shift; a reciprocal of 0 for the slope 0, which is never used."""
+    """`2^(32 + shift)/slope` and the shift; 0 for the slope 0, which is never used."""
     if slope <= 0:
         return 0, 1
     shift = slope.bit_length() + 30
@@ -115,8 +113,8 @@ def lsbs(
 ) -> tuple[Fraction, Fraction]:
     """Physical units per drive code and per output code: as given, else the finest that reach the ends of the ranges.
 
-    `output_range`: that of a model with effects. Raises FormatError for an LSB that is too small, and for an output
-    that stays 0.
+    `output_range`: the range of a model with effects. Raises FormatError for an LSB that is too small, and for an
+    output that stays 0.
     """
     code_max = FIXED[arithmetic].code_max
     found: list[Fraction] = []
@@ -150,16 +148,16 @@ def _rounded_up(x: Fraction) -> str:
 
 
 def decimal(x: float) -> Fraction:
-    """The number as it is written: 0.001 is exactly a thousandth, which no double is."""
+    """The exact value of the number as written: 0.001 is exactly a thousandth, which no double is."""
     return Fraction(repr(float(x)))
 
 
 class Builder:
     """The steps of `build`, each of which uses the results of those before it.
 
-    `given`: which LSB was asked for; `beyond`: how far beyond its range the input of the plays may be asked for, in
-    spans; `led`: whether signals in front of the memoryless part have bits below a drive code, as they do behind a lag;
-    `bent`: the most that an effect adds to the contribution of a play, in units of its input.
+    `given`: which LSBs were asked for; `beyond`: how far beyond its range the input of the plays may be asked for, in
+    spans; `led`: whether signals in front of the memoryless part have bits below a drive code, as behind a lag; `bent`:
+    the most that an effect adds to a play's contribution, in units of the play's input.
     """
 
     def __init__(
@@ -195,7 +193,7 @@ class Builder:
         )
 
     def solved(self) -> Fraction:
-        """Rounding of a solution for the input of the plays, in physical units."""
+        """Rounding of the plays' input as solved for, in physical units."""
         travel = self.hull[1] - self.hull[0]
         return self.step * (Fraction(1, 2) + Fraction(travel, 2**31) + Fraction(1, 2**8))
 
@@ -209,7 +207,7 @@ class Builder:
         low, high = (decimal(end) / self.drive_lsb for end in self.cascade.input_range)
         self.drive = (math.ceil(low), math.floor(high))
         low, high = (decimal(end) / self.output_lsb for end in self.cascade.output_range)
-        # an end that double precision may have moved off a code is that code: by 2^-50, which is 8 roundoffs, but not
+        # an end that double precision may have moved off a code counts as that code: by 2^-50, or 8 roundoffs, but not
         # by more than a thousandth of a code where the terms of a sum cancel
         size = Fraction(largest_sum(self.cascade)) + abs(Fraction(self.cascade.output_offset))
         slack = min(size / 2**50 / self.output_lsb, Fraction(1, 1024))
@@ -230,13 +228,13 @@ class Builder:
             raise FormatError(*self.refused)
 
     def _finer(self, key: str) -> str:
-        """Advice for codes that are too coarse; unless an LSB is set, they are already as fine as possible."""
+        """Advice for codes that are too coarse; unless an LSB is set, they are already the finest possible."""
         return f"use {f'a smaller emit.{key} or ' if self.given[key] else ''}a finer arithmetic"
 
     # ------------------------------------------------------------ the input of the plays
 
     def _plays(self) -> None:
-        """Least step of w, thresholds, start states and curves in it."""
+        """Step of w, and in that step thresholds, start states and curves."""
         c, pi = self.cascade, self.cascade.pi
         # where plays can be: in the range of their input, at the start memory, or at 0 after a reset
         low = min(Fraction(c.play_range[0]), *(Fraction(s) for s in pi.start), Fraction(0))
@@ -260,7 +258,7 @@ class Builder:
             cap = math.floor(self.span / self.step) + 8  # rounding of the curves can add 8 steps
         else:
             cap = max(self.drive[1] << self.fine, *states, 0) - min(self.drive[0] << self.fine, *states, 0)
-        # no input is farther than `cap` from a play, so that one with such a threshold never moves
+        # no input is farther than `cap` from a play, so a play with such a threshold never moves
         self.threshold = [min(nearest(Fraction(r) / self.step), cap) for r in pi.thresholds]
         self.still = max(bisect.bisect_left(self.threshold, cap), 1)
         for i in range(2, self.still):
@@ -296,10 +294,10 @@ class Builder:
         self.hull = (min(self.play[0], *states, 0), max(self.play[1], *states, 0))  # where plays can be
 
     def _hold(self, states: list[int]) -> None:
-        """Put all plays that never move at their weighted mean, which leaves their part of the output the same.
+        """Put all plays that never move at their weighted mean, which keeps their part of the output.
 
-        Their thresholds, cut to what fits, may leave too little room for their own start states: they are widened
-        until the mean is admissible beside the play before them, or to the width of the type, with the mean limited.
+        Their thresholds, cut to fit, may leave too little room for their start states; they are widened until the mean
+        is admissible beside the previous play, or to the width of the type, with the mean limited.
         """
         pi, k = self.cascade.pi, self.still
         weights = [Fraction(p) for p in pi.weights[k:]]
@@ -324,7 +322,7 @@ class Builder:
             return
         lsb, step = float(self.drive_lsb / 2**self.fine), float(self.step)
         degree = FIXED[self.arithmetic].degree
-        # a curve's own error: a 64th of a code, or rounding where codes are as fine as that
+        # a curve's own error: a 64th of a code, or rounding if codes are that fine
         allowed = max(0.5 * step, lsb * c.front_slopes[0] / 64)
         breaks = _breaks(c)
         for ascending in (True, False):
@@ -338,7 +336,7 @@ class Builder:
         for up in (True, False):
             bottom, top = (math.floor(min(max(end / step, -FAR), FAR)) for end in _envelope_ends(c, up))
             self.arguments.append((bottom, top))
-            if top < FAR:  # far enough for an input beyond the envelope to be noticed
+            if top < FAR:  # far enough to notice an input beyond the envelope
                 noticed = max(top - self.play[1], self.play[0] - bottom)
                 self.margin = max(self.margin, min(noticed, 1 << self.play_bits) + 2)
         self.arguments *= 2
@@ -361,7 +359,7 @@ class Builder:
     # ------------------------------------------------------------ weights and sums
 
     def _weights(self) -> None:
-        """Fraction bits of a sum, rounded sums of weights, and a bound of every sum."""
+        """Fraction bits of a sum, rounded sums of weights, and a bound on every sum."""
         pi = self.cascade.pi
         gain = [Fraction(p) * self.step / self.output_lsb for p in pi.weights]
         sums = [Fraction(0), *itertools.accumulate(gain)]
@@ -409,7 +407,7 @@ class Builder:
         limits[slots.DRIVE_MIN], limits[slots.DRIVE_MAX] = self.drive
         limits[slots.OUTPUT_MIN], limits[slots.OUTPUT_MAX] = self.output
         limits[slots.OFFSET] = self.offset
-        far = 2 * max(map(abs, c.input_range))  # as good as any drive beyond it, and finite
+        far = 2 * max(map(abs, c.input_range))  # equivalent to any drive beyond it, and finite
 
         def code(v: float) -> Fraction:
             return Fraction(min(max(v, -far), far)) / self.drive_lsb
@@ -424,7 +422,7 @@ class Builder:
         limits[slots.MARGIN], limits[slots.FRACTION] = self.margin, self.bits
         limits[slots.FINE], limits[slots.CODE_MAX] = self.fine, self.code_max
         limits[slots.SATURATED] = self._saturated()
-        # output codes of half a drive code and of the error of a reciprocal, on the steepest piece
+        # half a drive code and the error of a reciprocal, in output codes on the steepest piece
         limits[slots.SHY] = (max(self.slope) * ((2**self.fine + 1) // 2 + 8) >> self.bits) + 2
         curves = self.front
         pieces = [piece for curve in curves for piece in curve.pieces]
@@ -472,7 +470,7 @@ class Builder:
         return reported
 
     def _play_errors(self) -> list[Fraction]:
-        """How far each play can be from that of the exact model, in physical units of w.
+        """Largest error of each play against the exact model, in physical units of w.
 
         Plays that never move count together; in the exact model one may move, by less than its rounded threshold shows.
         """
@@ -489,7 +487,7 @@ class Builder:
         return errors
 
     def sum_error(self) -> Fraction:
-        """How far a sum, before it is rounded to a code, can be from the exact model's output, in output codes."""
+        """Largest error of a sum, before it is rounded to a code, against the exact model's output, in output codes."""
         pi = self.cascade.pi
         plays = sum(Fraction(p) * e for p, e in zip(pi.weights, self._play_errors(), strict=True)) / self.output_lsb
         travel = self.hull[1] - self.hull[0]
@@ -499,17 +497,17 @@ class Builder:
         return plays + weights + self.offset_error
 
     def _own_error(self) -> tuple[Fraction, Fraction]:
-        """Rounding of the double model itself, each on one branch: forward in output, inverse in drive units."""
+        """Rounding of the double model itself on one branch: forward in output units, inverse in drive units."""
         own = error_bounds(self.cascade, "float64", "corners")
         return Fraction(own.forward), Fraction(own.rounding) if math.isfinite(own.rounding) else Fraction(0)
 
     def drive_short(self) -> Fraction:
-        """How far the first and last drive codes can be inside the ends of the range, in drive units."""
+        """Largest distance of the first and last drive codes from the ends of the range, in drive units."""
         (first, last), (low, high) = self.drive, self.cascade.input_range
         return max(Fraction(high) - last * self.drive_lsb, first * self.drive_lsb - Fraction(low), Fraction(0))
 
     def _forward_error(self) -> float:
-        # a code beyond the range is limited to the last code inside, where the exact model goes to the range's end
+        # a code beyond the range is limited to the last code inside, while the exact model goes to the range's end
         limited = Fraction(self.cascade.pi.slopes[-1]) * Fraction(self.cascade.front_slopes[1]) * self.drive_short()
         return upward(
             self.sum_error() + Fraction(1, 2) + (limited + self._own_error()[0]) / self.output_lsb
@@ -538,7 +536,7 @@ class Builder:
         return upward(min((self.gain() * residual + self._own_error()[1]) / self.drive_lsb, whole))
 
     def _inverse_error(self) -> float | None:
-        """The same plus the effect of taking another branch, as in `hystgen.compensator.bounds`."""
+        """`_inverse_rounding`, plus the effect of taking another branch, as in `hystgen.compensator.bounds`."""
         rounding = self._inverse_rounding()
         if rounding is None or not self.cascade.branches_differ:
             return rounding
@@ -573,7 +571,7 @@ def upward(x: Fraction) -> float:
 
 
 def _breaks(cascade: StaticModel) -> dict[bool, list[float]]:
-    """Drives at which the memoryless part has a kink, on each branch. Raises FormatError for too many."""
+    """Drives at which the memoryless part has a kink, on each branch. Raises FormatError if there are too many."""
     found: dict[bool, list[float]] = {}
     for ascending in (True, False):
         if not ascending and not cascade.branches_differ:
@@ -638,9 +636,9 @@ class _Piece:
 class FixedCurve:
     """A function of whole numbers as a piecewise polynomial; `error`: how far its values can be from the function's.
 
-    Interpolates at the Chebyshev points of ever shorter pieces until the sampled error is at most `allowed`.
-    `corners` are the places of kinks, `below` the bits of a value below a code, `edge` how far rounding can take an
-    argument out of the domain.
+    It interpolates at the Chebyshev points of ever shorter pieces until the sampled error is at most `allowed`.
+    `corners`: places of kinks; `below`: bits of a value below a code; `edge`: how far rounding can take an argument out
+    of the domain.
     """
 
     def __init__(
@@ -660,7 +658,7 @@ class FixedCurve:
         knots = {low, high + 1}
         for corner in corners:
             knots.update(k for k in (math.floor(corner), math.floor(corner) + 1) if low < k <= high)
-        knots.update(range(low, high + 1, max(1, (high + 1 - low + 3) // 4)))  # no coefficient wider than a value
+        knots.update(range(low, high + 1, max(1, (high + 1 - low + 3) // 4)))  # no coefficient is wider than a value
         todo = list(itertools.pairwise(sorted(knots)))[::-1]
         while todo:
             a, b = todo.pop()
@@ -713,7 +711,7 @@ def _kept(value: int) -> int:
     return min(max(value, -TABLE_MAX), TABLE_MAX)
 
 
-SAMPLES = 25  # of the error of a piece, both ends among them
+SAMPLES = 25  # at which a piece's error is evaluated, both ends among them
 _NODES = {  # cos of the odd multiples of pi / (2 degree + 2), written out: libraries differ in the last bit
     3: (0.9238795325112867, 0.3826834323650898, -0.3826834323650898, -0.9238795325112867),
     5: (0.9659258262890683, 0.7071067811865476, 0.25881904510252074,

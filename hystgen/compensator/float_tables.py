@@ -1,4 +1,4 @@
-"""From a model to the numbers that the kernels work with in floating point. Those of the corner engine are computed as
+"""Floating-point form of a model: the numbers that the kernels work with. For the corner engine they are computed as
 fractions and rounded once."""
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class _Sums:
 
 
 def _sums(cascade: StaticModel) -> _Sums:
-    """The model's, exactly."""
+    """The exact numbers of a model's plays."""
     pi = cascade.pi
     return _Sums([Fraction(r) for r in pi.thresholds], [Fraction(p) for p in pi.weights])
 
@@ -105,7 +105,7 @@ def _forward_curve(cascade: StaticModel, dtype: Any) -> Curve:
 def _inverse_curve(cascade: StaticModel, dtype: Any, limits: Sequence[Any] | None) -> Curve:
     """Input: the sum of the plays; output: their input w. `limits`: of the drive, then of the sum; None for no limits.
 
-    Each play follows a little early, by as much as rounding could otherwise carry an answer beyond that place.
+    Each play follows a little early, by as much as rounding could otherwise carry an answer past that place.
     """
     s = _sums(cascade)
     roundings = CornerRoundings.of(cascade, np.dtype(dtype).name)
@@ -137,14 +137,15 @@ def _curve(rows: Sequence[Sequence[Fraction]], dtype: Any) -> Curve:
 def _start(
     cascade: StaticModel, curve: Curve, states: Sequence[float], inverse: bool, seen: tuple[float, float]
 ) -> Start:
-    """The memory in which play k holds `states[k]`; `curve` is the operator's, `seen` the range of the plays' input.
+    """The memory in which play k holds `states[k]`; `curve`: of the operator; `seen`: range of the plays' input.
 
-    A play is left on the side of its state on which it can begin to follow within the range, since lines from far
-    outside would lose digits. Plays that cannot on either side belong to the bottom, as do all with larger thresholds.
+    A play is entered on that side of its state on which it can begin to follow within the range, since lines from far
+    outside would lose digits. Plays that can do so on neither side belong to the bottom, as do all with larger
+    thresholds.
     """
     s, dtype = _sums(cascade), curve.way.dtype.type
     held = [Fraction(state) for state in states]
-    # input and output if plays 0 .. k hold what play k holds
+    # input and output if plays 0 .. k all hold the value of play k
     centers = [(w, c * w + aside) for w, c, aside in zip(held, s.c, _aside(s, held), strict=True)]
     if inverse:
         centers = [(y, w) for w, y in centers]
@@ -160,8 +161,8 @@ def _start(
     risen = next((k - 1 for k in plays if risen_to(k, 1) > seen[1]), len(held) - 1)
     top = next((k for k in plays if k > risen and risen_to(k, -1) < seen[0]), len(held))
     # Where plays 0 .. top-1 all follow, a rising move gives y = C w - Q and a falling one y = C w + Q, apart from what
-    # the others hold: lines from two turning points with the same output and inputs on either side of the center. If
-    # every play can move, any center will do: it is the same for all start memories, so that a start is forgotten to
+    # the others hold: lines from two turning points with the same output and inputs on either side of the centre. If
+    # every play can move, any centre will do: it is the same for all start memories, so that a start is forgotten to
     # the last bit
     k = top - 1
     w = held[top] if top < len(held) else Fraction(min(max(0.0, seen[0]), seen[1]))
@@ -173,7 +174,7 @@ def _start(
 
 
 def _aside(s: _Sums, held: Sequence[Fraction]) -> list[Fraction]:
-    """What all plays with larger thresholds add to the sum, for each play."""
+    """Contribution to the sum of all plays with larger thresholds, for each play."""
     above = [p * w for p, w in zip(s.p, held, strict=True)]
     return [*itertools.accumulate(above[:0:-1], initial=Fraction(0))][::-1]
 
@@ -181,7 +182,7 @@ def _aside(s: _Sums, held: Sequence[Fraction]) -> list[Fraction]:
 def _corners(
     cascade: StaticModel, dtype: Any, limits: Sequence[float] | None, seen: tuple[float, float]
 ) -> dict[str, Any]:
-    """The entries of `Tables` for the corner engine; `limits` as there, up to OFFSET, None for no limits; `seen`: the
+    """The entries of `Tables` for the corner engine; `limits`: as in `Tables` up to OFFSET, None for no limits; `seen`:
     range of the plays' input."""
     forward = _forward_curve(cascade, dtype)
     inverse = forward
@@ -205,8 +206,8 @@ def build_float(
 ) -> Tables:
     """Tables of `cascade` in 'float32' or 'float64' for engine 'corners' or 'loop'; `visited` as for `build`.
 
-    Without `clamp` the drive and output limits are those of the arithmetic. Raises FormatError when a number or an
-    intermediate result of the model does not fit the arithmetic.
+    Without `clamp` only the arithmetic limits drive and output. Raises FormatError if a number or an intermediate
+    result of the model does not fit the arithmetic.
     """
     dtype = ARITHMETICS[arithmetic].computed.type
     info = np.finfo(dtype)

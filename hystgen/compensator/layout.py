@@ -1,4 +1,4 @@
-"""The constants of one model in one arithmetic, as the bit reference and the C text take them, and their limits."""
+"""The constants of one model in one arithmetic, as used by the bit reference and the C text, and their limits."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Tables(NamedTuple):
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
     ascending: Counts  # direction before the first move, in the same order
     stage_kind: Counts  # TANH or DEAD_ZONE, in order from the drive
-    stage_first: Counts  # where the stage's numbers begin in stage_data
+    stage_first: Counts  # place in stage_data where the stage's numbers begin
     stage_size: Counts  # break points of a dead zone
     stage_data: Reals
     forward: Curve  # of the corner engine, like the next six
@@ -53,14 +53,14 @@ class Tables(NamedTuple):
 
 
 class FixedTables(NamedTuple):
-    """The constants of one model in fixed point; arrays of int64, however narrow they are in C."""
+    """The constants of one model in fixed point; arrays of int64, however narrow in C."""
 
     threshold: Reals
     weight: Reals
     slope: Reals  # change of the sum per least step of the plays' input
     start_level: Reals
-    way: Reals  # 2 threshold: input gained since a corner when play k begins to follow; the last one never does
-    reach: Reals  # 2 start_level: the output gained
+    way: Reals  # 2 threshold: input gained since a corner when play k begins to follow; the last one is never reached
+    reach: Reals  # 2 start_level: output gained by then
     reciprocal: Reals  # 2^(32 + shift) / slope
     shift: Reals
     start: Reals
@@ -69,7 +69,7 @@ class FixedTables(NamedTuple):
     applied: Reals  # drive before the first move: 2 * inverse + (0 after init, 1 after reset)
     ascending: Reals  # direction before the first move, in the same order
     knot: Reals  # where the pieces of the curves begin, curve after curve
-    coefficient: Reals  # (pieces, degree + 1)
+    coefficient: Reals  # first argument of each piece, curve after curve
     scale: Reals  # left shift that stretches a piece to 2^31
     first: Reals  # first piece of each curve
     pieces: Reals
@@ -135,7 +135,7 @@ def first_moves(
 
     `not_above` gives the largest number of the type that does not exceed a drive, and whether the two are equal. The
     forward operator has to know in which direction the actuator moves from the drive of the start memory, even if that
-    is not a number of the type or lies beyond the limits. Seen from the number below it, every move has its true
+    drive is not a number of the type or lies beyond the limits. Seen from the number below it, every move has its true
     direction if staying there counts as descending. The inverse starts at the nearest number, where it may stay.
     """
     low, high = limits

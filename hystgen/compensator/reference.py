@@ -1,5 +1,5 @@
-"""The bit reference, which repeats the emitted C operation by operation, and sessions, which run it, or the same in
-double precision, over sampled signals."""
+"""The bit reference, which repeats the emitted C operation by operation, and sessions, which run it or the same in
+double precision over sampled signals."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 
 def operations(t: Tables | FixedTables | ChainTables) -> Operations:
-    """The functions of the bit reference for the arithmetic and the engine of these tables."""
+    """The functions of the bit reference for the arithmetic and the engine of given tables."""
     if isinstance(t, Tables | FixedTables):
         return _operations(t.engine == LOOP, t.fixed, t.has_front)
     from hystgen.compensator.chain.layout import OwnChainTables
@@ -82,14 +82,14 @@ def _chain_operations(
 def _corner_operations(
     forward: ModuleType, inverting: ModuleType, front_forward: Any, front_inverse: Any
 ) -> Operations:
-    """The operations of engine corners, from a module for each operator and the two functions of the front."""
+    """The operations of engine corners, from one module for each operator and the two functions of the front."""
     forward_init, forward_reset, forward_step = forward.forward_init, forward.forward_reset, forward.forward_step
     inverse_init, inverse_reset, inverse_step = inverting.inverse_init, inverting.inverse_reset, inverting.inverse_step
     forward_visit, inverse_visit = forward.forward_visit, inverting.inverse_visit
 
     @jit.jit
     def init(t: Any, m: Any, inverse: int) -> None:
-        """Start memory of the parameter file."""
+        """Set the start memory of the parameter file."""
         if inverse:
             inverse_init(t, m)
         else:
@@ -97,7 +97,7 @@ def _corner_operations(
 
     @jit.jit
     def reset(t: Any, m: Any, inverse: int) -> None:
-        """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
+        """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
         if inverse:
             inverse_reset(t, m)
         else:
@@ -105,7 +105,7 @@ def _corner_operations(
 
     @jit.jit
     def visit(t: Any, m: Any, inverse: int, v: Any) -> None:
-        """Let the actuator be at drive v before the next sample."""
+        """Move the actuator to drive v before the next sample."""
         if inverse:
             inverse_visit(t, m, v)
         else:
@@ -113,12 +113,12 @@ def _corner_operations(
 
     @jit.jit(inline=True)
     def itself(m: Any) -> Any:
-        """The memory of the plays is all there is."""
+        """The memory itself, which is only that of the plays."""
         return m
 
     @jit.jit(inline=True)
     def other(t: Any, m: Any, inverse: int, call: int, x: Any) -> Any:  # noqa: ARG001  the same call for every chain
-        """There are no other calls."""
+        """Return 0: there are no other calls."""
         return t.limits[ZERO]
 
     run = step.run_of(init, reset, forward_step, inverse_step, inverting.inverse_commit, itself, STATUS, other)
@@ -150,8 +150,7 @@ def codes(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[Any
 def answers(
     t: Tables | FixedTables | ChainTables, inverse: bool, call: Any, x: Any, compiled: bool = True
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
-    """Answers and status of the bit reference for operations `call` with arguments `x`, beginning at the start
-    memory."""
+    """Answers and status of the bit reference for operations `call` with arguments `x`, from the start memory on."""
     code, state = operations(t), new_state(t, inverse)
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
@@ -162,7 +161,7 @@ def answers(
 
 
 class Session:
-    """One instance of an operator, run over records that follow one another.
+    """One instance of an operator, run over consecutive records.
 
     `operator`: 'forward' or 'inverse'. Without `arithmetic` it computes in double precision and limits nothing unless
     `clamp` is set; with one it is the bit reference of the emitted C, which clamps. `lsb`: drive and output units per
@@ -198,7 +197,7 @@ class Session:
         self.init()
 
     def init(self) -> None:
-        """Back to the start memory."""
+        """Return to the start memory."""
         with jit.plain():  # one pass over the plays is not worth compiling
             self._code.init(self.tables, self.state, self._inverse)
 
@@ -216,7 +215,7 @@ class Session:
         return self._range
 
     def visit(self, drives: Iterable[float]) -> None:
-        """Let the actuator see these drive values, in range or not, after `init` and before the next samples."""
+        """Show the actuator these drives, in range or not, after `init` and before the next samples."""
         seen = self._samples(list(drives))
         if not self._fixed:
             inputs = [self._cascade.front(float(v), up) for v in seen for up in (True, False)]
@@ -229,7 +228,7 @@ class Session:
     def run(self, x: ArrayLike) -> tuple[NDArray[Any], Bytes]:
         """Answers (N,) for the input samples (N,), and the status bits of each sample.
 
-        Fixed point takes and gives codes. Raises ValueError for numbers that are not codes and for another shape,
+        Fixed point takes and gives codes. Raises ValueError for numbers that are not codes and for other shapes,
         TypeError for anything but an array of numbers.
         """
         samples = self._samples(x)

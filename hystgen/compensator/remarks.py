@@ -1,4 +1,4 @@
-"""What became of samples that an operator did not simply answer, in words: limited, held, beyond the range."""
+"""Remarks on samples that were limited, held or out of range."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from hystgen.compensator.reference import Session
 from hystgen.plays import slots
 
 ROUNDED = 1e-9
-"""[share of the range] A reference or drive no farther beyond its range is at its end but for rounding: a converter of
-29 bits has larger steps, and in double precision models and their inverses compose to 1e-12. Only counts depend on it.
-Set by: tests/test_clamped_inverse.py."""
+"""[share of the range] A reference or drive beyond its range by at most this counts as at its end, since it is
+rounding: a converter of 29 bits has larger steps, and in double precision models and their inverses compose to 1e-12.
+Only counts depend on it. Set by: tests/test_clamped_inverse.py."""
 
 
 def forward(v: NDArray[np.float64], ends: tuple[float, float], limited: bool, held: int = 0) -> list[str]:
-    """Of drives (N,) of a forward model: those outside its range, and the number of those held."""
+    """Remarks on drives (N,) of a forward model: those outside its range, and the number of held ones."""
     with np.errstate(invalid="ignore"):
         outside = int(np.count_nonzero(np.isfinite(v) & ((v < ends[0]) | (v > ends[1]))))
     how = "limited to it" if limited else "extrapolated, not limited"
@@ -30,7 +30,8 @@ def forward(v: NDArray[np.float64], ends: tuple[float, float], limited: bool, he
 
 
 def inverse(samples: int, references: int, drives: int, held: int = 0) -> list[str]:
-    """Of references of an inverse: the numbers that were limited, of other drives that were, and of those held."""
+    """Remarks on the references of an inverse: how many were limited or held, and how many other drives were
+    limited."""
     said = []
     if references:
         lie, were = ("lies", "was") if references == 1 else ("lie", "were")
@@ -54,8 +55,8 @@ def counted(status: slots.Bytes, bit: int) -> int:
 def run(session: Session, x: ArrayLike, moved: Session | None = None) -> tuple[NDArray[np.float64], list[str]]:
     """Answers (N,) of a session, and remarks on the samples.
 
-    `moved`: for an inverse in double precision a forward session with the same memory; counted are then the references
-    that the drives miss by more than rounding. The bit reference counts what the C would say.
+    `moved`: for an inverse in double precision, a forward session with the same memory; the count is then of references
+    that the drives miss by more than rounding. The bit reference counts by the status of the C.
     """
     answers, status = session.run(x)
     signal = arguments.signal("x", x)
@@ -74,6 +75,6 @@ def run(session: Session, x: ArrayLike, moved: Session | None = None) -> tuple[N
 
 
 def tell(said: Iterable[str], depth: int = 2) -> None:
-    """Warn with each remark; `depth`: calls between here and the user's."""
+    """Warn with each remark; `depth`: calls between here and the user's code."""
     for text in said:
         warnings.warn(text, SampleWarning, stacklevel=depth + 1)

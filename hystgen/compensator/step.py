@@ -1,5 +1,5 @@
-"""One step, and the operations around it: commit, reset, init. `operations_of` has what every chain shares, `made_of`
-the chain without blocks, engine loop of a model without effects; `hystgen.compensator.chain` has those with blocks.
+"""One step, and the operations around it: commit, reset, init. `operations_of` is shared by all chains, `made_of` is
+the chain without blocks, engine loop of a model without effects; `hystgen.compensator.chain` has chains with blocks.
 
 Every function has a counterpart of the same name in `c_runtime/`. Functions that both operators share begin with
 `operator_` there (`hystgen_operator_begin`; emission writes one for each) and have no prefix here (`begin`). Engine
@@ -50,7 +50,7 @@ from hystgen.plays.slots import (
 
 
 class Operations(NamedTuple):
-    """The operations on an instance: `init`, `visit` and `run` as in `made_of`, a step of each operator, the front."""
+    """The operations on an instance: `init`, `visit` and `run` as in `made_of`, both steps, and the front."""
 
     init: Callable[..., Any]
     visit: Callable[..., Any]
@@ -73,7 +73,7 @@ def inverse_answer(s: State, v: Any) -> Any:
 
 @jit
 def inverse_fits(t: Tables | FixedTables, s: State, v: Any, ascending: int) -> bool:
-    """Whether the move to v belongs to the branch that v was computed on."""
+    """Whether the move to v lies on the branch for which v was computed."""
     inside = clamp_drive(t, v)
     if inside == s.real[DRIVE]:
         return bool(s.counts[ASCENDING] == ascending)
@@ -82,7 +82,7 @@ def inverse_fits(t: Tables | FixedTables, s: State, v: Any, ascending: int) -> b
 
 class PlayOperations(NamedTuple):
     """Operations of plays behind a memoryless part, in any chain: `init` and `reset` set a start memory, `arrive` moves
-    to a drive, `drive` finds the drive that gives an input of the plays."""
+    to a drive, `drive` finds the drive for an input of the plays."""
 
     init: Callable[..., Any]
     reset: Callable[..., Any]
@@ -93,12 +93,11 @@ class PlayOperations(NamedTuple):
 def plays_of(
     front_forward: Callable[..., Any], front_inverse: Callable[..., Any], output: Callable[..., Any]
 ) -> PlayOperations:
-    """The operations of plays, from the two functions of the memoryless part and `output`, the output for the present
-    memory."""
+    """The operations of plays, from the two functions of the memoryless part and `output` at the present memory."""
 
     @jit
     def begin(t: Tables | FixedTables, s: State, which: int) -> None:
-        """The part common to init and reset, once the plays are set; `which` as in `Tables.applied`."""
+        """The part that init and reset share, once the plays are set; `which` as in `Tables.applied`."""
         drive = t.applied[which]
         s.counts[ASCENDING] = t.ascending[which]
         s.counts[HAS_PENDING] = 0
@@ -114,7 +113,7 @@ def plays_of(
 
     @jit
     def init(t: Tables | FixedTables, s: State, inverse: int) -> None:
-        """Start memory of the parameter file."""
+        """Set the start memory of the parameter file."""
         if len(t.start) == 1:
             loop_rest(s, t.start[0])
         else:
@@ -123,13 +122,13 @@ def plays_of(
 
     @jit
     def reset(t: Tables | FixedTables, s: State, inverse: int) -> None:
-        """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
+        """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
         loop_rest(s, t.limits[ZERO])
         begin(t, s, 2 * inverse + 1)
 
     @jit(inline=True)
     def set_drive(t: Tables | FixedTables, s: State, v: Any) -> None:
-        """The actuator is at drive v; of two branches, its move picks one."""
+        """Move the actuator to drive v; with two branches, the direction of the move picks one."""
         if t.branches:
             if v > s.real[DRIVE]:
                 s.counts[ASCENDING] = 1
@@ -139,13 +138,13 @@ def plays_of(
 
     @jit(inline=True)
     def arrive(t: Tables | FixedTables, s: State, v: Any) -> Any:
-        """The actuator is at drive v. Returns the input of the plays."""
+        """Move the actuator to drive v. Returns the input of the plays."""
         set_drive(t, s, v)
         return front_forward(t, v, s.counts[ASCENDING])
 
     @jit
     def inverse_choose(t: Tables | FixedTables, s: State, level: Any, w: Any) -> tuple[Any, int]:
-        """The drive that gives w on the branch of its own move: tries the branch of the reference's move, then the
+        """The drive that gives w on the branch of its own move: it tries the branch of the reference's move, then the
         other one; if neither fits, the drive holds."""
         if not t.branches:
             return front_inverse(t, w, 1)  # type: ignore[no-any-return]
@@ -178,16 +177,16 @@ def plays_of(
 
 
 class Hooks(NamedTuple):
-    """What a step leaves to the chain that it runs on, as functions of tables and memory."""
+    """The functions of a chain that a step calls, as functions of tables and memory."""
 
     plays: Callable[..., Any]  # the memory of the step itself
     finite: Callable[..., Any]
     forward_absorb: Callable[..., Any]
     inverse_absorb: Callable[..., Any]
-    shown: Callable[..., Any]  # the output now, and status bits
-    unread: Callable[..., Any]  # a reference is not finite
-    held: Callable[..., Any]  # the drive then
-    stands: Callable[..., Any]  # whether the last answer is that for a reference
+    shown: Callable[..., Any]  # the present output, and status bits
+    unread: Callable[..., Any]  # note a reference that is not finite
+    held: Callable[..., Any]  # the drive for it
+    stands: Callable[..., Any]  # whether the last answer holds for a reference
     sought: Callable[..., Any]  # the drive for a limited reference, which may lie beyond its range; sets BITS
     other: Callable[..., Any]  # a call that models without effects do not have
 
@@ -202,12 +201,12 @@ def run_of(
     place: int,
     other: Callable[..., Any],
 ) -> Callable[..., Any]:
-    """`Operations.run` of any engine; `place`: of the status in the counts of its memory."""
+    """`Operations.run` of any engine; `place`: of the status in the counts of the memory."""
 
     @jit
     def run(t: Any, s: Any, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
-        """Run op[i] with argument x[i]. answers[i] is the answer of a call that has one, else 0, and that of a reset is
-        left out; status[i] is read and cleared, or left for a later call."""
+        """Run op[i] with argument x[i]. answers[i] is the answer of a call that has one, else 0, also for a reset;
+        status[i] is read and cleared, or left for a later call."""
         m = plays(s)
         for i in range(len(op)):
             call = op[i] & OP_CALL
@@ -236,12 +235,12 @@ def operations_of(
     front: tuple[Callable[..., Any], Callable[..., Any]],
     hooks: Hooks,
 ) -> Operations:
-    """The operations on a chain: step, commit, hold, clamp and status are the same for every one."""
+    """The operations on a chain: step, commit, hold, clamp and status are the same for every chain."""
     plays, finite, forward_absorb, inverse_absorb, shown, unread, held, stands, sought, other = hooks
 
     @jit(inline=True)
     def forward_step(t: Any, s: Any, v: Any) -> Any:
-        """One sample of the forward operator."""
+        """Answer one sample of the forward operator."""
         m = plays(s)
         if not finite(t, v):
             m.counts[STATUS] |= HELD
@@ -256,7 +255,7 @@ def operations_of(
 
     @jit
     def inverse_take(t: Any, s: Any) -> None:
-        """The actuator has seen the pending drive."""
+        """Absorb the pending drive."""
         m = plays(s)
         if m.counts[HAS_PENDING]:
             inverse_absorb(t, s, m.real[PENDING])
@@ -264,7 +263,7 @@ def operations_of(
 
     @jit
     def inverse_step(t: Any, s: Any, u: Any) -> Any:
-        """One sample of the inverse operator."""
+        """Answer one sample of the inverse operator."""
         m = plays(s)
         inverse_take(t, s)
         if not finite(t, u):
@@ -286,7 +285,7 @@ def operations_of(
 
     @jit
     def inverse_commit(t: Any, s: Any, applied: Any) -> None:
-        """`applied` is the drive that was really applied in place of the last answer."""
+        """Replace the last answer by the drive that was really applied."""
         m = plays(s)
         if not finite(t, applied):
             m.counts[STATUS] |= HELD
@@ -309,46 +308,46 @@ def made_of(
     inverse_solve: Callable[..., Any],
     finite: Callable[..., Any],
 ) -> Operations:
-    """The operations of a chain without blocks, from the parts in which arithmetics differ: the memoryless part, the
-    output for the present memory with its status bits, the input of the plays that gives an output, and whether an
-    argument is finite."""
+    """The operations of a chain without blocks, from the functions in which arithmetics differ: the memoryless part,
+    the output at the present memory with its status bits, the plays' input for an output, and whether an argument is
+    finite."""
 
     @jit(inline=True)
     def level_of(t: Tables | FixedTables, s: State) -> Any:
-        """The output for the present memory; its status is not reported, since this is no step."""
+        """The output at the present memory; its status is not reported, since this is no step."""
         return output(t, s)[0]
 
     init, reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, level_of)
 
     @jit(inline=True)
     def itself(s: State) -> State:
-        """The memory of the plays is all there is."""
+        """The memory itself, which is only that of the plays."""
         return s
 
     @jit(inline=True)
     def absorb(t: Tables | FixedTables, s: State, v: Any) -> None:
-        """The actuator has seen drive v."""
+        """Absorb drive v."""
         loop_absorb(t, s, arrive(t, s, v))
 
     @jit
     def visit(t: Tables | FixedTables, s: State, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
-        """Let the actuator be at drive v before the next sample."""
+        """Move the actuator to drive v before the next sample."""
         absorb(t, s, v)
         s.real[LEVEL], bits = output(t, s)
         s.counts[STATUS] |= bits
 
     @jit(inline=True)
     def unread(t: Tables | FixedTables, s: State) -> None:
-        """No line of references has to go on."""
+        """Do nothing: there is no line of references."""
 
     @jit(inline=True)
     def held(t: Tables | FixedTables, s: State) -> Any:  # noqa: ARG001  the same call for every chain
-        """The last answer once more."""
+        """The last answer again."""
         return s.real[ANSWER] if s.counts[STEPPED] else s.real[DRIVE]
 
     @jit(inline=True)
     def stands(t: Tables | FixedTables, s: State, u: Any) -> bool:  # noqa: ARG001
-        """Whether the last answer still stands for reference u; u is the last reference from now on."""
+        """Whether the last answer holds for reference u; u becomes the last reference."""
         if s.counts[REPEAT] and u == s.real[REFERENCE]:
             return True
         s.real[REFERENCE] = u
@@ -363,7 +362,7 @@ def made_of(
 
     @jit(inline=True)
     def other(t: Tables | FixedTables, s: State, inverse: int, call: int, x: Any) -> Any:  # noqa: ARG001
-        """There are no other calls."""
+        """Return 0: there are no other calls."""
         return t.limits[ZERO]
 
     hooks = Hooks(itself, finite, absorb, absorb, output, unread, held, stands, sought, other)

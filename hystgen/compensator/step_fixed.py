@@ -1,4 +1,4 @@
-"""The parts of a step of engine loop that differ in fixed point."""
+"""The parts of a step of engine loop that are specific to fixed point."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hystgen.plays.slots import FRACTION, OFFSET
 
 @jit
 def output(t: FixedTables, s: State) -> tuple[Any, int]:
-    """Output code for the present memory, limited to the type, and its status."""
+    """Output code at the present memory, limited to the type, and its status."""
     return code(t, loop_output(t, s) + t.limits[OFFSET])
 
 
@@ -25,5 +25,5 @@ def inverse_solve(t: FixedTables, s: State, level: Any) -> Any:
 
 @jit
 def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  as in floating point
-    """Whether a code is finite: every one is."""
+    """True: every code is finite."""
     return True

@@ -1,4 +1,4 @@
-"""The parts of a step of engine loop that differ in floating point."""
+"""The parts of a step of engine loop that are specific to floating point."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hystgen.plays.slots import OFFSET, REAL_MAX
 
 @jit(inline=True)
 def output(t: Tables, s: State) -> tuple[Any, int]:
-    """Output for the present memory, offset included, and its status."""
+    """Output at the present memory, including the offset, and its status."""
     return loop_output(t, s) + t.limits[OFFSET], 0
 
 

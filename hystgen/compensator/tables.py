@@ -1,6 +1,6 @@
-"""From a model to the numbers that the kernels work with, in one arithmetic.
+"""The numbers that the kernels of a model work with, in one arithmetic.
 
-The bit reference and the C text both take all constants of an operator from here.
+Both the bit reference and the C text take all constants of an operator from here.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ def build(
 ) -> Tables | FixedTables:
     """Tables of `cascade` in 'float32', 'float64', 'q31' or 'q15' for engine 'corners' or 'loop'.
 
-    Without `clamp`, drive and output are limited only by the (float) arithmetic; without `inverse` as well, the stages
-    are not cut to the part that can be inverted. `lsb`: physical units per drive code and per output code in fixed
-    point; `visited`: inputs beyond the range that the plays may see, in floating point. Raises FormatError if the model
-    does not fit the arithmetic.
+    Without `clamp`, only the (float) arithmetic limits drive and output; without `inverse` as well, the stages are not
+    cut to their invertible part. `lsb`: physical units per drive code and per output code in fixed point; `visited`:
+    inputs beyond the range that the plays may see, in floating point. Raises FormatError if the model does not fit the
+    arithmetic.
     """
     if not ARITHMETICS[arithmetic].fixed:
         return build_float(cascade, arithmetic, engine, clamp, inverse, visited)

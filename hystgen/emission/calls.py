@@ -1,4 +1,4 @@
-"""The calls that emit: from models to C files in a folder, or to how those there differ."""
+"""The calls that emit: they turn models into C files in a folder, or tell how the files there differ."""
 
 from __future__ import annotations
 
@@ -40,9 +40,9 @@ def emit_options(
     optimize: str | None = None,
     allow_partial: bool = False,
 ) -> Options:
-    """What is to be emitted: the arguments given, else the parameter file's `emit` section.
+    """The options to emit with: the arguments given, else the parameter file's `emit` section.
 
-    `allow_partial`: effects that the C cannot have are left out, and named in its banner.
+    `allow_partial`: effects that the C cannot include are left out, and named in its banner.
     """
     defaults = model.parameters.emit
     operator, arithmetic = operator or defaults.operator, arithmetic or defaults.arithmetic
@@ -65,7 +65,7 @@ def emit_options(
 
 
 def _check_codes(model: Model, arithmetic: str, operator: str) -> None:
-    """Raise FormatError for sizes of codes in floating point, where only a quiet drive has one, its converter's."""
+    """Raise FormatError for code sizes in floating point, where only a quiet drive has one: its converter's."""
     emit = model.parameters.emit
     quiet = emit.compensation.quiet and bool(model.effects) and operator != "forward"
     fixed = " or ".join(FIXED)
@@ -80,7 +80,7 @@ def _check_codes(model: Model, arithmetic: str, operator: str) -> None:
 
 
 def emitted_model(model: Model, options: Options) -> Model:
-    """The model that the C is of: without what `options` leave out."""
+    """The model that the C implements: without the effects that `options` leave out."""
     if not options.left_out:
         return model
     return model.without([effect for effect, _ in model.refusals(options.operator, options.arithmetic)])
@@ -88,9 +88,9 @@ def emitted_model(model: Model, options: Options) -> Model:
 
 @arguments.taking(emit_options, "emit")
 def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
-    """Names and text of the C files of a model, or of several; options as for `emit`. Nothing is written.
+    """Names and text of the C files of one or several models; options as for `emit`. Nothing is written.
 
-    Raises what `emit` raises, and ValueError where two models make files of one name.
+    Raises whatever `emit` raises, and ValueError if two models make files of the same name.
     """
     models = _models(source)
     check_names(models)
@@ -106,8 +106,8 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
 
 
 def doubts(model: Model) -> list[str]:
-    """Possible faults of an inverse: of a model whose diagnosis could not separate the stage from its sensor, or whose
-    drive may not come to rest."""
+    """Possible faults of an inverse: the diagnosis could not separate the stage from its sensor, or the drive may not
+    come to rest."""
     named, advice = model.parameters.not_separable, "Record wide and nested loops, or with another sensor"
     found = []
     if ("asymmetry", "sensor_nonlinearity") in named and model.cascade.stages:
@@ -130,7 +130,7 @@ def doubts(model: Model) -> list[str]:
 
 
 def _swing(model: Model) -> float:
-    """How far the drive of a model with effects may go to and fro at rest, in drive units."""
+    """How far the drive of a model with effects may swing at rest, in drive units."""
     from hystgen.compensator.chain.bounds import swing
     from hystgen.compensator.chain.parts import Parts
 
@@ -139,8 +139,8 @@ def _swing(model: Model) -> float:
 
 
 def check_names(models: Sequence[Model]) -> None:
-    """Raise ValueError where two models make files of one name."""
-    names = [model.name.lower() for model in models]  # as some file systems and all macros see them
+    """Raise ValueError if two models make files of the same name."""
+    names = [model.name.lower() for model in models]  # as on some file systems and in all macros
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise ValueError(f"two models are called {twice[0]}, their files would overwrite each other; rename one")
@@ -148,15 +148,15 @@ def check_names(models: Sequence[Model]) -> None:
 
 @arguments.taking(emit_options, "emit")
 def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) -> list[Path]:
-    """Write the C files of a model, or of several, into folder `output` and return their paths.
+    """Write the C files of one or several models into folder `output` and return their paths.
 
-    `source`: a model, a parameter file, what `identify` or `diagnose` found, or a list of these.
+    `source`: a model, a parameter file, a result of `identify` or `diagnose`, or a list of these.
 
     Options: `operator` inverse, forward or both; `arithmetic` float32, float64, q31 or q15; `engine` auto, corners or
-    loop; `optimize` auto, speed or size, for what `engine` auto chooses; `layout` self-contained, shared-runtime or
-    single-header; `allow_partial` leaves out effects that the C cannot have. What is not given comes from the file.
-    Files that are there with the same bytes are left as they are. Raises ParameterError, NotInvertibleError,
-    FormatError and UnsupportedEffectsError; then nothing is written.
+    loop; `optimize` auto, speed or size, for the choice by `engine` auto; `layout` self-contained, shared-runtime or
+    single-header; `allow_partial` leaves out effects that the C cannot include. Missing options come from the file.
+    Existing files with the same bytes are left alone. Raises ParameterError, NotInvertibleError, FormatError and
+    UnsupportedEffectsError; then nothing is written.
     """
     return writing.write_files(Path(arguments.path("output", output)), emitted_files(source, **options))
 
@@ -165,8 +165,8 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
 def differences(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) -> list[str]:
     """The files in folder `output` that are missing or differ from what `emit` would write, one sentence per file.
 
-    The sentence names what differs: options, parameters, version of hystgen, edits by hand, line ends. Emitted files
-    that none of the models writes are among them: give all models of a folder together.
+    The sentence names the difference: options, parameters, version of hystgen, edits by hand, line ends. The list
+    includes emitted files that none of the models writes: give all models of a folder together.
     """
     from hystgen.emission import stale
 

@@ -1,6 +1,5 @@
 """The glue of a model with effects in C: tables and memory of its blocks, and the order of their calls. The blocks
-themselves are in `c_runtime/` and in the folders of effects.
-"""
+themselves are in `c_runtime/` and in the folders of effects."""
 
 from __future__ import annotations
 
@@ -26,29 +25,29 @@ NUMBERS = {
     "SLEW_RISING_REST": "and what rounding took from that",
     "SLEW_FALLING_REST": "",
 }
-"""Macros of the first places of `ChainTables.number`."""
+"""Macros for the first places of `ChainTables.number`."""
 
 
 @dataclass(frozen=True)
 class Block:
-    """One block of a chain: its numbers, and its name among those of the model."""
+    """One block of a chain: its constants, and its name within the model."""
 
     constants: Constants
     name: str
 
     @property
     def kind(self) -> Kind:
-        """Which names its functions and types."""
+        """The kind, which names its functions and types."""
         return self.constants.kind
 
     @property
     def table(self) -> str:
-        """How functions name its table."""
+        """The expression for its table in functions."""
         return f"&hystgen_{self.name}"
 
     @property
     def fields(self) -> list[Field]:
-        """Its memory."""
+        """The fields of its memory."""
         kind, rows = self.kind, self.kind.rows
         found = [Field(f"{kind.name}_t", self.name)]
         if rows and (rows.state or rows.memory):
@@ -56,7 +55,7 @@ class Block:
         return found
 
     def call(self, verb: str, x: str) -> str:
-        """A call of one of its verbs with the argument x."""
+        """A call of one of its verbs with argument x."""
         own = self.kind.verb(verb)
         given = [self.table] * (own in self.kind.reading) + [f"&self->{self.name}"] * (own != "resting")
         if own in ("rest", "absorb"):
@@ -68,11 +67,11 @@ class Block:
         return f"hystgen_nearest({name}({', '.join([*given, finer])}), {bits}u)"
 
     def warming(self) -> str:
-        """What plays that rub make of a move of the drive to v."""
+        """The heat that rubbing plays make of a move of the drive to v."""
         return f"hystgen_friction_move({self.table}, &self->{self.name}, self->{self.fields[1].name}, self->applied, v)"
 
     def tables(self, writer: Writer) -> list[Table]:
-        """Its table, behind that of its rows where it has any."""
+        """Its table, after the table of its rows if it has one."""
         kind, constants = self.kind, self.constants
         numbers = [entries(constants.table, kind.letters)] * (len(constants.table) > 0)
         numbers += map(str, constants.counts)
@@ -84,7 +83,7 @@ class Block:
 
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
-    """The blocks of an operator in front of the plays, starting from the drive, and those behind them."""
+    """The blocks of an operator: those in front of the plays, from the drive on, and those behind them."""
     from hystgen.compensator.chain import blocks
 
     found: list[list[Block]] = []
@@ -99,7 +98,7 @@ def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
 
 MOVES = ("play", "dilated", "relaxing", "dashpot")
 BENDS = ("none", "polynomial", "centre")
-"""Files of the run time that say how plays move and are bent, by the codes of `hystgen.compensator.chain.moving`."""
+"""Files of the run time for how plays move and are bent, by the codes of `hystgen.compensator.chain.moving`."""
 
 
 SETTINGS = {
@@ -110,12 +109,12 @@ SETTINGS = {
     "set_gain": slots.OP_GAIN,
     "set_travel": slots.OP_TRAVEL,
 }
-"""Calls of models with effects that take a number and return none."""
+"""Calls that only models with effects have, and that take a number and return none."""
 
 
 def plays(t: ChainTables) -> tuple[str, str]:
-    """How plays move and are bent; empty where engine loop has them, and bends where they are solved for one after the
-    other."""
+    """How plays move and are bent. The first is empty if engine loop has them, the second also if they are solved one
+    by one."""
     if t.moving.scanned:
         return MOVES[t.moving.moves], ""
     return (MOVES[t.moving.moves], BENDS[t.moving.bends]) if t.moving.used else ("", "")
@@ -123,9 +122,9 @@ def plays(t: ChainTables) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Shape:
-    """What decides on functions and memory of a chain beside its blocks: `effects`: it has any; `corners`: engine
-    corners, `taps`: samples of the reference that are summed, `waiting`: drives that wait; the others as in `Variant`.
-    """
+    """Properties of a chain that decide its functions and memory, besides its blocks. `effects`: whether it has any;
+    `corners`: engine corners; `taps`: samples of the reference that are summed; `waiting`: delayed drives; the others
+    as in `Variant`."""
 
     form: Form
     effects: bool = False
@@ -139,7 +138,7 @@ class Shape:
 
     @classmethod
     def of(cls, t: ChainTables, form: Form) -> Shape:
-        """That of a model with effects."""
+        """The shape of a model with effects."""
         return cls(
             form, True, t.plays.engine == slots.CORNERS, bool(t.slew), bool(t.braked), bool(t.quiet),
             bool(t.turning), len(t.tap), t.of("wait").samples,
@@ -148,8 +147,8 @@ class Shape:
 
 @dataclass(frozen=True)
 class Chain:
-    """The blocks of a model with effects, by operator in front of the plays and behind, and those beside: its clock,
-    and what rubs."""
+    """The blocks of a model with effects: by operator in front of the plays and behind, and in addition its clock and
+    the plays that rub."""
 
     sides: Mapping[str, tuple[list[Block], list[Block]]]
     clocks: list[Block]
@@ -157,7 +156,7 @@ class Chain:
 
     @classmethod
     def of(cls, t: ChainTables, operators: Sequence[str]) -> Chain:
-        """Those of a model."""
+        """The blocks of a model."""
         from hystgen.compensator.chain import blocks
 
         rubbing = [
@@ -179,7 +178,7 @@ def effects(
     from hystgen.compensator.chain.layout import DITHER
 
     t, chain = compiled.tables, Chain.of(compiled.tables, operators)
-    largest = max(map(chain.blocks, operators), key=len)  # the forward operator has what the inverse has, and modes
+    largest = max(map(chain.blocks, operators), key=len)  # the forward operator has the inverse's blocks, and modes
     tables = [table for block in largest for table in block.tables(writer)]
     numbers = dict(zip(NUMBERS, t.number, strict=False))
     constants = [(name, operand(value), NUMBERS[name]) for name, value in numbers.items()]
@@ -224,7 +223,7 @@ def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Seque
 
 
 def alone(operators: Sequence[str], plays: int, form: Form) -> Glue:
-    """The glue of a model without effects in engine loop: a chain without blocks."""
+    """The glue of a model without effects in engine loop, which is a chain without blocks."""
     shape = Shape(form)
     functions = [_functions(op, shape) for op in operators]
     return Glue({op: instance(op, shape, (), plays, 0, False) for op in operators}, "\n".join(functions), {})
@@ -283,7 +282,7 @@ def _functions(
     clocks: Sequence[Block] = (),
     rubbing: Sequence[Block | None] = (),
 ) -> str:
-    """The functions of one operator that name the blocks."""
+    """The functions of one operator that name its blocks."""
     inverse = op == "inverse"
     quiet, turning = inverse and t.quiet, inverse and t.turning
     settled = absorbed = seen = ""

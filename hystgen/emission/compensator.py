@@ -1,5 +1,5 @@
-"""A model's compensator in an arithmetic, as its C is made of it: names, numbers, tables and memory. What differs
-between floating and fixed point is a `Form`, one for either kind of arithmetic."""
+"""A model's compensator in an arithmetic, as the source of its C: names, numbers, tables and memory. A `Form` for each
+kind of arithmetic holds the differences between floating and fixed point."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Compiled
 
 Macro: TypeAlias = tuple[str, str, str]
-"""A macro of a model: its name behind that of the model, its value, and a comment."""
+"""A macro of a model: its name after the model's, its value, and a comment."""
 
 STANDARD = frozenset(["int32_t", "uint32_t", "uint16_t", "uint8_t"])
-"""Types of the language that tables are made of."""
+"""Types of the language that appear in tables."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A constant; `contents`: its types, without the prefix of a run time, each with how many of it there are."""
+    """A constant; `contents`: its types, without the prefix of a run time, and how many of each there are."""
 
     name: str
     text: str
@@ -42,8 +42,8 @@ class Table:
 
 @dataclass(frozen=True)
 class Stage:
-    """A memoryless stage: its kind, its tables, how functions name the last of these, and the argument by which they
-    tell that it limits something."""
+    """A memoryless stage: its kind, its tables, the expression for the last of them in functions, and the argument by
+    which functions report that the stage limited something."""
 
     kind: str
     arrays: tuple[Table, ...]
@@ -53,8 +53,8 @@ class Stage:
 
 @dataclass(frozen=True)
 class Field:
-    """A field of an instance, of a type of the run time without its prefix or one of the language; with a `count` it is
-    an array, which C gives the length `length`, if any."""
+    """A field of an instance. Its type is one of the run time without its prefix, or one of the language; with a
+    `count` it is an array, whose length in C is `length` if that is given."""
 
     kind: str
     name: str
@@ -63,7 +63,7 @@ class Field:
     length: str = ""
 
     def text(self) -> str:
-        """Its declaration."""
+        """Its declaration in C."""
         kind = f"hystgen_{self.kind}" if self.kind.endswith("_t") else self.kind
         size = f"[{self.length or self.count}]" if self.count else ""
         return f"{kind} {self.name}{size};" + (f" /* {self.comment} */" if self.comment else "")
@@ -71,15 +71,15 @@ class Field:
 
 @dataclass(frozen=True)
 class Writer:
-    """Writes the constants of the model `name` with the types of the run time `prefix`; each is called `own` behind the
-    model's name, and is an array where it has `sizes`."""
+    """Writes the constants of the model `name` with the types of the run time `prefix`. Each constant is named by the
+    model's name and `own`, and is an array if it has `sizes`."""
 
     name: str
     prefix: str
 
     @property
     def own(self) -> Writer:
-        """A writer of types that the model itself defines."""
+        """A writer for types that the model itself defines."""
         return Writer(self.name, self.name)
 
     def constant(self, kind: str, own: str, lines: Sequence[str], *sizes: int, words: str = "") -> Table:
@@ -96,7 +96,7 @@ class Writer:
         return self.constant(kind, own, filled(entries).splitlines(), words=words)
 
     def rows(self, kind: str, own: str, rows: Iterable[str], *sizes: int, last: str = ",") -> Table:
-        """An array of structures, one a line; `last`: what stands behind the last one."""
+        """An array of structures, one per line; `last`: text after the last one."""
         *first, final = [f"    {{{row}}}" for row in rows]
         return self.lines(kind, own, [*(f"{row}," for row in first), final + last], *sizes)
 
@@ -138,7 +138,7 @@ def filled(entries: Iterable[str]) -> str:
 
 
 def entries(values: Iterable[Number], letters: str = "") -> str:
-    """Numbers of a table as they stand in C; `letters` as in `hystgen.effects.kinds.Kind`, and r for one as it is."""
+    """Numbers of a table as written in C; `letters` as in `hystgen.effects.kinds.Kind`, and r for a plain number."""
     rest = iter(values)
     if not letters:
         return ", ".join(map(literal, rest))
@@ -160,8 +160,8 @@ AnyTables: TypeAlias = "Tables | FixedTables | ChainTables"
 
 @dataclass(frozen=True)
 class Errors:
-    """Bounds against the double model, of the forward operator and of the inverse, 0 where it has none; `rounding`:
-    that of the inverse while the conditions in words hold."""
+    """Bounds against the double model for the forward operator and the inverse, 0 for a missing one; `rounding`: the
+    inverse's while `condition`, in words, holds."""
 
     forward: Number
     inverse: Number
@@ -173,10 +173,10 @@ class Errors:
 class Numbers:
     """The numbers of a model in an arithmetic.
 
-    `drive`, `output`: limits of both; `macros`: those that functions may use; `plays`: tables with an entry for each
-    play, and the start memory; `beside`: other tables; `stages`: of the memoryless part where functions call them one
-    by one; `lsb`: physical units of a code of drive and output, where there are codes; `precision`: sentences about
-    both; the others as in `hystgen.emission.runtime.Variant`, and `envelopes`: an argument of an envelope is limited.
+    `drive`, `output`: limits of both; `macros`: for use by functions; `plays`: tables with an entry for each play, and
+    the start memory; `beside`: other tables; `stages`: of the memoryless part, if functions call them one by one;
+    `lsb`: physical units per code of drive and output, if there are codes; `precision`: sentences about both;
+    `envelopes`: whether an envelope limits its argument; the others as in `hystgen.emission.runtime.Variant`.
     """
 
     tables: AnyTables
@@ -203,7 +203,7 @@ class Numbers:
 
 @dataclass(frozen=True)
 class Effects:
-    """What a model with effects has beside its plays: tables, tables of saturation, and macros."""
+    """The C of a model's effects besides its plays: tables, tables of saturation, and macros."""
 
     compiled: Compiled
     tables: tuple[Table, ...]
@@ -212,11 +212,11 @@ class Effects:
 
 
 class Form(ABC):
-    """How one kind of arithmetic writes the numbers of a model, and the words for them: of its own where it has codes.
+    """How one kind of arithmetic writes the numbers of a model, and its own words for them if it has codes.
 
-    `apart`: how functions begin whose products would need the stack of what calls them; `suffix`: of names of macros
-    that are counted in codes; `held`: what the status bit HELD tells; `warning`: about flags of compilers; `settings`:
-    what calls that set something are given, MODEL being the model's name.
+    `apart`: words that begin functions which would cost their callers stack if inlined; `suffix`: of names of macros
+    that count codes; `held`: meaning of the status bit HELD; `warning`: about compiler flags; `settings`: arguments of
+    the calls that set something, where MODEL is the model's name.
     """
 
     apart = "static"
@@ -227,13 +227,13 @@ class Form(ABC):
 
     @abstractmethod
     def numbers(self, parameters: Parameters, cascade: StaticModel, options: Options, writer: Writer) -> Numbers:
-        """Those of a model without effects."""
+        """The numbers of a model without effects."""
 
     @abstractmethod
     def chained(
         self, parameters: Parameters, effects: Effects, stages: Sequence[Stage], options: Options, writer: Writer
     ) -> Numbers:
-        """Those of a model with effects, saturation behind the plays being these stages."""
+        """The numbers of a model with effects, with these stages of saturation behind the plays."""
 
     @abstractmethod
     def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[Stage]:
@@ -249,14 +249,14 @@ class Form(ABC):
 
     @abstractmethod
     def waited(self, t: ChainTables, writer: Writer) -> tuple[list[Table], list[Macro]]:
-        """How much of a step a delay takes."""
+        """The part of a step that a delay takes."""
 
     @abstractmethod
     def corners(self, inverse: bool, plays: int) -> list[Field]:
-        """The memory of the plays of engine corners in a model with effects."""
+        """The memory of engine corners' plays in a model with effects."""
 
     def effects(self, t: ChainTables) -> list[Macro]:
-        """Numbers of a model with effects that codes need."""
+        """Numbers of a model with effects that only codes need."""
         return []
 
     def code_sizes(self, t: ChainTables) -> list[Macro]:
@@ -264,7 +264,7 @@ class Form(ABC):
         return []
 
     def setting_codes(self, t: ChainTables) -> tuple[float, float]:
-        """What sets a degree more, and the gain 1."""
+        """The change that sets one degree more, and the value that sets the gain 1."""
         return 1.0, 1.0
 
     def drive_bits(self, t: ChainTables) -> int:
@@ -280,23 +280,23 @@ class Form(ABC):
         """The number at this fraction of a range, in operations of the arithmetic."""
 
     def arguments(self, t: AnyTables, values: Sequence[Number]) -> Reals:
-        """The nearest arguments of calls."""
+        """The nearest arguments that calls can take."""
         return np.array(values, dtype=t.threshold.dtype)
 
     def counted(self, side: str, unit: str) -> str:
-        """What numbers of the drive or the output count."""
+        """The quantity that numbers of the drive or the output count."""
         return self.quantity(side, "", unit)
 
     def unit(self, unit: str, side: str = "") -> str:
-        """The unit behind a number, of which side where that is said."""
+        """The unit after a number, naming the side if one is given."""
         return f" {unit}" if unit else ""
 
     def quantity(self, words: str, macro: str, unit: str) -> str:
-        """A quantity with its unit; `macro`: with the size of a code."""
+        """A quantity with its unit; `macro`: of the size of a code."""
         return f"{words}, {unit}" if unit else words
 
     def unless_held(self, call: str) -> str:
-        """What a call does with arguments that are no numbers."""
+        """What a call does with arguments that are not numbers."""
         return ""
 
 
@@ -307,7 +307,7 @@ def limits(numbers: Tables | FixedTables | ChainTables) -> tuple[tuple[str, str]
 
 
 def macros(numbers: Tables | FixedTables) -> list[Macro]:
-    """Macros of every arithmetic."""
+    """Macros that every arithmetic has."""
     ends = numbers.limits
     return [
         ("OFFSET", operand(ends[slots.OFFSET]), "part of every output"),
@@ -336,14 +336,14 @@ def pointers(numbers: Tables | FixedTables, places: Sequence[str], writer: Write
 
 
 def units(parameters: Parameters) -> tuple[str, str]:
-    """Those of drive and output behind a number."""
+    """Units of drive and output, as written after a number."""
     words = (comment_text(unit) for unit in (parameters.units.input, parameters.units.output))
     drive, output = (f" {unit}" if unit else "" for unit in words)
     return drive, output
 
 
 def drives(numbers: Tables | FixedTables, columns: Sequence[Reals], operator: str, writer: Writer) -> Table:
-    """The drives that the start memories of an operator stand for: these columns, and the direction."""
+    """The drives that an operator's start memories stand for: these columns, and the direction."""
     first = 2 * (operator == "inverse")
     rows = (
         f"{{{', '.join([*(literal(column[j]) for column in columns), truth(numbers.ascending[j])])}}}"
@@ -354,8 +354,8 @@ def drives(numbers: Tables | FixedTables, columns: Sequence[Reals], operator: st
 
 @dataclass(frozen=True)
 class Glue:
-    """The operators of a model as a chain: the memory of an instance by operator, functions, and which calls it has
-    beside those of every model."""
+    """The operators of a model as a chain: the memory of an instance by operator, functions, and the calls that it adds
+    to those of every model."""
 
     fields: Mapping[str, Sequence[Field]]
     functions: str
@@ -367,7 +367,7 @@ class Glue:
         return {op: _state(op, fields) for op, fields in self.fields.items()}
 
     def named(self, names: Mapping[str, Collection[str]]) -> Glue:
-        """With the fields alone that the functions of each operator name."""
+        """A copy with only the fields that the functions of each operator name."""
         fields = {op: [each for each in found if each.name in names[op]] for op, found in self.fields.items()}
         return replace(self, fields=fields)
 
@@ -382,38 +382,38 @@ def _state(op: str, fields: Sequence[Field]) -> str:
 
 @dataclass(frozen=True)
 class Names:
-    """The names of a model and of its run time in C, `NAME` and `RT` in macros."""
+    """The names of a model and of its run time in C, as `NAME` and `RT` in macros."""
 
     name: str
     rt: str
 
     @property
     def NAME(self) -> str:  # noqa: N802
-        """That of the model in macros."""
+        """The model's name in macros."""
         return self.name.upper()
 
     @property
     def RT(self) -> str:  # noqa: N802
-        """That of the run time in macros."""
+        """The run time's name in macros."""
         return self.rt.upper()
 
 
 @dataclass(frozen=True)
 class Units:
-    """Units of drive and output as they stand in comments, empty where the parameter file has none."""
+    """Units of drive and output as written in comments, empty if the parameter file has none."""
 
     drive: str
     output: str
 
     def behind(self, side: str) -> str:
-        """The unit of a side behind its name and a comma."""
+        """The unit of a side after a comma."""
         unit: str = getattr(self, side)
         return f", {unit}" if unit else ""
 
 
 @dataclass(frozen=True)
 class Compensator:
-    """A model in an arithmetic; `compiled`: of one with effects; `glue`: of one that is a chain."""
+    """A model in an arithmetic; `compiled`: only with effects; `glue`: only of a chain."""
 
     parameters: Parameters
     cascade: StaticModel
@@ -428,16 +428,16 @@ class Compensator:
 
     @property
     def units(self) -> Units:
-        """Of drive and output."""
+        """Units of drive and output."""
         units = self.parameters.units
         return Units(comment_text(units.input), comment_text(units.output))
 
     @property
     def calls(self) -> dict[str, list[str]]:
-        """By operator, the functions that a model with effects has in addition to those of every model."""
+        """By operator, the functions that a model with effects adds to those of every model."""
         return {op: list(calls) for op, calls in self.glue.calls.items()} if self.glue else {}
 
     @property
     def corners(self) -> int:
-        """How many corners the corner engine takes, 0 for engine loop."""
+        """Number of corners that the corner engine keeps, 0 for engine loop."""
         return self.family.corners(self.cascade.pi.n) if self.options.engine == "corners" else 0

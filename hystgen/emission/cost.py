@@ -1,4 +1,4 @@
-"""What an emitted model costs, derived from the model alone so that it is the same wherever it is emitted."""
+"""The cost of an emitted model, derived from the model alone so that it is the same wherever it is emitted."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Layout:
-    """How a target lays out data: sizes of `int` and of pointers; packed where nothing is aligned."""
+    """How a target lays out data: sizes of `int` and of pointers, and whether it packs them without alignment."""
 
     integer: int
     pointer: int
     packed: bool
 
     def struct(self, *fields: tuple[int, int]) -> tuple[int, int]:
-        """Size and alignment of a C struct of fields of these sizes and alignments."""
+        """Size and alignment of a C struct whose fields have these sizes and alignments."""
         if self.packed:
             return sum(size for size, _ in fields), 1
         at, most = 0, 1
@@ -45,7 +45,7 @@ AVR = Layout(integer=2, pointer=2, packed=True)
 
 @dataclass(frozen=True)
 class Memory:
-    """Bytes of the constant tables and of an instance of each operator; `play`: bytes of both per additional play."""
+    """Bytes of the constant tables and of an instance of each operator; `play`: bytes that each play adds to both."""
 
     tables: int
     instances: list[tuple[str, int]]
@@ -59,9 +59,9 @@ class Memory:
 
 @dataclass(frozen=True)
 class Cost:
-    """Code of the module by core (`hystgen.compensator.engines`), memory on a 32-bit target and on an 8-bit AVR, where
-    tables lie in RAM too (None in float64, which it lacks), and for each operator worst-case operations of a step in
-    words, and the dearest sample of such models on each core."""
+    """Code of the module by core (`hystgen.compensator.engines`); memory on a 32-bit target and on an 8-bit AVR, where
+    tables lie in RAM too (None in float64, which it lacks); and for each operator the worst-case operations of a step
+    in words and the most expensive sample of such models on each core."""
 
     code: Mapping[str, int]
     memory: Memory
@@ -76,7 +76,7 @@ class Cost:
         return f"{small} bytes on a Cortex-M0+, {large} on a Cortex-M4F"
 
     def dearest_words(self, operator: str) -> str:
-        """The dearest sample of an operator in words."""
+        """The most expensive sample of an operator in words."""
         small, large = (self.dearest[operator][core] for core in engines.CORES)
         return (
             f"{small.instructions} instructions and {small.stack} bytes of stack on a Cortex-M0+, "
@@ -89,9 +89,9 @@ Size: TypeAlias = tuple[int, int]
 
 
 def sizes(pieces: Iterable[Piece], family: Family, layout: Layout, lengths: Mapping[str, int]) -> dict[str, Size]:
-    """Of the types of a model, by their names without prefix, from their declarations.
+    """Sizes of a model's types, by their names without prefix, from their declarations.
 
-    `pieces`: in an order in which a type stands before those that contain it; `lengths`: macros in lengths of arrays.
+    `pieces`: ordered so that a type comes before those that contain it; `lengths`: values of macros in array lengths.
     """
     plain = {"bool": 1, "unsigned int": layout.integer} | LANGUAGE
     plain |= {name: LANGUAGE[kind] for name, kind in {"real_t": family.real, **family.types}.items()}
@@ -106,7 +106,7 @@ def sizes(pieces: Iterable[Piece], family: Family, layout: Layout, lengths: Mapp
     for piece in pieces:
         if members := piece.members:
             whole = [field(each) for each in members if not each.bits]
-            if bits := sum(each.bits for each in members):  # side by side in whole numbers, which stand last
+            if bits := sum(each.bits for each in members):  # bit fields are packed into whole numbers at the end
                 whole.append((-(-bits // 8), min(-(-bits // 8), layout.integer)))
             found[piece.name.removeprefix("hystgen_")] = layout.struct(*whole)
     return found
@@ -114,7 +114,7 @@ def sizes(pieces: Iterable[Piece], family: Family, layout: Layout, lengths: Mapp
 
 LANGUAGE = {"float": 4, "double": 8, "int64_t": 8, "int32_t": 4, "int16_t": 2, "uint32_t": 4, "uint16_t": 2,
             "uint8_t": 1, "uint_least16_t": 2, "uint_least8_t": 1}
-"""Bytes of the types of the language, in which they are aligned too."""
+"""Bytes of the types of the language, which are also their alignments."""
 
 
 def _length(words: str, lengths: Mapping[str, int]) -> int:
@@ -123,14 +123,15 @@ def _length(words: str, lengths: Mapping[str, int]) -> int:
 
 
 def _constants(contents: Iterable[tuple[str, int]], known: Mapping[str, Size], family: Family, plays: int = 1) -> int:
-    """Bytes of constants, without padding between them; for such with an entry for each of `plays`, of one entry."""
+    """Bytes of constants without padding between them; with `plays`, of one entry in tables that have one for each
+    play."""
     return sum(known[family.meaning(kind)][0] * (count // plays) for kind, count in contents)
 
 
 @dataclass(frozen=True)
 class Data:
-    """What a model has in memory: types, an instance of each operator, tables with an entry for each play, and all
-    constants, with those of the run time."""
+    """The data of a model in memory: types, an instance of each operator, tables with an entry for each play, and all
+    constants, including those of the run time."""
 
     family: Family
     types: Sequence[Piece]
@@ -162,23 +163,23 @@ def estimate(cascade: StaticModel, options: Options, numbers: AnyTables, data: D
 
 
 def selftest_bytes(real: int, memory: Memory, samples: int, layout: Layout) -> tuple[int, int]:
-    """Bytes of a self-test's samples, whose numbers have `real` each, and of the instance that its operators use one
-    after the other."""
+    """Bytes of a self-test's samples, whose numbers take `real` each, and of the instance that its operators use in
+    turn."""
     sample, _ = layout.struct((1, 1), (real, real), (real, real), (layout.integer, layout.integer))
     return samples * sample, max(size for _, size in memory.instances)
 
 
 @dataclass(frozen=True)
 class Counts:
-    """Operations of a kind of arithmetic, counted in the bit reference (`tests/test_cost.py`), and rounded up to what a
-    search that bisects its whole list would take.
+    """Operations of a kind of arithmetic, counted in the bit reference (`tests/test_cost.py`), and rounded up to the
+    cost of a search that bisects its whole list.
 
-    `factor`: multiplications of a product with a factor; `words`: about a multiplication; `plays`: by operator and
-    engine multiplications, comparisons, and further ones per play and per bit of n, of plays, checks and limits, with
-    engine `fast` for corners without a front; `both`: the same of corners that are solved for and follow what was
-    applied, which may be elsewhere; `solved`: multiplications per play of an inverse in engine loop, and `chained` of
-    one with effects multiplications, comparisons, and both per play; `braked`: multiplications of a lag behind a slew
-    limit, and per halving of its search.
+    `factor`: multiplications in a product with a factor; `words`: about a multiplication; `plays`: by operator and
+    engine, for plays, checks and limits: multiplications, comparisons, and further comparisons per play and per bit of
+    n, where engine `fast` is corners without a front; `both`: the same for corners that are solved for and then follow
+    the applied drive, which may be elsewhere; `solved`: multiplications per play of an inverse in engine loop;
+    `chained`: of an inverse with effects, multiplications, comparisons, and both per play; `braked`: multiplications of
+    a lag behind a slew limit, and per halving of its search.
     """
 
     factor: int
@@ -201,8 +202,8 @@ FLOAT = Counts(
 FIXED = Counts(
     2, " of 32 by 32 bits",
     {("forward", "loop"): (1, 11, 2, 0), ("inverse", "loop"): (3, 14, 3, 0),
-     # the corner, then the play in its block: either is bisected; clamps, the code, what lies ahead
-     # the output of a corner is the sum of its parts, for the top one and the one behind it
+     # the corner, then the play in its block: both are bisected; clamps, the code, the look ahead
+     # the output of a corner is the sum of its parts, for the top corner and the one behind it
      ("forward", "corners"): (1, 15, 0, 2), ("inverse", "corners"): (5, 19, 0, 4),
      ("forward", "fast"): (1, 15, 0, 2), ("inverse", "fast"): (7, 22, 0, 4)},
     both=(7, 25, 0, 4), solved=2, chained=(4, 21, 3, 3), braked=(13, 1),
@@ -214,14 +215,14 @@ def _counts(t: AnyTables) -> Counts:
 
 
 def _refined(t: ChainTables) -> bool:
-    """Whether a solution of an inverse has a remainder, which is searched for too."""
+    """Whether an inverse's solution has a remainder, which also takes a search."""
     from hystgen.compensator.chain.layout import ARRIVING_BITS
 
     return len(t.number) > ARRIVING_BITS and bool(t.number[ARRIVING_BITS])
 
 
 def chain_products(t: ChainTables) -> dict[str, int]:
-    """Multiplications of the blocks in front of the plays and behind them in one step, of each operator."""
+    """Multiplications in one step of the blocks in front of the plays and behind them, for each operator."""
     from hystgen.compensator.chain import blocks
     from hystgen.effects.lag import compensator as lag
     from hystgen.effects.saturation.fixed import Saturations
@@ -252,8 +253,8 @@ def _memory(n: int, options: Options, data: Data, layout: Layout) -> Memory:
 
 
 def worst_case(n: int, op: str, corners: bool, tables: AnyTables) -> str:
-    """The largest numbers of multiplications and comparisons in one step as functions of n, without those of tanh and
-    atanh, and of effects; b are the bits of n."""
+    """The largest numbers of multiplications and comparisons in one step as functions of n, except those of tanh, atanh
+    and effects; b is the number of bits of n."""
     numbers: Tables | FixedTables = tables if isinstance(tables, Tables | FixedTables) else tables.plays
     counts, passes, curves = _counts(tables), 1 if op == "forward" else 2 + int(numbers.branches), 0
     engine = "loop" if not corners else "corners" if numbers.has_front else "fast"
@@ -292,16 +293,16 @@ def worst_case(n: int, op: str, corners: bool, tables: AnyTables) -> str:
 
 
 def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
-    """Multiplications, further ones per play, comparisons, further ones per play, and tanh per play: of plays in engine
-    loop of a model with effects.
+    """Operations of the plays of a model with effects in engine loop: multiplications, more of them per play,
+    comparisons, more of them per play, and tanh per play.
 
-    Plain plays follow and are solved for one after the other. Plays that an effect moves or bends in a way of their own
-    are searched for: all of them are summed up once for each bisection.
+    Plain plays follow and are solved for one by one. Plays that an effect moves or bends in its own way are searched
+    for: each bisection sums up all of them.
     """
     from hystgen.compensator.chain import moving
 
     m, counts, inverse = t.moving, _counts(t), op == "inverse"
-    factor, more = counts.factor, counts.factor - 1  # a comparison more where a product with a factor has two parts
+    factor, more = counts.factor, counts.factor - 1  # one more comparison if a product with a factor has two parts
     if not m.used or m.scanned:
         if not inverse:
             return 1, 1 + 2 * factor * m.scanned, 11 + 2 * more, 4 + 2 * more if m.scanned else 2, 0
@@ -316,7 +317,7 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
         moving.DASHPOT: ((factor + 3 + more, yields), (0, 0)),
     }.get(m.moves, ((0, 2), (0, 0)))
     bent, looked, tanh, sums, halved = _bent(m)
-    twice = 1 + (m.moves == moving.RELAXING)  # what a play contributes, and where it will rest
+    twice = 1 + (m.moves == moving.RELAXING)  # a play's contribution, and where it will rest
     sums, halved = sums * inverse, halved * inverse
     return (
         sums + 1 + halved,
@@ -328,8 +329,8 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
 
 
 def _bent(m: MovingTables | FixedMovingTables) -> tuple[int, int, int, int, int]:
-    """Multiplications, comparisons and tanh of what a play adds to itself; how often a search sums the plays up, and
-    multiplications of its halvings."""
+    """Multiplications, comparisons and tanh of a bend per play; sums over the plays in a search, and multiplications of
+    its halvings."""
     from hystgen.compensator.chain import moving
     from hystgen.compensator.chain.moving import FixedMovingTables
 

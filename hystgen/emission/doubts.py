@@ -1,4 +1,4 @@
-"""What makes an emitted inverse of a model with effects of little use, in the words of its banner and of stderr."""
+"""Reasons why an emitted inverse of a model with effects is of little use, in the words of its banner and of stderr."""
 
 from __future__ import annotations
 
@@ -11,22 +11,22 @@ from hystgen.emission.text import comment_text
 from hystgen.parameters.files import Parameters
 
 NOISY = 4.0
-"""[times the gain at rest] Noise gain from which it is told: the drive then has two bits of noise more than the
-reference. The inverse of a lag of one sample has 3.97. Set by: benchmarks/chosen_numbers.py noisy."""
+"""[times the gain at rest] Noise gain from which a doubt is reported: the drive then has two bits of noise more than
+the reference. The inverse of a lag of one sample has 3.97. Set by: benchmarks/chosen_numbers.py noisy."""
 
 FAST = 50.0
-"""[samples] Shortest step, in time constants of the slowest effect, that is taken for a mistake: the effect then moves
-the drive by a 50th of a sample, of the fastest sweep with a stated bound (SAMPLES_A_SWEEP) 4e-4 of the range. Set by:
+"""[time constants of the slowest effect] Steps from this length on are taken for a mistake: the effect then moves the
+drive by a 50th of a sample, 4e-4 of the range in the fastest sweep with a stated bound (SAMPLES_A_SWEEP). Set by:
 benchmarks/chosen_numbers.py fast."""
 
 
 def found(parameters: Parameters, compiled: Compiled) -> list[str]:
-    """A sentence for each."""
+    """One sentence for each doubt."""
     return [*_noise(parameters, compiled), *_too_fast(parameters, compiled)]
 
 
 def _noise(parameters: Parameters, compiled: Compiled) -> list[str]:
-    """The noise of the reference that the drive shows."""
+    """A doubt about noise of the reference that reaches the drive."""
     if compiled.noise_gain <= NOISY:
         return []
     drive, hertz = noise.loudest(compiled.gain)
@@ -45,7 +45,7 @@ def _noise(parameters: Parameters, compiled: Compiled) -> list[str]:
 
 
 def _too_fast(parameters: Parameters, compiled: Compiled) -> list[str]:
-    """Effects that are over long before the next sample."""
+    """A doubt about effects that are over long before the next sample."""
     seconds = compiled.seconds
     scale, name = max((_time_scale(effect, compiled), effect.name) for effect in parameters.model.effects)
     if not 0.0 < scale <= seconds / FAST:
@@ -58,7 +58,7 @@ def _too_fast(parameters: Parameters, compiled: Compiled) -> list[str]:
 
 
 def _time_scale(effect: Effect, compiled: Compiled) -> float:
-    """`Effect.time_scale`, of an effect of the user's own that of its slowest state."""
+    """`Effect.time_scale`, or for a user's own effect the time scale of its slowest state."""
     low, high = compiled.static.input_range
     scale = effect.time_scale(high - low)
     if scale or effect.block is None:

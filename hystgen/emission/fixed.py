@@ -47,7 +47,7 @@ COLUMNS = (("threshold", "play_t", True), ("weight", "int32_t", True), ("slope",
 """Fields of the tables of engine loop, their types, and whether both operators read them."""
 
 RELAXING = COLUMNS[2:]
-"""Those that engine loop has for plays that relax."""
+"""The columns that engine loop has for plays that relax."""
 
 
 class Fixed(Form):
@@ -244,7 +244,7 @@ def _factors(own: str, rows: Reals, writer: Writer) -> Table:
 
 
 def _errors(options: Options, bounds: tuple[float, float | None, float | None], condition: str = "") -> Errors:
-    """The bounds in a few digits, rounded up."""
+    """The bounds to a few digits, rounded up."""
     forward, inverse, rounding = (_upward(bound) if bound else 0.0 for bound in bounds)
     return Errors(forward, inverse, rounding, condition) if options.inverse else Errors(forward, 0.0, 0.0, condition)
 
@@ -260,7 +260,7 @@ def _envelopes(cascade: StaticModel) -> bool:
 
 
 def _precision(parameters: Parameters, form: fixed_tables.Format | Codes, branch: str) -> list[str]:
-    """The size of codes, and how far answers are from the exact model."""
+    """The size of codes, and the error of answers against the exact model."""
     drive, output = units(parameters)
     drive_lsb, output_lsb = float(form.drive_lsb), float(form.output_lsb)
     forward, inverse = form.forward_error, form.inverse_rounding
@@ -275,7 +275,7 @@ def _precision(parameters: Parameters, form: fixed_tables.Format | Codes, branch
 
 
 def _macros(t: FixedTables) -> list[Macro]:
-    """Numbers that functions name in fixed point alone."""
+    """Numbers that functions name only in fixed point."""
     step = int(len(t.start) > 1)
     shy = "output codes that rounding can add: half a drive code, and an inexact reciprocal"
     return [
@@ -297,14 +297,14 @@ def _plays(t: FixedTables, options: Options, writer: Writer, chain: bool) -> lis
 
 
 def _pointers(t: FixedTables, options: Options, writer: Writer) -> list[Table]:
-    """Pointers to the tables of engine loop, NULL for those that nothing reads, and the ends of the plays' input."""
+    """Pointers to the tables of engine loop, NULL for unread ones, and the ends of the plays' input."""
     read = {field for field, _, both in COLUMNS if both or options.inverse}
     places = [f"{writer.name}_{field}" if field in read else "NULL" for field, _, _ in COLUMNS]
     return [pointers(t, [*places, *_ends(t)], writer)] * (options.engine == "loop")
 
 
 def _relaxing(t: ChainTables, options: Options, writer: Writer) -> list[Table]:
-    """The same for the inverse of plays that relax."""
+    """Pointers for the inverse of plays that relax."""
     own = [f"{writer.name}_{'relaxing_' * ((field, kind, both) in RELAXING)}{field}" for field, kind, both in COLUMNS]
     wanted = t.moving.scanned and options.inverse
     return [pointers(t.plays, [*own, *_ends(t.plays)], writer, "relaxing")] * bool(wanted)
@@ -316,7 +316,7 @@ def _ends(t: FixedTables) -> list[str]:
 
 
 def _corner_tables(t: FixedTables, options: Options, writer: Writer, chain: bool) -> list[Table]:
-    """The tables of engine corners: one curve for both operators, and what a start memory is made of."""
+    """The tables of engine corners: one curve for both operators, and the contents of a start memory."""
     never = (t.reach[-1], t.way[-1], 0, 0, 1)
     plays = zip(t.reach[:-1], t.way[:-1], t.slope[1:], t.reciprocal[1:], t.shift[1:], strict=True)
     low, high = t.limits[slots.PLAY_MIN], t.limits[slots.PLAY_MAX]
@@ -333,7 +333,7 @@ def _corner_tables(t: FixedTables, options: Options, writer: Writer, chain: bool
 
 
 def _curves(t: FixedTables, options: Options, writer: Writer) -> tuple[list[Table], list[Macro]]:
-    """The curves of the memoryless part in use: forward and, for an inverse, back; and their sizes."""
+    """The curves of the memoryless part in use: forward, back for an inverse, and their sizes."""
     if not t.fronts:
         return [], []
     arrays: list[Table] = []
@@ -371,7 +371,7 @@ def _names(tables: Sequence[Table]) -> str:
 
 
 def _bumps(t: FixedMovingTables, writer: Writer) -> list[Table]:
-    """What bent plays add to themselves."""
+    """The curves of bent plays less the plays themselves."""
     curves = [_pieces(t.bump, k, f"bump_{k + 1}", writer) for k in range(len(t.bump.pieces))]
     rows = [f"{_names(curve)}, {n}" for curve, n in zip(curves, t.bump.pieces, strict=True)]
     return [
@@ -382,7 +382,7 @@ def _bumps(t: FixedMovingTables, writer: Writer) -> list[Table]:
 
 
 def _saturation(t: ChainTables, j: int, writer: Writer) -> Stage:
-    """What saturates behind the plays."""
+    """A stage of saturation behind the plays."""
     behind, own = t.behind, f"behind_{j + 1}"
     if behind.kind[j] == slots.DEAD_ZONE:
         lower, upper, *over = behind.piece[j]

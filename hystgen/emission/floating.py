@@ -42,11 +42,11 @@ if TYPE_CHECKING:
 
 COLUMNS = (("threshold", "threshold", True), ("inverse_slope", "reciprocal", False), ("weight", "weight", True),
            ("lift", "lift", False))
-"""Fields of the tables of engine loop, what their arrays are called, and whether both operators read them."""
+"""Fields of the tables of engine loop, the names of their arrays, and whether both operators read them."""
 
 DEAD_ZONE = (("break_x", 0, True), ("break_y", 0, False), ("anchor_x", 1, True), ("anchor_y", 1, True),
              ("slope", 1, True), ("inverse_slope", 1, False))
-"""Arrays of a dead zone, how many more entries than break points they have, and whether both operators read them."""
+"""Arrays of a dead zone, their numbers of entries beyond the break points, and whether both operators read them."""
 
 class Floating(Form):
     """Floating point."""
@@ -155,7 +155,7 @@ def _errors(t: Tables | ChainTables, options: Options, bounds: tuple[float, floa
 
 
 def _numbers(t: Tables, errors: Errors, options: Options, writer: Writer, chain: bool) -> Numbers:
-    """`chain`: of the plays in a model with effects."""
+    """The numbers of a model, or with `chain` of the plays in a model with effects."""
     stages = [_stage(t, j, f"stage_{j + 1}", options, writer) for j in range(len(t.stage_kind))]
     beside = [array for stage in stages for array in stage.arrays]
     if options.engine == "corners":
@@ -206,7 +206,7 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], operator: str, writ
     for start, memory in zip(starts, ("init", "reset"), strict=True):
         points = [f"{{{entries(point[:2])}}}" for point in start.center]
         text = points[0] if len(points) == 1 else f"\n{filled(points)}\n"
-        if text not in before:  # after init and after reset plays may hold the same
+        if text not in before:  # plays may start the same after init and after reset
             before[text] = f"{writer.name}_{operator}_{memory}_center"
             found.append(writer.line("real_t", f"{operator}_{memory}_center", text, len(points), 2))
         output, falling, rising = map(literal, start.bottom)

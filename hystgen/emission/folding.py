@@ -1,9 +1,9 @@
-"""Leaves out of the C of a model what does nothing in it.
+"""Removes code without effect from the C of a model.
 
 The run time is written for every model: it calls a hook where some model has a slew limit, a preview or a front. In a
-model without them the hook returns its argument, and what depends on it is decided: parameters that nothing uses,
-conditions that cannot hold, fields that nothing reads. This takes such functions, statements and fields out, so that
-what a reviewer reads is what the model does. It changes no operation on numbers.
+model without them the hook returns its argument, and whatever depends on it is decided: parameters that nothing uses,
+conditions that cannot hold, fields that nothing reads. Such functions, statements and fields are removed, so that a
+reviewer reads only what the model does. No operation on numbers changes.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ _HEAD = re.compile(r"(?P<before>(?:[\w*]+\s+\**)+?)(?P<name>hystgen_\w+)\((?P<pa
 _OWN = ("static ", "HYSTGEN_APART_IN_FLOAT ", "HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ",
         "HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART_IN_FIXED_CHAIN ", "HYSTGEN_APART_IN_CHAIN ",
         "HYSTGEN_APART ")
-"""How functions begin that only the model itself calls."""
+"""Words that begin functions which only the model itself calls."""
 _DELIMITED = (re.compile(r"(?:[(,?:]|(?<![=!<>])=|\breturn)\s*$"), re.compile(r"\s*[),;:]"))
-"""What stands before and behind a whole argument, initializer or answer."""
+"""Text before and after a whole argument, initializer or answer."""
 _MARK = re.compile(r"^ *\(void\)(\w+);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
-"""A statement that marks a parameter as not used."""
+"""A statement that marks a parameter as unused."""
 
 
 @dataclass(frozen=True)
 class Function:
-    """A function: what stands before its name, its parameters as they are declared, and its body."""
+    """A function: the text before its name, its parameters as declared, and its body."""
 
     above: str
     before: str
@@ -57,13 +57,13 @@ class Function:
 
     @property
     def operator(self) -> str:
-        """The operator whose instance `self` is, or nothing."""
+        """The operator whose instance `self` is, or empty."""
         found = re.search(r"hystgen_(forward|inverse)_t \*self\b", ", ".join(self.parameters))
         return found[1] if found else ""
 
     @property
     def statements(self) -> str:
-        """Its body on one line, without those that mark parameters as not used."""
+        """Its body on one line, without marks of unused parameters."""
         return " ".join(_COMMENT.sub("", _MARK.sub("", self.body)).split())
 
     def text(self) -> str:
@@ -72,7 +72,7 @@ class Function:
 
 
 def parsed(text: str) -> Function | None:
-    """The function that a piece is; None for another piece."""
+    """The function in a piece, or None if the piece is something else."""
     start = _COMMENT.match(text)
     above = text[: start.end() + 1] if start else ""
     found = _HEAD.match(text[len(above) :])
@@ -90,8 +90,8 @@ def folded(
     apart: Sequence[str],
     meaning: Callable[[str], str] = str,
 ) -> dict[str, Function]:
-    """The functions of a model without what does nothing. `wanted` names those that are called; otherwise as `Folding`.
-    """
+    """The functions of a model without code that does nothing. `wanted` names those that are called; the rest as in
+    `_Folding`."""
     comments: list[str] = []
 
     def mask(found: re.Match[str]) -> str:
@@ -113,9 +113,9 @@ def folded(
 
 
 class _Folding:
-    """The functions of a model's operators. `kernels`: others that they call, which stay as they are; `apart`: how
-    functions begin that the compiler keeps apart here, for the sake of the stack; `meaning`: of names of types, of
-    which several may stand for one here."""
+    """The functions of a model's operators. `kernels`: other functions that they call, which stay unchanged; `apart`:
+    words that begin functions which are not inlined here, to save stack; `meaning`: of names of types, several of which
+    may denote the same type here."""
 
     def __init__(
         self, functions: Sequence[Function], kernels: Sequence[Function], apart: Sequence[str],
@@ -126,7 +126,7 @@ class _Folding:
         self._apart, self._meaning = tuple(apart), meaning
 
     def once(self) -> bool:
-        """One round. Returns whether anything has changed."""
+        """Do one round. Returns whether anything changed."""
         before = dict(self.functions)
         self._unused_parameters()
         for name in list(self.functions):
@@ -140,7 +140,7 @@ class _Folding:
         self.functions[name] = replace(self.functions[name], body=body)
 
     def _calls(self, name: str, changed: Callable[[str, int, int, list[str]], str | None]) -> None:
-        """Change every call of a function; `changed` takes the body, where the call begins and ends, its arguments."""
+        """Change every call of a function; `changed` takes the body, the call's start and end, and its arguments."""
         for caller, function in self.functions.items():
             body, at = function.body, 0
             while found := re.compile(rf"\b{name}\(").search(body, at):
@@ -153,7 +153,7 @@ class _Folding:
                 self._change(caller, body)
 
     def _looks(self, expression: str) -> bool:
-        """Whether an expression only looks: it calls nothing that may change what it is given."""
+        """Whether an expression only reads: it calls nothing that may change its arguments."""
         called = [self.functions.get(each) or self._known.get(each) for each in re.findall(r"(\w+)\(", expression)]
         given = [kind for each in called if each for kind in each.parameters]
         return None not in called and all("*" not in kind or kind.startswith("const ") for kind in given)
@@ -176,7 +176,7 @@ class _Folding:
             def without(
                 body: str, start: int, end: int, arguments: list[str], name: str = name, kept: Sequence[bool] = kept
             ) -> str | None:
-                if len(arguments) != len(kept):  # done
+                if len(arguments) != len(kept):  # already changed
                     return None
                 return f"{body[:start]}{name}({', '.join(_where(arguments, kept))}){body[end:]}"
 
@@ -189,7 +189,7 @@ class _Folding:
                 yield _arguments(function.body, found.end())[1]
 
     def _fold(self, function: Function) -> None:
-        """Put what a function does in the place of its calls, where that is nothing, or one thing as it stands."""
+        """Replace the calls of a function by its body, if that is empty or a single simple statement."""
         does = function.statements
         if function.own and does == "":
             self._calls(function.name, _no_statement)
@@ -208,7 +208,7 @@ class _Folding:
             self._forward(function, found[2], f"{found[3]})", bool(found[1]))
 
     def _converted(self, name: str, kind: str) -> None:
-        """Leaves out calls that convert to the type that the argument has."""
+        """Remove calls that convert an argument to the type that it already has."""
         for caller, function in self.functions.items():
             same = {each for each, own in _declared(function).items() if self._same(own, kind)}
             for each in same:
@@ -216,7 +216,7 @@ class _Folding:
             self.functions[caller] = function
 
     def _forward(self, function: Function, name: str, rest: str, answers: bool) -> None:
-        """A function that is a call of another one, which the callers may call themselves."""
+        """Let callers call directly what this function only forwards to."""
         other = self.functions.get(name) or self._known.get(name)
         end, given = _arguments(rest, 0)
         if other is None or end != len(rest) or len(given) != len(other.names):
@@ -243,7 +243,7 @@ class _Folding:
         self._calls(function.name, called)
 
     def _same(self, one: str, other: str) -> bool:
-        """Whether two types are one."""
+        """Whether two names denote the same type."""
         def plain(kind: str) -> str:
             kind = " ".join(re.sub(r"\b(const|inline)\b", "", kind).split()).replace(" *", "*")
             return re.sub(r"\w+", lambda name: self._meaning(name[0]), kind)
@@ -251,7 +251,7 @@ class _Folding:
         return plain(one) == plain(other)
 
     def _decided(self) -> None:
-        """Conditions that hold or cannot, and copies of what does not change."""
+        """Resolve conditions that always or never hold, and copies of constants."""
         for name, function in list(self.functions.items()):
             body = function.body
             if function.own:
@@ -262,7 +262,7 @@ class _Folding:
                 body = f"{body[: answered.start()]}    return {answered[3]};\n"
             for found in _FLAG.finditer(body):
                 uses = len(re.findall(rf"(?<![.>\w]){found[1]}\b", body)) - 1
-                if uses == body.count(f"if ({found[1]}) {{"):  # nothing sets it
+                if uses == body.count(f"if ({found[1]}) {{"):  # never set
                     body = body.replace(found[0], "").replace(f"if ({found[1]}) {{", "if (false) {")
             for local in _UNUSED.finditer(body):
                 if len(re.findall(rf"(?<![.>\w]){local[1]}\b", body)) == 1 and _pure(local[2]):
@@ -274,7 +274,7 @@ class _Folding:
                 self._change(name, body)
 
     def _copies(self, function: Function, body: str) -> str:
-        """The body without constants that are another one, or a parameter, once more."""
+        """The body without constants that only repeat another constant or a parameter."""
         types = _declared(replace(function, body=body))
         for found in re.finditer(r"^ *const (\w+) (\w+) = (\w+);\n", body, re.MULTILINE):
             kind, copy, of = found.groups()
@@ -289,7 +289,7 @@ class _Folding:
         return body
 
     def _unread_fields(self, operator: str) -> None:
-        """Takes out what is only ever written, and what is only ever written false."""
+        """Remove fields that are never read, and those that are only ever set to false."""
         mine = {name: each for name, each in self.functions.items() if each.operator == operator}
         reads: dict[str, set[str]] = {}
         read: set[str] = set()
@@ -317,23 +317,23 @@ class _Folding:
 
 
 def _declared(function: Function) -> dict[str, str]:
-    """The types of parameters and of constants of a function."""
+    """The types of a function's parameters and constants."""
     constants = re.finditer(r"^ *const (\w+) (\w+) =", function.body, re.MULTILINE)
     return dict(zip(function.names, function.types, strict=True)) | {each[2]: each[1] for each in constants}
 
 
 _ASKED = r"(?:\bif \(|\|= )self->(\w+)(?:\)| \? \w+ : 0u;)"
-"""A field that decides alone."""
+"""A field that is a condition by itself."""
 _STORE = re.compile(r"^ *self->(\w+) = ([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
 
 
 def _pure(expression: str) -> bool:
-    """Whether an expression changes nothing: it calls only what is given no memory."""
+    """Whether an expression changes nothing: none of its calls gets a pointer to memory."""
     return not re.search(r"\([^()]*(?:\bself\b(?!->)|&)", expression)
 
 
 def _unmarked(body: str, gone: Collection[str]) -> str:
-    """The body without the marks of what is gone."""
+    """The body without marks for these parameters."""
     return _MARK.sub(lambda found: "" if found[1] in gone else found[0], body)
 
 
@@ -342,7 +342,7 @@ def _where(values: Sequence[str], kept: Sequence[bool]) -> tuple[str, ...]:
 
 
 def _arguments(text: str, start: int) -> tuple[int, list[str]]:
-    """Where a call ends whose arguments begin at `start`, and the arguments."""
+    """The end of a call whose arguments begin at `start`, and the arguments."""
     depth, found, begin = 0, [], start
     for at in range(start, len(text)):
         character = text[at]
@@ -356,13 +356,13 @@ def _arguments(text: str, start: int) -> tuple[int, list[str]]:
 
 
 def _delimited(body: str, start: int, end: int) -> bool:
-    """Whether a part of a body is a whole argument, initializer, answer or choice."""
+    """Whether part of a body is a whole argument, initializer, answer or choice."""
     before, behind = _DELIMITED
     return bool(before.search(body[:start])) and bool(behind.match(body[end:]))
 
 
 def _no_statement(body: str, start: int, end: int, _: list[str]) -> str | None:
-    """Without a call that is a statement."""
+    """The body without a call that is a statement of its own."""
     begin = body.rfind("\n", 0, start) + 1
     stop = body.find("\n", end) + 1
     if body[begin:start].strip() not in ("", "(void)") or body[end:stop].strip() != ";":
@@ -373,7 +373,7 @@ def _no_statement(body: str, start: int, end: int, _: list[str]) -> str | None:
 def _argument(
     body: str, start: int, end: int, arguments: list[str], place: int, same: bool
 ) -> str | None:
-    """With an argument in the place of the call."""
+    """The body with an argument in place of the call."""
     argument, whole = arguments[place], _delimited(body, start, end)
     if not whole and not same:
         return None
@@ -384,16 +384,16 @@ def _argument(
 
 
 _FLAG = re.compile(r"^ *bool (\w+)(?: = false)?;(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
-"""A local flag that is false, or without a value, at first."""
+"""A local flag that is initially false or unset."""
 _UNUSED = re.compile(r"^ *(?:const )?(?:unsigned )?\w+ \*?(\w+) =\s([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
 """A local variable with its first value."""
 _ANSWERED = re.compile(r"^    const (\w+) (\w+) =\s+([^;{]*);\n    return \2;\n\Z", re.MULTILINE)
-"""A constant that is the answer; the initializer of a struct is no expression."""
+"""A constant that is then returned; the initializer of a struct does not count, since it is no expression."""
 _IF = re.compile(r"^( *)(\} else )?if \(([^{};]*)\) \{\n", re.MULTILINE)
 
 
 def _without_branches(body: str) -> str:
-    """The body without blocks that never run and without empty ones, and with those that always run as they stand."""
+    """The body without branches that never run or are empty, and with the contents of those that always run."""
     for found in _IF.finditer(body):
         indent, chained, condition = found.groups()
         close = body.index(f"\n{indent}}}", found.end() - 1) + 1
@@ -416,7 +416,7 @@ _LOOKS = r"[^()]+|!?hystgen_finite\(\w+\)"
 
 
 def _choices(body: str) -> str:
-    """The body without choices between the same."""
+    """The body without choices between equal values."""
     return re.sub(r"[\w>-]+ \? ((?:self->)?\w+)\s+: \1(?=[;,)])", r"\1", body)
 
 

@@ -1,4 +1,4 @@
-"""What the files of a model say of it: the banner, the header's macros and calls, and the words of the C."""
+"""What the files of a model say about it: the banner, the header's macros and calls, and the glossary of the C."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 # Banner
 
 PERIODS = (50, 200)
-"""[samples] Periods for which the header states what is lost of a sine: a fast one, as long as the fastest sweep for
-which bounds are stated, and a slow one."""
+"""[samples] Periods for which the header states the loss of a sine: a fast one, as long as the fastest sweep with
+stated bounds, and a slow one."""
 
 
 def banner(file: str, what: str, command: str, sha256: str, details: Sequence[str] = ()) -> str:
-    """A banner; `command`: that made the file, `sha256`: hash of the parameters, `details`: lines of its own."""
+    """A banner; `command`: that made the file; `sha256`: hash of the parameters; `details`: further lines."""
     width = WIDTH - len(" * ")
     lines = []
     for line in details:
@@ -47,7 +47,7 @@ def banner(file: str, what: str, command: str, sha256: str, details: Sequence[st
 
 
 def command(parameters: Parameters, options: Options) -> str:
-    """The command that emits a model again."""
+    """The command that emits the model again."""
     origins: dict[str, None] = {}
     if effects := parameters.model.effects:
         from hystgen.effects import own as own_effects
@@ -60,14 +60,13 @@ def command(parameters: Parameters, options: Options) -> str:
 
 
 def conditions(one: Compensator) -> tuple[str, str]:
-    """The conditions of NAME_INVERSE_ROUNDING_ERROR in words: of two branches, and of the memory; empty ones do not
-    matter."""
+    """The conditions of NAME_INVERSE_ROUNDING_ERROR in words: on branches and on memory; empty if there is none."""
     branch = "both take the same branch" if one.variant.branches else ""
     return branch, one.numbers.errors.condition or UNSLEWED * one.variant.slew
 
 
 def unbounded(one: Compensator) -> list[str]:
-    """A bound of the inverse's error that says nothing."""
+    """A sentence if the bound of the inverse's error is useless."""
     if not one.options.inverse:
         return []
     limits, errors, form = one.numbers.tables.limits, one.numbers.errors, one.form
@@ -90,7 +89,7 @@ def reading(one: Compensator) -> list[str]:
 
 
 def _averaged(compiled: Compiled) -> list[str]:
-    """What holds the noise gain, what keeps modes from ringing, and what both cost."""
+    """The averages that hold the noise gain, the shaper or notch that keeps modes from ringing, and their cost."""
     from hystgen.compensator.chain.layout import LEAST_LATE
 
     found = []
@@ -113,7 +112,7 @@ def _averaged(compiled: Compiled) -> list[str]:
 
 
 def _branches(compiled: Compiled, parameters: Parameters) -> list[str]:
-    """What a drive that comes to rest in front of two branches leaves."""
+    """The error that a drive at rest in front of two branches leaves."""
     from hystgen.compensator.chain.bounds import kept_branch
 
     if not compiled.tables.turning:
@@ -126,7 +125,7 @@ def _branches(compiled: Compiled, parameters: Parameters) -> list[str]:
 
 
 def _quiet(one: Compensator, compiled: Compiled) -> list[str]:
-    """When and how far a drive is kept at rest."""
+    """When and how closely a drive is kept at rest."""
     from hystgen.compensator.chain.layout import DITHER
 
     t = compiled.tables
@@ -141,7 +140,7 @@ def _quiet(one: Compensator, compiled: Compiled) -> list[str]:
 
 
 def details(one: Compensator, notes: Sequence[str], estimate: Cost) -> list[str]:
-    """The lines of a header's banner; `notes`: how the inverse reads references, and what makes it of little use."""
+    """The lines of a header's banner; `notes`: how the inverse reads references, and why it may be of little use."""
     parameters, options = one.parameters, one.options
     about = comment_text(parameters.description)
     avr = [] if estimate.avr is None else [
@@ -192,7 +191,7 @@ def _model(one: Compensator) -> str:
 
 
 def selftest_cost(options: Options, found: Cost, samples: int) -> list[str]:
-    """What the self-test takes."""
+    """The memory that the self-test takes."""
     real = ARITHMETICS[options.arithmetic].bytes
     constants, instance = cost.selftest_bytes(real, found.memory, samples, cost.CORE_32)
     lines = ["", f"Cost (32-bit target): {constants} bytes of constants, {instance} bytes of RAM for its own instance"]
@@ -206,7 +205,7 @@ def selftest_cost(options: Options, found: Cost, samples: int) -> list[str]:
 
 
 def version_number() -> int:
-    """The version as a number that the preprocessor can compare; what is not final counts as its release."""
+    """The version as a number that the preprocessor can compare; a prerelease counts as its release."""
     major, minor, patch = map(int, re.findall(r"\d+", __version__)[:3])
     return 10000 * major + 100 * minor + patch
 
@@ -216,7 +215,7 @@ def _defined(one: Compensator, macros: Iterable[Macro]) -> list[str]:
 
 
 def typedefs(one: Compensator) -> list[str]:
-    """The types of a model's numbers, those of plays and sums too unless a shared run time has them."""
+    """The types of a model's numbers, including those of plays and sums unless a shared run time has them."""
     units, names, types = one.units, one.names, one.family.types
     real = f"typedef {one.family.real} {names.name}_real_t;"
     if not one.numbers.lsb:
@@ -233,7 +232,7 @@ def typedefs(one: Compensator) -> list[str]:
 
 
 def limits(one: Compensator) -> list[str]:
-    """The macros of the header that a model's numbers are in."""
+    """The header's macros for a model's numbers."""
     numbers, errors, form, units = one.numbers, one.numbers.errors, one.form, one.units
     bound, suffix = "against the double model, ", form.suffix
     drive, output = form.counted("drive", units.drive), form.counted("output", units.output)
@@ -261,7 +260,7 @@ def limits(one: Compensator) -> list[str]:
 
 
 def _timing(one: Compensator) -> list[Macro]:
-    """Macros about time: its sample time, and of a model with effects what follows from it."""
+    """Macros about time: the sample time, and for a model with effects its consequences."""
     kind, period, compiled = one.family.arithmetic.real, one.parameters.sample_time, one.compiled
     found: list[Macro] = [] if period is None else [("SAMPLE_TIME", literal(kind(period)), "s, from step to step")]
     if compiled is None:
@@ -336,7 +335,7 @@ COSTS = {
     "expected": _FEW,
     "correct": _FEW,
 }
-"""What a call takes; that of a step is counted for each model."""
+"""What a call costs; the cost of a step is counted for each model."""
 
 _ENTERED = ("INPUT_CLAMPED", "HELD")
 _SET = ("LIMITED_SETTING", "HELD")
@@ -351,13 +350,13 @@ BITS = {
     "set_travel": _SET,
     "correct": _SET,
 }
-"""Status bits that a call may set, in a model that has them."""
+"""Status bits that a call may set, if the model has them."""
 
 _PROTOTYPE = re.compile(r"(?P<answer>[\w ]+?) hystgen_(?P<op>forward|inverse)_(?P<call>\w+)\((?P<given>[^)]*)\);")
 
 
 def documented(pieces: Sequence[Piece], one: Compensator, cost: Cost) -> Iterator[Piece]:
-    """Prototypes of the interface of a model, each below what there is to know of it."""
+    """Prototypes of a model's interface, each below its documentation."""
     for piece in pieces:
         found = _PROTOTYPE.search(" ".join(piece.code.split()))
         assert found, piece.text
@@ -389,7 +388,7 @@ def _line(mark: str, text: str) -> list[str]:
 
 
 def _unit(what: str, one: Compensator) -> str:
-    """A quantity with its unit: of the drive or the output, as a code in fixed point."""
+    """A quantity with its unit: of the drive or the output, or a code in fixed point."""
     side = "drive" if what == "drive" else "output"
     words = {"drive": "drive", "output": "displacement", "reference": "reference"}[what]
     macro = f"{one.names.NAME}_{side.upper()}_LSB"
@@ -449,7 +448,7 @@ def _cost(call: str, op: str, one: Compensator, cost: Cost) -> str:
 # Words
 
 _CORNERS = "_corner_t"
-"""What only the corner engine names."""
+"""A name that only the corner engine uses."""
 
 WORDS = (
     ("play", r"\bplays?\b",
@@ -475,11 +474,11 @@ WORDS = (
      "the drive answered last: part of the memory only when the next call absorbs it, or the drive committed in its "
      "place"),
 )
-"""A word, what a text has that uses it, and what it means."""
+"""Each word, a pattern found in texts that use it, and its meaning."""
 
 
 def overview(text: str) -> str:
-    """A comment with the words that a C text uses; nothing for a text that uses none."""
+    """A comment that explains the words that a C text uses; empty if it uses none."""
     found = [f"{word}: {meaning}" for word, sign, meaning in WORDS if re.search(sign, text)]
     if not found:
         return ""

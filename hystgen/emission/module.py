@@ -1,4 +1,4 @@
-"""From a model to the text of its C files: the compensator in an arithmetic, the module, its files."""
+"""Turns a model into the text of its C files: the compensator in an arithmetic, the module, its files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import Compiled
 
 FORMS: dict[str, Form] = {"float": Floating(), "fixed": Fixed()}
-"""By the kind of an arithmetic."""
+"""By kind of arithmetic."""
 
 WHAT = {"both": "forward and inverse operator", "forward": "forward operator", "inverse": "inverse operator"}
 
@@ -87,8 +87,9 @@ def _variant(
 
 @dataclass(frozen=True)
 class Code:
-    """Texts: `types` of tables, `states`, of instances; `kernels` and `operators`, functions; `macros` of these; and
-    the tables that they name, with an entry for each play or `beside` them. `data`: all of it in memory."""
+    """The C text of a model: types of its tables and of its instances (`states`), functions (`kernels`, `operators`),
+    the macros and tables that they name (`plays`: with an entry for each play, `beside`: others), and `data`, all of it
+    in memory."""
 
     types: str
     states: str
@@ -106,14 +107,14 @@ class Code:
 
 
 def front(one: Compensator) -> str:
-    """The functions of a model with the names of the run time: of its stages, and those that name its blocks."""
+    """The functions of a model under the run time's names: those of its stages, and those that name its blocks."""
     stages = one.numbers.stages
     whole = template("front.c.j2", stages=stages, branches=one.variant.branches) if stages else ""
     return f"{whole}\n{one.glue.functions}" if one.glue else whole
 
 
 def composed(one: Compensator) -> Code:
-    """The C of a compensator. Raises EffectsError where that of the user's own effects cannot be taken."""
+    """The C of a compensator. Raises EffectsError if the C of a user's own effect is refused."""
     family, names, operators = one.family, one.names, one.options.operators
     own_types: list[runtime.Piece] = []
     own_functions: list[runtime.Piece] = []
@@ -162,16 +163,16 @@ def composed(one: Compensator) -> Code:
 
 
 def _named(operators: str, every: Sequence[Table]) -> Collection[str]:
-    """The tables that functions name, or another table that they name."""
+    """The tables that functions name, directly or through another table."""
     named = set(re.findall(r"\w+", operators))
-    for table in reversed(every):  # those that others name stand before them
+    for table in reversed(every):  # a table comes before those that name it
         if table.name in named:
             named |= set(re.findall(r"\w+", table.text))
     return named
 
 
 def implementation(one: Compensator, code: Code) -> str:
-    """The operators with the parts of the run time that they need, except those in a shared one."""
+    """The operators with the parts of the run time that they need, except those in a shared run time."""
     family, name, single = one.family, one.names.name, one.options.layout == "single-header"
     opening, apart, closing = (
         runtime.verbatim(files, name, family, name)
@@ -187,10 +188,10 @@ def implementation(one: Compensator, code: Code) -> str:
 
 @dataclass(frozen=True)
 class Module:
-    """All that the files of a model show.
+    """Everything that the files of a model show.
 
-    `sha256`: hash of the parameters; `reading`: how the inverse of a model with effects reads the reference, in a
-    sentence for each option; `doubts`: what makes the inverse of little use, in sentences.
+    `sha256`: hash of the parameters; `reading`: how the inverse of a model with effects reads the reference, one
+    sentence per option; `doubts`: why the inverse may be of little use, in sentences.
     """
 
     compensator: Compensator
@@ -202,17 +203,17 @@ class Module:
 
     @property
     def name(self) -> str:
-        """That of the model."""
+        """The model's name."""
         return self.compensator.names.name
 
     @property
     def calls(self) -> Mapping[str, Sequence[str]]:
-        """By operator, the functions that it has in addition to those of every model."""
+        """By operator, the functions that it adds to those of every model."""
         return self.compensator.calls
 
 
 def of(parameters: Parameters, cascade: StaticModel, options: Options, sha256: str = "") -> Module:
-    """The module of a model; `sha256`: hash of the parameters in the file, by default of `parameters`.
+    """The module of a model; `sha256`: hash of the parameters in the file, by default the hash of `parameters`.
 
     Raises tables.FormatError.
     """
@@ -275,7 +276,7 @@ def files(module: Module) -> dict[str, str]:
 
 
 def _tidy(text: str) -> str:
-    """No trailing blanks, no runs of blank lines, one newline at the end."""
+    """The text without trailing blanks or runs of blank lines, and with one newline at the end."""
     lines: list[str] = []
     for line in text.splitlines():
         stripped = line.rstrip()

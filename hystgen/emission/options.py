@@ -1,4 +1,4 @@
-"""What to emit, and the banner of every emitted file: what made the file, and whether it has been edited since."""
+"""The options of emission, and the banner of every emitted file, which records its origin and any later edit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ OPTIONS = {
     "engine": ("corners", "loop"),
     "layout": ("self-contained", "shared-runtime", "single-header"),
 }
-"""Options of the command that a banner names, and their values."""
+"""Options of the command in a banner, and their values."""
 
 LAYOUTS = OPTIONS["layout"]
 OPERATORS = OPTIONS["operator"]
@@ -30,9 +30,9 @@ _SEAL = re.compile(r"^ \* Text: sha256 ([0-9a-f]{64}), (?:of this file )?without
 
 @dataclass(frozen=True)
 class Options:
-    """What to emit: `operator` inverse, forward or both; `engine` corners or loop; see LAYOUTS for `layout`.
+    """The options of emission: `operator` inverse, forward or both; `engine` corners or loop; see LAYOUTS for `layout`.
 
-    `left_out`: effects that the C does not have, in words, if leaving them out is allowed.
+    `left_out`: effects that the C does not include, in words, if leaving them out is allowed.
     """
 
     operator: str
@@ -43,24 +43,24 @@ class Options:
 
     @property
     def operators(self) -> tuple[str, ...]:
-        """The operators that are part of it."""
+        """The operators included."""
         return ("forward", "inverse") if self.operator == "both" else (self.operator,)
 
     @property
     def forward(self) -> bool:
-        """Whether the forward operator is part of it."""
+        """Whether the forward operator is included."""
         return self.operator in ("forward", "both")
 
     @property
     def inverse(self) -> bool:
-        """Whether the inverse operator is part of it."""
+        """Whether the inverse operator is included."""
         return self.operator in ("inverse", "both")
 
 
 @dataclass(frozen=True)
 class Banner:
-    """What a banner says: `version` of hystgen, `options` of its command, hash of the `parameters`; `edited`: whether
-    the file has changed since it was sealed; `model`: its name, empty for a run time that models share."""
+    """The contents of a banner: `version` of hystgen, `options` of its command, hash of the `parameters`; `edited`:
+    whether the file has changed since it was sealed; `model`: its name, empty for a shared run time."""
 
     version: str
     options: dict[str, str]
@@ -78,7 +78,7 @@ def seal(text: str) -> str:
 
 
 def read_banner(text: str) -> Banner | None:
-    """The banner of a file with line ends LF, None if it has none. Values that no option has are left out."""
+    """The banner of a file with line ends LF, None if it has none. Values that no option takes are left out."""
     generated, parameters, sealed = (form.search(text) for form in (_GENERATED, _PARAMETERS, _SEAL))
     if generated is None or parameters is None:
         return None

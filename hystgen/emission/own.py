@@ -1,9 +1,9 @@
-"""The C of an effect of the user's own: its file, checked, as pieces of the run time.
+"""The C of a user's own effect: its file, checked, as pieces of the run time.
 
-The file is the user's own code and is carried as it stands, with the model's name in front of its own. It may contain
-what blocks of the catalogue contain: two types, of the numbers and of the memory, named as in Python, and four
-functions, with further static functions that they call. Written with `hystgen_product` it is the same for every
-arithmetic. The language is not checked: `hystgen verify` shows what compiles, and to which bits.
+The file is the user's code and is carried unchanged, except that its names get the model's name in front. It may
+contain what blocks of the catalogue contain: two types, one of the numbers and one of the memory, named as in Python,
+and four functions, with further static functions that they call. Written with `hystgen_product` it is the same for
+every arithmetic. The language is not checked: `hystgen verify` shows whether it compiles, and to which bits.
 """
 
 from __future__ import annotations
@@ -24,26 +24,26 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables
 
 MOST_BYTES = 1 << 16
-"""Of a C file of the user's; the largest block of the package itself has 6 kB."""
+"""Largest C file of a user's effect; the largest block of the package itself has 6 kB."""
 
 INCLUDE = '#include "hystgen_runtime.h"'
-"""The one preprocessor line that a file has, so that it compiles by itself."""
+"""The one preprocessor line in a file, so that it compiles by itself."""
 
 CALLED = frozenset(["if", "for", "while", "switch", "return", "sizeof"])
-"""Words before a parenthesis that call nothing."""
+"""Words before a parenthesis that are not calls."""
 
 REFUSED = {
     "float": "hystgen_signal_t", "double": "hystgen_signal_t", "extern": "nothing", "volatile": "nothing",
     "asm": "C", "union": "struct", "goto": "a loop", "register": "nothing", "auto": "a type",
 }
-"""Words that a file may not contain, and what to write instead."""
+"""Words that a file may not contain, and their replacements."""
 
 GIVEN = frozenset(["hystgen_signal_t", "hystgen_number_t", "hystgen_product"])
 """Names of the run time that a file may use."""
 
 
 def pieces(t: ChainTables) -> tuple[list[Piece], list[Piece]]:
-    """Types and functions of the blocks of a model that are the user's own; raises as `of_effect`."""
+    """Types and functions of a model's user-defined blocks; raises as `of_effect`."""
     effects = dict.fromkeys(getattr(t, "own_effects", ()))
     found = [of_effect(effect) for effect in effects]
     types, functions = ([each for pair in found for each in pair[way]] for way in (0, 1))
@@ -82,11 +82,11 @@ _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 
 
 def _code(text: str) -> str:
-    """The text with its comments blank, line by line.
+    """The text with its comments blanked, line by line.
 
-    A compiler takes the same for comments only because `_of_lines` refuses whatever it replaces before, which are
-    trigraphs and lines joined by a backslash, and all else in which a comment does not begin: texts, characters, and
-    comments with //.
+    A compiler sees the same comments only because `_of_lines` refuses everything that is replaced before comments are
+    read (trigraphs and lines joined by a backslash) and everything inside which a comment cannot begin: strings,
+    characters, and comments with //.
     """
     return _COMMENT.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
 
@@ -96,7 +96,7 @@ EVERYWHERE = (
     (r"\\", "a backslash, which joins two lines even inside a comment; leave it out"),
     (r"\?\?", "two question marks, which begin a trigraph; write one"),
 )
-"""What no line may have, comments included."""
+"""Forbidden in every line, comments included."""
 
 IN_CODE = (
     (r"<:|:>|<%|%>|%:", "{0}, a digraph; write the character that it stands for"),
@@ -108,7 +108,7 @@ IN_CODE = (
     (r"[/%]", "a division; put the reciprocal in the table"),
     (r"(?<!\w)(?:\d+\.|\.\d|\d+[eE])", "a number with a fraction; put it in the table, rounded as Python has it"),
 )
-"""What no line may have outside comments; the first is told."""
+"""Forbidden outside comments; only the first match in a line is reported."""
 
 
 def _of_lines(text: str) -> Iterator[tuple[int, str]]:
@@ -164,7 +164,7 @@ def _split(text: str, problems: list[tuple[int, str]]) -> Iterator[Piece]:
 
 
 def _above(text: str, behind: int, begin: int) -> int:
-    """Where the comments begin that stand right above a piece, without an empty line; its own begin without any."""
+    """Start of the comments directly above a piece, without an empty line; the piece's own start if there are none."""
     for comment in reversed(list(_COMMENT.finditer(text, behind, begin))):
         if text[comment.end() : begin].strip() or "\n\n" in text[comment.end() : begin]:
             break
@@ -173,7 +173,7 @@ def _above(text: str, behind: int, begin: int) -> int:
 
 
 def _end(code: str, begin: int) -> int:
-    """Where a type or function ends: at the brace that closes a function, else at a semicolon."""
+    """End of a type or function: the brace that closes a function, else a semicolon."""
     depth = 0
     for at in range(begin, len(code)):
         depth += {"{": 1, "}": -1}.get(code[at], 0)
@@ -184,7 +184,7 @@ def _end(code: str, begin: int) -> int:
 
 
 def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int, str]]:
-    """What a block has besides its types and functions, and what it lacks."""
+    """Problems of a block: extra content besides its types and functions, and missing ones."""
     own_name, wanted = f"hystgen_{kind.name}", dict(_declared(kind))
     names = [piece.name for piece in found]
     functions = {piece.name for piece in found if "typedef" not in piece.text}
@@ -217,14 +217,14 @@ def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int,
 
 
 BRANCHING = frozenset(["if", "for", "while", "switch"])
-"""Words before parentheses behind which an expression may begin with another one."""
+"""Words before parentheses that may be followed by an expression in parentheses."""
 
 CAST = re.compile(r"\b(?:const|unsigned|int|bool|void|size_t|(?:u?int(?:8|16|32|64)|hystgen_\w+)_t)\b|\*\s*$")
 """Words of a type in parentheses in front of a value."""
 
 
 def _calls(code: str) -> Iterator[tuple[int, str]]:
-    """Places and names of what is called: a word in front of a parenthesis, or an expression that is in one itself."""
+    """Places and names of calls: a word in front of a parenthesis, or an expression that is itself in parentheses."""
     for found in re.finditer(r"(\w+)\s*\(", code):
         yield found.start(), found[1]
     for found in re.finditer(r"\)\s*\(", code):
@@ -241,12 +241,12 @@ def _calls(code: str) -> Iterator[tuple[int, str]]:
 
 
 def _bare(declared: str) -> str:
-    """A declaration without spaces and without the `const` of a memory, neither of which matters."""
+    """A declaration without spaces and without `const` on its memory, since neither matters."""
     return re.sub(r"\s+", "", re.sub(r"const (hystgen_\w+ \*self)", r"\1", declared))
 
 
 def _declared(kind: Kind) -> Iterator[tuple[str, str]]:
-    """Names of types and functions of a block, and how they are declared."""
+    """Names of a block's types and functions, and their declarations."""
     name = f"hystgen_{kind.name}"
     for own_type, member, names in ((f"{name}_table_t", "number", kind.table), (f"{name}_t", "signal", kind.state)):
         yield own_type, f"typedef struct {{ {' '.join(f'hystgen_{member}_t {each};' for each in names)} }} {own_type};"

@@ -1,8 +1,8 @@
-"""The hand-written C of `c_runtime/` and of the folders of effects, as text to be carried by emitted files.
+"""The hand-written C of `c_runtime/` and of the folders of effects, as text for emitted files.
 
-A file is a sequence of top-level pieces (functions, tables, types, constants). Only the pieces that a model needs are
-carried. Where a file has several forms of a piece, `#ifdef` on a fact of the model (`FACTS`) chooses one of them, as a
-compiler would. Names that a run time defines, which models may share, have its prefix; all others have the model's
+A file is a sequence of top-level pieces (functions, tables, types, constants). Emitted files carry only the pieces that
+a model needs. Where a file has several forms of a piece, `#ifdef` on a fact of the model (`FACTS`) selects one of them,
+as a compiler would. Names defined by a run time, which models may share, get its prefix; all others get the model's
 name.
 """
 
@@ -24,10 +24,10 @@ from hystgen.arithmetic import FIXED, FLOATING, Arithmetic
 from hystgen.emission import folding
 
 FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")
-"""Macros that say what a model has. Conditions on them are decided when C is emitted; others are carried."""
+"""Macros that state facts about a model. Conditions on them are decided at emission; others are carried."""
 
 OPERATORS = ("forward", "inverse")
-"""A file with functions `hystgen_operator_..` is written for either: it is emitted for each, under its name."""
+"""A file with functions `hystgen_operator_..` serves both operators: it is emitted once for each, under its name."""
 
 FLOAT_KERNELS = (
     "front/tanh_{bits}.c",
@@ -84,20 +84,20 @@ FIXED_CHAIN_BLOCKS = (
 SIGNALS = {
     "hystgen_signal_t": "hystgen_sum_t", "hystgen_fine_t": "hystgen_play_t", "hystgen_travel_t": "hystgen_sum_t",
 }
-"""Types between the blocks of a model with effects in fixed point; elsewhere they are those of codes, but in engine
-loop without effects signals are as wide as sums of the plays."""
+"""Types of signals between blocks in fixed point with effects; elsewhere they are the types of codes, except that in
+engine loop without effects signals are as wide as sums of the plays."""
 
 FINE = {
     "HYSTGEN_FINE_MIN": "HYSTGEN_DRIVE_MIN", "HYSTGEN_FINE_MAX": "HYSTGEN_DRIVE_MAX",
     "hystgen_clamp_fine": "hystgen_clamp_drive",
 }
-"""Names of numbers finer than a drive code in such a model, and what they stand for elsewhere."""
+"""Names of numbers finer than a drive code in such a model, and their meaning elsewhere."""
 
 SUMS = ("play_t", "reach_t", "sum_t")
-"""Types of plays, which in floating point are that of every number."""
+"""Types of plays; in floating point every number has the same type."""
 
 NUMBER = "hystgen_number_t"
-"""What a block of the user's own multiplies with, in floating point a number like any other."""
+"""The type that a user's own block multiplies with; in floating point an ordinary number."""
 
 FIXED_KERNELS = (
     "arithmetic/division.c",
@@ -113,14 +113,14 @@ APART = "HYSTGEN_APART "
 
 @dataclass(frozen=True)
 class Family(ABC):
-    """An arithmetic in C: its files of the run time and its types; `chain`: in a model with effects, `loop`: in one
-    without, in engine loop.
+    """An arithmetic in C: its run-time files and its types; `chain`: in a model with effects; `loop`: in a model
+    without effects in engine loop.
 
-    `kind`: the kind of arithmetic, in names of files, and `ending` of those that have none for floating point;
-    `chain_types`, `chain_blocks`: files of effects; `curves`: those of a memoryless part whose stages no function calls
-    one by one, `codes`: those of codes; `moves_apart`: plays that are moved and bent take less of the stack in
-    functions of their own; `opening`: headers before all code of a file; in a single header between `opening_apart` and
-    `closing`, so that its user's code is compiled as before.
+    `kind`: the kind of arithmetic, in names of files; `ending`: of files whose floating-point names have none;
+    `chain_types`, `chain_blocks`: files of effects; `curves`: of a memoryless part whose stages are not called one by
+    one; `codes`: of codes; `moves_apart`: whether moving and bending plays takes less stack in separate functions;
+    `opening`: headers before all code of a file, which in a single header stand between `opening_apart` and `closing`,
+    so that its user's code is compiled as before.
     """
 
     arithmetic: Arithmetic
@@ -138,11 +138,11 @@ class Family(ABC):
     opening_apart: ClassVar[tuple[str, ...]] = ()
     closing: ClassVar[tuple[str, ...]] = ()
     kernels: ClassVar[tuple[str, ...]] = ("kernels.h",)
-    """Headers of the run time that have the prototypes of its kernels."""
+    """Headers of the run time with the prototypes of its kernels."""
     build: ClassVar[tuple[str, ...]] = ("arithmetic/build.h",)
     """Headers that check how code is built."""
     shared_version: ClassVar[int] = 3
-    """Of the interface between emitted models and a shared run time."""
+    """Version of the interface between emitted models and a shared run time."""
 
     @property
     def bits(self) -> str:
@@ -151,7 +151,7 @@ class Family(ABC):
 
     @property
     def shared_file(self) -> str:
-        """The name of a shared run time's files."""
+        """The file name of a shared run time, without its ending."""
         return f"hystgen_runtime_{self.bits}"
 
     @property
@@ -161,57 +161,57 @@ class Family(ABC):
 
     @property
     def facts(self) -> frozenset[str]:
-        """What is true of every model of it."""
+        """Facts about every model in this arithmetic."""
         return frozenset([*self.arithmetic.facts, *["HYSTGEN_CHAIN"] * self.chain])
 
     @property
     def types(self) -> Mapping[str, str]:
-        """Types of the run time beside `real_t`."""
+        """Types of the run time other than `real_t`."""
         return self.arithmetic.types
 
     @property
     def signals(self) -> dict[str, str]:
-        """Names in code that models with and without effects share, and their meaning here."""
+        """Names in code shared by models with and without effects, and their meaning here."""
         return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE
 
     @property
     def casts(self) -> bool:
-        """Whether conversions stay that lead to the type of inputs and answers."""
+        """Whether conversions to the type of inputs and answers are kept."""
         return False
 
     @abstractmethod
     def storage(self, corners: bool) -> dict[str, str]:
-        """Words before functions, and what stands there in this arithmetic, in engine corners or loop."""
+        """Replacements of the storage-class words before functions in this arithmetic, in engine corners or loop."""
 
     def corners(self, plays: int) -> int:
-        """How many corners the corner engine takes for so many plays."""
+        """Number of corners that the corner engine keeps for so many plays."""
         return max(plays, 1)
 
     def alike(self, kind: str) -> str:
-        """The name of a type, or that of the type that it is."""
+        """The name of a type, or of the type that it equals here."""
         return kind
 
     def meaning(self, kind: str) -> str:
-        """The type that a name stands for here, both without prefix."""
+        """The type that a name denotes here, both without prefix."""
         return self.alike(self.signals.get(f"hystgen_{kind}", kind).removeprefix("hystgen_"))
 
     @property
     def tables(self) -> tuple[str, ...]:
-        """The headers of the run time that have the types of its tables."""
+        """The run-time headers with the types of its tables."""
         return (f"plays/tables_{self.kind}.h",)
 
     @property
     def states(self) -> tuple[str, ...]:
-        """The headers of the run time that have the types of its memory."""
+        """The run-time headers with the types of its memory."""
         return (f"plays/state_{self.kind}.h",)
 
     @property
     @abstractmethod
     def kernel_files(self) -> tuple[str, ...]:
-        """The files with its kernels, callees before callers."""
+        """The files of its kernels, callees before callers."""
 
     def soft(self, kernels: str) -> tuple[str, ...]:
-        """The header with what the corner engine asks of floating point, where it is among these kernels."""
+        """The header with the corner engine's floating-point requirements, if these kernels use it."""
         return ("arithmetic/soft_float.h",) if "_SOFT_FLOAT" in kernels else ()
 
 
@@ -287,14 +287,14 @@ FAMILIES: dict[str, Family] = {
 
 @dataclass(frozen=True)
 class Variant:
-    """The kind of a model, which decides on the files of the run time that its operators are made of.
+    """The kind of a model, which decides the run-time files that its operators are made of.
 
-    `fronts`: it has a memoryless part, `branches`: one of two branches; `finer`: inputs of the plays have bits below a
-    drive code, or with effects what arrives there has bits below them; `saturates`: output codes are limited;
-    `start_list`: each play starts at its own value; `chain`: it has effects, `slew`: one of them keeps the drive within
-    a rate, `braked`: and a lag behind that from overshooting, `quiet`: the drive stands still at rest, `turning`: a lag
-    arrives at two branches, `waits`: it does not act at once, `previews`: references are summed, `ages`: one is a gain
-    that follows the travel, `moves` and `bends`: how plays move and are bent where that is not as in engine loop.
+    `fronts`: it has a memoryless part; `branches`: with two branches; `finer`: inputs of the plays, or with effects the
+    signals in front of them, have further bits; `saturates`: output codes are limited; `start_list`: each play starts
+    at its own value; `chain`: it has effects; `slew`: the drive's rate is limited; `braked`: a lag behind that is kept
+    from overshooting; `quiet`: the drive stands still at rest; `turning`: a lag arrives at two branches; `waits`: it
+    has a delay; `previews`: references are summed; `ages`: it has a gain that follows the travel; `moves`, `bends`: how
+    plays move and are bent, if not as in engine loop.
     """
 
     engine: str
@@ -317,13 +317,13 @@ class Variant:
 
     @property
     def apart(self) -> tuple[str, ...]:
-        """How functions begin that the compiler keeps apart here."""
+        """Words that begin functions which are not inlined here."""
         storage = self.family.storage(self.engine == "corners")
         return (APART, *(word for word, here in storage.items() if here == APART))
 
     @property
     def facts(self) -> frozenset[str]:
-        """What is true of the model, beside what its arithmetic says."""
+        """Facts about the model, besides those of its arithmetic."""
         bent = self.bends not in ("", "none")
         found = {
             "CORNERS": self.engine == "corners", "START_LIST": self.start_list,
@@ -352,7 +352,7 @@ class Variant:
         return (*files, "compensator/drive.c", *own, "compensator/status.c")
 
     def _chain(self) -> tuple[str, ...]:
-        """The files of a chain, apart from its blocks: of a model with effects, or of engine loop."""
+        """The files of a chain except its blocks: for a model with effects, or for engine loop."""
         chain, moving = "compensator/chain/", "effects/rate_dependence/"
         loops, solve, refined = self.engine == "loop", f"{chain}plays_solve.c", f"{chain}refined_input.c"
         if not loops:
@@ -401,14 +401,13 @@ def _environment() -> jinja2.Environment:
 
 
 def template(template: str, /, **values: object) -> str:
-    """The text of a template with these values."""
+    """The text of a template filled in with these values."""
     return _environment().get_template(template).render(values)
 
 
 @dataclass(frozen=True)
 class Member:
-    """A member of a structure: its type without the prefix, lengths of an array, and how many bits it takes of a whole
-    number, 0 for one by itself."""
+    """A member of a structure: its type without prefix, the lengths of an array, and its bits in a bit field, or 0."""
 
     kind: str
     pointer: bool
@@ -431,7 +430,7 @@ class Piece:
 
     @property
     def members(self) -> tuple[Member, ...]:
-        """What it declares, if it is a structure."""
+        """The members that it declares, if it is a structure."""
         head, _, body = self.code.partition("{")
         if "typedef struct" not in head:
             return ()
@@ -444,7 +443,7 @@ class Piece:
 
     @property
     def contents(self) -> tuple[tuple[str, int], ...]:
-        """Type and number of what it defines, if it is a constant."""
+        """Type and number of the values that it defines, if it is a constant."""
         found = _CONSTANT.search(self.code)
         return ((found[1], math.prod(map(int, re.findall(r"\d+", found[2])))),) if found else ()
 
@@ -461,7 +460,7 @@ _NAME = re.compile(r"\b(?:hystgen|HYSTGEN)_\w+")
 
 
 def split_pieces(source: str) -> list[Piece]:
-    """The top-level pieces of a file, and of lines of the preprocessor the constants."""
+    """The top-level pieces of a file; of preprocessor lines only constants."""
     pieces = []
     lines: list[str] = []
     depth = 0
@@ -479,7 +478,7 @@ def split_pieces(source: str) -> list[Piece]:
         if not depth and not constant and line.startswith("#"):
             lines = []
             continue
-        if not depth and not inside and not line.strip():  # a comment above it is about the file
+        if not depth and not inside and not line.strip():  # a comment above it belongs to the file
             lines = []
             continue
         lines.append(line)
@@ -510,9 +509,9 @@ _CONDITION = re.compile(r"#\s*(ifdef|ifndef|if|elif|else|endif)\b(.*)")
 
 
 def chosen(source: str, facts: Collection[str]) -> str:
-    """The text of a file with what its conditions on facts choose where these hold; other conditions stay in it."""
+    """The text of a file with its conditions on facts resolved; other conditions stay in it."""
     kept = []
-    opened: list[tuple[bool, bool, bool]] = []  # is on facts, has chosen one of its sections, takes this one
+    opened: list[tuple[bool, bool, bool]] = []  # is on facts, has selected a section, takes this one
     for line in source.splitlines(keepends=True):
         found = _CONDITION.match(line)
         if not found:
@@ -547,8 +546,8 @@ def _holds(word: str, condition: str, facts: Collection[str]) -> bool:
 
 
 def forms(source: str, facts: Collection[str]) -> list[str]:
-    """The text of a file with what its conditions choose: of one for either operator, that of both. What either is
-    given, `operator_x`, is called as in its step."""
+    """The text of a file with its conditions resolved, once for each operator if it serves both. The argument
+    `operator_x` is then named as in that operator's step."""
     if "hystgen_operator_" not in source:
         return [chosen(source, facts)]
     return [
@@ -569,7 +568,7 @@ def kernel_pieces(family: Family) -> list[Piece]:
 
 
 def carried(family: Family, pieces: Iterable[Piece]) -> list[Piece]:
-    """The pieces of kernel files that `pieces` need although a shared run time keeps them to itself."""
+    """The kernel pieces that `pieces` need but a shared run time keeps private."""
     shared = {piece.name for piece in _pieces(family.kernels, family.facts)}
     own = [piece for piece in kernel_pieces(family) if piece.name not in shared]
     return needed(own, sorted(used(pieces)))
@@ -581,7 +580,7 @@ def table_pieces(family: Family) -> list[Piece]:
 
 
 def memory_pieces(family: Family) -> list[Piece]:
-    """The types that instances and tables of an arithmetic are made of."""
+    """The types that an arithmetic's instances and tables are made of."""
     return _pieces(family.states, family.facts)
 
 
@@ -592,8 +591,8 @@ def operator_pieces(
     calls: Mapping[str, Iterable[str]] = MappingProxyType({}),
     own: Sequence[Piece] = (),
 ) -> list[Piece]:
-    """The functions of a model's operators, with those that `glue` defines for it, without what does nothing; `calls`
-    as for `api`; `own`: of blocks that are the user's own, which stay as they are."""
+    """The functions of a model's operators, including those in `glue`, without code that does nothing; `calls`: as for
+    `api`; `own`: functions of a user's own blocks, which stay unchanged."""
     family = variant.family
     blocks = family.chain_blocks if variant.chain else ()
     roots = [piece.name for op in operators for piece in _calls(op, calls.get(op, ()))]
@@ -628,12 +627,12 @@ def _piece(text: str) -> Piece:
 
 
 def chain_types(own: Iterable[Piece], glue: str, family: Family) -> list[Piece]:
-    """The types of blocks, those of the user's own last, and then of instances of models with effects."""
+    """The types of blocks, a user's own last, and then of instances of models with effects."""
     return [*_pieces(family.chain_types, family.facts), *own, *split_pieces(glue)]
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
-    """Prototypes of an operator: those of every model, and those of models with effects that are named."""
+    """Prototypes of an operator: those of every model, and the named ones of models with effects."""
     prefix = f"hystgen_{operator}_"
     usual = [piece for piece in _pieces(["compensator/api.h"], ()) if piece.name.startswith(prefix)]
     chain = {prefix + each for each in more}
@@ -654,7 +653,7 @@ def state_pieces(variant: Variant, family: Family, operators: Iterable[str], fun
 
 
 def needed(pieces: Iterable[Piece], roots: Iterable[str]) -> list[Piece]:
-    """The pieces that `roots` need, in their order; names in `roots` that no piece has are defined elsewhere."""
+    """The pieces that `roots` need, in order; names in `roots` without a piece are defined elsewhere."""
     by_name = {piece.name: piece for piece in pieces}
     wanted: set[str] = set()
     queue = [name for name in roots if name in by_name]
@@ -672,7 +671,7 @@ def used(pieces: Iterable[Piece]) -> set[str]:
 
 
 def _joined(pieces: Iterable[Piece]) -> str:
-    """Their text, with an empty line between them unless a constant shares the comment of the one before."""
+    """The text of pieces, separated by empty lines unless a constant shares the comment of the one before."""
     text = ""
     for piece in pieces:
         shared = piece.text.startswith("#define") and text.rpartition("\n\n")[2].count("#define")
@@ -690,7 +689,7 @@ def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -
 
 
 def _stored(text: str, family: Family, corners: bool) -> str:
-    """The text with what stands before functions in this arithmetic."""
+    """The text with storage-class words replaced for this arithmetic."""
     for word, here in family.storage(corners).items():
         text = text.replace(word, here)
     return text
@@ -707,7 +706,7 @@ def render_operators(
 ) -> str:
     """Operators, or the types of their instances, as C text of the model `name` with the run time `prefix`.
 
-    `corners`: how many the corner engine takes, 0 for engine loop; `carried`: as in `render_carried`.
+    `corners`: number of corners that the corner engine keeps, 0 for engine loop; `carried`: as in `render_carried`.
     """
     text = _stored(_joined(pieces), family, corners > 0)
     text = text if family.chain else text.replace("HYSTGEN_ALONE ", "")
@@ -723,14 +722,14 @@ def api(
     calls: Mapping[str, Iterable[str]],
     documented: Callable[[Sequence[Piece]], Iterable[Piece]],
 ) -> str:
-    """Prototypes of a model's functions; `calls`: by operator, the functions it has in addition; `documented`: puts
-    above each what there is to know of it."""
+    """Prototypes of a model's functions; `calls`: additional functions by operator; `documented`: puts the
+    documentation above each prototype."""
     every = [piece for op in operators for piece in documented(_calls(op, calls.get(op, ())))]
     return _named("\n".join(piece.text for piece in every), prefix, family, name)
 
 
 def verbatim(files: Iterable[str], owner: str, family: Family, name: str) -> str:
-    """Whole files behind their first paragraph, of the module `name`; `owner` is named in messages."""
+    """Whole files without their first paragraph, for the module `name`; `owner` is named in messages."""
     whole = [chosen(_read(file).partition("\n\n")[2], family.facts) for file in files]
     text = "\n".join(whole).replace('"hystgen: ', f'"{owner}: ')
     return _named(text, name, family, name)
@@ -748,7 +747,8 @@ def _own(family: Family) -> frozenset[str]:
 def _named(
     text: str, prefix: str, family: Family, name: str, carried: frozenset[str] = frozenset()
 ) -> str:
-    """The text with the names of a model and of its run time; `carried`: those that the model has in its place."""
+    """The text with the names of a model and of its run time; `carried`: run-time names that the model carries
+    itself."""
     for shared, here in family.signals.items():
         cast = f"({shared})"
         if here == "hystgen_real_t" and not family.casts:

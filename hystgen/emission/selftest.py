@@ -20,18 +20,18 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables
 
 CALLS = {slots.OP_STEP: "s", slots.OP_COMMIT: "c", slots.OP_RESET: "r"}
-"""Letters of the calls that every model has."""
+"""Letters of the calls in every model."""
 
 LETTERS = {
     "push": "p", "settle": "q", "set_offset": "o", "set_temperature": "t", "set_gain": "g", "set_travel": "d",
 }
-"""Letters of the settings of models with effects."""
+"""Letters of the settings in models with effects."""
 
 WIDE = ("set_travel",)
-"""Settings that take more bits than a code, too many for the samples of fixed point."""
+"""Settings with more bits than a code, too many for fixed-point samples."""
 
 SHARE = 0.125
-"""[share of its span] The samples change a setting by this much: so little that references stay in reach."""
+"""[share of its span] How far the samples change a setting: little enough that references stay within reach."""
 
 
 def _fractions(length: int) -> list[float]:
@@ -51,7 +51,7 @@ def _fractions(length: int) -> list[float]:
 
 @dataclass(frozen=True)
 class Sample:
-    """A call with its letter, what it is given, and the answer and the status that are expected of it, as C text."""
+    """A call with its letter and argument, and the expected answer and status, as C text."""
 
     call: str
     argument: str
@@ -61,7 +61,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class Operator:
-    """What is run of an operator: its settings with their letters, and its samples."""
+    """The test of an operator: its settings with their letters, and its samples."""
 
     name: str
     settings: list[tuple[str, str]]
@@ -69,7 +69,7 @@ class Operator:
 
 
 def operators(one: Compensator) -> list[Operator]:
-    """What is run of each operator of a model."""
+    """The tests of a model's operators."""
     wide = WIDE if one.family.arithmetic.travels > 1 else ()
     found = []
     for name in one.options.operators:
@@ -80,8 +80,8 @@ def operators(one: Compensator) -> list[Operator]:
 
 
 def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
-    """An argument of a setting, in fixed point before it is rounded to a code; every third one is beyond its limits,
-    where there are any."""
+    """An argument of a setting, in fixed point before it is rounded to a code; every third one exceeds its limits, if
+    any."""
     from hystgen.effects.ageing import compensator as ageing
 
     degree, one = form.setting_codes(t)
@@ -122,7 +122,7 @@ def _samples(one: Compensator, inverse: bool, settings: Sequence[str]) -> list[S
             arguments.append(argument)
     x = one.form.arguments(numbers, arguments)
     op = np.array(calls, dtype=np.uint8)
-    op[:-1:2] |= slots.OP_UNREAD  # so that bits have to stay until they are read
+    op[:-1:2] |= slots.OP_UNREAD  # so that bits have to persist until they are read
     answers, status = reference.answers(numbers, inverse, op, x, compiled=False)
     status[op >= slots.OP_UNREAD] = slots.OP_UNREAD
     letters = {**CALLS, **{SETTINGS[call]: LETTERS[call] for call in settings}}

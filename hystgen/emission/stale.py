@@ -1,4 +1,5 @@
-"""Emitted files that are out of date or that no model writes, and the commands that settle that."""
+"""Emitted files that are out of date or that no model writes, and the commands that bring them up to date or delete
+them."""
 
 from __future__ import annotations
 
@@ -19,7 +20,7 @@ EDITED = "was edited by hand"
 
 @dataclass(frozen=True)
 class Difference:
-    """A file that differs from what would be written: `reasons` in words, and the options that its own banner names."""
+    """A file that differs from what would be written: `reasons` in words, and the options in its own banner."""
 
     path: Path
     reasons: tuple[str, ...]
@@ -31,7 +32,7 @@ class Difference:
 
 
 def find(folder: Path, files: Mapping[str, str]) -> list[Difference]:
-    """What in `folder` is missing or other than `files` (name to text)."""
+    """Files that are missing from `folder` or differ from `files` (name to text)."""
     found = []
     for name, text in files.items():
         path = folder / name
@@ -73,23 +74,23 @@ def _words(options: Mapping[str, str], keys: list[str]) -> str:
 
 @dataclass(frozen=True)
 class Orphan:
-    """An emitted file that none of the models writes; `reason`: in words."""
+    """An emitted file that none of the models writes; `reason` in words."""
 
     path: Path
     reason: str
 
     def sentence(self) -> str:
-        """The file and why it is one."""
+        """The file and the reason."""
         return f"{self.path} {self.reason}"
 
 
 def orphans(folder: Path, written: Collection[str], models: Collection[str]) -> list[Orphan]:
-    """Files of C in `folder` with a banner of hystgen that are not among the names `written` for all the `models`."""
+    """C files in `folder` with a banner of hystgen whose names are not among the `written` ones of all the `models`."""
     found = []
     for path in sorted(folder.iterdir()) if folder.is_dir() else []:
         if path.suffix not in (".c", ".h") or path.name in written or not path.is_file():
             continue
-        with contextlib.suppress(OSError):  # a file of somebody else's that may not be read
+        with contextlib.suppress(OSError):  # another user's file may be unreadable
             text = path.read_bytes().decode("utf-8", "surrogateescape").replace("\r\n", "\n")
             banner = read_banner(text.partition("*/")[0])
             if banner is None:
@@ -106,8 +107,8 @@ def orphans(folder: Path, written: Collection[str], models: Collection[str]) -> 
 
 @dataclass(frozen=True)
 class Stale:
-    """A model whose files differ: its parameter file, the differences, `wanted`: all options that the command line led
-    to, and `again`, which compares the files with other options."""
+    """A model whose files differ: its parameter file, the differences, all options `wanted` by the command line, and
+    `again`, which compares the files with other options."""
 
     parameters: str
     differences: list[Difference]
@@ -116,12 +117,12 @@ class Stale:
 
     @property
     def flags(self) -> dict[str, str | bool]:
-        """The options that a banner does not tell."""
+        """The options that a banner does not contain."""
         return {key: value for key, value in self.wanted.items() if value is True}
 
     @property
     def own(self) -> dict[str, str]:
-        """The options of the banners, if they are others than the wanted ones and all legible."""
+        """The options in the banners, if they are legible and differ from the wanted ones."""
         complete = len(self.wanted) - len(self.flags)
         theirs = next((dict(each.options) for each in self.differences if len(each.options) == complete), {})
         return {} if {**theirs, **self.flags} == self.wanted else theirs
@@ -134,11 +135,11 @@ def advice(
     given: Mapping[str, str | bool],
     effects: Sequence[str] = (),
 ) -> list[str]:
-    """Commands that settle the differences of all models and their orphans, each with what it does.
+    """Commands that resolve the differences of all models and their orphans, each with its effect.
 
-    One writes all of them as asked. Files that were made with other options of their own are confirmed, or written
-    again with these, by one command for each set of options. `given`: options of the command line; `effects`: files of
-    effects of the user's own.
+    One command writes everything as asked. Files made with other options are confirmed, or written again with their
+    own, by one command per set of options. `given`: options of the command line; `effects`: files of a user's own
+    effects.
     """
     found = [each for model in models for each in model.differences]
     lost = _lost(found)
@@ -173,7 +174,7 @@ def _lost(found: Sequence[Difference]) -> str:
 def command(
     parameters: Sequence[str], folder: str, options: Mapping[str, str | bool], effects: Sequence[str] = ()
 ) -> str:
-    """The command that emits with these options and files of the user's own effects."""
+    """The command that emits with these options and files of a user's own effects."""
     words = ["hystgen", "emit", *parameters, *(["-o", folder] if folder != "." else [])]
     for key, value in options.items():
         words.append(f"--{key.replace('_', '-')}")

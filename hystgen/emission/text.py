@@ -1,8 +1,8 @@
 """C text: exact literals, tables, comments, and lines of at most WIDTH characters, however long the model's name is.
 
-The files of `c_runtime/` and of effects are formatted for the prefix `hystgen_`; with another name in them statements
-are broken anew. Rows of tables are broken only if they are too long. clang-format formats those files but not what is
-emitted: its lines depend on its version, and the same parameters have to give the same bytes anywhere.
+The files of `c_runtime/` and of effects are formatted for the prefix `hystgen_`; once another name replaces it, lines
+are broken again. Rows of tables are broken only if they are too long. clang-format formats those files but not emitted
+ones: its line breaks depend on its version, and the same parameters have to give the same bytes anywhere.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 WIDTH = 100
 
 Number: TypeAlias = "float | np.integer | np.floating"
-"""A number of a table."""
+"""A number in a table."""
 
 _WAYS = [
     re.compile(form)
@@ -31,16 +31,16 @@ _WAYS = [
         r"(?<= (?:==|!=|<=|>=)) |(?<=[\w)\]] [<>]) ",
     )
 ]
-"""Where a line may be broken, the best places first: behind commas, before ? and :, behind operators."""
+"""Where a line may be broken, best places first: after commas, before ? and :, after operators."""
 _ASSIGNED = re.compile(r"(?<= =) |(?<=return) ")
 """Where a line is broken as a last resort, or to keep a sum or a choice together."""
 
 
 def literal(x: Number) -> str:
-    """The C literal that gives exactly this float32, float64 or whole number back, the shortest one.
+    """The shortest C literal that gives back exactly this float32, float64 or whole number.
 
-    Whole numbers keep their value in every dialect: without the suffix C90 and C++98 take one beyond `long` as
-    unsigned, and the smallest number of a type is not a literal in any.
+    Whole numbers keep their value in every dialect: without a suffix C90 and C++98 take one beyond `long` as unsigned,
+    and the smallest number of a type has no literal in any dialect.
     """
     if isinstance(x, np.integer | int):
         return _whole(int(x))
@@ -139,9 +139,9 @@ _ASCII = {code: unicodedata.normalize("NFD", chr(code))[0] for code in range(0xC
 def comment_text(text: str) -> str:
     """Any text as one line of printable ASCII that is harmless inside a C comment of either kind.
 
-    Common letters and signs beyond ASCII are spelt out, others become `?`; white space becomes single blanks.
-    Nothing in the result opens or closes a comment, forms a trigraph or continues a line, and it neither
-    starts nor ends in a blank.
+    Common letters and signs beyond ASCII are spelt out, others become `?`; white space becomes single blanks. The
+    result never opens or closes a comment, forms a trigraph or continues a line, and neither starts nor ends with a
+    blank.
     """
     text = re.sub(r"[^ -~]", "?", " ".join(text.translate(_ASCII).split())).replace("\\", "/")
     text = re.sub(r"\*(?=/)", "* ", text)
@@ -158,7 +158,7 @@ _BEHIND = re.compile(r"(\s*\S.*?)\s+(/\* .* \*/)$")
 
 
 def _in_columns(lines: list[str]) -> Iterator[str]:
-    """Comments behind consecutive lines begin in one column."""
+    """Align comments behind consecutive lines in one column."""
     for commented, group in itertools.groupby(map(_BEHIND.fullmatch, lines), bool):
         found = list(group)
         here, lines = lines[: len(found)], lines[len(found) :]
@@ -168,7 +168,7 @@ def _in_columns(lines: list[str]) -> Iterator[str]:
 
 
 def define(name: str, value: str, comment: str = "") -> str:
-    """A macro with a comment behind it."""
+    """A macro with a comment after it."""
     return f"#define {name} {value}" + (f" /* {comment} */" if comment else "")
 
 
@@ -201,7 +201,7 @@ def _fitted(lines: list[str]) -> Iterator[str]:
 
 
 def _ends(lines: list[str], at: int) -> bool:
-    """Whether a statement, or the head of a block, ends in this line."""
+    """Whether a statement, or the head of a block, ends on this line."""
     code = re.sub(r"\s*/\*.*$", "", lines[at])
     following = lines[at + 1].strip() if at + 1 < len(lines) else "{"
     return not code.strip() or code.endswith((";", "{", "}")) or following in ("{", "")
@@ -229,10 +229,10 @@ def _statement(lines: list[str], indent: str) -> Iterator[str]:
 
 
 def _aligned(lines: list[str]) -> list[str]:
-    """Lines inside parentheses begin below the first character in them, as before names were put in."""
+    """Align lines inside parentheses with the first character in them, as before names were replaced."""
     made: list[str] = []
     opened: list[int] = []
-    first: dict[int, int] = {}  # column of the first line inside, by that of the parenthesis
+    first: dict[int, int] = {}  # column of the first line inside, by column of the parenthesis
     for line in lines:
         column = len(line) - len(line.lstrip())
         if opened:
@@ -254,7 +254,7 @@ def _broken(code: str, indent: str) -> list[str]:
     inside = len(indent) + 4
     lines = []
     text = indent + code.strip()
-    opened: list[int] = []  # columns behind parentheses of earlier lines that are still open
+    opened: list[int] = []  # columns after parentheses of earlier lines that are still open
     while len(text) > WIDTH:
         found = _place(text, opened, inside)
         if found is None:  # too far to the right
@@ -270,7 +270,7 @@ def _broken(code: str, indent: str) -> list[str]:
 
 
 def _place(text: str, before: list[int], inside: int) -> tuple[int, list[int]] | None:
-    """Where to break a line that is too long, and the parentheses that are open there; None for nowhere."""
+    """Where to break a line that is too long, and the parentheses open there; None if there is no place."""
     start = len(text) - len(text.lstrip())
     opened = list(before)
     stacks = []  # at each character
@@ -307,13 +307,13 @@ def _place(text: str, before: list[int], inside: int) -> tuple[int, list[int]] |
 
 
 def _rest_fits(text: str, place: int, column: int) -> bool:
-    """Whether the longest piece that cannot be broken would fit behind the break."""
+    """Whether the longest unbreakable piece would fit after the break."""
     pieces = re.split(r"(?<=,) | ", text[place:])
     return column + max(map(len, pieces)) <= WIDTH
 
 
 def _comment(lines: list[str]) -> Iterator[str]:
-    """A comment with lines of WIDTH; what does not fit in a line goes in one of its own."""
+    """A comment on lines of WIDTH; the excess of a line goes on lines of its own."""
     indent = " " * (len(lines[0]) - len(lines[0].lstrip()))
     starred = any(line.startswith(indent + " *") for line in lines[1:])
     more = indent + (" * " if starred else "   ")
@@ -332,7 +332,7 @@ def _comment(lines: list[str]) -> Iterator[str]:
 
 
 def _directive(line: str) -> Iterator[str]:
-    """A line of the preprocessor; a comment behind it goes above, a message is continued."""
+    """A preprocessor line; a comment after it moves above it, a message is continued."""
     macro = re.match(r"^(#define .*?) (/\* .* \*/)$", line)
     if len(line) <= WIDTH:
         yield line
@@ -348,6 +348,6 @@ def _directive(line: str) -> Iterator[str]:
 
 
 def _continued(lines: list[str]) -> Iterator[str]:
-    """Lines that are one to the preprocessor."""
+    """Lines that the preprocessor joins into one."""
     yield from (f"{line} \\" for line in lines[:-1])
     yield lines[-1]

@@ -10,9 +10,9 @@ from hystgen.effects.base import Effect
 from hystgen.model import Model
 
 SWEEPS = 8
-"""[sweeps] Over the whole range, on which the effect is looked at. What settles is then within 2 % of its worth over 64
-sweeps (lag, resonance; a slew limit 16 %); creep and ageing never settle. Set by: benchmarks/chosen_numbers.py
-sweeps."""
+"""[sweeps] Sweeps over the whole range on which an effect is measured. The result is then within 2 % of that over 64
+sweeps for effects that settle (lag, resonance; a slew limit 16 %); creep and ageing never settle. Set by:
+benchmarks/chosen_numbers.py sweeps."""
 
 
 def sentence(model: Model, effect: Effect, reason: str) -> str:
@@ -23,7 +23,7 @@ def sentence(model: Model, effect: Effect, reason: str) -> str:
     unit = model.parameters.units.output
     try:
         missing = model.simulate(v) - model.without([effect]).simulate(v)
-    except EffectsError:  # a column that only a record has
+    except EffectsError:  # depends on a column that only a record has
         return f"{effect.name} ({reason}); what it is worth depends on a record's columns"
     rms = float(np.sqrt(np.mean(missing**2)))
     worth = f"{rms:.3g}{f' {unit}' if unit.isascii() and unit else ''} rms"

@@ -14,7 +14,7 @@ KINDS = tuple(kind for part in PARTS for kind in part.kinds)
 
 
 def of(t: ChainTables, parts: Sequence[ChainPart], operator: str = "forward") -> list[Constants]:
-    """The blocks of an operator that some parts of the chain have."""
+    """The blocks of an operator that belong to some parts of the chain."""
     every = parts_with(*t.own_blocks, t.own_effects) if isinstance(t, OwnChainTables) else PARTS
     pairs = [(every[k], t.blocks[k]) for k in map(PARTS.index, parts)]
     return [
@@ -24,17 +24,17 @@ def of(t: ChainTables, parts: Sequence[ChainPart], operator: str = "forward") ->
 
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Constants], list[Constants]]:
-    """The blocks of an operator in front of the plays, starting at the drive, and those behind them."""
+    """The blocks of an operator: those in front of the plays, from the drive on, and those behind them."""
     return of(t, AHEAD, operator), of(t, BEHIND, operator)
 
 
 def every(t: ChainTables, operator: str) -> list[Constants]:
-    """The blocks of both sides, what rubs, and the clock of a drift."""
+    """The blocks of both sides, the plays that rub, and the clock of a drift."""
     return [*of(t, (*AHEAD, *BEHIND), operator), *(each for each in rubbing(t) if each), *clocks(t)]
 
 
 def rubbing(t: ChainTables) -> list[Constants | None]:
-    """The plays whose friction warms, of each block of own heat; None where the drive's square does."""
+    """For each block of own heat, the plays whose friction warms it, or None if the square of the drive does."""
     pairs = zip(PARTS, t.blocks, strict=True)
     return [each for part, tables in pairs for each in part.arithmetic(t.fixed).beside(tables)]
 

@@ -1,20 +1,20 @@
-"""How far a compiled operator with effects can be from the model in double precision, block by block.
+"""Error bounds of a compiled operator with effects against the model in double precision, block by block.
 
 Every block adds the roundings of its own operations to the error that reaches it, and passes the sum on with its
-largest gain from sample to sample. A drive that is limited to its range or committed, in one of two computations or in
-both, never increases their difference: limiting is not expansive, and both absorb the applied drive. A slew limit
-leaves drives as far apart as they were, while a lag in front of the plays follows them; with both, only the range of
-the drive bounds the errors behind, and `rounding` leaves that out.
+largest gain from sample to sample. Limiting a drive to its range or committing one, in one computation or in both,
+never increases their difference: limiting is not expansive, and both absorb the applied drive. A slew limit leaves
+drives as far apart as they were, while a lag in front of the plays follows them; with both, only the range of the drive
+bounds the errors behind, and `rounding` excludes that.
 
 Inverse. The reference less its offsets passes through saturation (slope at the ends of the output), the taps (sum of
-their sizes) and gains (at most 1/LEAST_GAIN); then creep, whose inverse passes an error of its output on to its input,
-and from there through all states to later inputs: `e <= R eta + R g e`, with `g = sum c_i (1 - b1_i)` the states' share
-of the input before, hence `e <= eta/(d + 2 sum c_i b1_i - sum c_i)`. The plays as in `hystgen.compensator.bounds`. The
-lead of a lag multiplies an error by `(2 - rate)/rate`, its goal by `(1 + 2 theta)/(1 - theta)`: the target before
-counts too, even if a limit has shifted it. A block of the user's own as in `hystgen.compensator.chain.own`.
+their sizes) and gains (at most 1/LEAST_GAIN); then creep, whose inverse passes an output error on to its input, and
+from there through all states to later inputs: `e <= R eta + R g e`, with `g = sum c_i (1 - b1_i)` the states' share of
+the previous input, hence `e <= eta/(d + 2 sum c_i b1_i - sum c_i)`. Plays are as in `hystgen.compensator.bounds`. The
+lead of a lag multiplies an error by `(2 - rate)/rate`, its goal by `(1 + 2 theta)/(1 - theta)`: the previous target
+counts too, even if a limit has shifted it. A user's own block is as in `hystgen.compensator.chain.own`.
 
 States that move by less than their last bit are kept in two parts. Their roundings are proportional to their steps, so
-that they add up to a few units of the state, however slow it is, and those of the second part to `u^2/rate` of it.
+they add up to a few units of the state however slow it is; roundings of the second part add up to `u^2/rate` of it.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from hystgen.plays import slots
 SAME = "both have seen the same drives"
 
 STILL = "the drive does not stand still"
-"""Of a quiet drive in front of a lag: what has arrived is then within twice its dither of what is sought."""
+"""Condition of a quiet drive in front of a lag: the arriving signal is then within twice its dither of the target."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,7 +66,7 @@ def _sizes(compiled: Compiled) -> _Sizes:
 
 def _saturation(compiled: Compiled, u: float, kind: str) -> tuple[float, float, float]:
     """Saturation: the slope of its inverse at the ends of the output, the roundings of the inverse as errors of its
-    input, and those of the map."""
+    input, and the roundings of the map."""
     slope, back, there = 1.0, 0.0, 0.0
     limits = compiled.tables.limits
     ends = np.array([float(limits[slots.OUTPUT_MIN]), float(limits[slots.OUTPUT_MAX])]) - compiled.static.output_offset
@@ -92,7 +92,7 @@ def _saturation(compiled: Compiled, u: float, kind: str) -> tuple[float, float, 
 
 
 def _gains(compiled: Compiled, u: float, emitted: bool) -> Gained:
-    """All gains in one, those of own heat at the fastest rate; `emitted` as for `_moving`."""
+    """All gains combined, with own heat at the fastest rate; `emitted` as for `_moving`."""
     speed = Speed(compiled.static.input_range, compiled.largest_step, compiled.seconds)
     output = _sizes(compiled).output
     found = [one.gained(speed, output, u, emitted) for one in compiled.behind]
@@ -102,8 +102,8 @@ def _gains(compiled: Compiled, u: float, emitted: bool) -> Gained:
 
 
 def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float, float]:
-    """Of plays that an effect moves or bends: the shift of their input that errors of a play are worth, the roundings
-    of their sum, and its error because a search ends at some width.
+    """Errors of plays that an effect moves or bends: roundings of a play as a shift of its input, roundings of the sum,
+    and error of the sum because a search stops at a finite width.
 
     `emitted`: include the approximations of the C, which double precision does not make.
     """
@@ -134,8 +134,8 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float,
 def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[float, float]:
     """Errors of the forward operator's displacement, and of the sum of the plays that the inverse asks for.
 
-    For one arithmetic and without those of the plays; `emitted` as for `_moving`; `same`: for compensators whose states
-    have seen the same drives.
+    They hold for one arithmetic and leave out the plays' own errors; `emitted` as for `_moving`; `same`: the
+    compensators' states have seen the same drives.
     """
     u = float(np.finfo(kind).eps) / 2
     sizes = _sizes(compiled)
@@ -150,7 +150,7 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
     ahead, behind, ones = ahead_of(compiled.ones), compiled.behind, compiled.ones
     moved = max((one.rounding(sizes.drive, u)[0] for part in SENT for one in ones[part.name]), default=0.0)
     moved += _slewed(compiled, kind)
-    if not emitted:  # in double precision each step of such a drive is rounded
+    if not emitted:  # in double precision each slew-limited step is rounded
         moved += u * sizes.drive * crossing(compiled.static, compiled.parts, compiled.seconds)
     moved += sum(one.rounding(sizes.drive, u)[0] for one in ahead)
     static = compiled.static
@@ -184,31 +184,31 @@ def _seen(compiled: Compiled) -> float:
 
 
 def _kept(compiled: Compiled) -> float:
-    """How far the input of the plays can be from the one that is sought while the drive stands still, and a drive that
-    keeps a lag on its branch from the state of that lag, with which the model in double precision keeps it."""
+    """How far the input of the plays can be from its target while the drive stands still. Also how far a drive that
+    keeps a lag on its branch can be from the state of that lag, which the model in double precision keeps it at."""
     return 2.0 * float(compiled.tables.number[DITHER])
 
 
 def _slewed(compiled: Compiled, kind: str) -> float:
-    """How far a drive at a limited rate can be from an exact one, in drive units: roundings of the drive, of the one
-    before where it is committed, and of the rate, and what they add up to while it crosses its range."""
+    """How far a slew-limited drive can be from an exact one, in drive units: roundings of the drive, of the previous
+    one where it is committed, and of the rate, accumulated while the drive crosses its range."""
     steps = crossing(compiled.static, compiled.parts, compiled.seconds)
     u = float(np.finfo(kind).eps) / 2
     return _sizes(compiled).drive * (3.0 * u * (steps > 0.0) + steps * 2.0 * u * u)
 
 
 CELLS = 4096
-"""[parts of the drive's range] On which the miss of a kept branch is bounded; each adds at most its width, 2e-4 of the
-range, to the way that is kept."""
+"""[parts of the drive's range] Grid on which the miss of a kept branch is bounded; each cell adds at most its width,
+2e-4 of the range, to the kept way."""
 
 
 def kept_branch(compiled: Compiled) -> float:
     """Largest distance of the displacement at rest from its reference, in output units, because a drive in front of two
     branches keeps its own.
 
-    It holds up to a lag's share theta of the way to the other branch, and what rounding may take back, `limits[HOLD]`,
-    beyond a target that has half of that rounding itself. Between neighbours in a grid of drives both branches rise, so
-    that their values there bound those in between.
+    The drive stays put for up to a lag's share theta of the way to the other branch, plus the step back that rounding
+    may cause, `limits[HOLD]`, beyond a target that itself has half of that rounding. Both branches rise between grid
+    points, so their values there bound all values in between.
     """
     static, t = compiled.static, compiled.tables
     theta = ahead_of(compiled.ones)[0].row[1] if t.turning else 0.0
@@ -231,8 +231,8 @@ def kept_branch(compiled: Compiled) -> float:
 
 
 def swing(static: StaticModel, parts: Parts, seconds: float) -> float:
-    """How far a drive may go to and fro at rest because blocks of the user's own lead it from one of two branches to
-    the other, in drive units; 0 where it comes to rest."""
+    """How far a drive at rest may swing, in drive units, because a user's own blocks lead it from one of two branches
+    to the other; 0 if it comes to rest."""
     if not static.branches_differ or not parts.own_drives:
         return 0.0
     gain = lead(ahead_of(parts.ones(seconds)))
@@ -243,12 +243,12 @@ def swing(static: StaticModel, parts: Parts, seconds: float) -> float:
 def condition(compiled: Compiled) -> str:
     """The condition of `rounding` in words, if only the range bounds the difference of two drives; else "".
 
-    A led lag misses its target by a second difference, so that plays and creep behind it have not seen what was solved
-    for; their memory then differs between two drives, and the lead amplifies that. So does a block of the user's own in
-    front while the drive is limited: what it keeps of an earlier difference moves plays that the same drive would have
-    moved alike. Thresholds that grow with the rate amplify an earlier difference of the drives. A lag that is braked
-    behind a slew limit gives up more of its lead than the limit cuts off. In front of two branches a lag stays where it
-    is rather than turn, which depends on the drives that it has seen.
+    A led lag misses its target by a second difference, so the plays and creep behind it see something else than was
+    solved for; their memory then differs between two drives, and the lead amplifies that. So does a user's own block in
+    front while the drive is limited: its memory of an earlier difference moves plays that the same drive would have
+    moved alike. Thresholds that grow with the rate amplify an earlier difference of the drives. A braked lag behind a
+    slew limit gives up more of its lead than the limit cuts off. In front of two branches a lag stays where it is
+    rather than turn, which depends on the drives that it has seen.
     """
     still = STILL * (compiled.tables.quiet > 0)
     if compiled.tables.braked:
@@ -260,7 +260,7 @@ def condition(compiled: Compiled) -> str:
 
 
 def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
-    """Bounds for `arithmetic` 'float32' or 'float64', if nothing but gains and temperatures is set from outside."""
+    """Bounds for `arithmetic` 'float32' or 'float64', if only gains and temperatures are set from outside."""
     static = dataclasses.replace(compiled.static, output_offset=0.0)
     plays = error_bounds(static, arithmetic, engines.ENGINES[compiled.tables.plays.engine])
     pi = static.pi
@@ -269,9 +269,9 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     if pi.weights[0] > 0.0:
         whole_gain = 2.0 / pi.weights[0] - 1.0 / pi.slopes[-1]
         gain = (1.0 / pi.weights[0] if same else whole_gain) / static.front_slopes[0]
-        at_once = gain * static.front_slopes[0] / whole_gain  # for plays that hold the same, as `rounding` states
+        at_once = gain * static.front_slopes[0] / whole_gain  # for plays with the same memory, as `rounding` states
         plays = dataclasses.replace(plays, rounding=plays.rounding * at_once)
-    only_seen = 0.0  # by creep behind plays whose drive is limited: errors of the sum that the inverse undoes
+    only_seen = 0.0  # error of the sum that the inverse undoes; only creep behind plays with a limited drive sees it
     if compiled.tables.moving.used:
         least = moving.least_slope(static, compiled.parts.plays) * (1.0 if same else 0.5)
         if compiled.tables.moving.moves == moving.DILATED:

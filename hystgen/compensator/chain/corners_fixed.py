@@ -30,14 +30,14 @@ from hystgen.plays.slots import Reals
 
 @jit
 def keep(to: Reals, kink: Kink) -> None:
-    """Field by field."""
+    """Copy the kink field by field."""
     for i in range(4):
         to[i] = kink[i]
 
 
 @jit
 def start(t: ChainTables, s: ChainState, zero: int) -> None:
-    """The plays are at the start memory, or all at 0; nothing is known but where they are."""
+    """Set the plays to the start memory, or all to 0; only their positions are known then."""
     m = s.corners
     corners_fixed.start(t.plays, m, t.plays.zero if zero else t.plays.start)
     for i in range(4):
@@ -54,7 +54,7 @@ def started(t: ChainTables, s: ChainState) -> Any:
 
 @jit
 def move_on(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: Any) -> bool:
-    """Move the plays to an input between the kink and the next one. False if it lies elsewhere."""
+    """Move the plays to an input between the kink and the next one. Returns False if the input lies elsewhere."""
     kink = (kept[0], kept[1], kept[2], kept[3])
     moved = gained(t, m, kink, w)
     if moved < 0 or kink[0] + moved > m.real[NEXT]:
@@ -65,14 +65,14 @@ def move_on(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: Any) -> bool:
 
 @jit
 def moved(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: Any) -> bool:
-    """The same to any input between this kink and its next one, once it has been found."""
+    """Move the plays to any input between this kink and the next one, which it finds."""
     m.real[NEXT] = next_output(t, m, (kept[0], kept[1], kept[2], kept[3]))
     return move_on(t, m, kept, w)
 
 
 @jit
 def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
-    """The plays follow their input w. Returns their sum."""
+    """Move the plays with their input w. Returns their sum."""
     m = s.corners
     if s.flags[OPERATOR]:
         there = m.counts[SOUGHT] != 0 and moved(t.plays, m, s.kink, w)

@@ -23,7 +23,7 @@ from hystgen.plays.corners.corners_float import (
 
 @jit
 def start(t: ChainTables, s: ChainState, zero: int) -> None:
-    """The plays are at the start memory, or all at 0."""
+    """Set the plays to the start memory, or all to 0."""
     p = t.plays
     s.corners.counts[SOUGHT] = 0
     if s.flags[OPERATOR]:
@@ -40,7 +40,7 @@ def started(t: ChainTables, s: ChainState) -> Any:  # noqa: ARG001  as in fixed 
 
 @jit
 def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
-    """The plays follow their input w. Returns their sum."""
+    """Move the plays with their input w. Returns their sum."""
     m = s.corners
     if not s.flags[OPERATOR]:
         return plays_step(t.plays.forward, m, w)

@@ -1,4 +1,4 @@
-"""The code that effects add to a model: a table measured on emulated cores (`benchmarks/effect_costs.py`)."""
+"""Code size that effects add to a model: a table measured on emulated cores (`benchmarks/effect_costs.py`)."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ PARTS = (
     "any", "creep", "lag", "lag_exact", "ageing", "heat", "friction", "gain", "clock", "preview", "slew", "braked",
     "tanh", "dead_zone", "relaxing", "dilated", "dashpot", "polynomial", "centre", "mode", "delay", "quiet",
 )
-"""Parts of the code: `any` (with engine corners `any_corners`) once for a model with effects, the others once for
-each kind of block in it; `friction` beside `heat` for the heat of plays that rub, `dilated` for all plays whose input
-is found by a search, `braked` for a lag and a slew limit together, `quiet` for a drive that stands still at rest."""
+"""Parts of the code: `any` (with engine corners `any_corners`) once for a model with effects, each other part once for
+its kind of block; `friction` in addition to `heat` if plays rub, `dilated` for all plays whose input is found by a
+search, `braked` for a lag together with a slew limit, `quiet` for a drive that stands still at rest."""
 
 OPERATORS = {"preview": "inverse", "quiet": "inverse", "mode": "forward", "delay": "forward"}
-"""Parts that only one operator has, and that operator."""
+"""Parts that only one operator has."""
 
 PER_PLAY = ("relaxing", "dilated", "dashpot", "polynomial", "centre")
-"""Parts that move or bend plays: each play adds to what a sample takes."""
+"""Parts that move or bend plays: their cost per sample grows with the number of plays."""
 
 
 def parts(t: ChainTables, operator: str) -> list[str]:
-    """The parts that an operator of a model has; two blocks of one kind share their code."""
+    """The parts that an operator of a model has; blocks of one kind share their code."""
     exact = t.of("lag").exact.tolist()
     kinds = [int(kind) for kind in (t.behind.kind if t.fixed else t.behind.stage_kind)]
     found = Counter(dict(zip(NAMES, t.counts.tolist(), strict=True)) | {

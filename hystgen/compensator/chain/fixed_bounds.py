@@ -1,16 +1,16 @@
-"""How far a model with effects in fixed point can be from the one in double precision, block by block.
+"""Error bounds of a model with effects in fixed point against double precision, block by block.
 
 As in `hystgen.compensator.chain.bounds`, every block adds the roundings of its own operations and constants to the
-error that reaches it, and passes the sum on with its largest gain. Signals are rounded to their last bit in every
-operation; states to bits below that, and a state keeps each rounding for 1/rate samples. The drive is rounded to a code
-and absorbed as sent: the plays see that rounding, or behind a lag `rate/2` codes of it. Errors are in units of signals
-in front of the plays and in output codes behind them.
+error that reaches it, and passes the sum on with its largest gain. Every operation rounds signals to their last bit and
+states to lower bits; a state keeps each rounding for 1/rate samples. The drive is rounded to a code and absorbed as
+sent: the plays see that rounding, or `rate/2` codes of it behind a lag. Errors are in units of signals in front of the
+plays and in output codes behind them.
 
-A led lag misses its target by a second difference, so that plays behind it have not seen what was solved for: their
-memory differs between two drives, and the lead amplifies that up to the range of the drive. A block of the user's own
-in front has such an effect while the drive is limited. `rounding` is then the
-difference from a compensator in double precision that has seen the same drives. Behind a memoryless part it holds only
-while nothing is limited, since a lag cannot be led beyond the drive's range there.
+A led lag misses its target by a second difference, so plays behind it see something else than was solved for: their
+memory differs between two drives, and the lead amplifies that up to the range of the drive. A user's own block in front
+has the same effect while the drive is limited. `rounding` is then the difference from a compensator in double precision
+that has seen the same drives. Behind a memoryless part it holds only while nothing is limited, since there a lag cannot
+be led beyond the drive's range.
 """
 
 from __future__ import annotations
@@ -46,16 +46,16 @@ from hystgen.effects.rate_dependence import compensator as dashpot
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 
 DOUBLE = 2.0**-40
-"""Relative error of double precision itself: a thousand roundings."""
+"""Relative error allowed for double precision itself: a thousand roundings."""
 
 
 @dataclass(frozen=True)
 class Sizes:
     """Largest sizes of the signals behind the plays, in output codes.
 
-    Forwards: the sum of the plays, the input of each block of each part (`given`) and of each saturation, and the
-    output. Backwards: the reference after the inverse of each saturation, the least and largest input to which each
-    tanh is inverted (`inverted`), the target of the output side, the output asked of each block (`wanted`), and the sum
+    Forwards: the sum of the plays, the input of each block (`given`, by part) and of each saturation, and the output.
+    Backwards: the reference after the inverse of each saturation, the least and largest input to which each tanh is
+    inverted (`inverted`), the target of the output side, the output wanted from each block (`wanted`), and the sum
     asked of the plays.
     """
 
@@ -79,7 +79,7 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Bend:
-    """The curve of a saturation, with the bits of a signal that arguments and values leave out."""
+    """The curve of a saturation; its arguments leave out `drop` bits of a signal, its values `lift` bits."""
 
     curve: FixedCurve
     drop: int
@@ -95,10 +95,10 @@ class Bend:
 class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
-    `formats`: the blocks of each part; `bends`: the curve and inverse curve of each tanh; `ends`: of the output;
-    `slewed`: drive codes that rounding takes from a drive at a limited rate; `reached`: whether the block in front can
-    be led to every input asked of the plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in front of
-    the plays below their input; `bumps`: of bent plays.
+    `formats`: the blocks of each part; `bends`: the curve and inverse curve of each tanh; `ends`: range of the output;
+    `slewed`: error of a slew-limited drive by rounding, in drive codes; `reached`: whether the block in front can be
+    led to every input asked of the plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in front of the
+    plays below their input; `bumps`: curves of bent plays.
     """
 
     static: StaticModel
@@ -121,7 +121,7 @@ class Bounds:
 
     @property
     def drifted(self) -> float:
-        """Error of drifts in units of signals."""
+        """Error of all drifts, in units of signals."""
         return float(sum(each.error for each in self.formats["clock"]))
 
     @property
@@ -152,14 +152,14 @@ class Bounds:
         return ahead_of(self.formats)
 
     def _behind(self, forward: bool) -> list[tuple[Coded, float, CodedGain | None]]:
-        """Blocks behind the plays, with the size of their input, and as gains; those of the `forward` operator or of
-        the inverse."""
+        """Blocks behind the plays in the `forward` operator or in the inverse, each with its input size and its gain,
+        if any."""
         parts = [part.name for part in BEHIND if forward or not part.forward]
         speed = Speed(self.static.input_range, self.largest_step, self.seconds)
         lsb = float(self.inner.output_lsb)
         coding = Coding(float(self.inner.drive_lsb), lsb, (self.ends[1] - self.ends[0]) / lsb)
         found: list[tuple[Coded, float, CodedGain | None]] = []
-        reached = 0.0  # of gains one after the other, whose ends are nearer than those that signals have room for
+        reached = 0.0  # by gains so far: its ends are nearer than the sizes that signals have room for
         for name in parts:
             for each, size in zip(self.formats[name], self.sizes.given[name], strict=True):
                 gain = each.gain(reached or size, speed, coding)
@@ -169,8 +169,8 @@ class Bounds:
         return found
 
     def _saturation(self) -> tuple[float, float, float]:
-        """Saturation: the slope of its inverse at the ends of the output, the error of the inverse, and that of the
-        map, in output codes."""
+        """Saturation: the slope of its inverse at the ends of the output, and the errors of inverse and map, in output
+        codes."""
         ends = [end - self.static.output_offset for end in self.ends]
         slope, back, there = 1.0, 0.0, 0.0
         bends = [self.bends[i : i + 2] for i in range(0, len(self.bends), 2)]
@@ -197,8 +197,8 @@ class Bounds:
     # ------------------------------------------------------------ operators
 
     def _arrival(self) -> tuple[float, float]:
-        """Roundings of the signal in front of the plays for the drive as sent, and its change by rounding the drive to
-        a code, in units of signals."""
+        """Roundings of the signal in front of the plays, given the drive as sent, and its change by rounding the drive
+        to a code, both in units of signals."""
         here = sum(each.arrived for each in self._ahead)
         here += 0.5 * 2.0**self.finer if self.finer else 0.0
         code = 0.5 * 2.0**self._fine
@@ -210,7 +210,7 @@ class Bounds:
 
     @property
     def _kept(self) -> float:
-        """How far the input of the plays can be from the one that is sought while the drive stands still."""
+        """How far the input of the plays can be from its target while the drive stands still."""
         return 2.0 * float(self.tables.number[DITHER]) if self.tables.quiet and not self.condition else 0.0
 
     @cached_property
@@ -228,8 +228,11 @@ class Bounds:
         return 1.0 + steepest_bend(self.static, self.parts.plays) if self.bumps.curves else 1.0
 
     def _moved(self, way: float) -> tuple[float, float]:
-        """Error of the sum of plays that an effect moves or bends, by roundings and by contacts within a step in which
-        their input moves by `way`, in codes; and the part of it that the inverse undoes."""
+        """Error of the sum of plays that an effect moves or bends, in codes, and the part of it that the inverse
+        undoes.
+
+        It comes from rounding, and from contacts within a step in which the plays' input moves by `way`.
+        """
         t = self.tables.moving
         if not t.used:
             return 0.0, 0.0
@@ -253,8 +256,8 @@ class Bounds:
         return (shifted + bumps) / lsb + slopes, (shifted - counting) / lsb
 
     def _dashpot(self, step: float, way: float) -> float:
-        """How far plays with a nonlinear dashpot can be from those of the model: by the table, and because the input
-        counts as standing still within a step."""
+        """How far plays with a nonlinear dashpot can be from the model's: by the table, and by treating the input as
+        standing still within a step."""
         t = self.tables.moving
         effect = next(filter(dashpot.nonlinear, self.parts.plays))
         seen = float(t.seen[0]) / 2.0 ** int(t.seen[1])
@@ -262,7 +265,7 @@ class Bounds:
 
     @cached_property
     def _steepest(self) -> float:
-        """Largest change of the sum of the plays per change of their input, at all samples."""
+        """Largest change of the sum of the plays per change of their input, over all samples."""
         first, *others = map(abs, self.static.pi.weights)
         dilated = self.tables.moving.moves == DILATED
         if not dilated and not self.bumps.curves:
@@ -271,8 +274,8 @@ class Bounds:
         return float(first + self._bent * math.fsum(more))
 
     def _plays(self, arriving: float, way: float | None = None) -> float:
-        """Error of the sum of the plays, in output codes, for an error in front of the memoryless part; `way` as
-        `_way`, which is taken if none is given."""
+        """Error of the sum of the plays, in output codes, for an error before the memoryless part; `way`: by default
+        `_way`."""
         steep = self.static.front_slopes[1] * self._steepest / float(self.inner.output_lsb)
         level = 0.5 * self._signal if self.drop else 0.0
         moved, _ = self._moved(self._way if way is None else way)
@@ -321,11 +324,11 @@ class Bounds:
         return self._asked() * float(self.inner.output_lsb) + missed_by
 
     def _solution(self) -> float:
-        """Rounding of the input of the plays that is found, in units of signals.
+        """Rounding of the plays' input as solved for, in units of signals.
 
-        With bits below it, what remains of the sum is divided by the slope of the plays that follow to that input.
-        Others may follow in the rest of a step: the slope is then too small by down to `p_0/sum p`, and of what is then
-        more than a step nothing is added.
+        With bits below that input, the remainder of the sum is divided by the slope of the plays that follow up to it.
+        More plays may follow in the rest of a step: the slope is then too small, by a factor down to `p_0/sum p`, and
+        any result beyond a step is cut off.
         """
         t, step = self.tables.moving, float(self.inner.step)
         solution = 1.5 * step if t.used and not t.scanned else float(self.inner.solved())
@@ -344,8 +347,8 @@ class Bounds:
         return self._gain() * self._residual(way, solved) / self._arriving
 
     def _found_error(self, way: float) -> float:
-        """The same of the inverse's answer, with what it undoes, or under its `condition`: plays then hold the same,
-        and what it finds is off by its own rounding."""
+        """Error of the inverse's answer, without the part that it undoes; under a `condition` plays hold the same, and
+        the answer is off by its own rounding."""
         if not self.condition:
             undone = self._moved(way)[1] * float(self.inner.output_lsb)
             return self._arriving_error(way) - self._gain() * undone / self._arriving
@@ -364,8 +367,8 @@ class Bounds:
         return 1.0 / least / self.static.front_slopes[0]
 
     def _gain(self) -> float:
-        """The same for plays that have seen what each compensator has sent."""
-        if self.tables.moving.moves == DILATED:  # bounds are those at once; drives that are held may be farther
+        """As `_gain_at_once`, for plays that have each seen the drives of their own compensator."""
+        if self.tables.moving.moves == DILATED:  # bounds as at once; drives that are held may be farther apart
             least = least_dilated(self.static, self.parts.plays, self.seconds)
             if self.bumps.curves:
                 least = min(least, 0.5 * least_slope(self.static, self.parts.plays))
@@ -391,7 +394,7 @@ class Bounds:
         return upward(Fraction(min(own + DOUBLE * whole, whole)))
 
     def hold(self) -> int:
-        """Steps back of the drive that come only from rounding, at most this long, in units of signals."""
+        """Longest step back of the drive that can come from rounding alone, in units of signals."""
         if not self.static.branches_differ or not self.inner.invertible:
             return 0
         # contacts within a step move drives, but do not turn them
@@ -415,11 +418,11 @@ class Bounds:
         return max(own, self._limits_off()) if self.condition else own
 
     def _limits_off(self) -> float:
-        """How far the limits of the drive are off because drives are whole codes: a limited one and the one before."""
+        """Error of the drive's limits, for a limited drive and the one before it, because drives are whole codes."""
         return upward(max(self.inner.drive_short() / self.inner.drive_lsb, Fraction(2.0 * self.slewed)))
 
     def inverse(self) -> float:
-        """Bound of the inverse in drive codes, with the effect of another branch and of limits."""
+        """Bound of the inverse in drive codes, including another branch and limits."""
         if self.condition:
             return float(self.inner.drive[1] - self.inner.drive[0])
         if not self.static.branches_differ:

@@ -1,10 +1,10 @@
-"""From a model with effects to whole numbers: signals, ranges and constants of fixed point.
+"""Fixed-point form of a model with effects: signals, ranges and constants as whole numbers.
 
 Signals in front of the plays are in units of the plays' input, which is a drive code or finer; signals behind the plays
 have `LEVEL_BITS` bits below an output code. Every signal is bounded here, by intervals propagated forwards from the
-drive and backwards from the reference; there are as many bits as let every signal be a factor of a product (`LARGEST`).
-States of filters have as many bits below those of signals as keep the slowest state from stalling. No sum or product
-can overflow, whatever is called in whatever order; a model that does not fit is refused.
+drive and backwards from the reference, and gets as many bits as still let a product take it (`LARGEST`). States of
+filters get enough further bits to keep the slowest state from stalling. No sum or product can overflow, in whatever
+order calls are made; a model that does not fit is refused.
 """
 
 from __future__ import annotations
@@ -73,22 +73,20 @@ from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 
 TEMPERATURE_BITS = {15: 7, 31: 22}
-"""Fraction bits of a temperature in degC by the bits of a code: +-256 or +-512 degrees."""
+"""Fraction bits of a temperature in degC, by the bits of a code: the range is +-256 or +-512 degrees."""
 
 BEYOND = 7
-"""Most spans beyond its range for which the input of plays behind a lag may be asked: 8 spans of 2^26 steps and a sign
+"""Most spans beyond its range that the input of plays behind a lag may be asked for: 8 spans of 2^26 steps and a sign
 fit in 32 bits."""
 
 MOST_FINER = 16
-"""Most bits of a signal in front of the plays below their input: the division by a slope of 31 bits then still fits in
-64."""
+"""Most bits of a signal in front of the plays below their input: division by a 31-bit slope then still fits in 64."""
 
 BEND_BITS = 30
 """Bits of the arguments and values of a curve, without their sign."""
 
 STEEP = 4.0
-"""Largest argument of a tanh to which a displacement is inverted, in its levels: the slope of the inverse is 750
-there."""
+"""Largest argument of a tanh to which a displacement is inverted, in its levels: the inverse has slope 750 there."""
 
 
 def build(
@@ -259,26 +257,26 @@ class _Builder:
 
     @cached_property
     def _unlimited(self) -> tuple[float, float]:
-        """Extremes of the settled output in front of the saturations, with the offset."""
+        """Extremes of the settled output in front of the saturations, including the offset."""
         return output_range(self.static, dataclasses.replace(self.parts, saturations=[]), self.seconds)
 
     def _inverted(self, effect: TanhSaturation, at_rest: tuple[float, float], size: float) -> tuple[float, float]:
-        """Least and largest input to which a displacement is inverted; never less than the model reaches `at_rest`."""
+        """Least and largest input to which a displacement is inverted; at least what the model reaches `at_rest`."""
         centre = self._code(effect.centre)
         way = max(*(abs(end - centre) for end in at_rest), min(size + abs(centre), STEEP * self._code(effect.level)))
         return centre - way, centre + way
 
     def _beyond(self) -> tuple[int, bool]:
-        """How far beyond its range the input of the plays has to be asked for, in spans, and whether all of it can be.
+        """Spans beyond its range that the input of the plays has to be asked for, and whether they all can be.
 
-        A lag is led there and goes on; behind a memoryless part there is nothing beyond the range.
+        A lag is led past its range and keeps moving; behind a memoryless part there is nothing beyond the range.
         """
         if self.static.stages:
             return 0, False
         low, high = self.static.play_range
         most = self.sizes.asked * float(self.output_lsb) / self.static.pi.slopes[-1]
         spans = math.ceil((most + max(abs(low), abs(high))) / (high - low)) + 1
-        straight = not any(effect.bends_plays() for effect in self.parts.plays)  # bent ones are straight outside
+        straight = not any(effect.bends_plays() for effect in self.parts.plays)  # bent plays are straight outside
         return min(spans, BEYOND), spans <= BEYOND and straight
 
     # ------------------------------------------------------------ constants
@@ -290,14 +288,14 @@ class _Builder:
 
     def _moving(self, plays: Any) -> Any:
         step = float(self.inner.step)
-        farthest = min(self._farthest, TABLE_MAX)  # that a search looks at; it may answer with the input beyond
+        farthest = min(self._farthest, TABLE_MAX)  # for a search, which may still answer with the input beyond
         return moving.build_fixed(
             plays, self.static, self.parts.plays, self.seconds, farthest, self.bumps, step, self._largest_step()
         )
 
     @cached_property
     def bumps(self) -> Bumps:
-        """What bent plays contribute in addition to the plays themselves."""
+        """Difference between bent plays' contributions and the plays themselves."""
         end = max(map(abs, self.inner.hull))
         try:
             return moving.bumps(self.static, self.parts.plays, float(self.inner.step), end, self.about.degree)
@@ -306,10 +304,10 @@ class _Builder:
             raise
 
     def _limits(self, plays: Any) -> Any:
-        """Those of the whole chain."""
+        """The limits of the whole chain."""
         limits = plays.copy()
         low, high = Fraction(self.low) / self.output_lsb, Fraction(self.high) / self.output_lsb
-        slack = Fraction(1, 1024)  # double precision may have moved an end off a code by as much
+        slack = Fraction(1, 1024)  # double precision may have moved an end off a code by this much
         limits[slots.OUTPUT_MIN], limits[slots.OUTPUT_MAX] = math.ceil(low - slack), math.floor(high + slack)
         limits[slots.OFFSET] = 0
         most = self.about.code_max
@@ -344,13 +342,13 @@ class _Builder:
         return found
 
     def _largest_step(self) -> float:
-        """`Compiled.largest_step`, and a code that a limited drive makes up for at once."""
+        """`Compiled.largest_step`, plus the code that a limited drive catches up at once."""
         low, high = self.static.input_range
         max_rate = fastest(self.static, self.parts, self.seconds, self.how)
         return min(max_rate * self.seconds + float(self.drive_lsb) * bool(self.parts.slew), high - low)
 
     def slew(self, span: int) -> list[int]:
-        """Whole drive codes by which the drive may rise and fall in one step, and the fractions beside them."""
+        """Whole drive codes that the drive may rise and fall in one step, then their fractions."""
         if not self.parts.slew:
             return [0, 0, 0, 0]
         if self._slewed > MOST_SLEWED:
@@ -362,11 +360,11 @@ class _Builder:
 
     @property
     def _slewed(self) -> float:
-        """Codes that rounding a limited rate adds up to while the drive crosses its range."""
+        """Rounding error in codes of a slew-limited drive after crossing its range."""
         return crossing(self.static, self.parts, self.seconds) * 2.0**-REST_BITS
 
     def _tables(self) -> tuple[Any, ...]:
-        """Those of all parts, in their order; what is in front of the plays with as many bits as there is room for."""
+        """The tables of all parts in order; those in front of the plays get as many bits as fit."""
         margin = Margin(1.0, turning=self.turning)
         about = FixedSurroundings(
             self.seconds, self.static.input_range, self.high - self.low, self.reading.ahead(self.how.preview),
@@ -399,13 +397,13 @@ class _Builder:
         return tuple(found[name] for name in NAMES)
 
     def _behind(self, part: ChainPart) -> list[tuple[float, float]]:
-        """Sizes of the input and of the output asked for of each block, in output codes."""
+        """Largest input, and output asked for, of each block in output codes."""
         if part not in BEHIND:
             return [(0.0, 0.0)] * len(self.ones[part.name])
         return list(zip(self.sizes.given[part.name], self.sizes.wanted[part.name], strict=True))
 
     def _in_front(self, margin: Margin) -> dict[str, list[tuple[float, float]]]:
-        """The same of each block in front of the plays, in signals there."""
+        """As `_behind` for each block in front of the plays, in units of signals there."""
         c = self.inner
         given = float(max(map(abs, c.drive)) << (c.fine + self.finer)) + 1.0
         asked = float(max(map(abs, c.play)) + c.margin) * 2.0**self.finer if not self.static.stages else given + 1.0
@@ -420,10 +418,10 @@ class _Builder:
         return found
 
     def _finest(self) -> int:
-        """Bits below the plays' input with which the lead of the lags amplifies rounding to no more than half a code.
+        """Further bits in front of the plays that keep rounding below half a code when the lags' lead amplifies it.
 
-        Only models without a memoryless part and effects on plays have them, and only if the input of the plays has no
-        bits below a drive code.
+        0 for models with a memoryless part or effects on plays, and if the plays' input already has bits below a drive
+        code.
         """
         if self.static.stages or self.parts.plays or self.inner.fine:
             return 0
@@ -473,7 +471,7 @@ class _Builder:
         )
 
     def _bends(self, effect: TanhSaturation, size: float, inverted: tuple[float, float]) -> tuple[Bend, Bend]:
-        """The curve of a tanh for inputs up to `size` codes, and its inverse for results between two."""
+        """The curve of a tanh for inputs up to `size` codes, and its inverse for results within `inverted`."""
         scale = 2.0**self.bits
 
         def curve(function: Callable[[float], float], low: float, high: float, value: float) -> Bend:

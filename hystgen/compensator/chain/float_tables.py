@@ -1,4 +1,4 @@
-"""From a model with effects to the numbers that its operators work with in floating point."""
+"""Floating-point form of a model with effects: the numbers that its operators work with."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 
 ROUNDINGS = 4.0
-"""[half last bits of the largest drive] What rounding leaves between the input of the plays that is sought and the one
-that arrives: those of the goal and of the state of a lag. Set by: tests/test_chain.py -k stands_still."""
+"""[half last bits of the largest drive] Rounding difference between the plays' input that is sought and the one that
+arrives: from a lag's goal and its state. Set by: tests/test_chain.py -k stands_still."""
 
 
 def _behind(parts: Parts, arithmetic: str) -> Stages:
@@ -78,7 +78,7 @@ def _behind(parts: Parts, arithmetic: str) -> Stages:
 
 
 def _in_two(x: Fraction, dtype: Any) -> tuple[float, float]:
-    """A number that is at least 0 as one of the arithmetic and what rounding took from that, together no larger."""
+    """A nonnegative number as one of the arithmetic and the remainder that rounding removed; their sum is no larger."""
     whole = dtype(min(float(x), float(np.finfo(dtype).max) / 32))
     rest = dtype(float(x - Fraction(float(whole))))
     if Fraction(float(whole)) + Fraction(float(rest)) > x:
@@ -87,8 +87,8 @@ def _in_two(x: Fraction, dtype: Any) -> tuple[float, float]:
 
 
 def slewed(steps: float, dtype: Any) -> float:
-    """What rounding a drive at a limited rate adds up to in that many steps, share of the range's end: in each half a
-    last bit of what is kept beside the drive, and of the rate."""
+    """Accumulated rounding of a slew-limited drive after so many steps, as a share of the range's end: per step half a
+    last bit of the remainder kept beside the drive, and half of the rate's."""
     u = float(np.finfo(dtype).eps) / 2
     return steps * 2.0 * u * u
 
@@ -113,7 +113,7 @@ def build(
 
     plays = build_float(dataclasses.replace(static, output_offset=0.0), arithmetic, engine, True, True)
     free = {end: getattr(plays.forward, end) for end in ("limit", "inside", "range")}
-    plays = plays._replace(inverse=plays.inverse._replace(**free))  # what is limited is the drive in front of a lag
+    plays = plays._replace(inverse=plays.inverse._replace(**free))  # the limit applies to the drive in front of a lag
     low, high = inward(*output_range(static, parts, seconds), dtype)
     if not low < high:
         raise FormatError((("input_range",), f"the range of the output is narrower than {arithmetic} can tell apart"))

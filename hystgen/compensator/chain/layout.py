@@ -25,40 +25,40 @@ from hystgen.plays.slots import Counts, Reals
 
 OFFSET, FARTHEST, RISING, FALLING, RISING_REST, FALLING_REST, SHARE, DITHER = range(8)
 """Places in `ChainTables.number`: output offset, the largest offset that may be set, how far the drive may rise and
-fall in a step, what rounding took from these two, the share with which verification corrects, and how far a drive at
-rest goes to and fro, as a signal in front of the plays."""
+fall in a step, the parts of these two lost to rounding, the share by which verification corrects, and how far a drive
+at rest dithers, as a signal in front of the plays."""
 
 LEVEL_BITS, LEVEL_DROP, LARGEST_LEVEL, LEAST_CODE, MOST_CODE, SHARE_BITS, DRIVE_BITS, ARRIVING_BITS, BRAKED_DROP = (
     range(8, 17)
 )
-"""Further places in fixed point: bits of a signal behind the plays below an output code, bits of a sum of the plays
-below those of a signal, the largest sum asked of the plays, the least and largest code of a drive before it is limited,
+"""Further places in fixed point: bits of a signal behind the plays below an output code, bits that a sum of the plays
+has below such a signal, the largest sum asked of the plays, the least and largest code of a drive before it is limited,
 bits of a mantissa below a code, bits of a signal in front of the plays below a drive code and below their input, and
-bits of such a signal below the numbers with which the lead of a braked lag is searched."""
+bits that such a signal has below the numbers in the search for the lead of a braked lag."""
 
 TRAVEL_BITS = 16
 """In fixed point, verification sets travels in multiples of 2^16 drive codes."""
 
 REST_BITS = 30
-"""In fixed point, bits below a code of what rounding takes from a drive at a limited rate, and from that rate."""
+"""In fixed point, bits below a code of the rounding remainders of a slew-limited drive and of its rate."""
 
 MOST_SLEWED = 16.0
-"""[last bits of the range's end] What rounding may add up to while a drive crosses its range at a limited rate; slower
-rates are refused. Derived: a bound of float32 is some 100 of them, so that a tenth of it goes to the rate."""
+"""[last bits of the range's end] Most rounding that may accumulate while a slew-limited drive crosses its range; slower
+rates are refused. Derived: a bound of float32 is some 100 of them, so a tenth of it goes to the rate."""
 
 VERIFIED_SHARE = 0.125
-"""The share with which verification corrects: a number of every arithmetic."""
+"""The share by which verification corrects: exact in every arithmetic."""
 
 LEAST_LATE = 1e-6
-"""[samples] Motion that is less late is in time: the means of ages are sums with rounding."""
+"""[samples] Smaller delays count as none: mean ages are sums with rounding."""
 
 SAMPLES_A_SWEEP = 50
 """Fewest samples from one end of the drive's range to the other for which bounds are stated: a triangle at a hundredth
-of the sample rate still has its shape, and errors by ageing and by contacts within a step are small."""
+of the sample rate keeps its shape, and errors by ageing and by contacts within a step are small."""
 
 
 class Stages(NamedTuple):
-    """Memoryless stages, as `hystgen.front.stage.StageTables`."""
+    """Memoryless stages, as in `hystgen.front.stage.StageTables`."""
 
     stage_kind: Counts
     stage_first: Counts
@@ -71,8 +71,8 @@ class Stages(NamedTuple):
 class ChainTables(NamedTuple):
     """The constants of one model with effects in one arithmetic.
 
-    `limits`: as in `Tables`, of the whole chain; `plays`: front and plays without an offset, with the same limits in
-    floating point, and in fixed point with limits of a drive that may have bits below a code; `behind`: saturation.
+    `limits`: as in `Tables`, for the whole chain; `plays`: front and plays without an offset, whose limits are the same
+    in floating point; in fixed point their drive may have bits below a code; `behind`: saturation.
     """
 
     plays: Any  # `Tables` or `FixedTables`
@@ -81,7 +81,7 @@ class ChainTables(NamedTuple):
     blocks: tuple[Any, ...]  # tables of each of `parts.PARTS`
     counts: Counts  # of their blocks
     behind: Any  # `Stages`, or in fixed point `hystgen.effects.saturation.fixed.Saturations`
-    tap: Reals  # (L,), in fixed point factors (L, 2); none without a preview
+    tap: Reals  # (L,), as factors (L, 2) in fixed point; empty without a preview
     number: Reals
     slew: int  # 1 if the rate of the drive is limited
     quiet: int  # equal references after which the drive stands still, 0 if it never has to
@@ -97,17 +97,17 @@ class ChainTables(NamedTuple):
         return self.blocks[NAMES.index(part)]
 
     def number_of(self, part: str) -> int:
-        """Of blocks of a part of the chain."""
+        """Number of blocks in a part of the chain."""
         return int(self.counts[NAMES.index(part)])
 
     @property
     def calls(self) -> set[str]:
-        """What its blocks add to the interface."""
+        """The calls that its blocks add to the interface."""
         return {call for part in PARTS if self.number_of(part.name) for call in part.calls}
 
     @property
     def braked(self) -> bool:
-        """Whether a lag behind a slew limit is kept from overshooting."""
+        """Whether a lag behind a slew limit is braked, so that it does not overshoot."""
         return bool(self.blocks[LED].braked)
 
     @property
@@ -118,28 +118,28 @@ class ChainTables(NamedTuple):
 
 
 class OwnChainTables(ChainTables):
-    """The same of a model with effects of the user's own: their classes, in front of the plays and behind."""
+    """The tables of a model with a user's own effects: `own_sides` has their classes, ahead of the plays and behind."""
 
     own_sides: tuple[tuple[type[Effect], ...], tuple[type[Effect], ...]]
 
     @property
     def own_effects(self) -> tuple[type[Effect], ...]:
-        """All of them."""
+        """The user's own effects, in front of the plays and then behind."""
         return (*self.own_sides[0], *self.own_sides[1])
 
     @property
     def own_blocks(self) -> tuple[tuple[OwnBlock, ...], tuple[OwnBlock, ...]]:
-        """Their blocks, in front of the plays and behind."""
+        """The blocks of these effects, in front of the plays and behind."""
         ahead, behind = (tuple(e.block for e in side if e.block is not None) for side in self.own_sides)
         return ahead, behind
 
 
 @dataclass(frozen=True)
 class Codes:
-    """A model with effects in fixed point: physical units per code, bounds in codes, and ranges.
+    """The units of a model with effects in fixed point: physical units per code, bounds in codes, and ranges.
 
-    `forward_error` in output codes, `inverse_error` and the part of it on the same branch, `inverse_rounding`, in drive
-    codes; `condition`: the condition of `inverse_rounding` in words; `largest`: bound of every signal.
+    `forward_error` in output codes; `inverse_error`, and its part on the same branch, `inverse_rounding`, in drive
+    codes; `condition`: the condition of `inverse_rounding` in words; `largest`: bound on every signal.
     """
 
     drive_lsb: Fraction
@@ -164,9 +164,9 @@ class Compiled:
     asked: int | None = None
     smoothing: Smoothing | None = None
     shaped: Shaped | None = None
-    """what the taps contain beside a delay and inverted modes"""
+    """shaped modes in the taps, besides a delay and inverted modes"""
     codes: Codes | None = None
-    """of fixed point"""
+    """only in fixed point"""
 
     @property
     def largest_step(self) -> float:
@@ -181,7 +181,7 @@ class Compiled:
 
     @property
     def ahead(self) -> int:
-        """NAME_PREVIEW: what the model needs, or what was asked for."""
+        """NAME_PREVIEW: as asked for, else as the model needs."""
         return Read(self.taps, self.smoothing, self.shaped).ahead(self.asked)
 
     @property
@@ -196,12 +196,12 @@ class Compiled:
 
     @property
     def last(self) -> list[One]:
-        """The blocks behind these that the forward operator has alone."""
+        """The blocks behind these that only the forward operator has."""
         return [one for part in BEHIND if part.forward for one in self.ones[part.name]]
 
     @cached_property
     def ones(self) -> dict[str, list[Any]]:
-        """Its blocks."""
+        """The blocks of each part of the chain."""
         return self.parts.ones(self.seconds, bool(self.tables.turning))
 
     @property
@@ -217,12 +217,12 @@ class Compiled:
 
 QUIET = 32
 """[samples] Equal references after which the drive stands still. Set by: benchmarks/chosen_numbers.py quiet. Behind a
-lag of 10 samples in q15 a ramp of a code in 20 samples then arrives as without it; with 8 it is missed by 0.088 codes
-(rms) instead of 0.077. With 128 a ramp of a code in 100 samples still dithers all the time, with 32 a third of it."""
+lag of 10 samples in q15 a ramp of a code in 20 samples then arrives unchanged; with 8 it is missed by 0.088 codes (rms)
+instead of 0.077. With 128 a ramp of a code in 100 samples still dithers all the time, with 32 a third of it."""
 
 
 def quiet(how: Compensation, taps: Taps | None) -> int:
-    """`ChainTables.quiet`: those, and as many as the preview sums beside the first."""
+    """`ChainTables.quiet`: `QUIET`, plus one for each sample that the preview sums beside the first."""
     return QUIET + (len(taps.weights) if taps else 1) - 1 if how.quiet else 0
 
 
@@ -232,12 +232,12 @@ def ahead_of(ones: Mapping[str, Sequence[Any]]) -> list[Any]:
 
 
 def lead(ahead: Sequence[One]) -> float:
-    """Largest gain from what arrives in front of the plays to the drive, 0 if the drive itself arrives there."""
+    """Largest gain from the signal in front of the plays to the drive, 0 if there are no blocks between them."""
     return math.prod(one.lead for one in ahead) if ahead else 0.0
 
 
 def braked(parts: Parts, ones: Mapping[str, Sequence[Any]]) -> int:
-    """1 where a slew limit has one block behind it that is led."""
+    """1 if a single led block follows a slew limit."""
     return int(bool(parts.slew) and [one.exact for one in ones[NAMES[LED]]] == [False])
 
 
@@ -256,7 +256,7 @@ def crossing(static: StaticModel, parts: Parts, seconds: float) -> float:
 
 
 def too_slow(steps: float, arithmetic: str, finer: str) -> str:
-    """Refusal of a rate at which the drive crosses its range in that many steps."""
+    """Message that refuses a rate at which the drive crosses its range in that many steps."""
     return (
         f"slew_limit: the drive crosses its range in {steps:.2g} samples, too slow for {arithmetic}; use {finer}, or a "
         "longer sample_time"
@@ -264,19 +264,19 @@ def too_slow(steps: float, arithmetic: str, finer: str) -> str:
 
 
 HELD_CODES = 3
-"""[times DITHER] How far rounding alone takes a lag beyond its target in front of two branches: a drive is kept ahead
-of it by up to two, and rounding that drive to a code adds half of one."""
+"""[times DITHER] How far rounding alone takes a lag beyond its target in front of two branches: a drive is kept up to
+two ahead of it, and rounding that drive to a code adds half of one."""
 
 
 def hold(rounded: Any, dither: Any, turning: bool) -> Any:
-    """Moves back of the drive in front of two branches that are none: those of `rounded` computation, and of drives
-    that are not the ones asked for."""
+    """Largest move back of the drive in front of two branches that does not count: from `rounded` computation, and from
+    drives that differ from those asked for."""
     return rounded + (HELD_CODES if turning else 1) * dither
 
 
 def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> float:
-    """NAME_MAX_RATE in drive units per second: as asked for, else a slow sweep, and no more than the amplifier can do,
-    nor than own heat allows without the gain leaving its limits.
+    """NAME_MAX_RATE in drive units per second: as asked for, else a slow sweep; at most the rate of the amplifier, and
+    the rate at which own heat keeps the gain within its limits.
 
     Beyond a slew limit the drive differs from the one given to the C, depending on when in a step it is reached.
     """
@@ -289,17 +289,16 @@ def fastest(static: StaticModel, parts: Parts, seconds: float, how: Compensation
 
 
 def largest_way(static: StaticModel, ahead: Sequence[One], step: float) -> float:
-    """Largest move of the plays' input in a step in which the drive moves by at most `step`, through blocks of the
-    user's own `ahead`, up the steepest slope of the front and from one of its branches to the other. A lag makes it no
-    larger."""
+    """Largest move of the plays' input in a step in which the drive moves by at most `step`: through a user's own
+    blocks `ahead`, up the steepest slope of the front and from one of its branches to the other. A lag adds nothing."""
     grown = math.prod(one.growth for one in ahead)
     low, high = static.play_range
     return min(static.front_slopes[1] * grown * step + static.branch_gap, max(grown, 1.0) * (high - low))
 
 
 class Read(NamedTuple):
-    """How the reference is read: its weights in the preview, None if it is taken as it comes, and in them the averages
-    that hold the noise gain and what keeps modes from ringing."""
+    """How the reference is read: weights in the preview, None if it is taken unchanged, and the averages in them that
+    hold the noise gain and that keep modes from ringing."""
 
     taps: Taps | None
     smoothing: Smoothing | None
@@ -315,7 +314,7 @@ class Read(NamedTuple):
         return max(self.taps.ahead, 0) if self.taps else 0
 
     def missing(self, asked: int | None) -> int:
-        """Samples of these that are not known ahead of the motion."""
+        """Samples of `needed` that are not known ahead of the motion."""
         return max(self.needed - self.ahead(asked), 0)
 
     def late(self, asked: int | None) -> float:
@@ -324,7 +323,7 @@ class Read(NamedTuple):
 
 
 def read(static: StaticModel, parts: Parts, seconds: float, how: Compensation) -> Read:
-    """The reading of the reference that a model takes."""
+    """How a model reads the reference."""
     delay = parts.delay + (0.5 * seconds if how.drive_hold == "held" else 0.0)
     modes, by = ([], "inverse") if how.resonance == "none" else (parts.modes, how.resonance)
     needed = preview.taps(delay, modes, seconds, how.taps, how.corner, by)

@@ -1,14 +1,14 @@
 """Plays that an effect moves or bends in its own way: the constants of `c_runtime/compensator/chain/moving_plays.c`.
 
-The state of play i is where it would come to rest, and what it contributes there. A plain play rests where it is. A
-viscous one, with the state q before a step, is at `z = q + b1 dz_r(w - q)` at the end of the step, and its new state is
+The state of play i is where it would come to rest, and its contribution there. A plain play rests where it is. A
+viscous play with the state q before a step is at `z = q + b1 dz_r(w - q)` at the end of the step, and its new state is
 `q = z + (1 - E/M) dz_r(w - z)`, with `M = (1 - E) tau/T` and dz_r the part beyond +-r: the exact response to a straight
 input while the play slides or rests.
 
-The state of a play with a nonlinear dashpot is where it is, in two parts. In a step its input counts as if it stood
-still at a fraction a of the way: `z' = z + D(dz_r(x + a (w - x) - z))`, with D the yield of a stretch in a step by the
-dashpot's own law. Two such plays whose inputs differ by at most e stay within e of each other, so that the error is at
-most a times the way.
+The state of a play with a nonlinear dashpot is its position, in two parts. In a step its input counts as standing still
+at a fraction a of the way: `z' = z + D(dz_r(x + a (w - x) - z))`, with D the yield of a stretch in a step by the
+dashpot's own law. Two such plays whose inputs differ by at most e stay within e of each other, so the error is at most
+a times the way.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ SCALE, INVERSE_SCALE, MIDDLE, INVERSE_WIDTH, BUMP, TANH_CENTRE, LEAST_INPUT, LAR
 
 CELLS = 4096
 """Cells in which the slope of bent plays is computed: 1/4096 of the range is far below the width of any bump that a
-record shows; a search accepts none below a twentieth of the range."""
+record shows; a search rejects widths below a twentieth of the range."""
 
 YIELD_BEGIN, YIELD_C0, YIELD_C1, YIELD_C2, YIELD_C3, YIELD_SCALE, YIELD_LIFT = range(7)
 """Columns of the yields of a nonlinear dashpot in fixed point, as in `hystgen_yield_t`."""
@@ -58,8 +58,9 @@ step."""
 
 
 class MovingTables(NamedTuple):
-    """`first`, `second` (n + 1,): for dilated plays the growth of a threshold per unit of a step, for viscous ones b1
-    and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials; `halves`: bisections of the search."""
+    """Constants of moved or bent plays. `first`, `second` (n + 1,): for dilated plays the growth of a threshold per
+    unit of a step, for viscous ones b1 and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials; `halves`:
+    bisections of the search."""
 
     moves: int
     bends: int
@@ -68,24 +69,23 @@ class MovingTables(NamedTuple):
     curve: Reals
     number: Reals
     halves: int
-    scanned: int  # 1 for viscous plays with one time constant that nothing bends
-    share: Reals  # for those, p_i b1 (n + 1,)
+    scanned: int  # 1 for viscous plays with one time constant and no bend
+    share: Reals  # p_i b1 (n + 1,), if scanned
     inverse: Reals  # 1 / (p_0 + b1 (p_1 + ... + p_i))
     yields: Reals  # (K, 5): yields of a nonlinear dashpot, by pieces
 
     @property
     def used(self) -> bool:
-        """Whether an effect moves or bends the plays; engine loop solves them if not."""
+        """Whether an effect moves or bends the plays; if not, engine loop solves for them."""
         return self.moves != PLAIN or self.bends != STRAIGHT
 
 
 class FixedMovingTables(NamedTuple):
-    """The same in fixed point: `first`, `second` are factors (n + 1, 2), `farthest` the largest input that a search
-    tries, and `relaxed` tables of plays with the slopes that viscous plays with one time constant have in a step.
-    `bump`: curves of what bent plays contribute in addition to the play itself, with `bump_bits` bits below a step of
-    their input; `bump_of` (n + 1,): the curve of each play.
-    `yields` (K, 7): yields of a nonlinear dashpot with `yield_bits` bits below a step, with columns `YIELD_BEGIN` and
-    so on, for stretches up to `stretch`; `seen`: a factor."""
+    """The same in fixed point. `first`, `second`: factors (n + 1, 2); `farthest`: the largest input that a search
+    tries; `relaxed`: tables of plays with the slopes that viscous plays with one time constant have in a step; `bump`:
+    curves of bent plays less the plays themselves, with `bump_bits` bits below a step of their input; `bump_of`
+    (n + 1,): the curve of each play; `yields` (K, 7): yields of a nonlinear dashpot with `yield_bits` bits below a
+    step, in columns from `YIELD_BEGIN` on, for stretches up to `stretch`; `seen`: a factor."""
 
     moves: int
     bends: int
@@ -104,13 +104,13 @@ class FixedMovingTables(NamedTuple):
 
     @property
     def used(self) -> bool:
-        """Whether an effect moves or bends the plays; engine loop solves them if not."""
+        """Whether an effect moves or bends the plays; if not, engine loop solves for them."""
         return self.moves != PLAIN or self.bends != STRAIGHT
 
 
 @dataclass(frozen=True)
 class Bumps:
-    """What bent plays contribute in addition to the play itself, in fixed point: curves for whole inputs from -`end` to
+    """Contributions of bent plays less the plays themselves, in fixed point: curves for whole inputs from -`end` to
     `end`, whose values have `bits` bits below a step of the input and leave out `lift` of them; `of` (n + 1): the curve
     of each play; `largest`: the largest value, in steps."""
 
@@ -142,14 +142,14 @@ def problems(static: StaticModel, effects: Sequence[Effect], seconds: float) -> 
 
 
 def _dilated(static: StaticModel, effects: Sequence[Effect], seconds: float) -> bool:
-    """Whether thresholds grow with the rate and are emitted as such, without viscous plays in their place."""
+    """Whether thresholds grow with the rate and are emitted as such, not replaced by viscous plays."""
     r, p = np.array(static.pi.thresholds), np.array(static.pi.weights)
     thresholds = [effect for effect in effects if isinstance(effect, ThresholdRate)]
     return any(Movement(effect, r, p).by_threshold(seconds) for effect in thresholds)
 
 
 def beyond_forward(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
-    """Thresholds that grow so fast with the rate that viscous plays replace them, which only the inverse may do."""
+    """Thresholds that grow so fast with the rate that viscous plays replace them, which only the inverse allows."""
     for effect in effects:
         if isinstance(effect, ThresholdRate) and not _dilated(static, [effect], seconds):
             yield effect, "viscous plays stand in for it, which only the inverse may; emit the inverse alone"
@@ -167,8 +167,7 @@ def least_dilated(static: StaticModel, effects: Sequence[Effect], seconds: float
 
 
 def least_slope(static: StaticModel, effects: Sequence[Effect]) -> float:
-    """Least change of the sum per change of the plays' input, over their reach and over any number of plays that
-    follow."""
+    """Least change of the sum per change of the plays' input, over their reach and any number of plays that follow."""
     low, high = static.play_range
     p, r = np.array(static.pi.weights), np.array(static.pi.thresholds)
     at = np.linspace(low - r[-1], high + r[-1], CELLS + 1)
@@ -181,7 +180,7 @@ def least_slope(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 
 def bent_slopes(static: StaticModel, effects: Sequence[Effect]) -> tuple[Array, Array]:
-    """Least and largest change of what each play (n + 1,) contributes per change of the play, where it can be."""
+    """Least and largest change of each play's contribution (n + 1,) per change of the play, wherever it can be."""
     low, high = static.play_range
     r, start = np.array(static.pi.thresholds), np.array(static.pi.start)
     ends = np.array([low + r, high - r, start])
@@ -196,7 +195,7 @@ def bent_slopes(static: StaticModel, effects: Sequence[Effect]) -> tuple[Array, 
 
 
 def of_shifts(static: StaticModel, effects: Sequence[Effect], moves: int, shifts: Array) -> tuple[float, float]:
-    """Errors of the sum of plays that see their input shifted by up to `shifts` (n,), and what counts of them in the
+    """Errors of the sum of plays whose input is shifted by up to `shifts` (n,), and the part that counts in the
     inverse, as an error of the sum that its gain `2/least_slope` multiplies."""
     flat, steep = bent_slopes(static, effects)
     p = np.abs(static.pi.weights)
@@ -209,9 +208,9 @@ def of_shifts(static: StaticModel, effects: Sequence[Effect], moves: int, shifts
 
 
 def found_shifted(most: Array, least: Array, shifts: Array, in_order: bool) -> float:
-    """How far off the inverse can find the input of plays that see it shifted by up to `shifts` (n,), each time anew.
+    """Error of the inverse's input for plays whose input is shifted by up to `shifts` (n,), anew at each time.
 
-    `most`, `least` (n + 1,): change of what a play contributes per change of the play; `in_order`: see below.
+    `most`, `least` (n + 1,): change of a play's contribution per change of the play; `in_order`: see below.
 
     The difference of two such plays is `d_i' = a_i (e + g_i - d_i)`, with shifts g_i and rates a_i >= 0, and the
     inverse has `p_0 e = -sum p_i d_i`. Backwards in time, the share x_i of d_i in e is like heat that starts in a hub
@@ -221,11 +220,12 @@ def found_shifted(most: Array, least: Array, shifts: Array, in_order: bool) -> f
 
         |e| <= sum g_i p_i (2/(p_0 + .. + p_i) - 1/sum p).
 
-    Places that take heat up slowly can gain some anew from others. A search of schedules for sets of 3 to 6 weights
-    over up to four decades found sums of at most 1.13 times that if rates do not rise with the threshold (`in_order`),
-    all below those without the second term, which are taken here. For rates in any order it found up to 0.7 of
-    `2 g log(sum p/p_0)`, which is no less than those sums in whatever order of the plays. Neither is proved for plays
-    that follow in part; benchmarks/chosen_numbers.py shifts searches again, and comes to 0.86 and 0.64 of them.
+    Places that heat up slowly can take heat from others again. A search of schedules for sets of 3 to 6 weights over up
+    to four decades found sums of at most 1.13 times this bound if rates do not rise with the threshold (`in_order`),
+    all below the bound without its second term, which is used here. For rates in any order it found up to 0.7 of
+    `2 g log(sum p/p_0)`, which is at least as large as that bound for any order of the plays. Neither is proved for
+    plays that follow in part; benchmarks/chosen_numbers.py shifts repeats the search, and reaches 0.86 and 0.64 of
+    them.
     """
     slopes = np.cumsum(least)
     if in_order:
@@ -234,7 +234,7 @@ def found_shifted(most: Array, least: Array, shifts: Array, in_order: bool) -> f
 
 
 def _in_order(effect: Effect) -> bool:
-    """Whether of moving plays none yields faster than one with a smaller threshold."""
+    """Whether no moving play yields faster than one with a smaller threshold."""
     if isinstance(effect, ThresholdRate):
         return len(set(effect.betas)) == 1
     return isinstance(effect, RelaxingPlays) and effect.exponent >= 1.0
@@ -255,7 +255,7 @@ def steepest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
 def build(
     static: StaticModel, effects: Sequence[Effect], seconds: float, largest_step: float, dtype: Any
 ) -> MovingTables:
-    """The tables of a model's plays, for effects without `problems` and a drive that takes no larger steps."""
+    """The tables of a model's plays, for effects without `problems` and drive steps up to `largest_step`."""
     n = static.pi.n
     low, high = static.play_range
     first, second = np.zeros(n + 1), np.zeros(n + 1)
@@ -311,13 +311,13 @@ def largest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 
 def largest_stretch(static: StaticModel) -> float:
-    """Most by which the plays' input can be ahead of a play: the way between all places where either can be."""
+    """Largest distance by which the plays' input can be ahead of a play: the span of all places where either can be."""
     ends = *static.play_range, *static.pi.start
     return max(ends) - min(ends)
 
 
 def _far(static: StaticModel) -> float:
-    """Largest distance of plays from 0, and a little more."""
+    """Largest distance of plays from 0, with a small margin."""
     return 1.001 * max(*map(abs, static.play_range), *map(abs, static.pi.start))
 
 
@@ -344,7 +344,7 @@ def bumps(static: StaticModel, effects: Sequence[Effect], step: float, end: int,
 
 
 def _bump(effect: Effect, i: int, scale: float) -> tuple[Any, Callable[[float], float]]:
-    """A key that plays with the same bend share, and the contribution of a bent play in addition to itself."""
+    """A key that plays with the same bend share, and the difference between a bent play's contribution and the play."""
     if isinstance(effect, PlayFunctions):
         row = effect.coefficients[i - 1]
 
@@ -372,7 +372,7 @@ def build_fixed(
     step: float,
     largest_step: float,
 ) -> FixedMovingTables:
-    """The same in fixed point, with inputs in steps of `step` and up to `farthest`. Raises OverflowError."""
+    """The tables in fixed point, with inputs in steps of `step` and up to `farthest`. Raises OverflowError."""
     own = build(static, effects, seconds, largest_step, np.float64)
     first, second = (np.array([factor(x) for x in each], dtype=np.int64) for each in (own.first, own.second))
     ends, scaled = [(-bump.end, bump.end)] * len(bump.curves), [(0, bump.lift)] * len(bump.curves)
@@ -399,7 +399,7 @@ def _yields(
 ) -> list[tuple[int, ...]]:
     """Pieces of the yields of stretches up to `end`, cubic between whole knots; the first one is straight."""
     knots = sorted({0, end + 1, *(x for x in begins if 0 < x <= end)})
-    while knots[-2] and dashpot.LONGEST * knots[-2] < end:  # beyond the end of the table in floating point
+    while knots[-2] and dashpot.LONGEST * knots[-2] < end:  # beyond the last piece in floating point
         knots.insert(-1, int(dashpot.LONGEST) * knots[-2])
     while (wide := max(b - a for a, b in itertools.pairwise(knots))) > 2**30:
         k = next(i for i, (a, b) in enumerate(itertools.pairwise(knots)) if b - a == wide)
@@ -407,7 +407,7 @@ def _yields(
     rows = []
     for a, b in itertools.pairwise(knots):
         shift = 31 - (b - a).bit_length()
-        ratio = 2.0 ** (31 - shift) / (b - a)  # of the variable's range to the piece
+        ratio = 2.0 ** (31 - shift) / (b - a)  # range of the variable per length of the piece
         if a:
             (low, begin), (high, slope) = law(a * step), law(b * step)
             run, rise = (b - a) * step, high - low
@@ -423,19 +423,18 @@ def _yields(
 def yield_error(
     t: FixedMovingTables, effect: RelaxingPlays, static: StaticModel, seconds: float, step: float, way: float
 ) -> float:
-    """As `dashpot.stretch_error`, for tables in fixed point with steps of `step`, plus the stretch that rounding holds
-    back."""
+    """As `dashpot.stretch_error`, for tables in fixed point with steps of `step`, plus the stretch lost to rounding."""
     rows, held = [], []
     for begin, *c, shift, lift in t.yields.tolist():
         unit, run = step * 2.0 ** (lift - t.yield_bits), step * 2.0 ** (31 - shift)
         rows.append((begin * step, *(each * unit / run**k for k, each in enumerate(c))))
-        held.append(2.5 * unit)  # of a coefficient, and of three products
+        held.append(2.5 * unit)  # rounding of a coefficient and of three products
     ways = way, largest_stretch(static)
     return dashpot.stretch_error(effect, static.pi.thresholds[-1], seconds, np.array(rows), ways, np.array(held))
 
 
 def _relaxed(plays: FixedTables, late: float) -> FixedTables:
-    """Plays with the slopes of viscous ones that gain the share `late` of their stretch in a step."""
+    """Tables of plays with the slopes of viscous ones that gain the share `late` of their stretch in a step."""
     weight = plays.weight
     sums = [0, int(weight[0])]
     for p in weight[1:].tolist():

@@ -1,4 +1,4 @@
-"""How plays move and are bent in fixed point: the C of `effects/rate_dependence/` and `effects/noncongruent/`."""
+"""Movement and bending of plays in fixed point: the C of `effects/rate_dependence/` and `effects/noncongruent/`."""
 
 from __future__ import annotations
 
@@ -28,8 +28,7 @@ from hystgen.plays.slots import Reals
 
 @jit
 def yields(t: FixedMovingTables, x: Any) -> Any:
-    """The part of a stretch x >= 0 that a play with a nonlinear dashpot gains in a step, with bits below a step of the
-    input."""
+    """The yield in a step of a play with a nonlinear dashpot at stretch x >= 0, with bits below a step of the input."""
     inside = t.stretch if x > t.stretch else x
     low = 0
     high = len(t.yields)
@@ -50,19 +49,19 @@ def yields(t: FixedMovingTables, x: Any) -> Any:
 
 @jit
 def seen(t: FixedMovingTables, way: Any) -> Any:
-    """How far into the step `way` the input counts as standing still."""
+    """The part of `way` at which the input counts as standing still."""
     return times(way, t.seen[0], t.seen[1])
 
 
 @jit
 def moved_by(t: FixedMovingTables, gained: Any) -> Any:
-    """The move of a play for a yield."""
+    """The move of a play for its yield."""
     return nearest(gained, t.yield_bits)
 
 
 @jit
 def yield_of(t: FixedMovingTables, moved: Any) -> Any:
-    """The yield that the move of a play stands for."""
+    """The yield for a play's move."""
     return moved << t.yield_bits
 
 
@@ -74,7 +73,7 @@ def share_of(factors: Reals, i: int, x: Any) -> Any:
 
 @jit
 def bent(t: FixedMovingTables, plays: Any, i: int, z: Any) -> Any:  # noqa: ARG001  as in floating point
-    """What play i contributes at z."""
+    """Contribution of play i at z."""
     if t.bends == STRAIGHT:
         return z
     value, _ = bend(t.bump, t.bump_of[i], z)
@@ -83,8 +82,8 @@ def bent(t: FixedMovingTables, plays: Any, i: int, z: Any) -> Any:  # noqa: ARG0
 
 @jit
 def relaxing_follow(t: FixedMovingTables, plays: Any, s: State, w: Any) -> Any:
-    """Viscous plays with one time constant follow their input w. Returns their sum. Each rests at most as far from the
-    play before as their thresholds are from each other, in spite of rounding."""
+    """Move viscous plays with one time constant with their input w. Returns their sum. In spite of rounding,
+    neighbouring plays rest at most as far apart as their thresholds."""
     r, p = plays.threshold, plays.weight
     total = p[0] * w
     for i in range(1, len(r)):
@@ -104,8 +103,8 @@ def relaxing_follow(t: FixedMovingTables, plays: Any, s: State, w: Any) -> Any:
 
 @jit
 def relaxing_input(t: FixedMovingTables, plays: Any, s: State, h: Any) -> Any:  # noqa: ARG001  as in floating point
-    """Input of viscous plays at which their sum is h: none is stretched with the input where play 1 rests; beyond it
-    they are solved for like plain ones, with smaller slopes."""
+    """Input of viscous plays at which their sum is h. With the input where play 1 rests, none is stretched; beyond that
+    they are solved for like plain plays, with smaller slopes."""
     s.play[0] = s.play[1]
     return loop_solve(t.relaxed, s, h)
 
@@ -116,7 +115,7 @@ def search(sum_at: Callable[..., Any]) -> Callable[..., Any]:
     @jit
     def searched(t: ChainTables, s: ChainState, h: Any) -> Any:
         """Input of the plays at which their sum is h, by bisection between the present input and the farthest one: the
-        nearer of two neighbours, or the input beyond the farthest where even that is not enough."""
+        nearer of two neighbours, or the input beyond the farthest if even that is not enough."""
         here = s.plays.play[0]
         total = sum_at(t, s, here)
         low = -t.moving.farthest if total > h else here
@@ -141,13 +140,13 @@ def search(sum_at: Callable[..., Any]) -> Callable[..., Any]:
 
 @jit
 def level(t: ChainTables, total: Any) -> Any:
-    """A sum of the plays, which has bits below those of a signal, as a signal."""
+    """A sum of the plays, which has bits below a signal's, as a signal."""
     return nearest(total, t.number[LEVEL_DROP])
 
 
 @jit
 def asked(t: ChainTables, h: Any) -> Any:
-    """The sum of the plays that a signal asks for, limited to what they can give."""
+    """The sum of the plays that a signal asks for, limited to their range."""
     inside = h
     if inside > t.number[LARGEST_LEVEL]:
         inside = t.number[LARGEST_LEVEL]

@@ -1,4 +1,4 @@
-"""How plays move and are bent in floating point: the C of `effects/rate_dependence/` and `effects/noncongruent/`."""
+"""Movement and bending of plays in floating point: the C of `effects/rate_dependence/` and `effects/noncongruent/`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from hystgen.plays.slots import Reals
 
 @jit
 def yields(t: MovingTables, x: Any) -> Any:
-    """The part of a stretch x >= 0 that a play with a nonlinear dashpot gains in a step."""
+    """The yield in a step of a play with a nonlinear dashpot at stretch x >= 0."""
     low = 0
     high = len(t.yields)
     while high - low > 1:
@@ -47,13 +47,13 @@ def yields(t: MovingTables, x: Any) -> Any:
 
 @jit(inline=True)
 def seen(t: MovingTables, way: Any) -> Any:
-    """How far into the step `way` the input counts as standing still."""
+    """The part of `way` at which the input counts as standing still."""
     return way * t.number[SEEN]
 
 
 @jit(inline=True)
 def unchanged(t: MovingTables, x: Any) -> Any:  # noqa: ARG001  as in fixed point
-    """The move of a play for a yield, and the reverse."""
+    """The move of a play for its yield, and the reverse."""
     return x
 
 
@@ -65,7 +65,7 @@ def share_of(factors: Reals, i: int, x: Any) -> Any:
 
 @jit
 def bent(t: MovingTables, plays: Any, i: int, z: Any) -> Any:
-    """What play i contributes at z."""
+    """Contribution of play i at z."""
     if t.bends == POLYNOMIAL:
         x = z * t.number[INVERSE_SCALE]
         total = z - z
@@ -80,7 +80,7 @@ def bent(t: MovingTables, plays: Any, i: int, z: Any) -> Any:
 
 @jit
 def relaxing_follow(t: MovingTables, plays: Any, s: State, w: Any) -> Any:
-    """Viscous plays with one time constant follow their input w. Returns their sum."""
+    """Move viscous plays with one time constant with their input w. Returns their sum."""
     r, p = plays.threshold, plays.weight
     total = p[0] * w
     for i in range(1, len(r)):
@@ -94,7 +94,7 @@ def relaxing_follow(t: MovingTables, plays: Any, s: State, w: Any) -> Any:
 @jit
 def relaxing_input(t: MovingTables, plays: Any, s: State, h: Any) -> Any:
     """Input of viscous plays at which their sum is h: first without a stretched play, then with those stretched on the
-    way there."""
+    way to it."""
     r, p = plays.threshold, plays.weight
     rest = r[0]
     for i in range(1, len(r)):

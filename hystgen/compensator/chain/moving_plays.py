@@ -16,20 +16,20 @@ Function = Callable[..., Any]
 
 
 class Kind(NamedTuple):
-    """The parts in which arithmetics differ; `m` are the `moving` tables, `plays` those of plain plays."""
+    """The functions in which arithmetics differ; `m` are the `moving` tables, `plays` those of plain plays."""
 
-    level: Function  # of chain tables and a sum: the sum as a signal
-    asked: Function  # of chain tables and a signal: the sum of the plays that it asks for
+    level: Function  # of chain tables and a sum: the signal
+    asked: Function  # of chain tables and a signal: the sum of the plays asked for
     solve: Function  # of plays, state and a sum: as engine loop
     relaxing_follow: Function  # of m, plays, state and w
     relaxing_input: Function  # of m, plays, state and a sum
     share_of: Function  # of factors, i and x: x times factor i
     yields: Function  # of m and a stretch, not negative: its yield in a step
-    seen: Function  # of m and a way: how far into it the input counts as standing still
+    seen: Function  # of m and a way: the part of it at which the input counts as standing still
     moved_by: Function  # of m and a yield: the move of a play
     yield_of: Function  # of m and the move of a play: the yield
     bent: Function  # of m, plays, i and z
-    search: Callable[[Function], Function]  # of a function that gives the sum at an input: that finds the input
+    search: Callable[[Function], Function]  # of a function from input to sum: the function that finds the input
 
 
 def movement(kind: Kind) -> tuple[Function, Function, Function]:
@@ -38,7 +38,7 @@ def movement(kind: Kind) -> tuple[Function, Function, Function]:
 
     @jit
     def change(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
-        """How far play i with a nonlinear dashpot moves while the input of the plays goes to w, as a yield."""
+        """Move, as a yield, of play i with a nonlinear dashpot while the input of the plays goes to w."""
         x = s.play[0] + seen(m, w - s.play[0]) - s.play[i]
         gained = zero(x)
         if x > r[i]:
@@ -67,7 +67,7 @@ def movement(kind: Kind) -> tuple[Function, Function, Function]:
 
     @jit
     def move(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> None:
-        """Play i moves while the input of the plays goes to w."""
+        """Move play i while the input of the plays goes to w."""
         if m.moves == DASHPOT:
             gained = change(m, r, i, s, lost, w)
             z = s.play[i] + moved_by(m, gained)
@@ -78,7 +78,7 @@ def movement(kind: Kind) -> tuple[Function, Function, Function]:
 
     @jit
     def put(m: Any, i: int, s: State, lost: Reals, z: Any) -> None:
-        """Play i rests at z."""
+        """Put play i to rest at z."""
         if m.moves == DASHPOT:
             lost[i] = zero(lost[i])
         s.play[i] = z
@@ -106,7 +106,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def moved_follow(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
-        """The plays move while their input goes to w. Returns their sum."""
+        """Move the plays while their input goes to w. Returns their sum."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         for i in range(1, len(r)):
@@ -120,7 +120,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def relax(m: Any, plays: Any, s: State, values: Reals) -> None:
-        """The plays go on to where they would come to rest with their input held, as seen one step later."""
+        """Move the plays to where they would rest with their input held, as seen one step later."""
         if m.moves != RELAXING:
             return
         for i in range(1, len(plays.threshold)):
@@ -149,7 +149,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def moved_rest(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
-        """The plays come to rest with their input at w. Returns their sum."""
+        """Bring the plays to rest with their input at w. Returns their sum."""
         r, p = plays.threshold, plays.weight
         total = p[0] * w
         for i in range(1, len(r)):
@@ -161,7 +161,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def sum_at(t: ChainTables, s: ChainState, w: Any) -> Any:
-        """Sum of the plays with their input at w."""
+        """The sum of the plays with their input at w."""
         if s.flags[MOVING]:
             return moved_sum(t.moving, t.plays, s.plays, s.lost, s.bent, w)
         return resting_sum(t.moving, t.plays, s.plays, s.bent, w)
@@ -170,11 +170,11 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit(inline=True)
     def start(t: ChainTables, s: ChainState, zero: int) -> None:
-        """The plays are at the start memory, or all at 0, as `step.plays_of` sets them."""
+        """Set the plays to the start memory, or all to 0, as `step.plays_of` does."""
 
     @jit
     def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
-        """The plays follow their input w. Returns their sum."""
+        """Move the plays with their input w. Returns their sum."""
         m = t.moving
         if m.moves == PLAIN and m.bends == STRAIGHT:
             loop_absorb(t.plays, s.plays, w)
@@ -192,7 +192,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
 
     @jit
     def started(t: ChainTables, s: ChainState) -> Any:
-        """Sum of the plays in the start memory."""
+        """The sum of the plays in the start memory."""
         m = t.moving
         if m.scanned or (m.moves == PLAIN and m.bends == STRAIGHT):
             return level(t, loop_output(t.plays, s.plays))

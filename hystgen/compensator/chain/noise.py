@@ -1,13 +1,13 @@
 """The gain from the reference to the drive over all frequencies, and the averages that hold it below a limit.
 
-What leads, leads by differences, whose gain grows with the frequency. A moving average over w samples divides a
-difference by w at most: `(1 - z)(1 + z + .. + z^(n-1) + e z^n) = 1 - (1 - e) z^n - e z^(n+1)` has no gain above 2, as
-`1 - z` itself. Averages are weights of the preview like all others: no state, no recursion, hence no limit cycles, and
-centred ones shift nothing in time. Poles in front of the lead that hold the same limit leave 5 to 50 times the error
-of smooth references with a preview, and 1.02 to 1.9 times without (benchmarks/chosen_numbers.py averages).
+A lead uses differences, whose gain grows with the frequency. A moving average over w samples lowers the largest gain of
+a difference to at most 2/w: `(1 - z)(1 + z + .. + z^(n-1) + e z^n) = 1 - (1 - e) z^n - e z^(n+1)` has no gain above 2,
+like `1 - z` itself. Averages are weights of the preview like all others: no state, no recursion, hence no limit cycles,
+and centred ones shift nothing in time. Poles in front of the lead that hold the same limit leave 5 to 50 times the
+error of smooth references with a preview, and 1.02 to 1.9 times without (benchmarks/chosen_numbers.py averages).
 
-One average stands in front of all leads. Blocks in series are linear about an operating point, so that only the product
-of their gains counts, and no rule has to share the limit among them.
+One average stands in front of all leads. Blocks in series are linear about an operating point, so only the product of
+their gains counts, and no rule has to divide the limit among them.
 """
 
 from __future__ import annotations
@@ -34,36 +34,36 @@ from hystgen.parameters.schema import MOST_REFERENCES
 Array = NDArray[np.float64]
 
 FREQUENCIES = np.append(np.geomspace(1e-10, 1e-3, 281)[:-1], np.linspace(1e-3, np.pi, 4096))
-"""[rad a sample] Where a gain is looked at first: 8 places in each lobe of an average over 1000 samples, 40 in each
-decade below, where creep of up to 2^28 samples makes a step of the gain."""
+"""[rad a sample] Frequencies at which a gain is evaluated first: 8 in each lobe of an average over 1000 samples, 40 in
+each decade below, where creep of up to 2^28 samples makes a step of the gain."""
 
 PEAK = 0.9
-"""[largest value] Local maxima that are looked at closely: between two places of `FREQUENCIES` a lobe hides 8 % at
-most, `1 - cos(pi/8)`."""
+"""[largest value] Local maxima from here on are refined: between `FREQUENCIES` a lobe hides at most 8 %,
+`1 - cos(pi/8)`."""
 
 HALVINGS = 60
-"""[steps] Of a search for a frequency or a width: to the last bits of a double."""
+"""[steps] In a search for a frequency or a width: to the last bits of a double."""
 
 SAME = 1e-9
-"""[relative] Excess of a limit that is rounding: responses of a thousand weights have some 1e-13 of it."""
+"""[relative] Excess over a limit that counts as rounding: responses of a thousand weights have about 1e-13 of it."""
 
 SERIES = 1.1
-"""[ratio] Of widths that are tried one after the other: below 11 samples each adds less than one, while the gain falls
-and rises again over two."""
+"""[ratio] Of successive widths in a search: below 11 samples each adds less than one, while the gain falls and rises
+again over two."""
 
 MOST_TIMES = 4
-"""[averages] Most that stand one behind the other. For half the gain one loses least, for a twentieth two, and three
-where a lag and a mode are led together; a fifth is never the best. Set by: benchmarks/chosen_numbers.py averages."""
+"""[averages] Most in series. At half the gain one average loses least, at a twentieth two, and three where a lag and a
+mode are led together; a fifth is never best. Set by: benchmarks/chosen_numbers.py averages."""
 
 
 @dataclass(frozen=True)
 class Gain:
-    """The largest gain (N,) of a model's inverse at frequencies (N,) in rad a sample, over that at rest.
+    """The largest gain (N,) of a model's inverse at frequencies (N,) in rad a sample, over the gain at rest.
 
-    Of small changes of the reference, over all numbers of plays that follow them: plays that relax, or grow with the
-    rate, follow more slowly than those of the static inverse. What is behind a lag remembers what arrived, which is the
-    wanted signal less its second difference: with the response F, of which D comes at once, and the lag's share L that
-    arrives, the wanted input is `1/(D + (F - D) L)`. `taps`: of the preview.
+    It holds for small changes of the reference, over any number of plays that follow: plays that relax, or whose
+    thresholds grow with the rate, follow more slowly than in the static inverse. Blocks behind a lag remember the
+    signal that arrived, which is the wanted one less its second difference: with their response F, of which D comes at
+    once, and the lag's share L that arrives, the wanted input is `1/(D + (F - D) L)`. `taps`: of the preview.
     """
 
     static: StaticModel
@@ -73,7 +73,7 @@ class Gain:
 
     @cached_property
     def _blocks(self) -> list[One]:
-        """The blocks of the inverse, those of the user's own last."""
+        """The blocks of the inverse, the user's own last."""
         parts = sorted((part for part in (*AHEAD, *BEHIND) if not part.forward), key=lambda part: part.joined)
         turning = self.parts.turning(self.static.branches_differ)
         return [one for each in self.parts.ones(self.seconds, turning, parts).values() for one in each]
@@ -83,7 +83,7 @@ class Gain:
         return np.asarray(np.abs(led) * np.max([np.abs(slope * rest / answer) for slope, answer in answers], axis=0))
 
     def drive(self, at: Array) -> Array:
-        """The same in drive units per unit of the reference, where plays and front are least steep; saturation, which
+        """The gain in drive units per unit of the reference, where plays and front are least steep; saturation, which
         adds to it near its ends, is left out."""
         led, _, answers = self._answers(at)
         least = self.static.front_slopes[0]
@@ -93,7 +93,7 @@ class Gain:
 
     def _answers(self, at: Array) -> tuple[NDArray[np.complex128], float, list[tuple[float, NDArray[np.complex128]]]]:
         """The lead (N,), the gain at rest behind the plays, and for each number of plays that follow, their slope at
-        rest and the response (N,) by which the lead is divided."""
+        rest and the response (N,) that divides the lead."""
         z = np.exp(-1j * at)
         led = np.polynomial.polynomial.polyval(z, self.taps.weights[::-1].astype(complex))
         found = Responses(led, np.ones_like(z), np.ones_like(z), 1.0, 1.0)
@@ -106,12 +106,12 @@ class Gain:
         return found.led, found.rest, answers
 
     def _plays(self, z: NDArray[np.complex128]) -> Iterator[tuple[float, NDArray[np.complex128], float]]:
-        """For each number of plays that follow their slope at rest, their response, and what of it comes at once."""
+        """For each number of plays that follow: slope at rest, response, and the part of it that comes at once."""
         if not self._moving_plays:
             yield 1.0, np.ones_like(z), 1.0
         for effect in self._moving_plays:
             p = self._steepest
-            if dashpot.nonlinear(effect):  # some stretch is so slow that its play does not follow
+            if dashpot.nonlinear(effect):  # some stretch is too slow for its play to follow
                 yield float(np.sum(p)), np.full_like(z, p[0]), float(p[0])
                 continue
             movement = Movement(effect, np.array(self.static.pi.thresholds), p)
@@ -139,13 +139,13 @@ class Gain:
 
     @cached_property
     def near(self) -> Array:
-        """Frequencies between which it does not rise and fall unseen: blocks of the user's own may ring."""
+        """Frequencies between which the gain cannot rise and fall unseen: a user's own blocks may ring."""
         return np.unique(np.concatenate([FREQUENCIES, *(one.ringing for one in self._blocks)]))
 
 
 def peaks(gain: Callable[[Array], Array], near: Array) -> tuple[Array, Array]:
-    """The local maxima (M,) close to the largest one, and their frequencies; `near` rises, with one maximum at most
-    between three of them."""
+    """The local maxima (M,) close to the largest one, and their frequencies; `near` is ascending, with at most one
+    maximum among three neighbours."""
     found = gain(near)
     before, behind = (np.append(-np.inf, found[:-1]), np.append(found[1:], -np.inf))
     places = np.flatnonzero((found >= before) & (found >= behind) & (found >= PEAK * np.max(found)))
@@ -171,8 +171,7 @@ def loudest(gain: Gain) -> tuple[float, float]:
 
 
 def check(gain: float, limit: float) -> None:
-    """Raise UnsupportedEffectsError where the widest averages leave a noise gain above its limit, by more than its own
-    rounding."""
+    """Raise UnsupportedEffectsError if the widest averages leave a noise gain above its limit, rounding aside."""
     if gain > limit * (1.0 + SAME):
         raise UnsupportedEffectsError(
             f"averages over {MOST_REFERENCES} samples of the reference, the most that the C keeps, leave a noise gain "
@@ -182,10 +181,10 @@ def check(gain: float, limit: float) -> None:
 
 @dataclass(frozen=True)
 class Smoothing:
-    """`times` moving averages over `width` samples in series, `centred` or not, as `preview.averages`.
+    """`times` moving averages over `width` samples in series, `centred` or not, as in `preview.averages`.
 
-    `ahead`: samples by which the newest one of the last average is ahead of the motion. `without`: the noise gain
-    without them.
+    `ahead`: samples by which the newest one of the last average is ahead of the motion. `without`: noise gain without
+    them.
     """
 
     times: int
@@ -196,7 +195,7 @@ class Smoothing:
 
     @property
     def row(self) -> Array:
-        """Weights of all together, from the oldest sample to the newest."""
+        """Weights of all averages together, from the oldest sample to the newest."""
         return averages(self.times, self.width, self.centred)
 
     @property
@@ -206,12 +205,12 @@ class Smoothing:
 
     @property
     def late(self) -> float:
-        """Samples by which the motion is later for them."""
+        """Samples by which they delay the motion."""
         return self.age - self.ahead
 
     @property
     def variance(self) -> float:
-        """Of the samples' age: the loss of a slow sine is `variance frequency^2/2`, with the frequency in rad."""
+        """Variance of the samples' age: a slow sine loses `variance frequency^2/2`, with the frequency in rad."""
         return float(self.row @ (np.arange(len(self.row))[::-1] - self.age) ** 2)
 
     def gain(self, at: Array) -> Array:
@@ -226,20 +225,20 @@ class Smoothing:
         return np.asarray((np.abs(one) / self.width) ** self.times)
 
     def loss(self, period: float) -> float:
-        """Share that a sine with a period in samples loses of its size."""
+        """Share of its amplitude that a sine with a period given in samples loses."""
         return 1.0 - float(self.gain(np.array([2.0 * np.pi / period]))[0])
 
     def before(self, row: Taps) -> Taps:
-        """The weights of a preview `row` and of the averages in series."""
+        """The weights of these averages in series with a preview `row`."""
         return Taps(row.first + self.ahead - (len(self.row) - 1), np.convolve(row.weights, self.row))
 
 
 def smoothing(gain: Gain, limit: float, references: int, asked: int | None) -> Smoothing | None:
-    """The averages of at most `references` weights with the preview that hold a noise gain, or else come closest to it.
+    """The averages that hold a noise gain, or come closest, with at most `references` weights including the preview.
 
-    None where nothing exceeds the limit. They are centred if the reference may be `asked` samples ahead, for None as
-    far as it takes; else they look back, and are as little late as they can. The number of averages is the one that
-    loses least of a slow reference.
+    None if the gain is within the limit. They are centred if the reference may be read `asked` samples ahead (None: as
+    far as needed); else they look back, with the least delay. The number of averages is the one that loses least of a
+    slow reference.
     """
     without = largest(gain)
     if without <= limit * (1.0 + SAME):
@@ -268,7 +267,7 @@ def least(gain: Gain, limit: float, room: int, centred: bool) -> Smoothing:
 
 
 def narrowest(gain: Gain, limit: float, times: int, widest: float, centred: bool) -> tuple[Smoothing, float]:
-    """The least width at which `times` averages hold the limit, and its gain; the widest one if none does."""
+    """The least width at which `times` averages hold the limit, and their gain; the widest one if none does."""
     near, sizes = gain.near, gain(gain.near)
 
     def holds(width: float) -> bool:
@@ -291,7 +290,7 @@ def narrowest(gain: Gain, limit: float, times: int, widest: float, centred: bool
 
 def _bracket(holds: Callable[[float], bool], widest: float) -> tuple[float, float]:
     """The last width of a series that does not hold a limit, and the next one, which does; the widest one twice if none
-    does. The gain is that of the sample rate's half first, and has lobes from there on: it does not always fall."""
+    does. The gain does not always fall with the width: at first half the sample rate sets it, later the lobes do."""
     low = high = 1.0
     while not holds(high):
         if high >= widest:

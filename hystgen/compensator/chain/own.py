@@ -1,6 +1,6 @@
-"""Blocks of effects of the user's own: their numbers, and their gains for signals and errors.
+"""Blocks of a user's own effects: their numbers, and their gains for signals and errors.
 
-Such a block is linear, so that calls of its functions with unit states and inputs give its matrices: forwards
+Such a block is linear, so calling its functions with unit states and inputs gives its matrices: forwards
 `s <- A s + B x`, `y = C s + D x` from absorb, and backwards from y to x from solve followed by absorb. Sums over all
 later samples are bounded mode by mode, `sum |C A^k B| <= sum |c_j b_j|/(1 - |lambda_j|)` in the eigenvectors of A, or
 by sums of powers of A, whichever is smaller; if two modes coincide, only by powers.
@@ -25,16 +25,16 @@ from hystgen.effects.part import Function, Margin, One, Realized, Responses, Ver
 from hystgen.plays.slots import Counts, Reals
 
 Glue = tuple[Function, Function, Function]
-"""What an arithmetic puts around blocks: product, a signal into a block, and a signal out of it."""
+"""The functions that an arithmetic puts around blocks: product, a signal into a block, and a signal out of it."""
 
 SAME = 1e-9
 """Relative difference up to which two answers of a block differ only by rounding, for time constants of up to a million
-samples, with which a difference of states loses as many digits."""
+samples, at which a difference of states loses that many digits."""
 
 
 class OwnTables(NamedTuple):
-    """Blocks on one side of the plays: `number` (m,), in fixed point (m, 4), of block j from `first[j]` (k + 1) on; its
-    memory from `place[j]` (k + 1) on; `bits` (k,): bits of its signals below those of the chain, in fixed point."""
+    """Blocks on one side of the plays. `number` (m,), in fixed point (m, 4): block j's begin at `first[j]` (k + 1); its
+    memory begins at `place[j]` (k + 1); `bits` (k,): bits of its signals below the chain's, in fixed point."""
 
     first: Counts
     number: Reals
@@ -44,7 +44,7 @@ class OwnTables(NamedTuple):
 
 @dataclass(frozen=True)
 class System:
-    """`s <- a s + b x`, `y = c s + d x` of a state (n,)."""
+    """The linear system `s <- a s + b x`, `y = c s + d x` with a state (n,)."""
 
     a: Array
     b: Array
@@ -52,7 +52,7 @@ class System:
     d: float
 
     def _modes(self) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any]] | None:
-        """Reciprocals of each mode's loss in a sample, the eigenvectors, and their inverse.
+        """The reciprocal loss of each mode per sample, the eigenvectors, and their inverse.
 
         None if two modes coincide, so that the eigenvectors do not span the states.
         """
@@ -63,7 +63,7 @@ class System:
             return 1.0 / np.maximum(1.0 - np.abs(values), 0.0), vectors, np.linalg.inv(vectors)
 
     def _sums(self) -> Array:
-        """A bound (n, n) of `sum |A^k|`: of twice as many powers, `S + S |A^m|`."""
+        """A bound (n, n) on `sum |A^k|`, which `S + S |A^m|` extends to twice as many powers."""
         power, total = self.a, np.eye(len(self.b))
         with np.errstate(over="ignore", invalid="ignore"):
             while not np.max(np.sum(np.abs(power), axis=1), initial=0.0) <= 0.5:
@@ -75,7 +75,7 @@ class System:
 
     @property
     def radius(self) -> float:
-        """Spectral radius: the share of a disturbance that a sample leaves in the long run."""
+        """Spectral radius: the share of a disturbance that each sample leaves in the long run."""
         return float(np.max(np.abs(np.linalg.eigvals(self.a)), initial=0.0))
 
     def states(self) -> Array:
@@ -87,7 +87,7 @@ class System:
         return np.asarray(bound)
 
     def after(self) -> Array:
-        """Sum (n,) of the output's absolute changes by one disturbance of each state."""
+        """Sum (n,) of the output's absolute changes after one disturbance of each state."""
         bound = np.abs(self.c) @ self._sums()
         if (modes := self._modes()) is not None:
             lost, vectors, back = modes
@@ -95,7 +95,7 @@ class System:
         return np.asarray(bound)
 
     def once(self) -> Array:
-        """Largest change (n,) of the output at any later sample by one disturbance of each state."""
+        """Largest change (n,) of the output at any later sample after one disturbance of each state."""
         bound = self.after()
         if (modes := self._modes()) is not None:
             _, vectors, back = modes
@@ -123,7 +123,7 @@ class System:
 
 @dataclass(frozen=True)
 class Linear(One):
-    """A block at one step length: forwards and backwards, its gain at rest, and the states (n,) of the input 1."""
+    """A block at one step length: forwards and backwards, its gain at rest, and its states (n,) at rest at input 1."""
 
     effect: Effect
     numbers: Array
@@ -148,21 +148,21 @@ class Linear(One):
         """Largest output for inputs within 1."""
         return self.forward.largest
 
-    def solved(self, error: float, size: float, u: float, same: bool) -> float:  # noqa: ARG002  as of every block
-        """Error of the input that it is solved for, by an error of the output."""
+    def solved(self, error: float, size: float, u: float, same: bool) -> float:  # noqa: ARG002  as in every block
+        """Error of the input solved for, given an error of the output."""
         return self.passed(error) + self.rounding(size, u)[1]
 
     def led(self, error: float, drive: float, u: float, same: bool, turning: bool) -> float:  # noqa: ARG002
-        """The same in front of the plays."""
+        """As `solved`, in front of the plays."""
         return self.solved(error, drive, u, same)
 
     def seen(self) -> float:
-        """Factor by which states that see its input multiply an error of that."""
+        """Factor by which states that see the block's input multiply an error of that input."""
         return self.passed(0.0, 1.0)
 
     @property
     def misses(self) -> bool:
-        """Whether what arrives may differ from what it was solved for."""
+        """Whether the signal that arrives may differ from the one solved for."""
         return True
 
     @property
@@ -171,7 +171,7 @@ class Linear(One):
         return np.asarray(np.abs(np.angle(np.linalg.eigvals(self.backward.a))))
 
     def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
-        """What it makes of frequencies, behind other blocks."""
+        """Responses with this block added behind other blocks."""
         found = found._replace(rest=found.rest * self.rest)
         if not self.exact:
             return found._replace(led=found.led * self.backward.response(z))
@@ -179,7 +179,7 @@ class Linear(One):
 
     @property
     def fineness(self) -> float:
-        """Bits that its lead takes from a signal in front of the plays."""
+        """Bits that its lead costs a signal in front of the plays."""
         return math.log2(2.0 * self.backward.largest)
 
     def at_rest(self, x: float) -> float:
@@ -191,17 +191,16 @@ class Linear(One):
         return size * self.forward.largest * margin.slack + 1.0
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
-        """Largest input that solve or resting can give for an output within a size, after inputs `given`."""
+        """Largest input from solve or resting for an output within a size, after inputs within `given`."""
         now, before = abs(self.forward.d), self.forward.before()
         return max((asked + before * given) / now, asked / self.rest) * margin.slack + 1.0
 
     def sizes(self) -> Array:
-        """Largest states (n,) for inputs within 1, from rest at one."""
+        """Largest states (n,) for inputs within 1, starting from rest at such an input."""
         return self.forward.states() + np.abs(self.settled)
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output for inputs within `size`, and of the input that the inverse gives, without errors of
-        the output asked for."""
+        """Roundings of the output for inputs within `size`, and of the inverse's input for an exact output."""
         shares = self._shares(u)
         sizes = [Rounded(each, 0.0, u) for each in (size * self.sizes()).tolist()]
         state = np.array(sizes, dtype=object)
@@ -218,10 +217,10 @@ class Linear(One):
     def passed(self, error: float, own: float = 0.0) -> float:
         """Error of the input for an error of the output, and for roundings `own` of solve.
 
-        A limit may pass an error of the input on in part or not at all. A single state then lies between its values for
-        the two cases. If earlier inputs count less in an output than the present one does, errors of the input
-        contract. If solve gives the input for which absorb returns the output, an error of the input has the effect of
-        one of the output that it is asked for, by what the present input counts.
+        A limit may pass an input error on in part or not at all. A single state then lies between its values for the
+        two cases. If earlier inputs count less in an output than the present one, input errors contract. If solve gives
+        the input for which absorb returns the output, an input error acts like an error of the output asked for, scaled
+        by the weight of the present input.
         """
         forward, back = self.forward, self.backward
         before, now = forward.before(), abs(forward.d)
@@ -290,7 +289,7 @@ def linear(effect: Effect, seconds: float) -> Linear:
 
 
 def problems(effect: Effect, seconds: float, fixed: bool) -> Iterator[str]:
-    """Reasons why the C cannot have the block of an effect, in fixed point or else in floating point."""
+    """Reasons why the C cannot include an effect's block, in fixed point or in floating point."""
     assert effect.block is not None
     one = linear(effect, seconds)
     if not _adds_up(one, seconds):
@@ -329,7 +328,7 @@ def problems(effect: Effect, seconds: float, fixed: bool) -> Iterator[str]:
 
 
 def _stays_for_solve(effect: Effect, seconds: float) -> bool:
-    """Whether solve leaves the memory as it is."""
+    """Whether solve leaves the memory unchanged."""
     instance = own.Instance(effect)
     instance.advance(seconds)
     before = np.random.default_rng(0).normal(size=len(instance.state))
@@ -339,7 +338,7 @@ def _stays_for_solve(effect: Effect, seconds: float) -> bool:
 
 
 def _adds_up(one: Linear, seconds: float) -> bool:
-    """Whether a block is linear: for random states and inputs it answers as the system from its unit answers does."""
+    """Whether a block is linear: it answers random states and inputs like the system built from its unit answers."""
     rng = np.random.default_rng(0)
     instance = own.Instance(one.effect)
     instance.advance(seconds)
@@ -368,13 +367,13 @@ def build(every: Sequence[Linear], reals: Any) -> OwnTables:
 
 
 def constants(t: OwnTables, kinds: Sequence[type[Effect]]) -> list[Constants]:
-    """The numbers of each block of these effects."""
+    """The numbers of each of these effects' blocks."""
     found = []
     for j, effect in enumerate(kinds):
         assert effect.block is not None
         row = t.number[t.first[j] : t.first[j + 1]]
         kind, products = own.kind(effect), effect.block.products
-        if row.ndim > 1:  # fixed point, where a product takes two
+        if row.ndim > 1:  # fixed point: two products each
             absorb, solve = products
             found.append(Constants(kind, row.ravel(), (2 * absorb, 2 * solve), bits=int(t.bits[j])))
         else:
@@ -393,7 +392,7 @@ def product(number: Any, x: Any) -> Any:
 
 @jit(inline=True)
 def passed(t: OwnTables, j: int, x: Any) -> Any:  # noqa: ARG001  as in fixed point
-    """A signal of the chain as one of block j, and the reverse: the same number."""
+    """A signal of the chain as one of block j, and the reverse: the number is the same."""
     return x
 
 
@@ -408,7 +407,8 @@ def memory(t: OwnTables, dtype: Any) -> Reals:
 def arithmetic(
     blocks: Sequence[OwnBlock], effects: Sequence[type[Effect]], made: Glue, *tables: Callable[..., Any]
 ) -> Realized:
-    """Blocks on one side of the plays, one after the other, as one of the chain; `tables` and formats as it has."""
+    """Blocks on one side of the plays in series, as one block of the chain; `tables`: its makers of tables and
+    formats."""
 
     def through(verb: str) -> Function:
         calls = [_one(made, block, verb, j) for j, block in enumerate(blocks)]
@@ -421,7 +421,7 @@ def arithmetic(
 
 
 def _both(first: Function, behind: Function) -> Function:
-    """A verb applied by two blocks, one after the other."""
+    """A verb of two blocks in series."""
 
     @jit
     def both(t: OwnTables, s: Reals, j: int, x: Any) -> Any:
@@ -431,19 +431,19 @@ def _both(first: Function, behind: Function) -> Function:
 
 
 def _one(made: Glue, block: OwnBlock, verb: str, j: int) -> Function:
-    """A verb of block j, with its numbers and memory picked."""
+    """A verb of block j, bound to its numbers and memory."""
     product, entered, left = made
     function = block.compiled(verb, product)
     if verb == "resting":
 
         @jit
-        def resting(t: OwnTables, s: Reals, k: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+        def resting(t: OwnTables, s: Reals, k: int, y: Any) -> Any:  # noqa: ARG001  as in every block
             return left(t, j, function(t.number[t.first[j] : t.first[j + 1]], entered(t, j, y)))
 
         return resting
 
     @jit
-    def call(t: OwnTables, s: Reals, k: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+    def call(t: OwnTables, s: Reals, k: int, x: Any) -> Any:  # noqa: ARG001  as in every block
         row, memory = t.number[t.first[j] : t.first[j + 1]], s[t.place[j] : t.place[j + 1]]
         return left(t, j, function(row, memory, entered(t, j, x)))
 

@@ -1,8 +1,8 @@
-"""Blocks of effects of the user's own in fixed point: formats that follow from their functions, and roundings.
+"""Blocks of a user's own effects in fixed point: formats derived from their functions, and roundings.
 
-The functions are those of floating point. Signals in a block have as many bits below those of the chain as keep the
-accumulated roundings of its states below a fraction of the chain's last bit. A number of its table is a factor; its
-product leaves out the last bits of an argument that has more bits than a product takes.
+The functions are the same as in floating point. Signals in a block have enough bits below the chain's to keep the
+accumulated roundings of its states below a fraction of the chain's last bit. A number of its table is a factor; if an
+argument has more bits than a product takes, the product leaves out its last bits.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ MANTISSA, SHIFT, DROP, LIFT = range(4)
 @dataclass(frozen=True)
 class Formats(Coded):
     """A block in fixed point: `table` (n, 4) of its numbers, each a factor and the bits that a product leaves out of
-    its argument and of its result; `bits` of its signals below those of the chain; `output` and `answer`: roundings of
-    the results of absorb and solve, in units of the chain's signals."""
+    its argument and of its result; `bits` of its signals below the chain's; `output` and `answer`: roundings of the
+    results of absorb and solve, in units of the chain's signals."""
 
     linear: Linear
     table: list[tuple[int, int, int, int]]
@@ -48,21 +48,21 @@ class Formats(Coded):
         """Roundings of the output in front of the plays."""
         return self.output
 
-    def led(self, error: float, code: float, same: bool, turning: bool) -> float:  # noqa: ARG002  as of every block
-        """Error of the input for one of the output asked for; `code`: rounding of the input."""
+    def led(self, error: float, code: float, same: bool, turning: bool) -> float:  # noqa: ARG002  as in every block
+        """Error of the input for an error of the output asked for; `code`: rounding of the input."""
         return self._passed(error + self.output, self.answer + code, same)
 
-    def there(self, size: float, signal: float) -> float:  # noqa: ARG002  as of every block
-        """Roundings of the output, with signals of this unit."""
+    def there(self, size: float, signal: float) -> float:  # noqa: ARG002  as in every block
+        """Roundings of the output, for signals in units of `signal`."""
         return self.output * signal
 
     def solved(self, error: float, at: Sought) -> float:
-        """Error of the input that it is solved for, by one of the output."""
+        """Error of the input solved for, given an error of the output."""
         states = at.seen * self.linear.forward.before() + self.output * at.signal
         return self._passed(error + states, self.answer * at.signal, at.same)
 
     def residual(self, missed: float, same: bool) -> float:
-        """The error of an output that the inverse makes of one of the sum of the plays."""
+        """The error of an output for an error of the sum of the plays that the inverse leaves."""
         return self._passed(0.0, missed, same)
 
     def _passed(self, error: float, own: float, same: bool) -> float:
@@ -72,7 +72,7 @@ class Formats(Coded):
 
 @dataclass
 class _Number:
-    """A number of a table, and the largest size of its arguments; `exact`: its factor is taken for the number."""
+    """A number of a table, and the largest size of its arguments; `exact`: whether its factor counts as exact."""
 
     value: float
     row: tuple[int, int, int, int]
@@ -90,7 +90,7 @@ class _Number:
 
 @dataclass(frozen=True)
 class _Traced:
-    """A whole number within `size`, no farther than `error` from the exact one; `most`: the largest of all sizes."""
+    """A whole number within `size`, at most `error` from the exact one; `most`: the largest of all sizes."""
 
     size: float
     error: float
@@ -118,7 +118,7 @@ def _row(value: float, seen: float) -> tuple[int, int, int, int]:
 
 @dataclass(frozen=True)
 class _Trace:
-    """The sizes and errors in the functions of a block, for an input and an output asked for up to these sizes."""
+    """The sizes and errors in the functions of a block, for inputs up to `given` and outputs up to `asked`."""
 
     linear: Linear
     given: float
@@ -127,9 +127,9 @@ class _Trace:
     def run(
         self, rows: Sequence[tuple[int, int, int, int]], bits: int, exact: bool
     ) -> tuple[list[float], float, float, float]:
-        """For signals with `bits` more bits: the largest argument of each number, the largest size, and the roundings
-        of absorb and of solve; `exact`: without those of the factors, which are shares of the signals and which no
-        bits of these make smaller."""
+        """The largest argument of each number, the largest size, and the roundings of absorb and of solve, with `bits`
+        more bits for signals; `exact`: without the errors of factors, which are proportional to the signals and which
+        more bits do not reduce."""
         most = [0.0]
         pairs = zip(self.linear.numbers.tolist(), rows, strict=True)
         numbers = [_Number(value, row, exact) for value, row in pairs]
@@ -154,9 +154,9 @@ class _Trace:
 
 
 def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
-    """A block for an input and an output asked for up to these sizes, in signals of the chain.
+    """A block for inputs up to `given` and outputs up to `asked`, in signals of the chain.
 
-    Those have `code` bits below a code. Raises OverflowError if its numbers do not fit or its states would stall.
+    These have `code` bits below a code. Raises OverflowError if its numbers do not fit or its states would stall.
     """
     trace = _Trace(linear, given, asked)
     values = linear.numbers.tolist()
@@ -186,7 +186,7 @@ def build(rows: Sequence[Formats]) -> OwnTables:
 
 @jit
 def product(number: Any, x: Any) -> Any:
-    """A number of the table times x, to the nearest whole number."""
+    """A number of the table times x, rounded to the nearest whole number."""
     return times(x >> number[DROP], number[MANTISSA], number[SHIFT]) << number[LIFT]
 
 
@@ -207,7 +207,7 @@ def part(name: str, place: Place, blocks: Sequence[OwnBlock] = (), effects: Sequ
     ahead = place is Place.DRIVE
 
     def format_of(one: Linear, about: FixedSurroundings, size: float, asked: float) -> Formats:
-        bits = 0 if ahead else about.bits  # of the sizes in front of the plays below those that are given
+        bits = 0 if ahead else about.bits  # of the sizes in front of the plays below the given ones
         return formats(one, size * 2.0**bits, asked * 2.0**bits, bits)
 
     return ChainPart(

@@ -1,4 +1,4 @@
-"""The parts of the chain in their order, and the effects of a model by their part in it."""
+"""The parts of the chain in order, and the effects of a model sorted into them."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from hystgen.plays.slots import Counts
 OWN_AHEAD, OWN_BEHIND = own_fixed.part("own_ahead", Place.DRIVE), own_fixed.part("own_behind", Place.LINEAR)
 
 SENT = (DELAY,)
-"""What a drive passes on its way to the amplifier."""
+"""Between the drive and the amplifier."""
 
 AHEAD = (LAG, OWN_AHEAD)
-"""In front of the plays, from the amplifier on. Only the first one is led in front of two branches."""
+"""In front of the plays, from the amplifier on. In front of two branches only the first is led."""
 
 BEHIND = (CREEP, OWN_BEHIND, AGEING, HEAT_PART, GAIN_PART, MODE)
 """Behind the plays, from their sum on."""
 
 BESIDE = (CLOCK,)
-"""What is added to the displacement."""
+"""Added to the displacement."""
 
 PARTS = (*SENT, *AHEAD, *BEHIND, *BESIDE)
-"""All of them, in the order of `ChainTables.blocks`."""
+"""All parts, in the order of `ChainTables.blocks`."""
 
 NAMES = [part.name for part in PARTS]
 LED = PARTS.index(AHEAD[0])
@@ -46,7 +46,7 @@ LED = PARTS.index(AHEAD[0])
 def parts_with(
     ahead: Sequence[OwnBlock], behind: Sequence[OwnBlock], effects: Sequence[type[Effect]] = ()
 ) -> list[ChainPart]:
-    """The parts of a model with blocks of the user's own; `effects`: the classes of all of these."""
+    """The parts of a model with a user's own blocks; `effects`: the classes of these blocks, those `ahead` first."""
     given = {
         OWN_AHEAD.name: own_fixed.part(OWN_AHEAD.name, Place.DRIVE, ahead, effects[: len(ahead)]),
         OWN_BEHIND.name: own_fixed.part(OWN_BEHIND.name, Place.LINEAR, behind, effects[len(ahead) :]),
@@ -56,8 +56,8 @@ def parts_with(
 
 @dataclass(frozen=True)
 class Parts:
-    """The effects of a model by their part in the chain, each list in the order of the chain; `blocks`: of each of the
-    parts."""
+    """The effects of a model by their part in the chain, each list in the order of the chain; `blocks`: by part
+    name."""
 
     blocks: dict[str, list[Any]]
     saturations: list[Any]
@@ -77,27 +77,27 @@ class Parts:
 
     @property
     def delay(self) -> float:
-        """Of a drive on its way, in s."""
+        """Total delay of the drive, in s."""
         return math.fsum(each.dead_time for each in self.blocks[DELAY.name])
 
     @property
     def modes(self) -> list[Any]:
-        """Those that the preview inverts."""
+        """Modes that the preview inverts."""
         return self.blocks["mode"]
 
     @property
     def own_drives(self) -> list[Effect]:
-        """The user's own in front of the plays."""
+        """The user's own effects in front of the plays."""
         return self.blocks["own_ahead"]
 
     @property
     def own_outputs(self) -> list[Effect]:
-        """The user's own behind the plays."""
+        """The user's own effects behind the plays."""
         return self.blocks["own_behind"]
 
     @property
     def counts(self) -> Counts:
-        """As in `ChainTables`."""
+        """Numbers of blocks, as in `ChainTables`."""
         found = [len(self.blocks[part.name]) for part in PARTS]
         most = [1 if part.joined else len(self.blocks[part.name]) for part in PARTS]
         return np.minimum(np.array(found, dtype=np.int64), most)
@@ -110,7 +110,7 @@ class Parts:
 
     @property
     def leading(self) -> list[Any]:
-        """Effects in front of the plays, whose inverse leads."""
+        """Effects in front of the plays: their inverse leads."""
         return [effect for part in AHEAD for effect in self.blocks[part.name]]
 
     def behind(self, seconds: float) -> list[Any]:
@@ -119,5 +119,5 @@ class Parts:
         return [one for each in ones.values() for one in each]
 
     def turning(self, branches: bool) -> bool:
-        """Whether a block that is led, alone, is in front of a memoryless part that has two `branches`."""
+        """Whether exactly one block is led, and in front of a memoryless part that has two `branches`."""
         return branches and len(self.blocks[AHEAD[0].name]) == 1 == len(self.leading)

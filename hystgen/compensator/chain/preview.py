@@ -1,8 +1,8 @@
 """The preview: a weighted sum of the reference's samples around the present one.
 
-A delay takes straight interpolation between two samples, a mode three samples
-(`hystgen.effects.resonance.compensator`), or, for steps from point to point, a shaper or a notch. In series they are
-one row of weights, which sum to 1: without a recursion it is stable for all numbers.
+A delay takes linear interpolation between two samples; a mode takes three samples
+(`hystgen.effects.resonance.compensator`), or a shaper or a notch for steps from point to point. In series they are one
+row of weights, which sum to 1: without recursion they are stable for any numbers.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from hystgen.parameters.schema import MOST_REFERENCES
 from hystgen.plays.slots import Counts, Reals
 
 WELL_DAMPED = 0.7
-"""[damping ratio] From here on a mode is inverted, and neither shaped nor notched. It overshoots a step by
-`exp(-pi z/sqrt(1 - z^2))`, at most 4.6 %, while the half period that a shaper waits for is 1.4 times that without
-damping and grows without a bound towards 1. Both are closed forms; no run set it."""
+"""[damping ratio] From here on a mode is inverted rather than shaped or notched. It overshoots a step by
+`exp(-pi z/sqrt(1 - z^2))`, at most 4.6 %, while the half period that a shaper waits for is 1.4 times the undamped one
+and grows without bound towards 1. Both are closed forms; no run set it."""
 
 
 class Taps(NamedTuple):
@@ -35,12 +35,12 @@ class Taps(NamedTuple):
 
     @property
     def ahead(self) -> int:
-        """Samples by which the last one lies ahead."""
+        """Samples by which the last weight looks ahead."""
         return self.first + len(self.weights) - 1
 
 
 PLAIN = Taps(0, np.ones(1))
-"""The reference as it comes."""
+"""The reference unchanged."""
 
 
 By = Literal["inverse", "shaper", "notch"]
@@ -48,18 +48,18 @@ By = Literal["inverse", "shaper", "notch"]
 
 
 def rings(mode: Resonance, by: By) -> bool:
-    """Whether a mode takes a shaper or a notch."""
+    """Whether a mode is compensated by a shaper or a notch."""
     return by != "inverse" and mode.damping < WELL_DAMPED
 
 
 def taps(
     delay: float, modes: Sequence[Resonance], seconds: float, number: int = 3, corner: int = 0, by: By = "inverse"
 ) -> Taps:
-    """The weights for a delay in s and modes in series at samples `seconds` apart; the reference itself without either.
+    """The weights for a delay in s and modes in series at samples `seconds` apart; else the reference itself.
 
-    A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`; 5 undo that up to a fourth
-    difference. `corner`: three centred moving averages over this number of samples smooth the reference. `by`: how a
-    mode that would ring after a step is kept from it.
+    A mode takes `number` references: with 3 the motion is `(x_(k+1) + 4 x_k + x_(k-1))/6`; 5 references cancel that
+    smoothing up to a fourth difference. `corner`: three centred moving averages over this number of samples smooth the
+    reference. `by`: how a mode that would ring after a step is kept from ringing.
 
     Raises FormatError if modes that are kept from ringing take more references than the C keeps.
     """
@@ -95,8 +95,9 @@ def taps(
 def shaper(mode: Resonance, seconds: float) -> NDArray[np.float64]:
     """The weights (n + 2,) of the reference now and about half a period ago, after which a mode does not ring.
 
-    Now, and n and n + 1 samples ago: a half period is between these. They sum to 1 and are 0 at the mode's poles p, so
-    that nothing is left of it behind a step: `sum w_k p^-k = 0`, zero vibration in samples.
+    They apply to the samples now and n and n + 1 samples ago, between which half a period lies. They sum to 1 and
+    vanish at the mode's poles p, so that nothing of the mode remains after a step: `sum w_k p^-k = 0`, zero vibration
+    in samples.
     """
     a1, a2 = denominator(mode, seconds)
     pole = complex(-0.5 * a1, math.sqrt(a2 - 0.25 * a1 * a1))
@@ -116,10 +117,9 @@ def notch(mode: Resonance, seconds: float) -> NDArray[np.float64]:
     """The weights of the reference now and before, after which a mode does not ring: its poles as zeros, `A(z)/A(1)`,
     behind two averages over `coth(w0 T/2)` samples.
 
-    Two poles at `p = exp(-w0 T)` in place of the averages have the same mean delay, `2 p/(1 - p)`, but for a part of a
-    sample, and the same bound of the gain of two differences, `((1 - p)/(1 + p))^2`; but they creep up to a step,
-    within 0.1 % in 9.2 times `1/w0`, where the averages end after 4 of these, and keep a state that rounding may hold
-    back.
+    Two poles at `p = exp(-w0 T)` in place of the averages would have the same mean delay, `2 p/(1 - p)`, up to part of
+    a sample, and the same bound on the gain of two differences, `((1 - p)/(1 + p))^2`; but they approach a step slowly,
+    within 0.1 % after 9.2 times `1/w0`, where the averages end after 4, and they keep a state that rounding may stall.
     """
     a1, a2 = denominator(mode, seconds)
     width = 1.0 / math.tanh(math.pi * mode.frequency * seconds)
@@ -134,9 +134,9 @@ def _too_long(what: str) -> FormatError:
 
 
 def averages(times: int, width: float, centred: bool) -> NDArray[np.float64]:
-    """The weights of so many moving averages over `width` samples in series, from the oldest sample to the newest.
+    """The weights of `times` moving averages over `width` samples in series, from the oldest sample to the newest.
 
-    `centred`: the same to both sides of a sample; else the newest samples count whole.
+    `centred`: symmetric about a sample; else the newest samples count in full.
     """
     n = whole(width, centred)
     rest = width - n
@@ -149,7 +149,7 @@ def averages(times: int, width: float, centred: bool) -> NDArray[np.float64]:
 
 
 def whole(width: float, centred: bool) -> int:
-    """Samples of an average that count whole."""
+    """Samples of an average that count in full."""
     return 2 * int((width - 1.0) // 2.0) + 1 if centred else int(width)
 
 
@@ -169,7 +169,7 @@ class Shaped(NamedTuple):
         return float(ages @ self.taps.weights) + own / self.seconds
 
     def missed(self, period: float) -> float:
-        """How far the motion is off a sine with a period in samples, as a share of its size."""
+        """Tracking error for a sine with a period given in samples, as a share of its amplitude."""
         turn = 2j * math.pi / period
         ages = -(self.taps.first + np.arange(len(self.taps.weights)))
         found = complex(np.exp(-turn * ages) @ self.taps.weights)

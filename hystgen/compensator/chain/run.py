@@ -24,8 +24,8 @@ def with_status(compiled: Compiled, record: Run, inverse: bool) -> tuple[NDArray
     """Answers (N,) for the drives or references in `record.v`, and their status bits; for a preview the last sample
     repeats.
 
-    The bits of a sample itself (limited, held) are with the sample, those of a drive with the drive. Fixed point takes
-    and gives codes, except temperatures, which are in degC. Raises ValueError for numbers that are not codes.
+    Bits about a sample itself (limited, held) come with the sample, bits about a drive with the drive. Fixed point
+    takes and gives codes, except temperatures, which are in degC. Raises ValueError for numbers that are not codes.
     """
     t = compiled.tables
     x = reference.codes(t, record.v) if t.fixed else record.v

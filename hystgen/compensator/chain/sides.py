@@ -1,7 +1,7 @@
-"""The two sides of the plays, in front of them and behind: the blocks of each part of the chain, part after part.
+"""The two sides of the plays, in front of them and behind: the blocks of each part of the chain, part by part.
 
-Blocks of the user's own come after the lag in front of the plays, and after creep behind them. All of these are linear
-and time-invariant, so that their order makes no difference.
+A user's own blocks come after the lag in front of the plays, and after creep behind them. All of these are linear and
+time-invariant, so their order makes no difference.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from hystgen.effects.part import ChainPart, Function, Verbs
 
 
 class Blocks(NamedTuple):
-    """The blocks of a chain in one arithmetic, and functions."""
+    """The functions of a chain and its blocks in one arithmetic."""
 
     verbs: Callable[[ChainPart], Verbs]
-    bent: tuple[Function, Function]  # what saturates: forward, inverse
-    target: Function  # of the preview's line
+    bent: tuple[Function, Function]  # saturation: forward, inverse
+    target: Function  # the output to reach, from the preview's line
     front: tuple[Function, Function]  # forward, inverse
     plays: tuple[Function, Function, Function, Function]  # start, follow, started, inverse input
     finer: Function  # the signal in front of the plays, with bits below their input
-    braked: Function  # the drive within reach from which a lag does not overshoot
-    ramp: Function  # a drive at a limited rate one step later, and what rounding took from it
+    braked: Function  # the drive in reach that keeps a lag from overshooting
+    ramp: Function  # a slew-limited drive one step later, and its rounding remainder
 
 
 class Sides(NamedTuple):
@@ -43,7 +43,7 @@ class Sides(NamedTuple):
 
 
 def _then(first: Function, k: int, verb: Function) -> Function:
-    """What `first` does, and then a verb by all blocks of part k, one after the other."""
+    """Apply `first`, then a verb of all blocks of part k in series."""
 
     @jit
     def each(t: Any, s: Any, n: int, x: Any) -> Any:
@@ -59,7 +59,7 @@ def _then(first: Function, k: int, verb: Function) -> Function:
 
 
 def _back(first: Function, k: int, verb: Function) -> Function:
-    """The same from the last block to the first."""
+    """As `_then`, from the last block to the first."""
 
     @jit
     def each(t: Any, s: Any, n: int, x: Any) -> Any:
@@ -75,13 +75,13 @@ def _back(first: Function, k: int, verb: Function) -> Function:
 
 
 @jit(inline=True)
-def _nothing(t: ChainTables, s: Any, x: Any) -> Any:  # noqa: ARG001  as of any blocks
-    """What no blocks make of x."""
+def _nothing(t: ChainTables, s: Any, x: Any) -> Any:  # noqa: ARG001  as with blocks
+    """Return x itself: there are no blocks."""
     return x
 
 
 def sides_of(every: Sequence[Verbs]) -> Sides:
-    """The sides of a chain, with the verbs of all its parts."""
+    """The sides of a chain, from the verbs of all its parts."""
 
     def through(side: Sequence[ChainPart], verb: str) -> Function:
         back = verb in ("resting", "solve")
@@ -105,7 +105,7 @@ def sides_of(every: Sequence[Verbs]) -> Sides:
 
 
 def _all(every: Sequence[Verbs], verb: str, and_then: Function, nothing: Function) -> Function:
-    """A verb by all blocks that have it, from `nothing` on by one part after the other."""
+    """A verb of all blocks that have it, part by part, after `nothing`."""
     for k, verbs in enumerate(every):
         if function := getattr(verbs, verb):
             nothing = and_then(nothing, k, function)
@@ -113,7 +113,7 @@ def _all(every: Sequence[Verbs], verb: str, and_then: Function, nothing: Functio
 
 
 def told(every: Sequence[Verbs], verb: str) -> Function:
-    """A verb with a number from the caller; whether any block had to limit it."""
+    """A verb that takes a number from the caller; it returns whether any block had to limit that number."""
 
     def and_then(first: Function, k: int, function: Function) -> Function:
         @jit
@@ -126,14 +126,14 @@ def told(every: Sequence[Verbs], verb: str) -> Function:
         return both
 
     @jit(inline=True)
-    def nothing(t: ChainTables, s: Any, x: Any) -> bool:  # noqa: ARG001  as of any blocks
+    def nothing(t: ChainTables, s: Any, x: Any) -> bool:  # noqa: ARG001  as with blocks
         return False
 
     return _all(every, verb, and_then, nothing)
 
 
 def resetting(every: Sequence[Verbs]) -> Function:
-    """All blocks as in the parameter file."""
+    """Reset all blocks to their values in the parameter file."""
 
     def and_then(first: Function, k: int, function: Function) -> Function:
         @jit
@@ -152,7 +152,7 @@ def resetting(every: Sequence[Verbs]) -> Function:
 
 
 def moves(every: Sequence[Verbs]) -> Function:
-    """All blocks that see how the drive moves, as it does."""
+    """Pass a move of the drive on to all blocks that see it."""
 
     def and_then(first: Function, k: int, function: Function) -> Function:
         @jit
@@ -165,6 +165,6 @@ def moves(every: Sequence[Verbs]) -> Function:
 
     @jit(inline=True)
     def nothing(t: ChainTables, s: Any, before: Any, v: Any) -> None:
-        """No block sees it."""
+        """No block sees the move."""
 
     return _all(every, "move", and_then, nothing)

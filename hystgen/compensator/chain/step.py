@@ -1,4 +1,4 @@
-"""One step of a model with effects: the bit reference of `chain/chain.c` in `c_runtime/compensator/`, and around it.
+"""One step of a model with effects, and its calls: the bit reference of `chain/chain.c` in `c_runtime/compensator/`.
 
 Blocks in front of the plays (lag) and behind them (creep, gain) absorb the applied drive forwards and are solved
 backwards; the plays between them are those of engine loop or corners. The functions of the blocks, and the conversion
@@ -77,22 +77,22 @@ AGED = next(k for k, part in enumerate(PARTS) if "travel" in part.calls)
 
 class ChainState(NamedTuple):
     """One instance. `real`: the offset set from outside, the last result of the output side, the last applied drive,
-    the drive at a limited rate, of a quiet drive what arrived in front of the plays and the last reference, in front of
-    two branches the last moves of what a lag is led to, and what rounding took from the drive at a limited rate;
-    `flags`: whether any drive has been applied yet, 1 for the inverse operator, the number of equal references, and
-    whether a lag arrives at two branches from below; `corners`: the plays of engine corners, `()` in engine loop, which
-    has them in `plays`."""
+    the slew-limited drive, for a quiet drive the signal that arrived in front of the plays and the last reference, in
+    front of two branches the last moves of a led lag's goal, and the rounding remainder of the slew-limited drive;
+    `flags`: whether a drive has been applied, 1 for the inverse operator, the number of equal references, and whether a
+    lag arrives at two branches from below; `corners`: the plays of engine corners, or `()` in engine loop, which has
+    them in `plays`."""
 
     plays: State
-    lost: Reals  # (n + 1,), what rounding took from each play that a nonlinear dashpot moves
-    bent: Reals  # (n + 1,), what each play contributes, if an effect moves or bends them
+    lost: Reals  # (n + 1,), rounding remainder of each play that a nonlinear dashpot moves
+    bent: Reals  # (n + 1,), contribution of each play, if an effect moves or bends plays
     blocks: tuple[Any, ...]  # memory of each of `parts.PARTS`
     counts: Counts  # of their blocks in this operator
     line: Line
     real: Reals
     flags: Counts
     corners: Any
-    kink: Reals  # (4,), in fixed point, of the solution that engine corners has found
+    kink: Reals  # (4,), in fixed point: the kink of the solution found by engine corners
 
 
 def new_state(t: ChainTables, inverse: bool) -> ChainState:
@@ -118,7 +118,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
 
 
 class Codes(NamedTuple):
-    """Conversion of an operator's arguments and answers to signals and back, in one arithmetic."""
+    """Conversions of an operator's arguments into signals, and of signals into its answers, in one arithmetic."""
 
     finite: Callable[..., Any]
     drive_signal: Callable[..., Any]
@@ -133,8 +133,8 @@ class Codes(NamedTuple):
 def made_of(
     blocks: Blocks, codes: Codes, drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] = ()
 ) -> Operations:
-    """The operations of models with effects in one arithmetic, with blocks of the user's own in front of the plays and
-    behind them."""
+    """The operations of models with effects in one arithmetic, with a user's own blocks in front of the plays and
+    behind."""
     every = [blocks.verbs(part) for part in parts_with(drives, outputs)]
     blocks_reset, blocks_move = resetting(every), moves(every)
     temperature_set, gain_set, travel_set = (told(every, f"set_{what}") for what in ("temperature", "gain", "travel"))
@@ -168,7 +168,7 @@ def made_of(
 
     @jit(inline=True)
     def undisplaced(t: ChainTables, s: ChainState, u: Any) -> tuple[Any, int]:
-        """The result that the output side has to give for the displacement u, and whether none gives it."""
+        """The result that the output side has to give for the displacement u, and whether there is none."""
         offset = t.number[OFFSET] + s.real[SET]
         for j in range(s.counts[CLOCK]):
             filled, moving = s.line.filled[0], s.flags[MOVING]
@@ -178,7 +178,7 @@ def made_of(
 
     @jit
     def settings_reset(t: ChainTables, s: ChainState) -> None:
-        """Offset and gains as in the parameter file."""
+        """Reset offset and gains to their values in the parameter file."""
         s.real[SET] = t.limits[ZERO]
         s.real[REACHED] = t.limits[ZERO]
         s.real[REST] = t.limits[ZERO]
@@ -186,15 +186,15 @@ def made_of(
 
     @jit
     def travelled(t: ChainTables, s: ChainState, v: Any) -> None:
-        """The drive moves to v from where it was, in one sample."""
+        """Move the drive from where it was to v, in one sample."""
         blocks_move(t, s, s.real[APPLIED], v)
 
     # ---------------------------------------------------------------- chain_turn.c, chain_turn_late.c
 
     @jit(inline=True)
     def turns(t: ChainTables, back: Any, way: Any) -> bool:
-        """Whether a drive that should go back by `back` goes to the other branch, `way` from there. Behind a lag only
-        if holding misses more than what the lag misses of that way in the first sample of a turn."""
+        """Whether a drive that should go back by `back` turns to the other branch, `way` from there. Behind a lag it
+        turns only if holding misses more than the lag misses of that way in the first sample of a turn."""
         missed = back - t.plays.limits[HOLD]
         if not t.turning:
             return bool(missed > 0)
@@ -204,8 +204,8 @@ def made_of(
 
     @jit
     def branch_drive(t: ChainTables, s: ChainState, h: Any, w: Any) -> Any:
-        """The drive that gives w on the branch of its own move: stays on the branch that it is on, where it moves on or
-        holds, and turns only for what is more than rounding."""
+        """The drive that gives w on the branch of its own move: it stays on its branch while it moves on or holds, and
+        turns only for more than rounding."""
         if not t.plays.branches:
             return inverse_drive(t.plays, s.plays, h, w)
         up, drive = s.plays.counts[ASCENDING], s.plays.real[DRIVE]
@@ -226,15 +226,14 @@ def made_of(
 
     @jit
     def steady_rest(t: ChainTables, s: ChainState) -> None:
-        """Everything has settled."""
+        """Settle everything."""
         s.real[WAY] = t.limits[ZERO]
         s.real[MOVED] = t.limits[ZERO]
         s.flags[RISES] = 1
 
     @jit
     def steady_drive(t: ChainTables, s: ChainState, a: Any) -> Any:
-        """The drive that leads to a in front of two branches, by way of a lag that arrives from the side of its
-        branch."""
+        """The drive that leads to a in front of two branches, through a lag arriving from the side of its branch."""
         s.flags[RISES] = s.plays.counts[ASCENDING]
         if a > s.plays.real[DRIVE]:
             s.flags[RISES] = 1
@@ -247,7 +246,7 @@ def made_of(
 
     @jit
     def steady_hold(t: ChainTables, s: ChainState, v: Any) -> Any:
-        """The drive v, or one that does not take the lag back from its branch."""
+        """The drive v, or one that keeps the lag on its branch."""
         last = drive_signal(t, s.real[APPLIED])
         return led_kept(t.blocks[LED], s.blocks[LED], v, s.flags[RISES], last, t.number[DITHER])
 
@@ -255,14 +254,14 @@ def made_of(
 
     @jit
     def quiet_rest(t: ChainTables, s: ChainState, a: Any) -> None:
-        """Everything has settled with a in front of the plays."""
+        """Settle everything with a in front of the plays."""
         s.real[ARRIVED] = a
         s.real[REFERENCE] = t.limits[ZERO]
         s.flags[EQUAL] = 0
 
     @jit
     def quiet_count(t: ChainTables, s: ChainState, u: Any) -> None:
-        """Count references that are equal to the next one, u."""
+        """Count references equal to the next one, u."""
         if u != s.real[REFERENCE]:
             s.real[REFERENCE] = u
             s.flags[EQUAL] = 0
@@ -298,7 +297,7 @@ def made_of(
 
     @jit
     def begin(t: ChainTables, s: ChainState) -> None:
-        """The part common to init and reset, once the plays are set: everything rests at the start memory."""
+        """Bring everything to rest at the start memory, once the plays are set; shared by init and reset."""
         s.line.filled[0] = 0
         s.flags[MOVING] = 0
         drive = s.plays.real[DRIVE]
@@ -314,7 +313,7 @@ def made_of(
 
     @jit
     def init(t: ChainTables, s: ChainState, inverse: int) -> None:
-        """Start memory of the parameter file, and its settings."""
+        """Set the start memory of the parameter file, and its settings."""
         settings_reset(t, s)
         plays_init(t.plays, s.plays, inverse)
         start(t, s, 0)
@@ -324,7 +323,7 @@ def made_of(
 
     @jit
     def reset(t: ChainTables, s: ChainState, inverse: int) -> None:
-        """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
+        """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
         plays_reset(t.plays, s.plays, inverse)
         start(t, s, 1)
         begin(t, s)
@@ -333,8 +332,8 @@ def made_of(
 
     @jit
     def absorb(t: ChainTables, s: ChainState, v: Any, reached: Any) -> None:
-        """The actuator has seen drive v, and `reached` behind its delay and slew limit; the first drive finds
-        everything at rest."""
+        """Absorb drive v, which is `reached` behind its delay and slew limit; the first drive finds everything at
+        rest."""
         moving = s.flags[MOVING] != 0
         if moving:
             travelled(t, s, v)
@@ -362,8 +361,8 @@ def made_of(
 
     @jit
     def nearest_ramp(t: ChainTables, before: Any, rest: Any, v: Any) -> tuple[Any, Any]:
-        """The drive nearest to v that the amplifier reaches in one step from `before`, of which rounding has left
-        `rest`, and what rounding leaves of it."""
+        """The drive nearest to v that the amplifier reaches in one step from `before` with rounding remainder `rest`,
+        and its own remainder."""
         if v > before or (v == before and rest < 0):
             drive, left = ramp(before, rest, t.number[RISING], t.number[RISING_REST])
             beyond = v > drive or (v == drive and left < 0)
@@ -374,7 +373,7 @@ def made_of(
 
     @jit
     def forward_slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
-        """The drive nearest to v that the amplifier reaches in one step; v itself in the first one."""
+        """The drive nearest to v that the amplifier reaches in one step; v itself in the first step."""
         if not t.slew:
             return v
         drive, rest = v, t.limits[ZERO]
@@ -385,14 +384,14 @@ def made_of(
 
     @jit
     def inverse_within(t: ChainTables, s: ChainState, v: Any) -> tuple[Any, Any]:
-        """The drive nearest to v that the amplifier reaches in one step from the one applied last. That is where the
-        answer led to, with what rounding has left of it, unless another one was applied."""
+        """The drive nearest to v that the amplifier reaches in one step from the last applied drive, and its rounding
+        remainder; the last drive keeps its own remainder if it was the answer."""
         rest = s.real[REST] if s.real[APPLIED] == s.real[REACHED] else t.limits[ZERO]
         return nearest_ramp(t, s.real[APPLIED], rest, v)
 
     @jit
     def inverse_held(t: ChainTables, s: ChainState) -> Any:
-        """The last answer once more, or the drive nearest to it that the amplifier reaches in one step."""
+        """The last answer again, or the drive nearest to it that the amplifier reaches in one step."""
         last = s.plays.real[ANSWER] if s.plays.counts[STEPPED] else s.real[APPLIED]
         if not t.slew or not s.flags[MOVING]:
             return last
@@ -405,7 +404,7 @@ def made_of(
 
     @jit
     def inverse_slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
-        """The drive in reach that is nearest to v, or from which a lag does not overshoot."""
+        """The drive in reach nearest to v, or the one from which a lag does not overshoot."""
         if not t.slew or not s.flags[MOVING]:
             return v
         near, rest = inverse_within(t, s, v)
@@ -419,7 +418,7 @@ def made_of(
 
     @jit
     def forward_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
-        """The drive is v: it passes the delay, and the amplifier follows."""
+        """Absorb drive v: it passes the delay, and the amplifier follows."""
         late = sent_absorb(t, s, v) if s.flags[MOVING] else sent_rest(t, s, v)
         reached = forward_slewed(t, s, late)
         if reached != late:
@@ -428,7 +427,7 @@ def made_of(
 
     @jit
     def seen(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
-        """The actuator of either operator has seen drive v."""
+        """Absorb drive v in either operator."""
         if inverse:
             absorb(t, s, v, v)
         else:
@@ -436,7 +435,7 @@ def made_of(
 
     @jit
     def settle(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
-        """Everything comes to rest at drive v; the plays move there as in any step."""
+        """Bring everything to rest at drive v; the plays move there as in any step."""
         if not finite(t, v):
             s.plays.counts[STATUS] |= HELD
             return
@@ -455,18 +454,18 @@ def made_of(
 
     @jit(inline=True)
     def inverse_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
-        """The actuator has seen drive v."""
+        """Absorb drive v."""
         absorb(t, s, v, v)
 
     @jit(inline=True)
     def shown(t: ChainTables, s: ChainState) -> tuple[Any, int]:
-        """The displacement now, and its status."""
+        """The present displacement, and its status."""
         return output_code(t, displacement(t, s, s.real[OUTPUT]))  # type: ignore[no-any-return]
 
     @jit
     def inverse_put(t: ChainTables, s: ChainState, level: Any) -> Any:
-        """Take the next reference, within its range, through the preview if there is one. Returns the output to reach
-        at this sample."""
+        """Take the next reference, already limited, through the preview if there is one. Returns the output to reach at
+        this sample."""
         if t.quiet:
             quiet_count(t, s, level_signal(t, level))
         wanted, limited = undisplaced(t, s, level_signal(t, level))
@@ -481,7 +480,7 @@ def made_of(
 
     @jit
     def inverse_push(t: ChainTables, s: ChainState, u: Any) -> None:
-        """Take the next reference of the preview, without an answer."""
+        """Take the next reference of the preview without answering it."""
         if not finite(t, u):
             s.plays.counts[STATUS] |= HELD
             unread(t, s)
@@ -493,17 +492,17 @@ def made_of(
 
     @jit(inline=True)
     def unread(t: ChainTables, s: ChainState) -> None:  # noqa: ARG001  the same call for every chain
-        """A reference that is no number: the newest one stands once more."""
+        """Repeat the newest reference in place of one that is not finite."""
         preview_repeat(s.line)
 
     @jit(inline=True)
     def stands(t: ChainTables, s: ChainState, u: Any) -> bool:  # noqa: ARG001
-        """Every reference is answered anew: time has passed for the effects."""
+        """Never: every reference is answered anew, since time has passed for the effects."""
         return False
 
     @jit
     def inverse_sought(t: ChainTables, s: ChainState, level: Any) -> Any:
-        """The drive for the limited reference `level`, in reach of a slew limit."""
+        """The drive for the limited reference `level`, within reach of a slew limit."""
         y = inverse_put(t, s, level)
         moving = s.flags[MOVING] != 0
         h = output_side_solve(t, s, y) if moving else output_side_resting(t, s, y)
@@ -546,7 +545,7 @@ def made_of(
 
     @jit
     def correct(t: ChainTables, s: ChainState, measured: Any, share: Any) -> None:
-        """Trim the offset by a share of what a sensor measures beyond the expected displacement."""
+        """Trim the offset by a share of the difference between measured and expected displacement."""
         more = shared(t, share, level_signal(t, measured) - displacement(t, s, s.real[OUTPUT]))
         put_offset(t, s, s.real[SET] + more)
 
@@ -560,7 +559,7 @@ def made_of(
 
     @jit
     def set_gain(t: ChainTables, s: ChainState, gain: Any) -> None:
-        """Set a gain in place of the one that follows the travel."""
+        """Set a gain that replaces the one that follows the travel."""
         if not finite(t, gain):
             s.plays.counts[STATUS] |= HELD
         elif gain_set(t, s, gain):
@@ -576,7 +575,7 @@ def made_of(
 
     @jit
     def other(t: ChainTables, s: ChainState, inverse: int, call: int, x: Any) -> Any:
-        """A call of models with effects alone. Returns its answer, or 0."""
+        """Run a call that only models with effects have. Returns its answer, or 0."""
         if call == OP_PUSH:
             inverse_push(t, s, x)
         elif call == OP_SETTLE:
@@ -602,7 +601,7 @@ def made_of(
 
     @jit
     def visit(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
-        """Let the actuator be at drive v before the next sample."""
+        """Move the actuator to drive v before the next sample."""
         seen(t, s, inverse, v)
 
     hooks = Hooks(

@@ -1,6 +1,6 @@
-"""The parts of a step of a model with effects that differ in fixed point, where signals have bits below codes.
+"""The parts of a step of a model with effects that are specific to fixed point, where signals have bits below codes.
 
-Signals in front of the plays are in units of their input, those behind the plays in fractions of an output code.
+Signals in front of the plays are in units of their input, signals behind the plays in fractions of an output code.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def front_forward(t: FixedTables, a: Any, ascending: int) -> Any:
 
 @jit
 def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
-    """The signal in front of the memoryless part for an input of the plays, and whether an envelope limits it."""
+    """The signal in front of the memoryless part for an input of the plays, and whether an envelope limited it."""
     if t.fronts:
         return curve.front_inverse(t, w, ascending)
     return w, 0
@@ -59,8 +59,8 @@ def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
 
 @jit
 def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
-    """The signal in front of the plays that gives their sum h, with more bits than their input w: the remainder of h at
-    w, divided by the slope."""
+    """The signal in front of the plays at which their sum is h, with more bits than their input w: the remainder of h
+    at w is divided by the slope."""
     bits = t.number[ARRIVING_BITS]
     if bits == 0:
         return a
@@ -111,7 +111,7 @@ def drive_signal(t: ChainTables, v: Any) -> Any:
 
 @jit
 def arriving(t: ChainTables, a: Any) -> Any:
-    """A signal in front of the plays, in units of their input."""
+    """A signal in front of the plays in units of their input."""
     return nearest(a, t.number[ARRIVING_BITS])
 
 
@@ -123,7 +123,7 @@ def level_signal(t: ChainTables, u: Any) -> Any:
 
 @jit
 def drive_code(t: ChainTables, x: Any) -> Any:
-    """Drive code of a signal, limited to two spans beyond the range."""
+    """The drive code of a signal, limited to two spans beyond the range."""
     code = nearest(x, t.number[DRIVE_BITS])
     if code > t.number[MOST_CODE]:
         return t.number[MOST_CODE]
@@ -134,7 +134,7 @@ def drive_code(t: ChainTables, x: Any) -> Any:
 
 @jit
 def output_code(t: ChainTables, y: Any) -> tuple[Any, int]:
-    """Output code of a signal, limited to the type, and its status."""
+    """The output code of a signal, limited to the type, and its status."""
     code = nearest(y, t.number[LEVEL_BITS])
     if code > t.limits[CODE_MAX]:
         return t.limits[CODE_MAX], OUTPUT_CLAMPED
@@ -151,7 +151,7 @@ def entered_travel(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in floati
 
 @jit
 def shared(t: ChainTables, share: Any, x: Any) -> Any:
-    """A share of a signal. The share is a code, and the largest code is the share just below 1."""
+    """A share of a signal. The share is a code; the largest code stands for almost 1."""
     return times(x, share << t.number[SHARE_BITS], 31)
 
 
@@ -164,7 +164,7 @@ led_braked = led.braked
 
 @jit
 def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
-    """The drive from which the lag does not overshoot, where the one in reach is near instead of v."""
+    """The drive from which the lag does not overshoot, if `near` is in reach instead of v."""
     bits = t.number[DRIVE_BITS]
     beyond = v - near if v > near else near - v
     drive = led_braked(
@@ -179,8 +179,7 @@ def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
 
 @jit
 def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
-    """The drive `before`, of which rounding has left `rest`, one step of `move` and `more` later, and what rounding
-    leaves of it."""
+    """The drive one step of `move` and `more` after `before`, with rounding remainder `rest`, and its own remainder."""
     left = rest + more
     whole = (left + (1 << (REST_BITS - 1))) >> REST_BITS
     return before + move + whole, left - (whole << REST_BITS)

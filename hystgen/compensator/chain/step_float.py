@@ -1,4 +1,4 @@
-"""The parts of a step of a model with effects that differ in floating point, where all signals have one type."""
+"""The parts of a step of a model with effects that are specific to floating point, where all signals have one type."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def bent(t: Stages, x: Any) -> Any:
 
 @jit(inline=True)
 def unbent(t: Stages, y: Any) -> tuple[Any, int]:
-    """The input of the saturation that gives y, and whether none does."""
+    """The input of the saturation that gives y, and whether there is none."""
     return front_inverse(t, y, 1)
 
 
@@ -37,7 +37,7 @@ def entered(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in fixed point
 
 @jit(inline=True)
 def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:  # noqa: ARG001  as in fixed point
-    """The signal in front of the plays, as fine as it is."""
+    """The signal in front of the plays, which is already as fine as it gets."""
     return a
 
 
@@ -62,7 +62,7 @@ led_braked, HALVES = led.braked, led.halves
 
 @jit
 def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
-    """The drive from which the lag does not overshoot, where the one in reach is near instead of v."""
+    """The drive from which the lag does not overshoot, if `near` is in reach instead of v."""
     beyond = v - near if v > near else near - v
     return led_braked(t.blocks[LED], s.blocks[LED], near, beyond, t.number[FALLING], t.number[RISING], HALVES)
 
@@ -72,8 +72,7 @@ def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
 
 @jit
 def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
-    """The drive `before`, of which rounding has left `rest`, one step of `move` and `more` later, and what rounding
-    leaves of it."""
+    """The drive one step of `move` and `more` after `before`, with rounding remainder `rest`, and its own remainder."""
     following = before + move
     moved = following - before
     left = ((before - (following - moved)) + (move - moved)) + (rest + more)

@@ -1,4 +1,4 @@
-"""From a model with effects to the numbers that its operators work with, in one arithmetic."""
+"""The numbers that the operators of a model with effects work with, in one arithmetic."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ def build(
     lsb: tuple[float | None, float | None] = (None, None),
     engine: str = "loop",
 ) -> Compiled:
-    """The model in an arithmetic at steps of `seconds`; `lsb` as in `hystgen.compensator.tables.build`; `engine`: of
-    plays that no effect moves or bends, 'corners' or 'loop'.
+    """The model in an arithmetic at steps of `seconds`; `lsb` as in `hystgen.compensator.tables.build`; `engine`:
+    'corners' or 'loop', for plays that no effect moves or bends.
 
     None of its effects is among the `refusals`. Raises FormatError if a number does not fit the arithmetic.
     """
@@ -39,14 +39,14 @@ def build(
 
 
 def _behind_slew(chain: Chain) -> int:
-    """Number of effects up to the slew limit, 0 without one."""
+    """Number of effects up to and including the slew limit, 0 without one."""
     return max((i for i, effect in enumerate(chain.effects) if effect.name == "slew_limit"), default=-1) + 1
 
 
 def refusals(
     chain: Chain, operator: str, seconds: float, arithmetic: str, how: Compensation = STANDARD
 ) -> Iterator[tuple[Effect, str]]:
-    """The effects that the C of an operator cannot have in an arithmetic, each with its reason."""
+    """The effects that the C of an operator cannot include in an arithmetic, each with its reason."""
     low, high = chain.cascade.input_range
     parts = Parts.of(chain.effects)
     for effect in chain.effects:

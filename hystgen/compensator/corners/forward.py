@@ -12,7 +12,7 @@ from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, HELD, INPUT_CLAMPED, OFFSE
 
 @jit(inline=True)
 def forward_step(t: Tables, m: Memory, v: Any) -> Any:
-    """One sample."""
+    """Answer one sample."""
     if not (t.limits[DRIVE_MIN] <= v <= t.limits[DRIVE_MAX]):
         if not (-t.limits[REAL_MAX] <= v <= t.limits[REAL_MAX]):
             m.counts[STATUS] |= HELD
@@ -24,24 +24,24 @@ def forward_step(t: Tables, m: Memory, v: Any) -> Any:
 
 @jit
 def forward_begin(t: Tables, m: Memory, which: Start) -> None:
-    """The part common to init and reset."""
+    """The part that init and reset share."""
     start(t.forward, m, which)
     m.counts[STATUS] = 0
 
 
 @jit
 def forward_init(t: Tables, m: Memory) -> None:
-    """Start memory of the parameter file."""
+    """Set the start memory of the parameter file."""
     forward_begin(t, m, t.forward_first)
 
 
 @jit
 def forward_reset(t: Tables, m: Memory) -> None:
-    """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
+    """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
     forward_begin(t, m, t.forward_zero)
 
 
 @jit
 def forward_visit(t: Tables, m: Memory, v: Any) -> None:
-    """Let the actuator be at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     plays_step(t.forward, m, v)

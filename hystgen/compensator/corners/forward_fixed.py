@@ -15,7 +15,7 @@ from hystgen.plays.slots import INPUT_CLAMPED, Reals
 
 @jit
 def forward_arrive(t: FixedTables, m: FixedMemory, v: Any) -> None:
-    """The actuator is at drive v; its move sets the direction, and so the branch."""
+    """Move the actuator to drive v; the direction of the move picks the branch."""
     if v > m.real[DRIVE]:
         m.counts[ASCENDING] = 1
     elif v < m.real[DRIVE]:
@@ -26,7 +26,7 @@ def forward_arrive(t: FixedTables, m: FixedMemory, v: Any) -> None:
 
 @jit(inline=True)
 def forward_step(t: FixedTables, m: FixedMemory, v: Any) -> Any:
-    """One sample."""
+    """Answer one sample."""
     inside = clamp_drive(t, v)
     if inside != v:
         m.counts[STATUS] |= INPUT_CLAMPED
@@ -38,7 +38,7 @@ def forward_step(t: FixedTables, m: FixedMemory, v: Any) -> Any:
 
 @jit
 def forward_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> None:
-    """The part common to init and reset; `first` as in `FixedTables.applied`."""
+    """The part that init and reset share; `first` as in `FixedTables.applied`."""
     start(t, m, play)
     m.real[NEXT] = m.real[INPUT]
     m.real[DRIVE] = t.applied[first]
@@ -48,17 +48,17 @@ def forward_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> No
 
 @jit
 def forward_init(t: FixedTables, m: FixedMemory) -> None:
-    """Start memory of the parameter file."""
+    """Set the start memory of the parameter file."""
     forward_begin(t, m, t.start, 0)
 
 
 @jit
 def forward_reset(t: FixedTables, m: FixedMemory) -> None:
-    """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
+    """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
     forward_begin(t, m, t.zero, 1)
 
 
 @jit
 def forward_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
-    """Let the actuator be at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     forward_arrive(t, m, v)

@@ -13,7 +13,7 @@ from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, HELD, INPUT_CLAMPED, OFFSE
 
 @jit
 def forward_arrive(m: Memory, v: Any) -> None:
-    """The actuator is at drive v; its move sets the direction, and so the branch."""
+    """Move the actuator to drive v; the direction of the move picks the branch."""
     if v > m.real[DRIVE]:
         m.counts[ASCENDING] = 1
     elif v < m.real[DRIVE]:
@@ -23,7 +23,7 @@ def forward_arrive(m: Memory, v: Any) -> None:
 
 @jit(inline=True)
 def forward_step(t: Tables, m: Memory, v: Any) -> Any:
-    """One sample."""
+    """Answer one sample."""
     if not (t.limits[DRIVE_MIN] <= v <= t.limits[DRIVE_MAX]):
         if not (-t.limits[REAL_MAX] <= v <= t.limits[REAL_MAX]):
             m.counts[STATUS] |= HELD
@@ -36,7 +36,7 @@ def forward_step(t: Tables, m: Memory, v: Any) -> Any:
 
 @jit
 def forward_begin(t: Tables, m: Memory, which: Start, first: int) -> None:
-    """The part common to init and reset; `first` as in `Tables.applied`."""
+    """The part that init and reset share; `first` as in `Tables.applied`."""
     start(t.forward, m, which)
     m.real[DRIVE] = t.applied[first]
     m.counts[ASCENDING] = t.ascending[first]
@@ -45,18 +45,18 @@ def forward_begin(t: Tables, m: Memory, which: Start, first: int) -> None:
 
 @jit
 def forward_init(t: Tables, m: Memory) -> None:
-    """Start memory of the parameter file."""
+    """Set the start memory of the parameter file."""
     forward_begin(t, m, t.forward_first, 0)
 
 
 @jit
 def forward_reset(t: Tables, m: Memory) -> None:
-    """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
+    """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
     forward_begin(t, m, t.forward_zero, 1)
 
 
 @jit
 def forward_visit(t: Tables, m: Memory, v: Any) -> None:
-    """Let the actuator be at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     forward_arrive(m, v)
     plays_step(t.forward, m, front_forward(t, v, m.counts[ASCENDING]))

@@ -53,7 +53,7 @@ from hystgen.plays.slots import (
 
 @jit
 def inverse_search(t: Tables, m: Memory, u: Any) -> Any:
-    """Any sample but a usual one."""
+    """Answer any sample except a usual one."""
     x = u - t.limits[OFFSET]
     bits = 0
     copy_place(m, UNDO, HERE)
@@ -78,7 +78,7 @@ def inverse_search(t: Tables, m: Memory, u: Any) -> Any:
 
 @jit(inline=True)
 def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
-    """One sample."""
+    """Answer one sample."""
     rising = m.counts[RISING]
     x = u - t.limits[OFFSET]
     at = m.real[INPUT]
@@ -100,7 +100,7 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
 
 @jit
 def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
-    """`applied` is the drive that was really applied in place of the last answer."""
+    """Replace the last answer by the drive that was really applied."""
     v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
     if not (-t.limits[REAL_MAX] <= applied <= t.limits[REAL_MAX]):
         m.counts[STATUS] |= HELD
@@ -122,7 +122,7 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
 
 @jit
 def inverse_begin(t: Tables, m: Memory, which: Start) -> None:
-    """The part common to init and reset."""
+    """The part that init and reset share."""
     start(t.inverse, m, which)
     move_to_output(t.inverse, m, clamp_drive(t, m.real[OUTPUT]))
     copy_place(m, UNDO, HERE)
@@ -134,19 +134,19 @@ def inverse_begin(t: Tables, m: Memory, which: Start) -> None:
 
 @jit
 def inverse_init(t: Tables, m: Memory) -> None:
-    """Start memory of the parameter file."""
+    """Set the start memory of the parameter file."""
     inverse_begin(t, m, t.inverse_first)
 
 
 @jit
 def inverse_reset(t: Tables, m: Memory) -> None:
-    """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
+    """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
     inverse_begin(t, m, t.inverse_zero)
 
 
 @jit
 def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
-    """Let the actuator be at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     move_to_output(t.inverse, m, v)
     copy_place(m, UNDO, HERE)
     m.real[BEFORE] = m.real[INPUT]

@@ -42,20 +42,20 @@ NEVER = -(2**31)
 
 @jit(inline=True)
 def inverse_along(m: FixedMemory, u: Any) -> Any:
-    """A reference along the present move; ~u is -u - 1, which overflows for no code."""
+    """A reference along the present move; ~u is -u - 1, which never overflows for a code."""
     return u if m.counts[RISING] else ~u
 
 
 @jit
 def inverse_stay(m: FixedMemory) -> None:
-    """No step is usual before another search, which begins here."""
+    """Make no step usual before another search, which begins here."""
     m.real[NEXT] = NEVER
     m.counts[ON] = 0
 
 
 @jit
 def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
-    """Steps are usual up to the next kink or limit, less rounding, but not below the least reference."""
+    """Make steps usual up to the next kink or limit, less rounding, but not below the least reference."""
     rising = m.counts[RISING]
     most = inverse_along(m, t.limits[OUTPUT_MAX] if rising else t.limits[OUTPUT_MIN])
     end = (t.limits[DRIVE_MAX] if rising else t.limits[DRIVE_MIN]) << t.limits[FINE]
@@ -69,7 +69,7 @@ def inverse_look_ahead(t: FixedTables, m: FixedMemory, following: Any) -> None:
 
 @jit
 def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
-    """Any sample but a usual one."""
+    """Answer any sample except a usual one."""
     copy_place(m, UNDO, HERE)
     m.counts[ON] = 0
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
@@ -90,7 +90,7 @@ def inverse_search(t: FixedTables, m: FixedMemory, u: Any) -> Any:
 
 @jit
 def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
-    """One sample."""
+    """Answer one sample."""
     on = along(m, (u << t.limits[FRACTION]) - m.real[OUTPUT])
     if inverse_along(m, u) < m.real[NEXT] and on > 0 and u != m.real[REFERENCE]:
         k = m.counts[K] + 1
@@ -106,7 +106,7 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
 
 @jit
 def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
-    """`applied` is the drive that was really applied in place of the last answer."""
+    """Replace the last answer by the drive that was really applied."""
     v = clamp_drive(t, applied)
     if v != applied:
         m.counts[STATUS] |= INPUT_CLAMPED
@@ -122,7 +122,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
 
 @jit
 def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals) -> None:
-    """The part common to init and reset."""
+    """The part that init and reset share."""
     start(t, m, play)
     copy_place(m, UNDO, HERE)
     inverse_stay(m)
@@ -135,19 +135,19 @@ def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals) -> None:
 
 @jit
 def inverse_init(t: FixedTables, m: FixedMemory) -> None:
-    """Start memory of the parameter file."""
+    """Set the start memory of the parameter file."""
     inverse_begin(t, m, t.start)
 
 
 @jit
 def inverse_reset(t: FixedTables, m: FixedMemory) -> None:
-    """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
+    """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
     inverse_begin(t, m, t.zero)
 
 
 @jit
 def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
-    """Let the actuator be at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     move_to_input(t, m, v << t.limits[FINE])
     copy_place(m, UNDO, HERE)
     inverse_stay(m)

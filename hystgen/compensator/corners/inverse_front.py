@@ -49,7 +49,7 @@ from hystgen.plays.slots import (
 
 @jit
 def inverse_keep(m: Memory) -> None:
-    """Keep the place for a commit to go back to."""
+    """Keep the place to which a commit goes back."""
     copy_place(m, UNDO, HERE)
     m.real[UNDO_DRIVE] = m.real[DRIVE]
     m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
@@ -57,7 +57,7 @@ def inverse_keep(m: Memory) -> None:
 
 @jit
 def inverse_arrive(m: Memory, v: Any) -> None:
-    """The actuator is at drive v; its move sets the direction, and so the branch."""
+    """Move the actuator to drive v; the direction of the move picks the branch."""
     if v > m.real[DRIVE]:
         m.counts[ASCENDING] = 1
     elif v < m.real[DRIVE]:
@@ -67,7 +67,7 @@ def inverse_arrive(m: Memory, v: Any) -> None:
 
 @jit
 def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
-    """Undo the last step: the actuator has gone to v instead."""
+    """Undo the last step: the actuator went to v instead."""
     copy_place(m, HERE, UNDO)
     forget_line(t.inverse, m)
     m.real[DRIVE] = m.real[UNDO_DRIVE]
@@ -80,7 +80,7 @@ def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
 
 @jit
 def inverse_hold(t: Tables, m: Memory) -> Any:
-    """A sample that is not finite: repeat the last answer."""
+    """Repeat the last answer for a sample that is not finite."""
     inverse_keep(m)
     inverse_replace(t, m, m.real[RETURNED] if m.counts[STEPPED] and m.counts[COMMITTED] else m.real[DRIVE])
     m.counts[STEPPED] = 1
@@ -91,7 +91,7 @@ def inverse_hold(t: Tables, m: Memory) -> Any:
 
 @jit
 def inverse_fits(t: Any, m: Any, v: Any, ascending: int) -> bool:
-    """Whether the move to v belongs to the branch that v was computed on."""
+    """Whether the move to v lies on the branch for which v was computed."""
     inside = clamp_drive(t, v)
     if inside == m.real[DRIVE]:
         return bool(m.counts[ASCENDING] == ascending)
@@ -99,7 +99,7 @@ def inverse_fits(t: Any, m: Any, v: Any, ascending: int) -> bool:
 
 
 def choosing(front_inverse: Callable[..., Any]) -> Jit[[Any, Any, Any, Any], tuple[Any, int]]:
-    """`inverse_choose` with the inverse of the memoryless part of an arithmetic."""
+    """`inverse_choose` with the inverse of an arithmetic's memoryless part."""
 
     @jit
     def inverse_choose(t: Any, m: Any, level: Any, w: Any) -> tuple[Any, int]:
@@ -130,7 +130,7 @@ inverse_choose = choosing(front_inverse)
 
 @jit
 def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
-    """One sample."""
+    """Answer one sample."""
     if not (-t.limits[REAL_MAX] <= u <= t.limits[REAL_MAX]):
         return inverse_hold(t, m)
     inverse_keep(m)
@@ -161,7 +161,7 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
 
 @jit
 def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
-    """`applied` is the drive that was really applied in place of the last answer."""
+    """Replace the last answer by the drive that was really applied."""
     v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
     if not (-t.limits[REAL_MAX] <= applied <= t.limits[REAL_MAX]):
         m.counts[STATUS] |= HELD
@@ -177,7 +177,7 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
 
 @jit
 def inverse_begin(t: Tables, m: Memory, which: Start, first: int) -> None:
-    """The part common to init and reset; `first` as in `Tables.applied`."""
+    """The part that init and reset share; `first` as in `Tables.applied`."""
     start(t.inverse, m, which)
     m.real[LEVEL] = m.real[INPUT] + t.limits[OFFSET]
     move_to_output(t.inverse, m, t.begin[first])
@@ -195,19 +195,19 @@ def inverse_begin(t: Tables, m: Memory, which: Start, first: int) -> None:
 
 @jit
 def inverse_init(t: Tables, m: Memory) -> None:
-    """Start memory of the parameter file."""
+    """Set the start memory of the parameter file."""
     inverse_begin(t, m, t.inverse_first, 2)
 
 
 @jit
 def inverse_reset(t: Tables, m: Memory) -> None:
-    """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
+    """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
     inverse_begin(t, m, t.inverse_zero, 3)
 
 
 @jit
 def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
-    """Let the actuator be at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     inverse_keep(m)
     inverse_replace(t, m, v)
     inverse_keep(m)

@@ -33,7 +33,7 @@ inverse_choose = choosing(front_inverse)
 
 @jit
 def inverse_keep(m: FixedMemory) -> None:
-    """Keep the place for a commit to go back to."""
+    """Keep the place to which a commit goes back."""
     copy_place(m, UNDO, HERE)
     m.real[UNDO_DRIVE] = m.real[DRIVE]
     m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
@@ -41,7 +41,7 @@ def inverse_keep(m: FixedMemory) -> None:
 
 @jit
 def inverse_arrive(t: FixedTables, m: FixedMemory, v: Any) -> Any:
-    """The actuator is at drive v; its move sets the direction, and so the branch. Returns the input of the plays."""
+    """Move the actuator to drive v; the direction of the move picks the branch. Returns the input of the plays."""
     if v > m.real[DRIVE]:
         m.counts[ASCENDING] = 1
     elif v < m.real[DRIVE]:
@@ -52,7 +52,7 @@ def inverse_arrive(t: FixedTables, m: FixedMemory, v: Any) -> Any:
 
 @jit
 def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
-    """One sample."""
+    """Answer one sample."""
     inverse_keep(m)
     if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
         level = inverse_clamp(t, u)
@@ -72,7 +72,7 @@ def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
 
 @jit
 def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
-    """`applied` is the drive that was really applied in place of the last answer."""
+    """Replace the last answer by the drive that was really applied."""
     v = clamp_drive(t, applied)
     if v != applied:
         m.counts[STATUS] |= INPUT_CLAMPED
@@ -86,7 +86,7 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
 
 @jit
 def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> None:
-    """The part common to init and reset; `first` as in `FixedTables.applied`."""
+    """The part that init and reset share; `first` as in `FixedTables.applied`."""
     start(t, m, play)
     m.real[DRIVE] = t.applied[first]
     m.counts[ASCENDING] = t.ascending[first]
@@ -101,19 +101,19 @@ def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> No
 
 @jit
 def inverse_init(t: FixedTables, m: FixedMemory) -> None:
-    """Start memory of the parameter file."""
+    """Set the start memory of the parameter file."""
     inverse_begin(t, m, t.start, 2)
 
 
 @jit
 def inverse_reset(t: FixedTables, m: FixedMemory) -> None:
-    """All plays 0, status cleared; the caller makes the step that belongs to a reset."""
+    """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
     inverse_begin(t, m, t.zero, 3)
 
 
 @jit
 def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
-    """Let the actuator be at drive v, in range or not, before the next sample."""
+    """Move the actuator to drive v, in range or not, before the next sample."""
     move_to_input(t, m, inverse_arrive(t, m, v))
     inverse_keep(m)
     m.real[LEVEL] = code(t, m.real[OUTPUT])[0]
