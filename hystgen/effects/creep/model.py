@@ -29,8 +29,8 @@ SHORTER = 1.0
 the same plants; half improves one by 2 %, twice changes none."""
 
 SHORTEST = 0.3
-"""[decades] Least width of such a spectrum: a factor of two, less than one of its states represents. That of the
-recorded times (`span`) is never less."""
+"""[decades] Least width of such a spectrum: a factor of two, less than one of its states represents. Recorded times
+(`span`) are never narrower."""
 
 LOGARITHMIC = "creep, logarithmic"
 
@@ -46,7 +46,7 @@ def creep(
     """Add the first-order filters of every column of `u` (N, R), each times its weight, to `total`.
 
     `step` (N - 1): the row of `decay`, `early` and `late` (., T) that applies; `states` (T, R): where the filters
-    begin. Several columns side by side, or all filters of one column, since each alone waits for its own previous
+    begin. Several columns, or all filters of one column, run side by side, since each alone waits for its own previous
     sample.
     """
     taus, rows = states.shape
@@ -162,10 +162,10 @@ class ExponentialCreep(_Creep):
 class LogarithmicCreep(_Creep):
     """Creep along log t: after a step of the play sum `y = h (1 + g log10(t/t_0))` for t between t_min and t_max.
 
-    The law is that of the piezo literature (Jung, Shim, Gweon: New open-loop actuating method of piezoelectric
-    actuators for removing hysteresis and creep, Rev. Sci. Instrum. 71, 2000); it is realised by states with equal
-    weights and time constants spread evenly over log t from t_min to t_max, and a gain with which a step has its full
-    height at t_0.
+    The law is from the piezo literature (Jung, Shim, Gweon: New open-loop actuating method of piezoelectric actuators
+    for removing hysteresis and creep, Rev. Sci. Instrum. 71, 2000); it is realised by states with equal weights and
+    time constants spread evenly over log t from t_min to t_max, and a gain with which a step has its full height at
+    t_0.
     """
 
     shape: Literal["logarithmic"] = Field(description="a spectrum of states, even over log t")
@@ -177,7 +177,7 @@ class LogarithmicCreep(_Creep):
     settled: ClassVar[tuple[str, ...]] = ("t0", "t_min", "t_max")
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """t_min < t_max, and no more decades than there may be states for."""
+        """t_min < t_max, at most 12 decades apart."""
         if not self.t_min < self.t_max:
             yield ("t_max",), f"{self.t_max!r} is not above t_min = {self.t_min!r}; give seconds, t_min < t_max"
         elif self.t_max > 1e12 * self.t_min:

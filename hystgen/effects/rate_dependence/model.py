@@ -248,7 +248,7 @@ class _RateDependence(Effect):
 
     @abstractmethod
     def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
-        """Write the plays with these numbers, all above 0, into rows (len(chosen), N)."""
+        """Write the plays with these indices, all above 0, into rows (len(chosen), N)."""
 
     def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
         """The drive itself, and the plays."""
@@ -258,7 +258,7 @@ class _RateDependence(Effect):
         return out
 
     def summed(self, p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-        """The sum of those with a weight."""
+        """The weighted sum, without plays of weight 0."""
         chosen = 1 + np.flatnonzero(p[1:])
         rows = np.empty((1 + len(chosen), len(w)))
         rows[0] = w

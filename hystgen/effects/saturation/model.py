@@ -136,7 +136,7 @@ class Stops(_Saturation):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Where they begin and how much they give, tried if a hard limit explains something."""
+        """Position and give of the stops, tried if a hard limit helps."""
         low, high = about.drive
         wide = about.output_range
         bottom, top = (wide * v / (high - low) for v in about.drive)  # for plays without hysteresis

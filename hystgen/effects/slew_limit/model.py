@@ -13,7 +13,7 @@ from hystgen.basics.quantities import Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 
 BELOW = (0.3, 0.5, 0.7, 1.0, 1.6, 2.2)
-"""Starts below the fastest recorded rate, in decades: a limit that acts never, or always, leaves no trace."""
+"""Starts below the fastest recorded rate, in decades: a limit that never or always acts leaves no trace."""
 
 BESIDE = 10.0
 """[times] A step of the drive is at least this many times faster than the changes next to it; those of a smooth drive
@@ -63,9 +63,8 @@ def sudden(t: Array, u: Array, edge: float, times: Array, drive: Array, given: N
 
     An edge is a change within one sample or two, `BESIDE` times as fast as those next to it. With `edge` 1/2 it happens
     at the mean time of the change: halfway between two samples or, if a converter that averages shows a sample on the
-    way, as long before the end of that sample as the sample is far along the step. With another `edge` it happens as
-    much earlier or later as between two samples. A linear filter distinguishes it from a straight edge only by second
-    differences.
+    way, as long before the end of that sample as the sample is far along the step. Another `edge` moves it by as much
+    as between two samples. A linear filter distinguishes it from a straight edge only by second differences.
     """
     times[0], drive[0], given[0] = t[0], u[0], 0
     n, k, last = 1, 0, len(u) - 1

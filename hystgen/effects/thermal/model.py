@@ -275,8 +275,8 @@ def _of_row(x: Array, row: tuple[int | None, int | None], about: About) -> tuple
 
 
 def _kept(share: Array) -> Array:
-    """Coefficients of the temperature and of the heat of each step, for steps in time constants; the next step's has no
-    part in it."""
+    """Coefficients of the temperature and of the heat of each step, for steps in time constants; the next step's heat
+    has no part in it."""
     return np.stack([np.exp(-share), -np.expm1(-share), np.zeros(len(share))])
 
 
