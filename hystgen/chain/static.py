@@ -121,10 +121,12 @@ class StaticModel:
 
     @cached_property
     def swung(self) -> tuple[float, float]:
-        """The output at either end of `input_range` after the other end: inside `output_range`, or exactly at its ends.
+        """The output at either end of `input_range` after a move from the other end: inside `output_range`, or exactly
+        at its ends.
 
         References between these and the ends of `output_range` need a drive out of range, once the drive has been at
-        the other end. If plays that begin at 0, as after a reset, need that for more references, their output counts.
+        the other end. If this leaves plays that begin at 0, as after a reset, with a narrower range, their output
+        counts.
         """
         low, high = self.play_range
         starts = (self.pi.start, (0.0,) * (self.pi.n + 1))
@@ -136,7 +138,8 @@ class StaticModel:
     def _after(self, *drives: float, start: Sequence[float] | None = None) -> float:
         """The output after the plays have been led from their start memory to inputs, one after the other.
 
-        In fractions, since an offset may cancel most of the sum, and limits are rounded inward from the result.
+        Computed in fractions, since an offset may cancel most of the sum, and limits are rounded inward from the
+        result.
         """
         thresholds = [Fraction(r) for r in self.pi.thresholds]
         states = [Fraction(s) for s in (self.pi.start if start is None else start)]

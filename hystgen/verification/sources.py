@@ -25,7 +25,7 @@ class Sources:
     operators: tuple[str, ...]
     module: tuple[Path, ...]
     harness: Path
-    selftest: Path | None = None  # some of what runs is not emitted
+    selftest: Path | None = None  # code that is not emitted has none
 
     @property
     def emitted(self) -> tuple[Path, ...]:
