@@ -53,12 +53,12 @@ def is_noise(error: float, noise: float, share: float = 1.0) -> bool:
 
 
 def apart(more: float, less: float) -> float:
-    """rms of what an error has beyond a smaller one, if the two parts are uncorrelated: sqrt(more^2 - less^2)."""
+    """rms by which an error exceeds a smaller one, if the excess is uncorrelated with it: sqrt(more^2 - less^2)."""
     return math.sqrt(max(more**2 - less**2, 0.0))
 
 
 def above_noise(removed: float) -> float:
-    """rms of noise and `removed` times as much of something uncorrelated, as a multiple of the noise."""
+    """rms of noise plus an uncorrelated part of `removed` times its size, as a multiple of the noise."""
     return math.sqrt(1.0 + removed**2)
 
 
@@ -109,8 +109,8 @@ Changed by: acceptance::blocks_are_longer_than_errors_remember."""
 SEEN_IN_BOTH = 0.25
 """[times the remaining error or the noise] An effect that removes `FIRST_REMOVES` or `FURTHER_REMOVES` from the fitted
 or the held-out records removes at least this from the others; an error that only one of them shows may belong to
-another effect. With 0.5 one of ten pairs loses its second name; with 0.25 none does, nor with 0, without a false name
-in 24 further cases. Set by: tune pair 0:10; with 0 also tune single, none and poor 0:8. Changed by: blind pair,
+another effect. With 0.5 one of ten pairs loses its second name; with 0.25 or 0 none does, and 0 gives no false name in
+24 further cases. Set by: tune pair 0:10; with 0 also tune single, none and poor 0:8. Changed by: blind pair,
 acceptance::an_effect_has_to_show_in_both."""
 
 ALIKE = 0.25
@@ -155,7 +155,7 @@ foreign 300:308, single and pair 300:312. Changed by: second_plants foreign 400:
 acceptance::names_explain_most."""
 
 MUCH_LEFT = 3.0
-"""[times the noise floor] If the named effects leave more than this, the verdict begins with what they leave, and none
+"""[times the noise floor] If the named effects leave more than this, the verdict begins with the remainder, and none
 has a name if a number of one is at an end of its range and more than `END_LEAVES` remains. Of 457 blind cases much was
 left with a number at an end for two disturbances by room temperature, and for one pair. Set by (the latter):
 second_plants foreign 11001, 11006, pair 8012, blind first 97000. Changed by: blind single,
@@ -164,17 +164,17 @@ acceptance::what_a_verdict_says_first."""
 END_LEAVES = 0.105
 """[share of the gap above the noise, rms] Where more than `MUCH_LEFT` remains and a number of an effect is at an end of
 its range, names stand only if they leave at most this of the held-out and of the fitted records, so that nine tenths
-are explained, in whole per cent as the verdict states it. Many times the noise says nothing of records with little
-noise. False names that left as much, room temperature acting on the gain, kept 0.62 and more. Set by: second_plants
-foreign 300:308, 11000:11020. Changed by: selection::test_a_number_at_an_end_of_its_range_explains_nine_tenths."""
+are explained, in whole per cent as the verdict states it. A multiple of the noise alone says nothing about records with
+little noise. False names for room temperature acting on the gain left 0.62 and more. Set by: second_plants foreign
+300:308, 11000:11020. Changed by: selection::test_a_number_at_an_end_of_its_range_explains_nine_tenths."""
 
 WIDER = 1.0
-"""[times the width of a range] How much farther than to the end of its usual range a number is sought that stands
-there, in the coordinates of its search: ranges are chosen to an order of magnitude. The wider one counts if it lowers
-the held-out error by `BETTER`. Changed by: selection::test_a_wider_range_where_a_number_is_at_its_end."""
+"""[times the width of a range] How far a range is widened beyond an end at which a number stands, in the coordinates of
+the search: ranges are chosen to an order of magnitude. The wider one counts if it lowers the held-out error by
+`BETTER`. Changed by: selection::test_a_wider_range_where_a_number_is_at_its_end."""
 
 WIDENINGS = 3
-"""[searches] Most that a range is widened in a row, each time by `WIDER` usual widths. Changed by: run time, and
+"""[searches] Most widenings of a range in a row, each by `WIDER` usual widths. Changed by: run time, and
 selection::test_how_often_a_range_is_widened."""
 
 FEW_COMPARED = 0.25
@@ -183,10 +183,10 @@ without a known history at least 0.5 are compared, of a test whose amplitude gro
 blind, all kinds, first 71000, and second_plants. Changed by: acceptance::what_a_verdict_says_first."""
 
 FLAT_END = 0.005
-"""[share of the drive range] A limit that begins closer to both ends than this is no name: it is met where the drive
-rests at its end, and a few samples elsewhere, so that it is another offset of those rests, which what is left of creep
-asks for. Wrong ones began at 0.0016 of the range, right ones at 0.0128 and more. Set by: second_plants single 9100 and
-9165, blind pair and poor first 97000. Changed by: acceptance::a_limit_at_the_very_end_of_the_drive."""
+"""[share of the drive range] A limit that begins closer to both ends than this is no name: the drive meets it only in
+rests at the end and in a few samples elsewhere, so that it acts as an offset of those rests, which residual creep calls
+for. Wrong ones began at 0.0016 of the range, right ones at 0.0128 and more. Set by: second_plants single 9100 and 9165,
+blind pair and poor first 97000. Changed by: acceptance::a_limit_at_the_very_end_of_the_drive."""
 
 MOST_EFFECTS = 5
 """[effects] The search adds at most this many: no case of any block has more than two. Changed by: run time of
@@ -696,11 +696,10 @@ half of `VARIABLE_SHARE`. Derived."""
 # Whether an inverse does more than records bear out ------------------------------------------------------------
 
 WILDER = 2.0
-"""[times] An inverse whose drive has second differences up to this times those of the plain inverse's is as calm:
-hysteresis alone turns a drive that often. Changed by: acceptance::a_drive_that_is_rougher."""
+"""[times] An inverse whose drive has second differences up to this times the plain inverse's counts as calm: hysteresis
+alone turns a drive that often. Changed by: acceptance::a_drive_that_is_rougher."""
 
 BEYOND_GAIN = 3.0
-"""[times the gain] What an inverse with effects moves the plain model's output by, at most, in held-out rms that the
-effects explain, or in noise if that is more. It takes out what they explain: 0.85 to 0.97 times that for creep, a lag
-and relaxing plays at three speeds, noise at 0.1 % of the output. Changed by:
-acceptance::an_output_that_moves_further."""
+"""[times the gain] Largest change that an inverse with effects makes to the plain model's output, in held-out rms that
+the effects explain, or in noise if that is larger. It was 0.85 to 0.97 times that for creep, a lag and relaxing plays
+at three speeds, with noise at 0.1 % of the output. Changed by: acceptance::an_output_that_moves_further."""

@@ -192,8 +192,8 @@ class Actuator(Ordered):
         """The best offset (N,) in front of a sensor and behind a limit, and the change of the output with it (N,).
 
         It includes the responses to an unknown start state, which a sensor also sees, but not drift added behind the
-        sensor: about the wrong offset its curve would be a different one. Also returns the responses' part of the
-        output (at the compared samples), to first order; their factors are within the limits of `largest`.
+        sensor: its curve depends on the offset. Also returns the responses' part of the output (at the compared
+        samples), to first order; their factors are within the limits of `largest`.
         """
         y = item.y[item.compared] - self.added(item.run)[item.compared]
         free = self._free(item) if self._needed == _MAPPED else self.nuisances(item)
@@ -320,8 +320,8 @@ def _within(columns: Array, y: Array, low: Array, high: Array) -> Array:
 class Part:
     """An effect in a hypothesis: its catalogue name and the candidate whose numbers are fitted.
 
-    `usual`: the candidate with its usual range, if that was widened; `firm`: whether it may not be, since farther off
-    the effect would be a different one, or since its author set the range.
+    `usual`: the candidate with its usual range, if that was widened; `firm`: whether the range is fixed, since the
+    effect would be a different one beyond it, or since its author set it.
     """
 
     name: str
@@ -345,7 +345,7 @@ def kept(effect: Effect) -> Part:
 class Structure:
     """Thresholds, a front and effects; its shape is the front's, then the numbers of each effect.
 
-    `starts`: as of an `Actuator`.
+    `starts`: as in an `Actuator`.
     """
 
     thresholds: Array

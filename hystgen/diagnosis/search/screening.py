@@ -237,10 +237,10 @@ class Records:
         )
 
     def terms(self, now: Fitted, other: Fitted) -> list[Fitted]:
-        """A hypothesis, and the same with the weights that suit the start states which another one leaves free.
+        """A hypothesis, and the same with weights refitted with the start states free that another one leaves free.
 
-        Those of an effect that is slow against the records follow whatever is slow. If the weights had to follow it
-        alone, they would be worse than with free states, and the difference would count for the effect.
+        Free states of an effect that is slow against the records follow any slow error. Weights that had to follow it
+        alone would be worse than beside free states, and the difference would count in favour of the effect.
         """
         if all(len(other.actuator.nuisances(item)) == 1 for item in self.quick):
             return [now]
@@ -409,7 +409,7 @@ def _while_falling(search: Search, steps: int) -> Search:
     """The search after `steps` steps, and as many again for as long as they lower the error by enough (`FALLING`).
 
     Steps that all fail are not the end: each damps the next one more, and one that is short enough lowers the error. A
-    cubic sensor far from straight was judged where its search began.
+    strongly cubic sensor was once judged at the start of its search.
     """
     for _ in range(acceptance.LONGER):
         before, search = search.now, search.further(steps, fits.COARSE)
