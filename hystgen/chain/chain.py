@@ -52,8 +52,8 @@ class JoinedRuns:
 def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> JoinedRuns:
     """The runs of a session on one time axis.
 
-    A record whose times come after those of the record before keeps them (session time), unless a rest would not fit in
-    between; any other starts one median step after the record before and its rest. In rests, and in gaps of more than
+    A record whose times follow the previous record's keeps them (session time), unless a rest would not fit in between;
+    any other starts one median step after the record before and its rest. In rests, and in gaps of more than
     `SESSION_GAP` steps, the drive holds until one step before the next record. The values of `history` are visited
     before the first record, each by a straight move of `VISIT` seconds, and the last is held for its rest. Raises
     ValueError for records without samples.

@@ -197,7 +197,7 @@ def without_plays(thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
 def not_one_a_play(
     key: str, values: Sequence[object], thresholds: tuple[float, ...] | None, what: str = "value"
 ) -> Iterator[Problem]:
-    """The problem of a key that does not have one of `what` for each play with a threshold."""
+    """The problem of a key that does not have one of `what` per play with a threshold."""
     if thresholds is not None and len(thresholds) > 1 and len(values) != len(thresholds) - 1:
         counts = f"{counted(len(values), what)} for {counted(len(thresholds) - 1, 'play')}"
         yield (key,), f"has {counts}; give one for each threshold but r_0"
@@ -242,13 +242,13 @@ class Effect(BaseModel):
     later: ClassVar[tuple[str, ...]] = ()
     """keys added when files without them existed: left out of files, and of the hash, at their defaults"""
     hint: ClassVar[str] = ""
-    """remark on what may have been meant, printed with an error about a wrong or missing key"""
+    """suggestion printed with an error about a wrong or missing key"""
     compensated: ClassVar[Compensated] = "not known"
     """how far a compensator can take the effect out"""
     compensation: ClassVar[str] = ""
     """how, one clause"""
     block: ClassVar[OwnBlock | None] = None
-    """compensator of an effect of the user's own; those of the catalogue have theirs in their folders"""
+    """compensator of a user's own effect; the catalogue's compensators are in their folders"""
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: object) -> None:

@@ -20,7 +20,7 @@ VERBS = ("rest", "resting", "solve", "absorb")
 @dataclass(frozen=True)
 class Rows:
     """The repeated entries of a block: an entry's name, real numbers, and memory; in fixed point `letters` and `memory`
-    give the types of either, as in `Kind`."""
+    give their types, as in `Kind`."""
 
     name: str
     table: tuple[str, ...] = ()

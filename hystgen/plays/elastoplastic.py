@@ -47,7 +47,7 @@ def _check(modulus: float, yield_stress: float) -> None:
 def parallel(stress: ArrayLike, modulus: float, yield_stress: float, strain: float = 0.0) -> Parallel:
     """Spring and slider in parallel under a given stress (7)-(11); `strain`: of both, before the first sample.
 
-    `stress`: N samples in the unit of `yield_stress`, the product of those of `modulus` and `strain`. The strain is
+    `stress`: N samples in the unit of `yield_stress`, which is the unit of `modulus` times `strain`. The strain is
     `play_r[stress] / E` (12), the play started at `E strain`. Raises ValueError for a modulus that is not positive, a
     negative yield stress, and samples or a start that are not finite.
     """

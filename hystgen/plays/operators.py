@@ -1,7 +1,7 @@
 """The operators of the Prandtl-Ishlinskii literature, sample by sample, as they are defined.
 
 Identification builds its regressors from these definitions, and everything faster is tested against them. Signals are
-one-dimensional arrays `v_0, v_1, ...`; equation numbers are those of the tutorial note that `docs/note.md` names.
+one-dimensional arrays `v_0, v_1, ...`; equation numbers refer to the tutorial note named in `docs/note.md`.
 """
 
 from __future__ import annotations

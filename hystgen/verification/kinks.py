@@ -28,8 +28,8 @@ COMMITTED, THERE = 0.6, 0.7
 
 @dataclass(frozen=True)
 class Path:
-    """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` that of the forward
-    operator after it (meaningless for init), `risen` whether the move to it was rising."""
+    """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` the forward operator's
+    after it (meaningless for init), `risen` whether the move to it rose."""
 
     op: Bytes
     drive: NDArray[np.float64]

@@ -70,8 +70,8 @@ fitted records. After a right name in a wrong shape, a second, wrong name remove
 not recorded)."""
 
 NEARLY_ALL = 0.25
-"""[share of the error before it] It also gets one if it leaves at most this of the error: beside a far larger effect no
-other can reach `NAME_SHARE`. Changed by: blind pair, selection::test_nearly_all_that_is_left_is_worth_a_name."""
+"""[share of the error before it] It also gets one if it leaves at most this of the error: next to a far larger effect
+no other can reach `NAME_SHARE`. Changed by: blind pair, selection::test_nearly_all_that_is_left_is_worth_a_name."""
 
 FIRST_REMOVES = 0.6
 """[times the remaining error or the noise, whichever is larger] A first effect removes at least this, and a difference
@@ -125,10 +125,9 @@ selection::test_all_records_decide_between_equal_numbers."""
 FAR_LESS = 0.5
 """[share of an error] A fitted error of at most this share of another one outweighs a small advantage of that one on
 held-out records, whose error may mostly belong to yet another effect. Chance does not let a held-out error fall this
-far, since nothing was fitted to it: a rate dependence beside creep left a third, shown in a few steps, with p = 0.12 by
-blocks. Set by (the latter): second_plants pair 2004. Changed by:
-acceptance::equal_effects_come_in_the_order_of_the_catalogue,
-acceptance::what_chance_does_not_explain."""
+far, since nothing was fitted to it: a rate dependence next to creep left a third, shown in a few steps, with p = 0.12
+by blocks. Set by (the latter): second_plants pair 2004. Changed by:
+acceptance::equal_effects_come_in_the_order_of_the_catalogue, acceptance::what_chance_does_not_explain."""
 
 EQUAL = 0.005
 """[share of an error] Errors that differ by less than this are equal, however certain the difference is, and
@@ -150,9 +149,8 @@ acceptance::names_near_the_noise_explain_half."""
 MOSTLY_EXPLAINED = 1.0 / 3.0
 """[share of the variance above the noise] The same limit if the names leave more than `MUCH_LEFT`, as wrong names do:
 they then have to explain two thirds. Room temperature acting on the gain kept 0.39 to 0.41 under the names of ageing
-and self-heating; right names left at most 0.30, beside a second effect that was not found. Set by: second_plants
-foreign 300:308, single and pair 300:312. Changed by: second_plants foreign 400:410,
-acceptance::names_explain_most."""
+and self-heating; right names left at most 0.30, with a second effect that was not found. Set by: second_plants foreign
+300:308, single and pair 300:312. Changed by: second_plants foreign 400:410, acceptance::names_explain_most."""
 
 MUCH_LEFT = 3.0
 """[times the noise floor] If the named effects leave more than this, the verdict begins with the remainder, and none
@@ -246,8 +244,7 @@ KEPT = 5
 single."""
 
 ALSO_KEPT = 2
-"""[shapes] Number followed up besides: those of the others with the smallest fitted errors. Changed by: blind
-single."""
+"""[shapes] Number of others followed up too: those with the smallest fitted errors. Changed by: blind single."""
 
 SHAPES_OF_ONE = 2
 """[shapes] At most this many of those belong to one effect, so that other effects have the remaining places. Changed
@@ -255,9 +252,9 @@ by: blind single."""
 
 TWIN = 0.02
 """[share of the errors] An effect whose fitted and held-out errors are within this of a kept one's is followed up too;
-otherwise chance would decide whether a lag or a delay is dropped. So is a shape with fewer numbers than those of its
-effect that are kept: a front that bends one way left 1 % more than one that bends both ways, and was dropped for it.
-Set by (the latter): second_plants single 8001. Changed by: acceptance::a_twin_follows."""
+otherwise chance would decide whether a lag or a delay is dropped. So is a shape with fewer numbers than the kept shapes
+of its effect: a front that bends one way left 1 % more than one that bends both ways, and was dropped for it. Set by
+(the latter): second_plants single 8001. Changed by: acceptance::a_twin_follows."""
 
 PROMISING = 2.0
 """[times the error of the best shape] A shape with larger fitted and held-out errors is not searched jointly. Changed
@@ -343,8 +340,7 @@ acceptance::the_longest_stretch."""
 
 THIN_STRAIGHT = 0.3
 """[times the noise] A stretch may be left out if the prediction deviates from a straight line over it by at most this,
-and the drive by at most what moves the output that far. Changed by:
-acceptance::a_bump_of_the_prediction."""
+and the drive by no more than moves the output that far. Changed by: acceptance::a_bump_of_the_prediction."""
 
 THIN_TURNING = 0.03
 """[times the noise] The same limit at a turning point, which the plays remember: a tenth of it. Changed by:
@@ -531,7 +527,7 @@ SAME_RINGING = 0.02
 single."""
 
 SAME_LINE = 0.05
-"""[share of the frequency or pitch] A line within this of a stronger one is what remains of that. Changed by:
+"""[share of the frequency or pitch] A line within this of a stronger one is a remainder of it. Changed by:
 acceptance::the_rest_of_a_line."""
 
 MOST_LINES = 4
@@ -549,8 +545,8 @@ COMMON_SHARE = 0.6
 share: most. Changed by: acceptance::pitches_of_a_pass."""
 
 STEADY_SHARE = 0.5
-"""[share] A line is steady if the phase and amplitude fitted to one half of a record remove at least this of what the
-other half's own fit removes. Changed by: acceptance::a_line_that_fades."""
+"""[share] A line is steady if the phase and amplitude fitted to one half of a record remove at least this share of the
+amount that the other half's own fit removes. Changed by: acceptance::a_line_that_fades."""
 
 AMPLITUDE_SAMPLES = 2.2
 """[samples per period] With fewer, the amplitude of a line cannot be measured: Nyquist's two, and a tenth more.
@@ -678,8 +674,8 @@ MEMORY_WINS = 1.25
 acceptance::memory_in_place_of_one_variable."""
 
 RATE_FREE_SHARE = 0.75
-"""[share] An error does not depend on rates if drive and memory alone explain at least this of what they explain
-together with rates. Changed by: acceptance::rate_free."""
+"""[share] An error does not depend on rates if drive and memory alone explain at least this share of the part that they
+explain together with rates. Changed by: acceptance::rate_free."""
 
 REPEATABLE_SHARE = 0.5
 """[share of the error's variance] An error is repeatable if at least this returns with the drive: most of it.

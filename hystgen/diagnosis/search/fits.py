@@ -44,7 +44,7 @@ two time constants that are nearly equal, ended up to 8e-4 above the least error
 1e-6 (`test_start_transients::test_nearly_equal_responses`, seeds 0 to 599)."""
 
 RESTARTS = 4
-"""[searches] Most for start memories beside the same effects. Another follows only if one lowers the error by `BETTER`,
+"""[searches] Most for start memories with the same effects. Another follows only if one lowers the error by `BETTER`,
 so this only bounds the time."""
 
 
@@ -315,7 +315,7 @@ def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> 
 
 
 def on_equal_terms(fitted: Fitted, other: Fitted, items: Sequence[Item]) -> Fitted:
-    """A fit whose weights are found anew with the start states free that another one leaves free."""
+    """A fit whose weights are solved for again, with the same free start states as in another one."""
     here, like = fitted.actuator, other.actuator
     blocks = [_Block(here, item, fitted.weights, like) for item in items if item.known.any()]
     whole, best = _solved(blocks, len(fitted.weights))
@@ -326,7 +326,8 @@ def on_equal_terms(fitted: Fitted, other: Fitted, items: Sequence[Item]) -> Fitt
 
 
 def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> Fitted:
-    """The fit with start memories found beside its effects, for records whose memory was found without a history.
+    """The fit with start memories found in the presence of its effects, for records whose memory was found without a
+    history.
 
     A memory found without the effects includes part of their response. The plays only have to explain the output less
     that response, and their weights are known in the search for a memory (`start.of_model`). The numbers are then
@@ -353,7 +354,7 @@ def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> F
 
 
 def restarts(item: Item) -> bool:
-    """Whether a record's start memory was found without a history, and may change with the effects beside it."""
+    """Whether a record's start memory was found without a history, and may change with the effects."""
     return item.history is None and item.turns is not None
 
 

@@ -79,11 +79,11 @@ class Forgetting(Effect):
 
 
 def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
-    """The element, if the records support it beside the effects that were found, or better than these; else None.
+    """The element, if the records support it in addition to the effects found, or better than them; else None.
 
-    The element is first tried in place of all names of the `outcome`, then of those that depend on time, then beside
-    them. Names that explain more stand. Where only chance separates the two, the names stand if the drive takes equal
-    ways in different times, since effects of time and of way then differ.
+    The element is first tried in place of all names of the `outcome`, then of those that depend on time, then in
+    addition to all. Names that explain more stand. Where only chance separates the two, the names stand if the drive
+    takes equal ways in different times, since effects of time and of way then differ.
     """
     none, now = outcome.refitted, outcome.fitted
     if records.one_loop or not selection.leaves_enough(none, records):
@@ -104,7 +104,7 @@ def _bases(outcome: Outcome, records: Records) -> Iterator[tuple[Fitted, tuple[s
     """The models to which the element is added, with the names that it would replace.
 
     The refitted one; then one with the effects found that do not depend on time or, if none was found, with the best
-    one tried, since the forgetting of a Duhem plant shows only beside its bent middle line.
+    one tried, since the forgetting of a Duhem plant shows only next to its bent middle line.
     """
     now = outcome.fitted
     names = tuple(dict.fromkeys(each.name for each in outcome.found))

@@ -69,7 +69,7 @@ class Actuator(Ordered):
     )
     """Gain and offset over a run, kept with the effect and the run, since the `id` of a deleted one may be reused."""
     starts: Starts = ()
-    """Start memories found beside the effects: the turns of an item, and those that replace them."""
+    """Start memories found in the presence of the effects: an item's turns, and the turns that replace them."""
 
     def columns(self, item: Item, p: Array | None = None, sums: Sums | None = None) -> tuple[Array, Array]:
         """Rows that the weights multiply, up to the output map, and the constant that is added to them.
@@ -137,7 +137,7 @@ class Actuator(Ordered):
         return total[item.compared] if self._needed == _FILTERED else total
 
     def _plays(self, item: Item) -> Array:
-        """(n + 1, N) plays after the effects that bend them; those of the last few hypotheses are cached."""
+        """(n + 1, N) plays after the effects that bend them; the last few hypotheses are cached."""
         if not self.bending:
             return self._moved(item)
         by = (self._moving, self.bending, self._needed == _MOVED)

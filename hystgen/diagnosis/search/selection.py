@@ -35,7 +35,8 @@ FRONTS = "asymmetry", "saturation"
 """Names of effects that are a front."""
 
 EXTENDED, REFITTED, GIVEN, IDENTIFIED = "extended", "refitted", "given", "identified"
-"""The models that may be written: with the effects, the nominal one refitted or as given, and that of `identify`."""
+"""The models that may be written: with the effects, the nominal one refitted or as given, and the one from
+`identify`."""
 
 
 # Merit of an effect, and the choice among several similar ones -----------------------------------------------
@@ -317,7 +318,7 @@ def takes_most(residual: float, gap: float, noise: float) -> bool:
 
 
 def bear_two(records: Records) -> bool:
-    """Whether records can support a second name, or one beside an effect that the model already has."""
+    """Whether records can support a second name, or one in addition to an effect that the model already has."""
     return not (records.one_loop and records.one_speed)
 
 
@@ -428,7 +429,7 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Withdrawal:
-    """Effects that were accepted at first but not in the end (`borne_out`): what they would have explained."""
+    """Effects that were accepted at first but not in the end (`borne_out`), and the part that they explained."""
 
     names: tuple[str, ...]
     refused: Refusal
@@ -722,8 +723,8 @@ def _beside_another(latest: _Step, failed: _Step, gap: float, records: Records) 
     """A step to another effect that the accepted one hides, and the step from there to the accepted one; None without
     any.
 
-    An effect of many numbers also follows other effects, as a fast state of creep follows relaxing plays. Beside it the
-    other effect has nothing left to explain, although it does not follow that well enough. The two are tried in the
+    An effect of many numbers also follows other effects, as a fast state of creep follows relaxing plays. In its
+    presence the other has nothing left to explain, although it follows the other only roughly. The two are tried in the
     other order if the accepted one leaves so much that a verdict would begin with it.
     """
     left = records.residual(failed.now)
@@ -749,7 +750,7 @@ def _hidden(now: Fitted, tried: Tried, records: Records) -> bool:
 
 
 def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step] | None:
-    """Two effects that hide each other: neither qualifies by itself, but each does beside the other.
+    """Two effects that hide each other: neither qualifies by itself, but each does with the other.
 
     Returns the first, and the step from it to both. The search begins with the effect that explains most on held-out
     records, and with each that is certain on fitted ones. Without the first, the other may leave less of the gap than
@@ -814,11 +815,11 @@ def _without_needless(
 def _exchanged(
     now: Fitted, found: list[Found], less: dict[str, Fitted], names: Collection[str], records: Records
 ) -> tuple[Fitted, list[Found]]:
-    """Replace earlier effects by others, or other shapes, that are better beside the later ones.
+    """Replace earlier effects by others, or other shapes, that are better with the later ones.
 
     The first of two was chosen while the second was missing, and may have taken part of its place; the second was
-    chosen beside a wrong first one. Rivals, too, are judged beside all the others. `less`: the model without an effect,
-    if known; `names`: effects that were among the best in some round, the only ones worth another search.
+    chosen next to a wrong first one. Rivals, too, are judged together with all the others. `less`: the model without an
+    effect, if known; `names`: effects that were among the best in some round, the only ones worth another search.
     """
     latest = found[-1].name
     for _ in range(acceptance.MOST_EXCHANGES):
@@ -902,7 +903,7 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
 def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
     """The effects with a rival in place of the latest and another shape of an earlier one, if that is better.
 
-    The shape of the earlier one was chosen while the latest was missing, and the latest beside that shape: where each
+    The shape of the earlier one was chosen while the latest was missing, and the latest next to that shape: where each
     holds the other in its place, no exchange of a single one finds the two that belong together.
     """
     others = {each.name: each for each in reversed(rivals(step.best, step.tried, records))}

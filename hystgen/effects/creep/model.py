@@ -25,8 +25,8 @@ half the first, one gets no name and two are 3 and 7 % worse; with half the seco
 changes none by 2 %."""
 
 SHORTER = 1.0
-"""[decades] A search for the ends of a logarithmic spectrum begins this far inside those of the recorded times. Set by:
-the same plants; half improves one by 2 %, twice changes none."""
+"""[decades] A search for the ends of a logarithmic spectrum begins this far inside the range of the recorded times. Set
+by: the same plants; half improves one by 2 %, twice changes none."""
 
 SHORTEST = 0.3
 """[decades] Least width of such a spectrum: a factor of two, less than one of its states represents. Recorded times

@@ -93,7 +93,7 @@ def bent_decay(x: float) -> float:
 def taylor(e: float, c1: float, q0: float, m: float, step: float) -> tuple[float, float]:
     """Increment of `e` over a step of `e' = speed - q`, `q` as `e^m`, by six terms from `c1` on, and the last of them.
 
-    The terms `q_k` of q follow from `e q' = m q e'`; those of e from the second on are `-step q_(k-1)/k`.
+    The terms `q_k` of q follow from `e q' = m q e'`; the terms of e from the second on are `-step q_(k-1)/k`.
     """
     d = 1.0 / e
     q1 = m * c1 * q0 * d

@@ -45,7 +45,7 @@ class ModeNumbers(One):
 
     `table` (5,): the changes of `off` and `rate` by themselves in a step, their coupling, and their responses to a
     change of the input; `largest` and `fastest`: output and rate for inputs within 1; `off_after`, `rate_after`: summed
-    response of the output to a disturbance of `off`, and of `rate`; `turned`, `slowed`: that of the rate.
+    response of the output to a disturbance of `off`, and of `rate`; `turned`, `slowed`: the same for the rate.
     """
 
     table: tuple[float, ...]

@@ -2,7 +2,7 @@
 inverse.
 
 It keeps the distance `off` of the output from the input, and its `rate`, both 0 at rest, as `compensator` does for a
-whole mode. A change of the input enters both by a share of what it adds there; the free oscillation is the same.
+whole mode. A change of the input adds a share of what it adds to a whole mode; the free oscillation is the same.
 """
 
 from __future__ import annotations

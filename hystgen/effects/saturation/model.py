@@ -12,7 +12,7 @@ from hystgen.basics.quantities import NotNegative, Number, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run
 
 LEVELS = (np.array([-0.02]), np.array([-0.1]), np.array([-0.3]))
-"""Starts within the output: a limit beyond what was measured does nothing, and neither does a small change of it."""
+"""Starts within the output: a limit beyond the measured range does nothing, even if it changes a little."""
 
 
 MIDDLE = 0.5

@@ -27,7 +27,8 @@ MIDDLE = 0.5
 one average ends and the next begins halfway between the times of both."""
 
 LEAST = 3.0
-"""The same of the least rate: a step from sample to sample is faster than all else by a hundred times and more."""
+"""Decades from the fastest recorded rate down to the least one: a step from sample to sample is more than a hundred
+times faster than anything else."""
 
 
 @jit
@@ -61,7 +62,7 @@ def limit(u: Array, up: Array, down: Array, out: Array, off: Array) -> None:
 def sudden(t: Array, u: Array, edge: float, times: Array, drive: Array, given: NDArray[np.intp]) -> int:
     """Write the drive with sudden edges into `times` and `drive`, and the position of each sample; returns its length.
 
-    An edge is a change within one sample or two, `BESIDE` times as fast as those next to it. With `edge` 1/2 it happens
+    An edge is a change within one sample or two, `BESIDE` times as fast as its neighbours. With `edge` 1/2 it happens
     at the mean time of the change: halfway between two samples or, if a converter that averages shows a sample on the
     way, as long before the end of that sample as the sample is far along the step. Another `edge` moves it by as much
     as between two samples. A linear filter distinguishes it from a straight edge only by second differences.

@@ -451,4 +451,4 @@ HEAT_PART = ChainPart(
     late("thermal", "HEAT_ARITHMETIC"),
     kinds=(HEAT_KIND, FRICTION_KIND),
 )
-"""Temperatures as parts of the chain: those that the caller sets, and those of own heat."""
+"""Temperatures as parts of the chain: set by the caller, or from own heat."""
