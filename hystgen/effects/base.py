@@ -179,7 +179,7 @@ class Candidate:
     amounts: tuple[int, ...] = ()
 
     def at(self, numbers: Array) -> Candidate:
-        """The same shape with all numbers fixed at their values here, except the amounts."""
+        """The same shape with all numbers but the amounts fixed at the given ones."""
         free = np.isin(np.arange(len(numbers)), self.amounts)
         return replace(self, low=np.where(free, self.low, numbers), high=np.where(free, self.high, numbers))
 
@@ -240,7 +240,7 @@ class Effect(BaseModel):
     settled: ClassVar[tuple[str, ...]] = ()
     """keys of conventions, and of numbers that a fit cannot separate from others: a refit leaves them as they are"""
     later: ClassVar[tuple[str, ...]] = ()
-    """keys added when files without them existed: left out of files, and of the hash, at their defaults"""
+    """keys added after the first files were written: left out of files, and of the hash, at their defaults"""
     hint: ClassVar[str] = ""
     """suggestion printed with an error about a wrong or missing key"""
     compensated: ClassVar[Compensated] = "not known"

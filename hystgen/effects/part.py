@@ -170,7 +170,7 @@ class One:
 
     @property
     def ringing(self) -> Array:
-        """Frequencies (k,) in rad a sample at which its inverse may ring."""
+        """Frequencies (k,) in rad per sample at which its inverse may ring."""
         return np.empty(0)
 
     def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:

@@ -1,4 +1,4 @@
-"""Densities of the continuous model, and the thresholds and weights that stand for them.
+"""Densities of the continuous model, and the thresholds and weights that represent them.
 
 The continuous model is `y = p0 v + int_0^R p(r) play_r[v] dr` (18 of the note). `[0, R]` is cut into n equal
 cells; each becomes one play with the cell's mass as weight and its centroid as threshold.

@@ -99,7 +99,7 @@ P_DIFFERENT = 0.01
 """[probability] Two effects are separable if the p-value of their difference is below this. Changed by: blind pair."""
 
 BLOCK_MEMORIES = 2.0
-"""[correlation times] Length of the blocks of samples that a test takes as independent: at this length neighbouring
+"""[correlation times] Length of the blocks of samples that a test treats as independent: at this length neighbouring
 blocks are hardly correlated. Changed by: blind none, acceptance::blocks_are_longer_than_errors_remember."""
 
 BLOCKS = 20
@@ -428,7 +428,7 @@ WIDE_DRIVE = 0.3
 acceptance::a_narrow_record_shows_no_scale."""
 
 OTHER_UNIT = 30.0
-"""[times the median width] A drive wider than this is in another unit, and the others are not measured by it. It lies
+"""[times the median width] A drive wider than this is in another unit, and is no measure for the others. It lies
 between the ratio of a large swing to small loops and a factor of 1000 between units. Changed by:
 acceptance::a_drive_in_another_unit_is_no_measure."""
 

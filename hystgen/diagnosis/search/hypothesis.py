@@ -191,9 +191,9 @@ class Actuator(Ordered):
     def level(self, h: Array, item: Item, p: Array) -> tuple[Array, Array, Array]:
         """The best offset (N,) in front of a sensor and behind a limit, and the change of the output with it (N,).
 
-        It includes the responses to an unknown start state, which a sensor also sees, but not drift added behind the
-        sensor: its curve depends on the offset. Also returns the responses' part of the output (at the compared
-        samples), to first order; their factors are within the limits of `largest`.
+        It includes the responses to an unknown start state, which a sensor also sees and which move it along its curve,
+        but not drift added behind the sensor. Also returns the responses' part of the output (at the compared samples),
+        to first order; their factors are within the limits of `largest`.
         """
         y = item.y[item.compared] - self.added(item.run)[item.compared]
         free = self._free(item) if self._needed == _MAPPED else self.nuisances(item)

@@ -33,7 +33,8 @@ not widened; only noise is left, so that none was tried."""
 
 @dataclass(frozen=True)
 class End:
-    """A number at an end of its range or beyond it, as `AtEnd` says; `part`: of the structure, with its `name`."""
+    """A number at an end of its range or beyond it, described by `AtEnd`; `part`: its part of the structure, called
+    `name`."""
 
     part: int
     name: str

@@ -854,7 +854,7 @@ def _that_replaces(now: Fitted, name: str, step: _Step, records: Records) -> _St
     """The step with the effect that replaces the named one, or None: its best, or an equally good one of fewer numbers.
 
     The best of a step is chosen by errors that differ by a few per cent, which no records bear out near the noise. A
-    shape of the effect itself with as few numbers as another effect stands, unless that one leaves less.
+    shape of the effect itself is preferred to another effect of as many numbers, unless that leaves less.
     """
     every = [*records.to_fit, *records.held]
     fitted, found = now, None

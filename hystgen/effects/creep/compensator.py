@@ -1,4 +1,4 @@
-"""Creep as a block: exactly invertible, since a state answers a move at once by a known share."""
+"""Creep as a block: exactly invertible, since each state follows a move at once by a known share."""
 
 from __future__ import annotations
 

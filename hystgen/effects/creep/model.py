@@ -211,7 +211,7 @@ class LogarithmicCreep(_Creep):
         return _fading(run, self.spectrum()[0][::PER_DECADE])
 
     def largest(self, run: Run) -> Array:
-        """Each represents the states of a decade, which lag behind the play sum by its span at most."""
+        """Each represents the states of a decade, which lag behind the play sum by at most its span."""
         tau, weight = self.spectrum()
         return np.full(len(tau[::PER_DECADE]), PER_DECADE * weight)
 

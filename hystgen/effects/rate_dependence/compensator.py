@@ -1,4 +1,4 @@
-"""How plays that depend on the rate move in one step, for a compensator."""
+"""One step of rate-dependent plays, for a compensator."""
 
 from __future__ import annotations
 

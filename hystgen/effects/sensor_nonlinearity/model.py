@@ -13,7 +13,8 @@ from hystgen.basics.quantities import Number, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, curve, not_as_many
 
 BENT = 1.0
-"""Parabolas from which a search starts, 10 % at the range's end: from a straight sensor its step may overshoot."""
+"""Parabolas from which a search starts, 10 % at the range's end: from a straight sensor, its first step may
+overshoot."""
 
 PIECES = (6, 12)
 """Pieces of the monotone curves that are tried if a cubic helps. For a root over the range, six leave 1.3 times the
@@ -95,7 +96,7 @@ class SensorCurve(_Sensor):
     settled: ClassVar[tuple[str, ...]] = ("knots", "values")
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """As many values as knots, and both rise."""
+        """As many values as knots, both rising."""
         yield from not_as_many("values", self.values, "knots", self.knots)
         for key in ("knots", "values"):
             for k, (one, other) in enumerate(zip(getattr(self, key)[:-1], getattr(self, key)[1:], strict=True), 1):

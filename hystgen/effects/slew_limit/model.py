@@ -227,7 +227,7 @@ class SuddenSlewLimit(_SlewLimit):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Tried if a limit helps: one rate, one for each direction, and either with another time of the steps."""
+        """Tried if a limit helps: one rate, one for each direction, and both with another position of the steps."""
         both = "rising and falling"
         return [
             cls._candidate(SUDDEN, 1, about, beyond=STRAIGHT, grown=lambda x: x),

@@ -40,7 +40,7 @@ LINEAR_ERROR, RECIPROCAL_ERROR = (last_bits * 2.0**-GAIN_BITS for last_bits in (
 least 1/2: twice the error of a linear one, and a Newton step."""
 
 FACTOR_ERROR = 2.0**-MANTISSA_BITS
-"""[share of a product] Error of a factor: half of its last bit. A temperature's reference has the same."""
+"""[share of a product] Error of a factor: half of its last bit. A temperature's reference has the same error."""
 
 TEMPERATURE_BITS = 37
 """Fraction bits of an internal temperature, so that temperatures of 512 degC are multiplied like any signal."""
