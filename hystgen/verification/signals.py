@@ -138,7 +138,7 @@ def suite(
 
 
 def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls]:
-    """Steps with everything else that may be called between them, sparsely and densely."""
+    """Steps mixed with all other calls, sparsely and densely."""
     first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
     low, high = (float(a) for a in tables.limits[first : first + 2])
     drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])

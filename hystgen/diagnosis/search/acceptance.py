@@ -204,23 +204,21 @@ by: acceptance::held_out_records_that_are_alone."""
 # How far a search goes ---------------------------------------------------------------------------------------
 
 SCREENED = 6_000
-"""[samples] Number compared while all shapes are screened, for the fitted and for the held-out records each. Changed
+"""[samples] While all shapes are screened, this many of the fitted and of the held-out records are compared. Changed
 by: run time and names of blind."""
 
 SEARCHED = 12_000
-"""[samples] Number fitted in later searches, and number used where many variables are regressed together. Changed by:
-as before."""
+"""[samples] Later searches fit this many, and regressions on many variables use as many. Changed by: as before."""
 
 PLAYS = 32
 """[plays] Number of thresholds of a fit. Half as many leave up to 1.4 times the noise in records without an effect,
 because of the gaps between thresholds; more leave no less. Set by: tune none (commit 9f9a31e, seeds not recorded)."""
 
 FIRST_STEPS = 2
-"""[steps] Number that a search takes from each start while shapes are screened. Changed by: blind single."""
+"""[steps] A search takes this many from each start while shapes are screened. Changed by: blind single."""
 
 SCREENING_STEPS = 2
-"""[steps] Number that it then takes from the best start; repeated while the error still falls. Changed by: blind
-single."""
+"""[steps] It then takes this many from the best start, again while the error still falls. Changed by: blind single."""
 
 FALLING = 0.8
 """[share of the error] A search continues if `SCREENING_STEPS` bring its error below this share. The minimum of a
@@ -240,11 +238,11 @@ IDLE = 0.01
 behind a large effect, every start of the next one may be worse than having none. Changed by: blind pair."""
 
 KEPT = 5
-"""[shapes] Number followed up after the screening: those with the smallest held-out errors. Changed by: blind
+"""[shapes] After the screening, this many with the smallest held-out errors are followed up. Changed by: blind
 single."""
 
 ALSO_KEPT = 2
-"""[shapes] Number of others followed up too: those with the smallest fitted errors. Changed by: blind single."""
+"""[shapes] Of the others, this many with the smallest fitted errors are followed up too. Changed by: blind single."""
 
 SHAPES_OF_ONE = 2
 """[shapes] At most this many of those belong to one effect, so that other effects have the remaining places. Changed
@@ -261,21 +259,21 @@ PROMISING = 2.0
 by: blind pair."""
 
 JOINT_STEPS = 5
-"""[steps] Number of a joint search before the shapes are compared again. Changed by: blind single."""
+"""[steps] A joint search takes this many before the shapes are compared again. Changed by: blind single."""
 
 HOPEFUL = 1.3
 """[times the held-out error of the best shape] A shape with a larger error after those steps is searched no further.
 Changed by: blind single."""
 
 RINGING_STARTS = 3
-"""[frequencies] Number of frequencies at which the error rings from which a resonance is searched for. Changed by:
+"""[frequencies] The search for a resonance starts from this many frequencies at which the error rings. Changed by:
 blind single with resonance."""
 
 BREAKS = 4
-"""[breaks] Number in the dead-zone sum that is tried as an asymmetry. Changed by: blind single with asymmetry."""
+"""[breaks] The dead-zone sum that is tried as an asymmetry has this many. Changed by: blind single with asymmetry."""
 
 FINER_BREAKS = 8
-"""[breaks] Number in the sum that is tried next where that one helps: each interval is halved. Derived."""
+"""[breaks] If that sum helps, one with this many is tried next: each interval is halved. Derived."""
 
 TANH_BEND, TANH_SIDE = 0.3, 2.0
 """[1], [half ranges] Curvature and place of the tanh envelopes that are further starts: each is bent one way over the
@@ -495,7 +493,7 @@ CARRIER_SHARE = 0.5
 Changed by: acceptance::harmonics_of_a_carrier."""
 
 HARMONICS = 10
-"""[harmonics] Number of multiples of that line that the actuator's response has. Changed by:
+"""[harmonics] The actuator's response has this many multiples of that line. Changed by:
 acceptance::harmonics_of_a_carrier."""
 
 LINE_PERIODS = 8
@@ -515,8 +513,8 @@ SPECTRUM_PARTS = (8, 64)
 every five seconds. Set by: disturbances (commit 8380866)."""
 
 SURROUNDINGS, SURROUNDINGS_OF_PARTS = 40, 12
-"""[bins] Number on either side with which a peak is compared, in the spectrum of a record and in the mean spectrum of
-its parts. Changed by: acceptance::surroundings_of_a_line."""
+"""[bins] A peak is compared with this many on either side, in the spectrum of a record and in the mean spectrum of its
+parts. Changed by: acceptance::surroundings_of_a_line."""
 
 SAME_BINS = 1.5
 """[bins] Lines closer than this are one line: less than the two bins of half the main lobe of a Hann window.
@@ -534,7 +532,7 @@ MOST_LINES = 4
 """[lines] At most this many are searched for: mains, two harmonics and a ripple. Changed by: blind foreign."""
 
 CRESTS = 5
-"""[bins] Number of the highest bins of a spectrum that are examined: `MOST_LINES` and one of the drive. Derived."""
+"""[bins] This many of the highest bins of a spectrum are examined: `MOST_LINES` and one of the drive. Derived."""
 
 SEEN_IN = 0.4
 """[share of the records that are long enough] A line counts if at least this share of the records has it, or if it has
@@ -565,12 +563,11 @@ CONVERTER_STEP = 0.02
 Changed by: acceptance::a_pitch_of_the_converter."""
 
 POSITION_BINS = 4096
-"""[bins] Number into which the range is divided, and in which errors are averaged, to find a pitch: enough for pitches
-of a thousandth of the range. Changed by: acceptance::the_finest_pitch."""
+"""[bins] To find a pitch, the range is divided into this many, and errors are averaged in each: enough for pitches of a
+thousandth of the range. Changed by: acceptance::the_finest_pitch."""
 
 PITCHES = 3
-"""[pitches] Number of the strongest that are examined. Changed by:
-acceptance::pitches_that_are_examined."""
+"""[pitches] This many of the strongest are examined. Changed by: acceptance::pitches_that_are_examined."""
 
 PASS_SAMPLES, PASS_PITCHES = 32, 3.0
 """[samples], [pitches] A pass, up or down, that confirms a ripple has at least these. Changed by:
@@ -659,8 +656,7 @@ VARIABLE_SHARE = 0.1
 acceptance::a_variable_that_matters."""
 
 VARIABLE_BINS = 24
-"""[bins] Number with which a function of one variable is described. Changed by:
-acceptance::folds."""
+"""[bins] A function of one variable is described with this many. Changed by: acceptance::folds."""
 
 FOLD_BLOCKS = 16
 """[blocks] Samples alternate between fit and test in this many blocks, which are longer than errors are correlated.

@@ -51,7 +51,7 @@ class Wild:
 def wild(extended: Model, plain: Model, held: Sequence[Item], gain: float, noise: float) -> Wild | None:
     """How far the inverse with effects exceeds their `gain` in the worst held-out record; None if it does not.
 
-    Motion of the output from the reference's noise, passed through both inverses, is subtracted.
+    The output's response to the reference's noise, passed through both inverses, is subtracted.
     """
     found = [each for item in held if (each := _over(extended, plain, item, gain, noise)) is not None]
     worst = max(found, key=lambda each: each.moves, default=None)

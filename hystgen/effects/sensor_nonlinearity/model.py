@@ -81,8 +81,8 @@ CUBIC = "sensor, cubic"
 class SensorCurve(_Sensor):
     """Sensor that reads `values` at `knots` and, between them, a smooth curve that rises everywhere; straight beyond.
 
-    Pieces of cubics whose slopes at the knots are harmonic means of the pieces' own: the curve then has no turning
-    point (F. N. Fritsch, J. Butland, SIAM Journal on Scientific and Statistical Computing 5, 1984, 300-304).
+    Cubic pieces whose slopes at the knots are harmonic means of the pieces' own: the curve then has no turning point
+    (F. N. Fritsch, J. Butland, SIAM Journal on Scientific and Statistical Computing 5, 1984, 300-304).
     """
 
     shape: Literal["curve"] = Field(description="a curve through points, which rises everywhere")
