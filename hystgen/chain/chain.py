@@ -26,8 +26,7 @@ VISIT_SAMPLES = 200
 Hz; 25 change it by 2e-4. Set by: benchmarks/chosen_numbers.py visits."""
 
 SESSION_GAP = 10.0
-"""Gap between two records of a session, in median steps, above which the drive is held in the gap; below, it is
-straight."""
+"""Gap between records of a session, in median steps, above which the drive is held in it; below, it is straight."""
 
 def _rank(effect: Effect) -> int:
     """Position in the chain: gains lie between linear filters of order 0 and others."""
@@ -253,8 +252,8 @@ class Chain(Ordered):
         return through_stages(self.cascade.stages, a, rising)
 
     def plays(self, w: Array, run: Run) -> Array:
-        """Rows (n+1, N) that the weights sum, from the start memory on: the plays, moved by at most one effect and bent
-        by the others."""
+        """Rows (n+1, N) that the weights sum, from the start memory: plays moved by at most one effect, bent by the
+        others."""
         pi = self.cascade.pi
         thresholds = np.asarray(pi.thresholds)
         return self.bent(self.moved(w, run, thresholds, np.asarray(pi.start)), thresholds)

@@ -30,8 +30,7 @@ CLOSE, FINE = 0.03, 3e-4
 """Shares of the error and of the step by which the output may leave the straight line between two samples."""
 
 GOLDEN = 0.381966011250105
-"""Place in an interval at which the output is compared with the straight line: halves of an interval could all be whole
-periods."""
+"""Place in an interval at which the output is compared with the straight line: halves could be whole periods."""
 
 GRADED = 4.0
 """Largest ratio of an interval between samples to its neighbour: an oscillation that happens to cross zero at the test

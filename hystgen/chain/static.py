@@ -121,8 +121,8 @@ class StaticModel:
 
     @cached_property
     def swung(self) -> tuple[float, float]:
-        """The output at either end of `input_range` after a move from the other end: inside `output_range`, or exactly
-        at its ends.
+        """The output at either end of `input_range` after a move from the other end: inside `output_range` or at its
+        ends.
 
         References between these and the ends of `output_range` need a drive out of range, once the drive has been at
         the other end. Plays that begin at 0, as after a reset, count if their range is narrower.
@@ -137,8 +137,7 @@ class StaticModel:
     def _after(self, *drives: float, start: Sequence[float] | None = None) -> float:
         """The output after the plays have moved from their start memory to inputs in turn.
 
-        Computed in fractions, since an offset may cancel most of the sum, and limits are rounded inward from the
-        result.
+        In fractions, since an offset may cancel most of the sum, and limits are rounded inward from the result.
         """
         thresholds = [Fraction(r) for r in self.pi.thresholds]
         states = [Fraction(s) for s in (self.pi.start if start is None else start)]

@@ -133,8 +133,7 @@ class One:
         return 0.0, 0.0
 
     def solved(self, error: float, size: float, u: float, same: bool) -> float:
-        """Error of the inverse for an error of the output; `same`: the states have seen the same inputs in both
-        cases."""
+        """Error of the inverse for an error of the output; `same`: the states have seen the same inputs."""
         return error
 
     def seen(self) -> float:
@@ -207,8 +206,7 @@ class Coding(NamedTuple):
 
 class Sought(NamedTuple):
     """The setting in which a block behind the plays is solved: sizes of its input and of the sum asked of the plays,
-    the unit of signals, how far `apart` states that follow the play sum, and their inputs, may be; `same`: they are
-    equal."""
+    the unit of signals, how far `apart` states behind the play sum, and their inputs, may be; `same`: not at all."""
 
     size: float
     asked: float
@@ -273,8 +271,7 @@ class FloatSurroundings(Surroundings):
 @dataclass(frozen=True)
 class FixedSurroundings(Surroundings):
     """The same in fixed point: units per code, `bits` of signals behind the plays below a code, bits of a code and the
-    largest code, fraction bits of a `temperature`, the largest `drive` in codes, and the span in signals,
-    `farthest`."""
+    largest code, fraction bits of a `temperature`, the largest `drive` in codes, and the span in signals `farthest`."""
 
     drive_lsb: Fraction
     output_lsb: Fraction
@@ -295,8 +292,7 @@ class FixedSurroundings(Surroundings):
 @dataclass(frozen=True)
 class Realized:
     """A kind of block in one arithmetic: its verbs, its constants from its tables, and the tables of its blocks; in
-    fixed point the tables come from `formats`, made from a block, the surroundings, and the largest input and output
-    asked for.
+    fixed point the tables come from `formats`, made from a block, the surroundings, and the largest input and output.
 
     `beside`: constants of an additional struct for each block.
     """

@@ -160,8 +160,7 @@ class _Block:
         return bool(np.any(beyond | opposite))
 
     def _behind(self, whole: Array, limited: Bools) -> Array:
-        """The triangle after elimination of the free components; the plays carry the others, which follow their
-        weights."""
+        """The triangle without the free components; the plays carry the others, which follow their weights."""
         n = self._free
         if limited.any():
             carried = whole[:, :n][:, limited] @ (self._side * self._most)[limited]
@@ -326,8 +325,7 @@ def on_equal_terms(fitted: Fitted, other: Fitted, items: Sequence[Item]) -> Fitt
 
 
 def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> Fitted:
-    """The fit with start memories found in the presence of its effects, for records whose memory was found without a
-    history.
+    """The fit with start memories found in the presence of its effects, for records with a memory but no history.
 
     A memory found without the effects includes part of their response. The plays only have to explain the output less
     that response, and their weights are known in the search for a memory (`start.of_model`). The numbers are then

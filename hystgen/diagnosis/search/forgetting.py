@@ -38,8 +38,7 @@ BALANCE = 0.9
 
 WEIGHT = 5.0
 """[mean slopes of the records] Largest weight of the element, which lags at positive ones: a friction of five times the
-stage's stiffness has no inverse. A leading element would stand for plays with negative weights, which a play sum does
-not have."""
+stage's stiffness has no inverse. A leading element would be plays of negative weight, which a play sum lacks."""
 
 LOOP = 0.1
 """[share of the drive range] Width of the minor loop that is said to stay open, as in `docs/plants.md`."""
@@ -226,8 +225,7 @@ def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, recor
 
 
 def _open(fitted: Fitted, element: Forgetting, low: float, high: float) -> float:
-    """How far a minor loop in the middle of the drive is from closing, as a share of its height; plays alone close
-    it."""
+    """How far a minor loop in the middle of the drive is from closing, as a share of its height; plays close it."""
     begin = 0.5 * (low + high)
     end = begin + LOOP * (high - low)
     v = np.array([low, high, low, end, begin, end])

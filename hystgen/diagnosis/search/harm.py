@@ -26,8 +26,7 @@ SAMPLES = 6_000
 """Most of a record that is taken, from its start: as many as the screening of effects compares."""
 
 SMOOTHED = 5
-"""[samples] A recorded output becomes a reference by averaging twice over this many; the remaining noise is
-subtracted."""
+"""[samples] A recorded output becomes a reference by averaging over this many twice; residual noise is subtracted."""
 
 SEED = 1
 """Seed of the noise through the inverses, whose effect is subtracted, so that the same records give the same answer."""

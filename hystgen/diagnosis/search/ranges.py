@@ -33,8 +33,7 @@ not widened; only noise is left, so that none was tried."""
 
 @dataclass(frozen=True)
 class End:
-    """A number at an end of its range or beyond it, described by `AtEnd`; `part`: its part of the structure, called
-    `name`."""
+    """A number at an end of its range or beyond it, described by `AtEnd`; `part`: in the structure, called `name`."""
 
     part: int
     name: str
@@ -76,8 +75,7 @@ def widened(part: Part, numbers: Array, thresholds: tuple[float, ...]) -> Part:
 
 
 def _allowed(candidate: Candidate, numbers: Array, j: int, way: float, thresholds: tuple[float, ...]) -> float:
-    """Largest share of a way from number j at which the schema allows an effect that differs from the one at its
-    beginning.
+    """Largest share of a way from number j at which the schema allows an effect unlike the one at its beginning.
 
     The schema has to allow a little more, for a search's slope.
     """

@@ -606,8 +606,8 @@ def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted
 def _widened(now: Fitted, records: Records) -> tuple[Fitted, float | None]:
     """The hypothesis with wider ranges for numbers at an end of theirs, as long as held-out errors fall.
 
-    Also returns the held-out rms with the widest range tried in vain, None without one. Where only noise remains, no
-    range is widened.
+    Also returns the held-out rms with the widest range tried in vain, None without one. If only noise remains, none is
+    tried.
     """
     for _ in range(acceptance.WIDENINGS):
         if is_noise(records.residual(now), records.noise):
@@ -720,8 +720,7 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
 
 
 def _beside_another(latest: _Step, failed: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
-    """A step to another effect that the accepted one hides, and the step from there to the accepted one; None without
-    any.
+    """A step to another effect that the accepted one hides, and the step from there to the accepted one, or None.
 
     An effect of many numbers also follows other effects, as a fast state of creep follows relaxing plays. In its
     presence the other has nothing left to explain, although it follows the other only roughly. The two are tried in the

@@ -52,8 +52,7 @@ def steepness(effect: Ageing, travelled: float) -> float:
 
 
 def pieces(effect: Ageing) -> Array:
-    """The gain as cubic pieces (m, 6): the beginning of each, 1 over its length, and coefficients in the share of it
-    passed.
+    """The gain as cubic pieces (m, 6): the beginning of each, 1 over its length, and coefficients in the share passed.
 
     A piece matches the gain's values and slopes at its ends, and is as long as TABLE_ERROR allows.
     """
@@ -145,8 +144,7 @@ KIND = Kind(
 
 
 class AgeingTables(NamedTuple):
-    """All ageing of a model: `piece` (m, 6), each block's from its `first` (k + 1) on; `number` (k, 5); `turns`
-    (k,)."""
+    """All ageing of a model: `piece` (m, 6), each block's from `first` (k + 1) on; `number` (k, 5); `turns` (k,)."""
 
     first: Counts
     piece: Reals

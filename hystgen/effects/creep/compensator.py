@@ -76,8 +76,7 @@ class CreepNumbers(One):
         return found, found
 
     def solved(self, error: float, size: float, u: float, same: bool) -> float:
-        """Error of the inverse for an error of the output; `same`: the states have seen the same inputs in both
-        cases."""
+        """Error of the inverse for an error of the output; `same`: the states have seen the same inputs."""
         return (1.0 / self.slope if same else self.backward) * (error + self.rounding(size, u)[1])
 
     def seen(self) -> float:

@@ -74,8 +74,7 @@ def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
 
 
 def verbs(memory: Function, start: Function, tick: Function, drift: Function, one: int, most: int) -> Verbs:
-    """The verbs of a clock from its functions in one arithmetic; `one`, `most`: columns of 1 and of the farthest
-    lead."""
+    """The verbs of a clock from its functions in an arithmetic; `one`, `most`: columns of 1 and the farthest lead."""
 
     @jit
     def added(t: Reals, s: Reals, j: int) -> Any:

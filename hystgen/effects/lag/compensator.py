@@ -117,8 +117,7 @@ class LagSizes:
 def numbers(effect: Lag, seconds: float, turning: bool = False, exact: bool | None = None) -> LagNumbers:
     """The constants of a lag at steps of `seconds`.
 
-    `turning`: blocks behind the lag depend on its direction of arrival, so it is always led; `exact`: overrides that
-    choice.
+    `turning`: blocks behind the lag depend on its direction of arrival, so it is always led; `exact`: overrides this.
 
     For steps T well below tau, the inverse of `a_k = E a_(k-1) + b0 v_(k-1) + b1 v_k` has a pole near -1 and rings.
     With `theta = b0/(1 - E)` and `x_k = E x_(k-1) + (1 - E) v_k`, which is exactly invertible, `a_k = (1 - theta) x_k +

@@ -228,8 +228,7 @@ def steady_absorb(s: Reals, before: Any) -> None:
 
 @jit
 def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: Any, code: Any, drop: Any) -> Any:
-    """As in floating point; `code`: a drive code; all arguments are signals; the search for a lead drops `drop`
-    bits."""
+    """As in floating point; `code`: a drive code; all arguments are signals; the search drops `drop` bits."""
     bits = t.block[0, BITS]
     missed = s[0, EARLIER] - s[0, WANTED]
     room = short + scaled(t, 0, -missed if missed < 0 else missed, INVERSE)

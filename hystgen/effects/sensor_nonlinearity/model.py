@@ -13,8 +13,7 @@ from hystgen.basics.quantities import Number, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, curve, not_as_many
 
 BENT = 1.0
-"""Parabolas from which a search starts, 10 % at the range's end: from a straight sensor, its first step may
-overshoot."""
+"""Parabolas from which a search starts, 10 % at the range's end: from a straight sensor it may overshoot."""
 
 PIECES = (6, 12)
 """Pieces of the monotone curves that are tried if a cubic helps. For a root over the range, six leave 1.3 times the

@@ -81,8 +81,7 @@ def turn_back(m: FixedMemory) -> None:
 
 @jit
 def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
-    """The last kink before `to`, an output or input along the move: where another play begins to follow, or the present
-    point."""
+    """The last kink before `to`, an output or input along the move: where another play begins to follow, or here."""
     c = -1
     low = 0
     left = m.counts[DEPTH]

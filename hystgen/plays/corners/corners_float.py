@@ -1,5 +1,4 @@
-"""Plays of the corner engine in floating point: `c_runtime/plays/corners_float.c`, and the parts that both arithmetics
-share."""
+"""Plays of the corner engine in floating point: `c_runtime/plays/corners_float.c`, and code for both arithmetics."""
 
 from __future__ import annotations
 
