@@ -22,11 +22,11 @@ VISIT = 10.0
 """Seconds of the straight move to each value of a history."""
 
 VISIT_SAMPLES = 200
-"""Samples of that move. More change the answer after a history by at most 4e-6 of its range, which a mode of 0.5 Hz
-takes; 25 would by 2e-4. Set by: benchmarks/chosen_numbers.py visits."""
+"""Samples of that move. More samples change the output after a history by at most 4e-6 of its range, with a mode of 0.5
+Hz; 25 change it by 2e-4. Set by: benchmarks/chosen_numbers.py visits."""
 
 SESSION_GAP = 10.0
-"""Gap between two records of a session, in median steps, above which the drive holds in it; below, it is straight."""
+"""Gap between records of a session, in median steps, above which the drive is held in it; below, it is straight."""
 
 def _rank(effect: Effect) -> int:
     """Position in the chain: gains lie between linear filters of order 0 and others."""
@@ -42,7 +42,7 @@ def in_order(effects: Sequence[Effect]) -> tuple[Effect, ...]:
 
 @dataclass(frozen=True)
 class JoinedRuns:
-    """Records that follow one another as one run, with the slice of it that each record is."""
+    """Consecutive records as one run, with the slice of each record in it."""
 
     run: Run
     parts: tuple[slice, ...]
@@ -51,8 +51,8 @@ class JoinedRuns:
 def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> JoinedRuns:
     """The runs of a session on one time axis.
 
-    A record whose times come after those of the record before keeps them (session time), unless a rest would not fit in
-    between; any other starts one median step after the record before and its rest. In rests, and in gaps of more than
+    A record whose times follow the previous record's keeps them (session time), unless a rest would not fit in between;
+    any other starts one median step after the record before and its rest. In rests, and in gaps of more than
     `SESSION_GAP` steps, the drive holds until one step before the next record. The values of `history` are visited
     before the first record, each by a straight move of `VISIT` seconds, and the last is held for its rest. Raises
     ValueError for records without samples.
@@ -101,13 +101,13 @@ def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> JoinedR
 
 
 NO_MOVE = 1e-12
-"""[share of the largest drive] A move no larger than this, of what an effect makes of the drive, is rounding and has no
-direction. A lag of a thousand samples on a drive that stands still goes to and fro by about 1e-13, as times that are
-even but for rounding give it other factors at each. Set by: tests/test_branches.py."""
+"""[share of the largest drive] A move no larger than this behind an effect of the drive is rounding and has no
+direction. A lag of a thousand samples on a resting drive moves back and forth by about 1e-13, since even times differ
+by rounding and so do its factors. Set by: tests/test_branches.py."""
 
 
 def arriving_slack(static: StaticModel, effects: Sequence[Effect]) -> float:
-    """How far the signal in front of the memoryless part may go back without a change of its branch, in drive units."""
+    """How far the signal in front of the memoryless part may go back without changing its branch, in drive units."""
     if not static.branches_differ or not any(effect.place is Place.DRIVE for effect in effects):
         return 0.0
     largest = max(abs(end) for end in static.input_range)
@@ -115,7 +115,7 @@ def arriving_slack(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 
 class Ordered:
-    """Effects in the order of the chain, and what those at each place make of a signal."""
+    """Effects in the order of the chain, and their results at each place."""
 
     effects: tuple[Effect, ...]
 
@@ -142,7 +142,7 @@ class Ordered:
 
     @cached_property
     def mover(self) -> Effect | None:
-        """The one effect that says how the plays move, if any does."""
+        """The one effect that determines how the plays move, if any."""
         return next((effect for effect in self.at(Place.PLAYS) if effect.moves_plays()), None)
 
     def driven(self, run: Run) -> Array:
@@ -173,7 +173,7 @@ class Ordered:
         return rows
 
     def bent_sum(self, p: Array, rows: Array, thresholds: Array) -> Array:
-        """The weighted sum (N,) of the rows of `bent`, of which there is one effect at least."""
+        """The weighted sum (N,) of the rows of `bent`; at least one effect has to bend them."""
         *first, last = self.bending
         for effect in first:
             rows = effect.bent(rows, thresholds)
@@ -252,8 +252,8 @@ class Chain(Ordered):
         return through_stages(self.cascade.stages, a, rising)
 
     def plays(self, w: Array, run: Run) -> Array:
-        """Rows (n+1, N) that the weights sum, beginning at the start memory: the plays, as one effect may move them and
-        all others bend them."""
+        """Rows (n+1, N) that the weights sum, from the start memory: plays moved by at most one effect, bent by the
+        others."""
         pi = self.cascade.pi
         thresholds = np.asarray(pi.thresholds)
         return self.bent(self.moved(w, run, thresholds, np.asarray(pi.start)), thresholds)

@@ -18,7 +18,7 @@ EDGE = 1e-9
 """[s] Duration of the step itself, far below that of any amplifier or converter."""
 
 HORIZON = 3600.0
-"""[s] The response to the step is computed for this time: whoever waits for longer waits for creep."""
+"""[s] Duration of the computed step response: anything slower is creep."""
 
 FOREVER = 1e15
 """[s] Time after which everything has come to rest; the filters take steps of any length."""
@@ -30,7 +30,7 @@ CLOSE, FINE = 0.03, 3e-4
 """Shares of the error and of the step by which the output may leave the straight line between two samples."""
 
 GOLDEN = 0.381966011250105
-"""Place in an interval at which the output is compared with the straight line: halves could all be whole periods."""
+"""Place in an interval at which the output is compared with the straight line: halves could be whole periods."""
 
 GRADED = 4.0
 """Largest ratio of an interval between samples to its neighbour: an oscillation that happens to cross zero at the test
@@ -134,7 +134,7 @@ def settling(chain: Chain, within: float) -> Settling:
 
 @dataclass(frozen=True)
 class _Answer:
-    """A step response: s until it has settled, its final size, and the s for which it was followed."""
+    """A step response: seconds until it has settled, its final size, and the seconds for which it was followed."""
 
     seconds: float
     size: float
@@ -155,7 +155,7 @@ class _Answer:
             inner = -inner
         share = (outer - within * size) / (outer - inner)
         seconds = float(times[k] + share * (times[k + 1] - times[k]))
-        # up to here the edge itself still moves, or plays that wait for its end
+        # until then the edge itself moves, or plays wait for its end
         return cls(seconds if seconds > dead + 2.0 * EDGE else dead, size, HORIZON)
 
 

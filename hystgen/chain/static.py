@@ -121,10 +121,11 @@ class StaticModel:
 
     @cached_property
     def swung(self) -> tuple[float, float]:
-        """The output at either end of `input_range` after the other end: inside `output_range`, or exactly at its ends.
+        """The output at either end of `input_range` after a move from the other end: inside `output_range` or at its
+        ends.
 
         References between these and the ends of `output_range` need a drive out of range, once the drive has been at
-        the other end. If plays that begin at 0, as after a reset, need that for more references, their output counts.
+        the other end. Plays that begin at 0, as after a reset, count if their range is narrower.
         """
         low, high = self.play_range
         starts = (self.pi.start, (0.0,) * (self.pi.n + 1))
@@ -134,7 +135,7 @@ class StaticModel:
         )
 
     def _after(self, *drives: float, start: Sequence[float] | None = None) -> float:
-        """The output after the plays have been led from their start memory to inputs, one after the other.
+        """The output after the plays have moved from their start memory to inputs in turn.
 
         In fractions, since an offset may cancel most of the sum, and limits are rounded inward from the result.
         """

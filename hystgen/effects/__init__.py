@@ -86,7 +86,7 @@ def shapes(name: str) -> tuple[type[Effect], ...]:
 
 
 def load_compiled() -> None:
-    """Have the compiled parts of all models compiled, or read from the cache, in this process before it forks."""
+    """Compile the compiled parts of all models, or read them from the cache, in this process before it forks."""
     from hystgen.effects import base
 
     base.load()

@@ -1,7 +1,7 @@
 """The base of all effects: parameters with units, a place in the chain, a forward model and shapes to try in a fit.
 
-Between two samples every signal is taken as straight, so that the filters are exact for any time steps on drives that
-are; before the first sample everything is at rest at that sample.
+Signals are straight between samples, so the filters are exact at any time steps for a piecewise straight drive. Before
+its first sample, a record has been at rest at that sample's drive.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ USER = "user:"
 """Prefix of the names of a user's own effects."""
 
 MOST_BYTES = 2**25
-"""Size of the factors that a record remembers."""
+"""[bytes] Most memory for the factors that a record caches."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Run:
     """the longer run from which these samples are taken; its first and its last sample are among them"""
 
     def picked(self, places: NDArray[np.intp]) -> Run:
-        """The run at fewer samples; sums from sample to sample still run over all of them."""
+        """The run at some of its samples; sums from sample to sample still include all of them."""
         extra = {name: column[places] for name, column in self.extra.items()}
         return Run(self.t[places], self.v[places], extra, self.rest, (self, places))
 
@@ -92,11 +92,11 @@ class Run:
         return 0.5 * np.abs(np.diff(0.5 * self.v * np.abs(self.v))) / self.steps
 
     def factors(self, time_constant: float) -> Array:
-        """`decays` of the steps and a time constant, (3, N - 1)."""
+        """`decays` over the steps with a time constant, (3, N - 1)."""
         return self.remembered(time_constant, lambda: self.of_steps(lambda s: np.stack(decays(s, time_constant))))
 
     def spectrum(self, time_constants: tuple[float, ...]) -> Array:
-        """`decays` of the `different` steps and several time constants, (3, steps, time constants)."""
+        """`decays` over the `different` steps with several time constants, (3, steps, time constants)."""
 
         def make() -> Array:
             steps, _ = self.different
@@ -115,7 +115,7 @@ class Run:
         return np.unique(self.steps, return_inverse=True)
 
     def remembered(self, by: Hashable, make: Callable[[], Array]) -> Array:
-        """Values made from the steps and some numbers, remembered, since a search comes back to most of them."""
+        """Cached values made from the steps and some numbers; a search reuses most of them."""
         found = self._made.pop(by, None)
         if found is None:
             found = make()
@@ -131,7 +131,7 @@ class Run:
 
 @dataclass(frozen=True)
 class About:
-    """The properties of the records for which shapes are listed."""
+    """Properties of the records for which shapes are listed."""
 
     drive: tuple[float, float]
     output_range: float
@@ -160,11 +160,11 @@ class About:
 class Candidate:
     """One shape of an effect to try in a fit: free numbers within bounds, and the effect that they make.
 
-    `low`, `high`, `start`: in the fit's own coordinates, of order one; `none`: numbers at which nothing happens;
-    `others`: further starts, where the error may have several minima; `beyond`: label of a shape of fewer numbers that
-    this one contains, and without which it is not worth trying; `grown`: a start made of the numbers of that one;
-    `amounts`: places of numbers that say how much of it there is, which are sought first from every start, since at a
-    small or wrong amount the other numbers say little.
+    `low`, `high`, `start`: in the fit's own coordinates, of order one; `none`: numbers at which the effect does
+    nothing; `others`: further starts, where the error may have several minima; `beyond`: label of a simpler shape that
+    this one contains; unless that one helps, this one is not tried; `grown`: makes a start from the simpler shape's
+    numbers; `amounts`: indices of numbers that scale the effect; a search finds these first from every start, since at
+    a wrong amount the other numbers mean little.
     """
 
     label: str
@@ -179,7 +179,7 @@ class Candidate:
     amounts: tuple[int, ...] = ()
 
     def at(self, numbers: Array) -> Candidate:
-        """The same shape with all numbers fixed at their values here, except the amounts."""
+        """The same shape with all numbers but the amounts fixed at the given ones."""
         free = np.isin(np.arange(len(numbers)), self.amounts)
         return replace(self, low=np.where(free, self.low, numbers), high=np.where(free, self.high, numbers))
 
@@ -197,7 +197,7 @@ def without_plays(thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
 def not_one_a_play(
     key: str, values: Sequence[object], thresholds: tuple[float, ...] | None, what: str = "value"
 ) -> Iterator[Problem]:
-    """The problem of a key that does not have one of `what` for each play with a threshold."""
+    """The problem of a key that does not have one of `what` per play with a threshold."""
     if thresholds is not None and len(thresholds) > 1 and len(values) != len(thresholds) - 1:
         counts = f"{counted(len(values), what)} for {counted(len(thresholds) - 1, 'play')}"
         yield (key,), f"has {counts}; give one for each threshold but r_0"
@@ -217,7 +217,7 @@ Compensated = Literal[
 class Effect(BaseModel):
     """An effect with its parameters; a subclass has a `place`, a method of that place and the keys of the YAML entry.
 
-    A method that is not overridden does nothing to what passes.
+    A method that is not overridden leaves its signal unchanged.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
@@ -236,23 +236,23 @@ class Effect(BaseModel):
     columns: ClassVar[tuple[str, ...]] = ()
     """further columns that a record needs"""
     fades: ClassVar[bool] = False
-    """whether its start state is at rest behind the pause before a record whose history is known"""
+    """whether a pause before a record with a known history brings its start state to rest"""
     settled: ClassVar[tuple[str, ...]] = ()
     """keys of conventions, and of numbers that a fit cannot separate from others: a refit leaves them as they are"""
     later: ClassVar[tuple[str, ...]] = ()
-    """keys that came after files were written without them: at their defaults they are left out, as from the hash"""
+    """keys added after the first files were written: left out of files, and of the hash, at their defaults"""
     hint: ClassVar[str] = ""
-    """word on what may have been meant, said with a wrong or missing key"""
+    """suggestion printed with an error about a wrong or missing key"""
     compensated: ClassVar[Compensated] = "not known"
     """how far a compensator can take the effect out"""
     compensation: ClassVar[str] = ""
     """how, one clause"""
     block: ClassVar[OwnBlock | None] = None
-    """compensator of an effect of the user's own; those of the catalogue have theirs in their folders"""
+    """compensator of a user's own effect; the catalogue's compensators are in their folders"""
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: object) -> None:
-        """A user's own effect may fail or answer anything, and is guarded."""
+        """Guard a user's own effect, which may fail or return anything."""
         words = getattr(cls.model_fields["name"].annotation, "__args__", ())
         if words and str(words[0]).startswith(USER):
             guarded.guard(cls, Effect, str(words[0]))
@@ -285,16 +285,16 @@ class Effect(BaseModel):
 
     @classmethod
     def moves_plays(cls) -> bool:
-        """Whether it says how the plays move."""
+        """Whether the effect determines how the plays move."""
         return cls.plays is not Effect.plays
 
     def summed(self, p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-        """PLAYS: sum (N,) of the plays with weights `p`, in which those of weight 0 need not move."""
+        """PLAYS: sum (N,) of the plays with weights `p`; plays of weight 0 need not be computed."""
         return operators.play_sum(w, thresholds, start, p)
 
     @classmethod
     def bends_plays(cls) -> bool:
-        """Whether it says what becomes of their rows."""
+        """Whether the effect bends the plays' rows."""
         return cls.bent is not Effect.bent
 
     def bent(self, rows: Array, thresholds: Array) -> Array:
@@ -330,7 +330,7 @@ class Effect(BaseModel):
         return np.empty((0, len(run.t)))
 
     def largest(self, run: Run) -> Array:
-        """Largest of these factors (k,) that any start state makes, in spans of the play sum; inf: no such limit."""
+        """Largest factors (k,) of the `transients` for any start state, in spans of the play sum; inf: no limit."""
         return np.full(len(self.transients(run)), np.inf)
 
     def numbers(self, seconds: float) -> Sequence[float]:
@@ -352,12 +352,12 @@ class Block(ABC):
 
     @abstractmethod
     def advance(self, seconds: float, later: float | None = None) -> None:
-        """The next sample comes this long after the last one, and the one behind it `later` after that; None: as long
-        again. For the first sample, at which everything rests, both are what comes behind it."""
+        """Set the time to the next sample, and the time from there to the one after it, `later`; None: the same again.
+        For the first sample, at which everything rests, both are the time that follows it."""
 
     @abstractmethod
     def call(self, verb: str, x: float) -> float:
-        """What one of the verbs below makes of x."""
+        """The result of one of the verbs below for x."""
 
     def resting(self, y: float) -> float:
         """The input that gives the output `y` once everything has settled."""
@@ -434,7 +434,7 @@ def curve(u: Array, scale: float, coefficients: Array, weight: float, total: Arr
 
 
 def load() -> None:
-    """Have these compiled, or read from the cache, on two samples."""
+    """Compile these functions, or read them from the cache, on two samples."""
     u, step, out = np.arange(2.0), np.ones(1), np.empty(2)
     follow(u, step, step, step, 0.0, out)
     curve(u, 1.0, step, 1.0, out)

@@ -15,7 +15,7 @@ from hystgen.plays.slots import Reals
 
 
 class BendPiece(Protocol):
-    """A piece of a curve, as of `hystgen.compensator.fixed_tables.FixedCurve`."""
+    """A piece of a curve, as in `hystgen.compensator.fixed_tables.FixedCurve`."""
 
     @property
     def knot(self) -> int: ...
@@ -26,8 +26,8 @@ class BendPiece(Protocol):
 
 
 class Bends(NamedTuple):
-    """Curves as in `hystgen.compensator.layout.FixedTables`, (k,); `scaled` (k, 2): bits of a signal that an argument
-    leaves out, and those that a value does."""
+    """Curves (k,) as in `hystgen.compensator.layout.FixedTables`; `scaled` (k, 2): bits dropped from a signal for the
+    argument, and for the value."""
 
     knot: Reals
     coefficient: Reals
@@ -41,7 +41,7 @@ class Bends(NamedTuple):
 def bends(
     pieces: Sequence[Sequence[BendPiece]], domain: Sequence[Any], scaled: Sequence[Any], degree: int
 ) -> Bends:
-    """The tables of curves; none has pieces that are not called for."""
+    """The tables of curves; a curve that is not needed has no pieces."""
     flat = list(itertools.chain.from_iterable(pieces))
     first = [0, *itertools.accumulate(map(len, pieces))][: len(pieces)]
 

@@ -1,4 +1,4 @@
-"""Kinds of blocks of a compensator: their numbers by name and their verbs, the same in Python and in C."""
+"""The kinds of a compensator's blocks: names of their numbers, and their verbs, the same in Python and in C."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ VERBS = ("rest", "resting", "solve", "absorb")
 
 @dataclass(frozen=True)
 class Rows:
-    """Several entries of a block: name of one, its real numbers, and those of its memory; in fixed point their
-    `letters` and those of its `memory`, as in `Kind`."""
+    """The repeated entries of a block: an entry's name, real numbers, and memory; in fixed point `letters` and `memory`
+    give their types, as in `Kind`."""
 
     name: str
     table: tuple[str, ...] = ()
@@ -33,16 +33,16 @@ class Rows:
 class Kind:
     """One kind of block, in the order of its C types.
 
-    `name`: of its functions, `hystgen_NAME_solve` and so on; `table`: its real constants, behind a
-    pointer to `rows` where it has these; `counts`: whole numbers behind them, the first of 16 bits, others of 8;
-    `state`: real numbers of its memory; `flags`: booleans of it; `reading`: the verbs that take the table; `own`: those
-    that it has; without `rest` it settles as it absorbs, without `resting` it rests as it solves.
+    `name`: in its functions, `hystgen_NAME_solve` and so on; `table`: its real constants, after a pointer to `rows` if
+    it has any; `counts`: whole numbers after them, the first of 16 bits, others of 8; `state`, `flags`: real numbers
+    and booleans of its memory; `reading`: the verbs that take the table; `own`: the verbs that it has; without `rest`
+    it settles as it absorbs, without `resting` it rests as it solves.
 
-    In fixed point numbers are of several types: `letters` are those of the table, `memory` those of its memory, f for a
-    factor, which takes two numbers, n for a number of the user's own, which takes four, w for 64 bits, i for 32, c for
-    four of these in an array, and b for 8.
+    In fixed point, `letters` and `memory` give the types of table and memory: f for a factor, which takes two numbers,
+    n for a number of a user's block, which takes four, w for 64 bits, i for 32, c for an array of four of these, and b
+    for 8.
 
-    `like`: the kind that it shares the type of its table with.
+    `like`: the kind whose table type it shares.
     """
 
     name: str
@@ -59,18 +59,18 @@ class Kind:
 
     @property
     def tabled(self) -> str:
-        """Name of the kind whose type its table has."""
+        """Name of the kind that its table type is named after."""
         return self.like or self.name
 
     def verb(self, asked: str) -> str:
-        """The function that does this."""
+        """The function that a verb calls."""
         return asked if asked in self.own else {"rest": "absorb", "resting": "solve"}[asked]
 
 
 @dataclass(frozen=True)
 class Constants:
-    """The numbers of one block: of its table (n,), rows (m, k) and counts; `products`: multiplications of absorb and of
-    solve; `bits`: of its signals below those of the chain, where it computes with finer ones."""
+    """The numbers of one block: its table (n,), rows (m, k) and counts; `products`: multiplications in absorb and in
+    solve; `bits`: fraction bits of its signals beyond the chain's, if it computes with finer ones."""
 
     kind: Kind
     table: Any
@@ -81,7 +81,7 @@ class Constants:
 
 
 def product(number: Any, x: Any) -> Any:
-    """A number of a block's table times x, in a block of the user's own; its C is `hystgen_product(&t->number, x)`."""
+    """A number of a block's table times x, in a user's own block; in C it is `hystgen_product(&t->number, x)`."""
     return number * x
 
 
@@ -113,7 +113,7 @@ class OwnBlock:
 
     @functools.cached_property
     def products(self) -> tuple[int, int]:
-        """Products that absorb and solve are written with."""
+        """Number of products in absorb and in solve."""
         return _products(self.absorb), _products(self.solve)
 
     def verbs(self) -> Iterator[tuple[str, Any]]:

@@ -5,9 +5,9 @@
     def solve(t, s, y): ...     the input that gives the output y at this sample
     def absorb(t, s, x): ...    the input is x at this sample; returns the output
 
-`t` are the block's numbers and `s` is its memory, arrays that these functions index. They run as they stand in double
-precision, and compiled as the bit reference of the C in each arithmetic, so that they are written with +, - and
-`product(t[..], ..)` alone: a number written out would be of another precision than the C computes in.
+`t` are the block's numbers and `s` is its memory, arrays that these functions index. They run unchanged in double
+precision, and compiled as the bit reference of the C in each arithmetic; so they use only +, - and `product(t[..],
+..)`: a literal would have another precision than the C.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ NAME = re.compile(r"user:([a-z][a-z0-9_]{0,30})")
 """Names of effects whose block can be called after them in C."""
 
 WORD = re.compile(r"[a-z][a-z0-9_]{0,30}")
-"""Names of a block's numbers, which C has too."""
+"""Names of a block's numbers, which are also their names in C."""
 
 
 def kind(effect: type[Effect]) -> Kind:
-    """The name of an effect's block in the C."""
+    """The kind of an effect's block."""
     assert effect.block is not None
     table, state = effect.block.table, effect.block.state
     called = _name(effect)
@@ -67,7 +67,7 @@ def origin(effect: type[Effect]) -> str:
 
 
 def numbers(effect: Effect, seconds: float) -> Array:
-    """The numbers of an effect's block at steps of `seconds`. Raises EffectsError for any that are none."""
+    """The numbers of an effect's block at steps of `seconds`. Raises EffectsError for wrong ones."""
     assert effect.block is not None
     try:
         found = np.asarray(effect.numbers(seconds), dtype=np.float64)
@@ -87,7 +87,7 @@ def _failed(effect: Effect, function: str, error: Exception) -> EffectsError:
 
 
 class Instance(Block):
-    """The block of a user's own effect in double precision; the numbers of a step length are kept."""
+    """The block of a user's own effect in double precision; it caches the numbers of a step length."""
 
     def __init__(self, effect: Effect) -> None:
         assert effect.block is not None
@@ -101,7 +101,7 @@ class Instance(Block):
         self.table = self._numbers(seconds)
 
     def call(self, verb: str, x: float) -> float:
-        """What a function makes of x."""
+        """The result of a verb for x."""
         memory = () if verb == "resting" else (self.state,)
         try:
             return float(getattr(self.block, verb)(self.table, *memory, x))
@@ -139,7 +139,7 @@ def problem(effect: type[Effect]) -> str:
 
 @functools.cache
 def check(effect: type[Effect]) -> None:
-    """Raise EffectsError where a class's block cannot be the bit reference of its C, `FILE:LINE: what; do` each."""
+    """Raise EffectsError where a class's block cannot be its C's bit reference, one line `FILE:LINE: what; do` each."""
     assert effect.block is not None
     if wrong := problem(effect):
         raise EffectsError(f"the effect {_name(effect)} {wrong}")
@@ -187,7 +187,7 @@ def _of_function(verb: str, function: Any) -> Iterator[str]:
             if not _of_table(node, tree.args.args[0].arg):
                 yield f"{place}: {verb} has {ast.unparse(node)}; give a number of the table first, product(t[..], ..)"
         elif isinstance(node, ast.operator):
-            continue  # named with what it is an operator of
+            continue  # the message about its operation names it
         elif (
             not isinstance(node, ALLOWED)
             or (isinstance(node, ast.BinOp) and not isinstance(node.op, ast.Add | ast.Sub))

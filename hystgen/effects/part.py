@@ -20,9 +20,9 @@ Function = Callable[..., Any]
 
 
 class Led(NamedTuple):
-    """How the only block in front of the plays is led where what follows depends on the way there: where it is, the
-    input that leads to an output, the one that is kept, what follows from an input, and what is missed of a way in its
-    first sample; and the input from which it does not overshoot behind a slew limit, found by so many `halves`."""
+    """How to lead the only block in front of the plays where the blocks behind it depend on its way: its state, the
+    input for an output, the input that is kept, the output of an input, the shortfall of a move in its first sample;
+    and the input that does not overshoot behind a slew limit, found by `halves` halvings."""
 
     state: Function
     solve: Function
@@ -35,17 +35,17 @@ class Led(NamedTuple):
 
 @dataclass(frozen=True)
 class Verbs:
-    """What blocks of one kind do in one arithmetic: functions of the tables and the memory of all of them, the index of
-    a block, and numbers. The chain calls those that a kind has.
+    """The functions of one kind of block in one arithmetic; arguments: tables and memory of all blocks, the index of a
+    block, and numbers. The chain calls the functions that a kind has.
 
-    `memory`: made for tables and a dtype; `rest`, `absorb`, `resting`, `solve`: of a block that signals pass; without
-    `rest` it settles as it absorbs, without `resting` it rests as it solves.
+    `memory`: made for tables and a dtype; `rest`, `absorb`, `resting`, `solve`: for a block that passes signals;
+    without `rest` it settles as it absorbs, without `resting` it rests as it solves.
 
-    `reset`: as in the parameter file; `move`: the drive has moved from one value to another in one sample; `set_*`: by
-    a number from the caller, and whether that had to be limited; `travelled`: of the memory alone, the way so far.
-    `added`: to the displacement, now; `lead`: a reference has come, whether or not it is the first one; `ahead`: added
-    to the displacement by the time of the newest reference, by whether there are any and whether the drive has moved.
-    `led`: of a block in front of the plays that may be led.
+    `reset`: to the parameter file's state; `move`: the drive has moved from one value to another in one sample;
+    `set_*`: set a number from the caller, and return whether it had to be limited; `travelled`: the travel, from the
+    memory alone. `added`: addition to the displacement now; `lead`: a reference has arrived, with a flag whether one
+    came before; `ahead`: addition to the displacement at the newest reference's time; flags: whether there is one, and
+    whether the drive has moved. `led`: for a block in front of the plays that may be led.
     """
 
     memory: Function
@@ -65,7 +65,7 @@ class Verbs:
     led: Led | None = None
 
     def verb(self, name: str) -> Function | None:
-        """The function that does this."""
+        """The function for a verb."""
         found: Function | None = getattr(self, name)
         instead = {"rest": self.absorb, "resting": self.solve}
         return found or instead.get(name)
@@ -73,7 +73,7 @@ class Verbs:
 
 class Margin(NamedTuple):
     """How far sizes of signals reach beyond those without rounding: a factor, and the `span` of the output, beyond
-    which no block adds anything; `turning`: what follows a block in front of the plays depends on the way there."""
+    which no block adds anything; `turning`: blocks behind one in front of the plays depend on its direction."""
 
     slack: float
     span: float = 0.0
@@ -81,8 +81,8 @@ class Margin(NamedTuple):
 
 
 class Responses(NamedTuple):
-    """What blocks of an inverse make of frequencies (N,): the lead, the share of what is wanted that arrives in front
-    of the plays, the response behind them, what of that comes at once, and the gain at rest."""
+    """Frequency responses (N,) of the blocks of an inverse: the lead, the share of the target that arrives in front of
+    the plays, the response behind them, its immediate part, and the gain at rest."""
 
     led: NDArray[np.complex128]
     arriving: NDArray[np.complex128]
@@ -92,7 +92,7 @@ class Responses(NamedTuple):
 
 
 class Speed(NamedTuple):
-    """How fast a drive within `ends` moves: by at most `step` in each of steps of `seconds`."""
+    """How fast a drive within `ends` moves: by at most `step` in a step of `seconds`."""
 
     ends: tuple[float, float]
     step: float
@@ -100,7 +100,7 @@ class Speed(NamedTuple):
 
 
 class Gained(NamedTuple):
-    """A gain behind the plays: roundings of its own, its ends, and what it adds to errors of its output (`there`) and
+    """A gain behind the plays: its own roundings, its ends, and its additions to the errors of its output (`there`) and
     of the output asked for (`back`)."""
 
     roundings: float
@@ -120,28 +120,28 @@ class One:
 
     @property
     def misses(self) -> bool:
-        """Whether what arrives differs from what it was solved for."""
+        """Whether the output differs from the one solved for."""
         return False
 
     @property
     def remembers(self) -> bool:
-        """Whether it has states that see what it gets."""
+        """Whether it has states that follow its input."""
         return False
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output for inputs within `size`, and of the input that it is solved for."""
+        """Roundings of the output for inputs within `size`, and of the inverse."""
         return 0.0, 0.0
 
     def solved(self, error: float, size: float, u: float, same: bool) -> float:
-        """Error of the input that it is solved for, by one of the output; `same`: its states have seen the same."""
+        """Error of the inverse for an error of the output; `same`: the states have seen the same inputs."""
         return error
 
     def seen(self) -> float:
-        """Factor by which states that see its input multiply an error of that."""
+        """Factor by which states that follow the input multiply an error of the input."""
         return 1.0
 
     def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
-        """It as a gain, for outputs within a size; `emitted`: with the approximations of the C."""
+        """The block's properties as a gain, for outputs within a size; `emitted`: with the approximations of the C."""
         return Gained(0.0, 1.0, 1.0, 0.0, 0.0)
 
     def at_rest(self, x: float) -> float:
@@ -155,12 +155,12 @@ class One:
 
     @property
     def room(self) -> float:
-        """The same, for results on the way."""
+        """The same gain, for intermediate results."""
         return self.lead
 
     @property
     def fineness(self) -> float:
-        """Bits that its lead takes from a signal in front of the plays, 0 for none."""
+        """Bits of a signal in front of the plays that its lead costs, 0 for none."""
         return 0.0
 
     def farthest(self, ends: tuple[float, float], span: float, seconds: float) -> float:
@@ -169,11 +169,11 @@ class One:
 
     @property
     def ringing(self) -> Array:
-        """Frequencies (k,) in rad a sample at which its inverse may ring."""
+        """Frequencies (k,) in rad per sample at which its inverse may ring."""
         return np.empty(0)
 
     def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
-        """What it makes of frequencies, `z` (N,) the factor of a delay by a sample, behind other blocks."""
+        """The responses with this block added behind the others, for `z` (N,), the factors of a delay by one sample."""
         return found
 
     def grown(self, size: float, margin: Margin) -> float:
@@ -181,13 +181,13 @@ class One:
         return size
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
-        """Largest input that it is solved for, by outputs within a size and after inputs `given`."""
+        """Largest input that the inverse gives, for outputs within `asked` and after inputs within `given`."""
         return asked
 
 
 class CodedGain(NamedTuple):
-    """A gain in fixed point: its ends, and in output codes what it adds to errors of its output and of its input that
-    is solved for, beside the rounding of either, and the largest offset."""
+    """A gain in fixed point: its ends, its additions to the errors of its output and of its inverse in output codes,
+    without their final rounding, and the largest offset."""
 
     least: float
     largest: float
@@ -205,8 +205,8 @@ class Coding(NamedTuple):
 
 
 class Sought(NamedTuple):
-    """What a block behind the plays is solved for: sizes of its input and of the sum asked of the plays, the unit of
-    signals, how far states that see the sum of the plays, and their inputs, may be `apart`; `same`: they are not."""
+    """The setting in which a block behind the plays is solved: sizes of its input and of the sum asked of the plays,
+    the unit of signals, how far `apart` states behind the play sum, and their inputs, may be; `same`: not at all."""
 
     size: float
     asked: float
@@ -217,7 +217,7 @@ class Sought(NamedTuple):
 
 
 class Coded:
-    """One block in fixed point; errors of those behind the plays are in output codes, of those in front in signals."""
+    """One block in fixed point; errors behind the plays are in output codes, errors in front of them in signals."""
 
     one: Any
 
@@ -228,7 +228,7 @@ class Coded:
 
     @property
     def follows(self) -> float:
-        """What a change of its input in one sample is of the output."""
+        """Change of the output for a change of the input in one sample, as a share."""
         return 1.0
 
     def there(self, size: float, signal: float) -> float:
@@ -236,22 +236,22 @@ class Coded:
         return 0.0
 
     def solved(self, error: float, at: Sought) -> float:
-        """Error of the input that it is solved for, by one of the output."""
+        """Error of the inverse for an error of the output."""
         return error
 
     def residual(self, missed: float, same: bool) -> float:
-        """The error of an output that the inverse makes of one of the sum of the plays."""
+        """Error of the output after the inverse, for an error of the play sum."""
         return missed
 
     def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain | None:
-        """It as a gain, for inputs within a size."""
+        """The block's properties as a gain, for inputs within a size; None if it is not one."""
         return None
 
 
 @dataclass(frozen=True)
 class Surroundings:
-    """What the tables of a part depend on beside its blocks: the length of a step, the `ends` of the drive's range, the
-    `span` of the output, by how many samples references come `ahead`, and whether a lead is `braked`."""
+    """What the tables of a part depend on besides its blocks: the length of a step, the `ends` of the drive's range,
+    the `span` of the output, the samples by which references come `ahead`, and whether a lead is `braked`."""
 
     seconds: float
     ends: tuple[float, float]
@@ -262,8 +262,7 @@ class Surroundings:
 
 @dataclass(frozen=True)
 class FloatSurroundings(Surroundings):
-    """The same in floating point: `reals` makes numbers, with a name, those of the arithmetic, which rounds by
-    `roundoff`."""
+    """The same in floating point: `reals` converts named numbers to the arithmetic, which rounds by `roundoff`."""
 
     reals: Callable[[Any, str], Any]
     roundoff: float
@@ -271,8 +270,8 @@ class FloatSurroundings(Surroundings):
 
 @dataclass(frozen=True)
 class FixedSurroundings(Surroundings):
-    """The same in fixed point: units per code, `bits` of signals behind the plays below a code, those of a code and the
-    largest one, fraction bits of a `temperature`, the largest `drive` in codes, and the span in signals, `farthest`."""
+    """The same in fixed point: units per code, `bits` of signals behind the plays below a code, bits of a code and the
+    largest code, fraction bits of a `temperature`, the largest `drive` in codes, and the span in signals `farthest`."""
 
     drive_lsb: Fraction
     output_lsb: Fraction
@@ -292,9 +291,10 @@ class FixedSurroundings(Surroundings):
 
 @dataclass(frozen=True)
 class Realized:
-    """A kind of block in one arithmetic: its verbs, its constants from its tables, and tables of blocks; in fixed point
-    of their `formats`, each of a block, surroundings, and the largest sizes of its input and of the output asked for.
-    `beside`: constants of what stands beside each block.
+    """A kind of block in one arithmetic: its verbs, its constants from its tables, and the tables of its blocks; in
+    fixed point the tables come from `formats`, made from a block, the surroundings, and the largest input and output.
+
+    `beside`: constants of an additional struct for each block.
     """
 
     verbs: Verbs
@@ -305,7 +305,7 @@ class Realized:
 
 
 def late(effect: str, name: str = "ARITHMETIC") -> Callable[[], Realized]:
-    """What the fixed point of an effect realizes, which is imported where it is asked for."""
+    """A loader for the fixed-point version of an effect, which imports it when called."""
 
     def realized() -> Realized:
         found: Realized = getattr(importlib.import_module("hystgen.effects." + effect + ".fixed"), name)
@@ -315,21 +315,21 @@ def late(effect: str, name: str = "ARITHMETIC") -> Callable[[], Realized]:
 
 
 def called(name: str, only: Callable[[Any], bool] | None = None) -> Callable[[Any], bool]:
-    """Whether an effect has a name, and if so is `only` one of these."""
+    """A test whether an effect has a name, and passes `only` if that is given."""
     return lambda effect: effect.name == name and (only is None or only(effect))
 
 
 def given(place: Place) -> Callable[[Any], bool]:
-    """Whether an effect brings a block of its own, in front of the plays or else behind them."""
+    """A test whether an effect brings its own block, in front of the plays or behind them."""
     return lambda effect: effect.block is not None and (effect.place is Place.DRIVE) == (place is Place.DRIVE)
 
 
 @dataclass(frozen=True)
 class ChainPart:
-    """One kind of block. `name`: as in C; `words`: in messages; `takes`: whether an effect is one; `one`: a block of
-    an effect at a step length, where it may be `turning`; `calls`: of the interface that it answers; `forward`: only
-    the forward operator has it; `joined`: all of them are one block; `kinds`: of its C, in floating point; `coded`:
-    it in fixed point, which is imported where a model is in fixed point."""
+    """One kind of block. `name`: in C; `words`: in messages; `takes`: whether it is the block of an effect; `one`:
+    makes a block from an effect, a step length, and whether it may be `turning`; `calls`: of the interface that it
+    serves; `forward`: only the forward operator has it; `joined`: all of them form one block; `kinds`: in its C, in
+    floating point; `coded`: loads its fixed-point version, for models in fixed point."""
 
     name: str
     words: str
@@ -344,9 +344,9 @@ class ChainPart:
 
     @functools.cached_property
     def fixed(self) -> Realized:
-        """It in fixed point."""
+        """Its fixed-point version."""
         return self.coded()
 
     def arithmetic(self, fixed: bool) -> Realized:
-        """It in fixed point, or else in floating point."""
+        """Its fixed-point version, or else the floating-point one."""
         return self.fixed if fixed else self.floating

@@ -1,4 +1,4 @@
-"""A user's own effects, from Python files of the same form as those of the catalogue."""
+"""A user's own effects, from Python files in the form of the catalogue's."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ def front_forward(t: CurveTables, v: Any, ascending: int) -> Any:
 
 @jit
 def front_inverse(t: CurveTables, w: Any, ascending: int) -> tuple[Any, int]:
-    """v = G^-1[w] on one branch, one code beyond the range if w lies beyond it; whether an envelope limits w."""
+    """v = G^-1[w] on one branch, one code beyond the range if w lies beyond it, and whether an envelope limits w."""
     if not t.fronts:
         return nearest(w, t.limits[FINE]), 0
     which = INVERSE + 1 - ascending

@@ -1,24 +1,24 @@
-"""Densities of the continuous model, and the thresholds and weights that stand for them.
+"""Densities of the continuous model, and the thresholds and weights that represent them.
 
 The continuous model is `y = p0 v + int_0^R p(r) play_r[v] dr` (18 of the note). `[0, R]` is cut into n equal
 cells; each becomes one play with the cell's mass as weight and its centroid as threshold.
 
-Error of the initial loading curve (19). Let D be the continuous curve less that of the play sum. Mass and first moment
-being kept, D and its slope vanish at every cell boundary. In a cell [a, b] with threshold c the slope of D grows by the
+Error of the initial loading curve (19). Let D be the continuous curve less the play sum's. Since mass and first moment
+are kept, D and its slope vanish at every cell boundary. In a cell [a, b] with threshold c the slope of D grows by the
 density, `D'' = p >= 0`, except for a fall by the whole mass at c: D rises from 0 up to c and falls back to 0 behind it.
 So the play sum never lies above the curve, and below it by at most `D(c) = int_a^c (c - r) p(r) dr`.
 
-Error of the output, for every drive and history. The play of threshold r, `s(r)`, is a memory with
-`|s(r) - s(r')| <= |r - r'|`. In a cell of mass m that is wrong by `|int p s dr - m s(c)| <= int p |r - c| dr`, and that
-is `2 D(c)`: c being the centroid, both sides of it have the same moment. The sum of `2 D(c)` over the cells is a bound,
-and no smaller one holds: a history that turns at every threshold and every boundary reaches it.
+Error of the output, for every drive and history. The play of threshold r, `s(r)`, is a memory with `|s(r) - s(r')| <=
+|r - r'|`. A cell of mass m is wrong by `|int p s dr - m s(c)| <= int p |r - c| dr`, which is `2 D(c)`: both sides of
+the centroid c have the same moment. The sum of `2 D(c)` over the cells is a bound, and no smaller one holds: a history
+that turns at every threshold and every boundary reaches it.
 
 Everything is computed with 40 digits and rounded to double once at the end, so that every machine gets the same
-numbers. A formula is replaced by polynomials on panels that are halved until the polynomials agree with it; what
-is left is counted in the bound.
+numbers. A formula is replaced by polynomials on panels that are halved until the polynomials agree with it; the bound
+includes the remaining difference.
 
-The work is bounded, by counts and so alike on every machine: no text of the permitted length computes for longer than
-about 10 s.
+The work is bounded by counts, so equally on every machine: no formula of the permitted length takes longer than about
+10 s.
 """
 
 from __future__ import annotations
@@ -42,15 +42,15 @@ FUNCTIONS = ("exp", "log", "sqrt", "sin", "cos", "tanh")
 _DIGITS = 40
 """Decimal digits of the arithmetic: the powers of a panel's polynomial lose six of them, and 34 remain."""
 _DEGREE = 16
-"""Of the polynomials; 33 values of the formula in each panel."""
+"""Degree of the polynomials; a panel takes 33 values of the formula."""
 _FIRST_PANELS = 64
-"""Panels to begin with, so that a narrow peak is seen."""
+"""Panels at the start, enough to see a narrow peak."""
 _MAX_PANELS = 600
 """Most panels: a formula that takes more has a pole, or oscillates too fast."""
 _MAX_HALVINGS = 60
 """Most halvings of the range down to a panel, beyond which doubles do not tell its ends apart."""
 _PRECISION = 1e-20
-"""Error of the polynomials allowed to a panel, relative to the whole mass."""
+"""Largest error of a panel's polynomial, relative to the whole mass."""
 _LARGEST_EXPONENT = 1000
 _SMALLEST_EXPONENT = -4000
 """Binary exponents beyond which an intermediate value is refused, or taken as 0."""
@@ -73,9 +73,9 @@ class DensityError(ValueError):
 class Discretisation:
     """Play sum of a density: `thresholds` (r_0 = 0 first), `weights` (p_0 first), same length.
 
-    `error` bounds the distance of the initial loading curve from the continuous one on `[0, R]`, in output
-    units; beyond R the two differ by rounding only. `output_error` bounds that of the output, for every drive and
-    history that leave the plays within R of zero; further out the rounding of the weights grows with the plays.
+    `error` bounds the distance of the initial loading curve from the continuous one on `[0, R]`, in output units;
+    beyond R the two differ by rounding only. `output_error` bounds the output's error, for every drive and history that
+    leave the plays within R of zero; further out the rounding of the weights grows with the plays.
     """
 
     thresholds: tuple[float, ...]
@@ -150,8 +150,8 @@ class Formula:
 def _power(base: Any, exponent: Any) -> Any:
     """`base**exponent`. Raises ValueError where it is not real.
 
-    A large exponent goes through the logarithm, with the bits that this costs: a whole one would be taken bit by bit,
-    with numbers that grow on the way, and has up to a thousand bits.
+    A large exponent goes through the logarithm, with the extra bits that this costs: an integer power would go bit by
+    bit, up to a thousand of them, with growing numbers.
     """
     mp = _context()
     if abs(exponent) <= _LARGE_POWER or base == 0:

@@ -1,11 +1,11 @@
-"""Elastoplastic elements, solved as plasticity in one dimension: what play and stop are in mechanics (7)-(17).
+"""Elastoplastic elements, solved as one-dimensional plasticity: the mechanics of play and stop (7)-(17).
 
-A spring of modulus E and a rigid-plastic slider of yield stress r, side by side or in a row. A step is a return
-mapping: a trial with the slider at rest, which stands where the slider can bear it and is brought back to its yield
-stress otherwise. No operator takes part, so that the elements are an independent test of the operators.
+A spring of modulus E and a rigid-plastic slider of yield stress r, in parallel or in series. A step is a return
+mapping: a trial with the slider at rest, kept where the slider can bear it and returned to the yield stress otherwise.
+No operator is involved, so the elements test the operators independently.
 
-Of a slider the relation between stress and rate is `stress in r sign(rate)`, set-valued at rest, with the rate of the
-slider's own strain; the note prints the rate of the whole strain in (16).
+A slider obeys `stress in r sign(rate)`, set-valued at rest, with the rate of its own strain; the note prints the rate
+of the whole strain in (16).
 """
 
 from __future__ import annotations
@@ -45,11 +45,11 @@ def _check(modulus: float, yield_stress: float) -> None:
 
 
 def parallel(stress: ArrayLike, modulus: float, yield_stress: float, strain: float = 0.0) -> Parallel:
-    """Spring and slider side by side under a given stress (7)-(11); `strain` is that of both before the first sample.
+    """Spring and slider in parallel under a given stress (7)-(11); `strain`: of both, before the first sample.
 
-    `stress`: N samples in the unit of `yield_stress`, to which that of `modulus` times that of `strain` comes. The
-    strain is `play_r[stress] / E` (12), the play started at `E strain`. Raises ValueError for a modulus that is not
-    positive, a negative yield stress, and samples or a start that are not finite.
+    `stress`: N samples in the unit of `yield_stress`, which is the unit of `modulus` times `strain`. The strain is
+    `play_r[stress] / E` (12), the play started at `E strain`. Raises ValueError for a modulus that is not positive, a
+    negative yield stress, and samples or a start that are not finite.
     """
     _check(modulus, yield_stress)
     finite(strain=strain)
@@ -66,10 +66,10 @@ def parallel(stress: ArrayLike, modulus: float, yield_stress: float, strain: flo
 
 
 def series(strain: ArrayLike, modulus: float, yield_stress: float, plastic_strain: float = 0.0) -> Series:
-    """Spring and slider in a row under a given strain (13)-(16); `plastic_strain` is the slider's before sample 0.
+    """Spring and slider in series under a given strain (13)-(16); `plastic_strain` is the slider's before sample 0.
 
-    `strain`: N samples in the unit of `plastic_strain`, which times that of `modulus` is that of `yield_stress`. The
-    stress is `stop_r[E strain]` (17), the stop started at `E plastic_strain`. Raises ValueError as `parallel` does.
+    `strain`: N samples in the unit of `plastic_strain`; that times the unit of `modulus` is the unit of `yield_stress`.
+    The stress is `stop_r[E strain]` (17), the stop started at `E plastic_strain`. Raises ValueError as `parallel` does.
     """
     _check(modulus, yield_stress)
     finite(plastic_strain=plastic_strain)

@@ -73,7 +73,7 @@ def divide_by_slope(t: FixedPlayTables, d: Any, k: int) -> Any:
 
 @jit
 def input_further(t: FixedPlayTables, w: Any, d: Any, k: int, rising: int) -> Any:
-    """The input of the plays whose output is d further than that of w, at most a little outside their range."""
+    """The input of the plays at which the output is d beyond the output at w, at most a little outside their range."""
     step = divide_by_slope(t, d, k)
     if rising:
         most = t.limits[PLAY_MAX] + t.limits[MARGIN]

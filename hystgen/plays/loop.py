@@ -1,10 +1,9 @@
-"""The plays of engine loop: every play in every sample, in floating point, and what fixed point shares with it.
+"""The plays of engine loop: every play in every sample, in floating point, and the parts that fixed point shares.
 
-Functions that are written once for Python and C stand in these rooms under the names that they have in `c_runtime/`
-and compute the same operations in the same order in the same arithmetic, so that results are compared for equal bits.
-They know nothing of numpy's or numba's types: they run as plain Python on scalars of the arrays they are given, or
-compiled (see `hystgen.basics.jit`). Real constants come out of arrays because a literal would not have the
-arithmetic's type.
+Functions that also exist in C have the same names here as in `c_runtime/`, and the same operations in the same order
+and arithmetic, so that results can be compared bit for bit. They know nothing of numpy's or numba's types: they run as
+plain Python on scalars of their arrays, or compiled (see `hystgen.basics.jit`). Real constants come out of arrays
+because a literal would not have the arithmetic's type.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The operators of the Prandtl-Ishlinskii literature, sample by sample, as they are defined.
 
 Identification builds its regressors from these definitions, and everything faster is tested against them. Signals are
-one-dimensional arrays `v_0, v_1, ...`; equation numbers are those of the tutorial note that `docs/note.md` names.
+one-dimensional arrays `v_0, v_1, ...`; equation numbers refer to the tutorial note named in `docs/note.md`.
 """
 
 from __future__ import annotations
@@ -110,8 +110,8 @@ def play(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
 def plays(v: ArrayLike, thresholds: ArrayLike, start: ArrayLike = 0.0) -> Array:
     """All plays of a model (1)(2): row i is the play of `thresholds[i]` started at `start[i]`; shape (n+1, N).
 
-    `v`: N samples; `thresholds`: n+1 numbers, and `start` as many or one for all, in the unit of the samples, as what
-    is returned. Raises ValueError for a negative threshold and for other shapes.
+    `v`: N samples; `thresholds`: n+1 numbers, and `start` as many or one for all, in the unit of the samples; the
+    result has the same unit. Raises ValueError for a negative threshold and for other shapes.
     """
     signal = samples(v)
     r = np.asarray(thresholds, dtype=np.float64, order="C")
@@ -133,7 +133,7 @@ def play_sum(v: Array, thresholds: Array, start: Array, weights: Array) -> Array
 
 
 def weighted_sum(weights: Array, rows: Array) -> Array:
-    """`weights @ rows` (N,), without rows of weight 0, added one after the other: of plays it is their `play_sum`."""
+    """`weights @ rows` (N,), without rows of weight 0, added one after the other; for plays it equals `play_sum`."""
     out = np.empty(rows.shape[1])
     _weighted_into(weights, rows, out)
     return out

@@ -25,7 +25,7 @@ INPUT_CLAMPED, OUTPUT_CLAMPED, HELD, DOMAIN, SLEW_LIMITED, LIMITED_SETTING = 1, 
 OP_STEP, OP_COMMIT, OP_RESET, OP_INIT = 0, 1, 2, 3
 # further calls of models with effects
 OP_PUSH, OP_SETTLE, OP_OFFSET, OP_GAIN, OP_TEMPERATURE, OP_TRAVEL, OP_CORRECT, OP_EXPECTED, OP_TRAVELLED = range(4, 13)
-# the bits of a call that say which it is, and one for status bits that stay for a later call to read with its own
+# the bits of a call that identify it, and one that leaves its status bits for a later call to read with its own
 OP_CALL, OP_UNREAD = 127, 128
 # more places in `limits`, of fixed point
 PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SATURATED, SHY = range(10, 18)

@@ -12,7 +12,7 @@ __all__ = ["Report", "Reports", "Row", "verify"]
 
 
 def __getattr__(name: str) -> object:
-    # Imported late, because the command line only needs the names of targets whenever it starts
+    # Imported late, since the command line only needs the names of targets to start
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from hystgen.verification import report, run

@@ -25,7 +25,7 @@ WARNINGS = [
 ]
 C_WARNINGS = [*WARNINGS, "-Wmissing-prototypes", "-Wstrict-prototypes"]
 
-# The strict build, and that of a user who passes no flags: the default dialect of gcc and clang, in which they may
+# The strict build, and a user's build without flags: in their default dialect, gcc and clang may
 # contract a * b + c to one rounding. If the CPU's baseline has no such instruction, its instruction set has to be
 # enabled
 STRICT = ["-std=c99", "-O2", "-ffp-contract=off"]

@@ -15,7 +15,7 @@ from hystgen.verification.targets import Machine, Target
 
 QEMU = "qemu-system-arm"
 SECONDS = 120
-SIZES = {"flash_size": 0x0004_0000, "ram_size": 0x0000_4000}  # the size of the smallest board's
+SIZES = {"flash_size": 0x0004_0000, "ram_size": 0x0000_4000}  # those of the smallest board
 FAULT = 255
 
 

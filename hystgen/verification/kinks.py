@@ -22,14 +22,14 @@ POINTS = 2000
 FOLLOWS, TURNS, LIMIT, ANY = range(4)
 SHARES = (0.6, 0.1, 0.2, 0.1)
 
-# Share of the points of the inverse after which a drive is committed, and of these the share with the point's own
+# Share of the inverse's points after which a drive is committed, and the share of these with the point's own drive
 COMMITTED, THERE = 0.6, 0.7
 
 
 @dataclass(frozen=True)
 class Path:
-    """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` that of the forward
-    operator after it (meaningless for init), `risen` whether the move to it was rising."""
+    """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` the forward operator's
+    after it (meaningless for init), `risen` whether the move to it rose."""
 
     op: Bytes
     drive: NDArray[np.float64]
@@ -115,10 +115,10 @@ def along(
 ) -> tuple[Bytes, NDArray[np.float64]]:
     """Operations and arguments that follow a path over and over, each time with different last bits.
 
-    Some points are approached in last bits or a little more, from the side of the move, and passed; some are requested
-    again, or beyond a limit. For the inverse the references are the outputs along the path, and the drive of a point is
-    mostly committed, so that its memory stays on the path. Between init and the first sample there may be a commit, and
-    one of the `special` values. `least(x)`: the least step of the type at x.
+    Some points are approached to within last bits or a little more, from the move's side, and passed; some are
+    requested again, or beyond a limit. For the inverse the references are the outputs along the path, and the drive of
+    a point is mostly committed, so that its memory stays on the path. Between init and the first sample there may be a
+    commit, and one of the `special` values. `least(x)`: the least step of the type at x.
     """
     argument = path.output if inverse else path.drive
     span, room = float(np.ptp(argument)), float(np.ptp(path.drive))

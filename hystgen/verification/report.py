@@ -17,12 +17,12 @@ from hystgen.verification.compilers import MissingError
 class Row:
     """One operator in one build: how many samples were compared, the result, and on emulated cores its cost.
 
-    Instructions are those of a call of `step`, from its first to its return, over the samples compared. `flash` is the
-    number of bytes of code and constants of the emitted module, `library` that of what the compiler linked to it (soft
-    float, and anything else the image called), `ram` the size of an instance, `stack` the bytes that the deepest call
-    used below the caller's frame, as measured. On an AVR, where constants are in RAM, `ram` includes them as well as an
-    instance of each operator. `note`: a remark on the figures. `missing`: nothing was compared, since a tool is not
-    usable on this machine.
+    Instructions are counted from the first of a call of `step` to its return, over the samples compared. `flash` is the
+    bytes of code and constants of the emitted module, `library` the bytes of library code linked to it (soft float, and
+    anything else the image called), `ram` the size of an instance, `stack` the bytes that the deepest call used below
+    the caller's frame, as measured. On an AVR, where constants are in RAM, `ram` includes them as well as an instance
+    of each operator. `note`: a remark on the figures. `missing`: nothing was compared, since a tool is not usable on
+    this machine.
     """
 
     target: str

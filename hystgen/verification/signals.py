@@ -120,8 +120,8 @@ def suite(
 ) -> Iterator[Calls]:
     """Records of `length` calls: name, operations and arguments, numbers of type `real`; the same every time.
 
-    For a model with effects: those of its plays, with calls of its settings among them. Status is read after each call,
-    and elsewhere after one of several, since its bits have to stay until they are read.
+    For a model with effects: the records of its plays, mixed with calls of its settings. Status is read after each call
+    in some parts, elsewhere after one of several, since its bits have to stay until they are read.
     """
     plays = tables.plays._replace(limits=tables.limits) if isinstance(tables, ChainTables) else tables
     records = _suite(plays, real, inverse, length)
@@ -138,7 +138,7 @@ def suite(
 
 
 def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls]:
-    """Steps with everything else that may be called between them, sparsely and densely."""
+    """Steps mixed with all other calls, sparsely and densely."""
     first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
     low, high = (float(a) for a in tables.limits[first : first + 2])
     drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
@@ -179,8 +179,8 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
 
 def _settled(tables: ChainTables, low: float, high: float, length: int) -> tuple[Bytes, NDArray[np.float64]]:
     """From init to a reference, sometimes 0, held long enough for a quiet drive to stop, and settled at that drive;
-    often with another drive committed right after it, and a move on. Where the drive stays shows what settling leaves
-    of the past."""
+    often with another drive committed right after it, and a move on. The drive's resting place shows how much of the
+    past settling leaves."""
     rng = np.random.default_rng(20261204)
     steps = max(4, 2 * tables.quiet + 4)
     count = -(-length // (2 * steps + 3))

@@ -25,7 +25,7 @@ class Sources:
     operators: tuple[str, ...]
     module: tuple[Path, ...]
     harness: Path
-    selftest: Path | None = None  # some of what runs is not emitted
+    selftest: Path | None = None  # code that is not emitted has none
 
     @property
     def emitted(self) -> tuple[Path, ...]:
@@ -44,8 +44,8 @@ def harness(
     more: Mapping[str, Sequence[str]] = MappingProxyType({}),
     arithmetic: Arithmetic = FLOAT32,
 ) -> str:
-    """The C that runs recorded calls of NAME_OP_step and the like; `more`: by operator, calls in addition to those of
-    every model."""
+    """The C that runs recorded calls of NAME_OP_step and the like; `more`: by operator, calls that not every model
+    has."""
     chain = {op: list(_chain_calls(name, op, more.get(op, ()), arithmetic)) for op in operators}
     return runtime.template(
         "harness.c.j2", name=name, operators=operators, calls=CALLS, call_bits=slots.OP_CALL, unread=slots.OP_UNREAD,

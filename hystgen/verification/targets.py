@@ -21,7 +21,7 @@ class Target:
     """A core: how compilers name it, and which processor of the emulator it is.
 
     `fpu`: floating point in hardware, where a user's flags can contract a product and a sum to one rounding. `calls`:
-    calls per verification record; a core without FPU needs hundreds of instructions for what others do in one.
+    calls per verification record; a core without FPU needs hundreds of instructions where others need one.
     """
 
     name: str

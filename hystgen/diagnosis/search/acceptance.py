@@ -53,12 +53,12 @@ def is_noise(error: float, noise: float, share: float = 1.0) -> bool:
 
 
 def apart(more: float, less: float) -> float:
-    """rms of what an error has beyond a smaller one, if the two parts are uncorrelated: sqrt(more^2 - less^2)."""
+    """rms by which an error exceeds a smaller one, if the excess is uncorrelated with it: sqrt(more^2 - less^2)."""
     return math.sqrt(max(more**2 - less**2, 0.0))
 
 
 def above_noise(removed: float) -> float:
-    """rms of noise and `removed` times as much of something uncorrelated, as a multiple of the noise."""
+    """rms of noise plus an uncorrelated part of `removed` times its size, as a multiple of the noise."""
     return math.sqrt(1.0 + removed**2)
 
 
@@ -70,8 +70,8 @@ fitted records. After a right name in a wrong shape, a second, wrong name remove
 not recorded)."""
 
 NEARLY_ALL = 0.25
-"""[share of the error before it] It also gets one if it leaves at most this of the error: beside a far larger effect no
-other can reach `NAME_SHARE`. Changed by: blind pair, selection::test_nearly_all_that_is_left_is_worth_a_name."""
+"""[share of the error before it] It also gets one if it leaves at most this of the error: next to a far larger effect
+no other can reach `NAME_SHARE`. Changed by: blind pair, selection::test_nearly_all_that_is_left_is_worth_a_name."""
 
 FIRST_REMOVES = 0.6
 """[times the remaining error or the noise, whichever is larger] A first effect removes at least this, and a difference
@@ -99,7 +99,7 @@ P_DIFFERENT = 0.01
 """[probability] Two effects are separable if the p-value of their difference is below this. Changed by: blind pair."""
 
 BLOCK_MEMORIES = 2.0
-"""[correlation times] Length of the blocks of samples that a test takes as independent: at this length neighbouring
+"""[correlation times] Length of the blocks of samples that a test treats as independent: at this length neighbouring
 blocks are hardly correlated. Changed by: blind none, acceptance::blocks_are_longer_than_errors_remember."""
 
 BLOCKS = 20
@@ -109,8 +109,8 @@ Changed by: acceptance::blocks_are_longer_than_errors_remember."""
 SEEN_IN_BOTH = 0.25
 """[times the remaining error or the noise] An effect that removes `FIRST_REMOVES` or `FURTHER_REMOVES` from the fitted
 or the held-out records removes at least this from the others; an error that only one of them shows may belong to
-another effect. With 0.5 one of ten pairs loses its second name; with 0.25 none does, nor with 0, without a false name
-in 24 further cases. Set by: tune pair 0:10; with 0 also tune single, none and poor 0:8. Changed by: blind pair,
+another effect. With 0.5 one of ten pairs loses its second name; with 0.25 or 0 none does, and 0 gives no false name in
+24 further cases. Set by: tune pair 0:10; with 0 also tune single, none and poor 0:8. Changed by: blind pair,
 acceptance::an_effect_has_to_show_in_both."""
 
 ALIKE = 0.25
@@ -125,10 +125,9 @@ selection::test_all_records_decide_between_equal_numbers."""
 FAR_LESS = 0.5
 """[share of an error] A fitted error of at most this share of another one outweighs a small advantage of that one on
 held-out records, whose error may mostly belong to yet another effect. Chance does not let a held-out error fall this
-far, since nothing was fitted to it: a rate dependence beside creep left a third, shown in a few steps, with p = 0.12 by
-blocks. Set by (the latter): second_plants pair 2004. Changed by:
-acceptance::equal_effects_come_in_the_order_of_the_catalogue,
-acceptance::what_chance_does_not_explain."""
+far, since nothing was fitted to it: a rate dependence next to creep left a third, shown in a few steps, with p = 0.12
+by blocks. Set by (the latter): second_plants pair 2004. Changed by:
+acceptance::equal_effects_come_in_the_order_of_the_catalogue, acceptance::what_chance_does_not_explain."""
 
 EQUAL = 0.005
 """[share of an error] Errors that differ by less than this are equal, however certain the difference is, and
@@ -150,12 +149,11 @@ acceptance::names_near_the_noise_explain_half."""
 MOSTLY_EXPLAINED = 1.0 / 3.0
 """[share of the variance above the noise] The same limit if the names leave more than `MUCH_LEFT`, as wrong names do:
 they then have to explain two thirds. Room temperature acting on the gain kept 0.39 to 0.41 under the names of ageing
-and self-heating; right names left at most 0.30, beside a second effect that was not found. Set by: second_plants
-foreign 300:308, single and pair 300:312. Changed by: second_plants foreign 400:410,
-acceptance::names_explain_most."""
+and self-heating; right names left at most 0.30, with a second effect that was not found. Set by: second_plants foreign
+300:308, single and pair 300:312. Changed by: second_plants foreign 400:410, acceptance::names_explain_most."""
 
 MUCH_LEFT = 3.0
-"""[times the noise floor] If the named effects leave more than this, the verdict begins with what they leave, and none
+"""[times the noise floor] If the named effects leave more than this, the verdict begins with the remainder, and none
 has a name if a number of one is at an end of its range and more than `END_LEAVES` remains. Of 457 blind cases much was
 left with a number at an end for two disturbances by room temperature, and for one pair. Set by (the latter):
 second_plants foreign 11001, 11006, pair 8012, blind first 97000. Changed by: blind single,
@@ -164,17 +162,17 @@ acceptance::what_a_verdict_says_first."""
 END_LEAVES = 0.105
 """[share of the gap above the noise, rms] Where more than `MUCH_LEFT` remains and a number of an effect is at an end of
 its range, names stand only if they leave at most this of the held-out and of the fitted records, so that nine tenths
-are explained, in whole per cent as the verdict states it. Many times the noise says nothing of records with little
-noise. False names that left as much, room temperature acting on the gain, kept 0.62 and more. Set by: second_plants
-foreign 300:308, 11000:11020. Changed by: selection::test_a_number_at_an_end_of_its_range_explains_nine_tenths."""
+are explained, in whole per cent as the verdict states it. A multiple of the noise alone says nothing about records with
+little noise. False names for room temperature acting on the gain left 0.62 and more. Set by: second_plants foreign
+300:308, 11000:11020. Changed by: selection::test_a_number_at_an_end_of_its_range_explains_nine_tenths."""
 
 WIDER = 1.0
-"""[times the width of a range] How much farther than to the end of its usual range a number is sought that stands
-there, in the coordinates of its search: ranges are chosen to an order of magnitude. The wider one counts if it lowers
-the held-out error by `BETTER`. Changed by: selection::test_a_wider_range_where_a_number_is_at_its_end."""
+"""[times the width of a range] How far a range is widened beyond an end at which a number stands, in the coordinates of
+the search: ranges are chosen to an order of magnitude. The wider one counts if it lowers the held-out error by
+`BETTER`. Changed by: selection::test_a_wider_range_where_a_number_is_at_its_end."""
 
 WIDENINGS = 3
-"""[searches] Most that a range is widened in a row, each time by `WIDER` usual widths. Changed by: run time, and
+"""[searches] Most widenings of a range in a row, each by `WIDER` usual widths. Changed by: run time, and
 selection::test_how_often_a_range_is_widened."""
 
 FEW_COMPARED = 0.25
@@ -183,10 +181,10 @@ without a known history at least 0.5 are compared, of a test whose amplitude gro
 blind, all kinds, first 71000, and second_plants. Changed by: acceptance::what_a_verdict_says_first."""
 
 FLAT_END = 0.005
-"""[share of the drive range] A limit that begins closer to both ends than this is no name: it is met where the drive
-rests at its end, and a few samples elsewhere, so that it is another offset of those rests, which what is left of creep
-asks for. Wrong ones began at 0.0016 of the range, right ones at 0.0128 and more. Set by: second_plants single 9100 and
-9165, blind pair and poor first 97000. Changed by: acceptance::a_limit_at_the_very_end_of_the_drive."""
+"""[share of the drive range] A limit that begins closer to both ends than this is no name: the drive meets it only in
+rests at the end and in a few samples elsewhere, so that it acts as an offset of those rests, which residual creep calls
+for. Wrong ones began at 0.0016 of the range, right ones at 0.0128 and more. Set by: second_plants single 9100 and 9165,
+blind pair and poor first 97000. Changed by: acceptance::a_limit_at_the_very_end_of_the_drive."""
 
 MOST_EFFECTS = 5
 """[effects] The search adds at most this many: no case of any block has more than two. Changed by: run time of
@@ -206,23 +204,21 @@ by: acceptance::held_out_records_that_are_alone."""
 # How far a search goes ---------------------------------------------------------------------------------------
 
 SCREENED = 6_000
-"""[samples] Number compared while all shapes are screened, for the fitted and for the held-out records each. Changed
+"""[samples] While all shapes are screened, this many of the fitted and of the held-out records are compared. Changed
 by: run time and names of blind."""
 
 SEARCHED = 12_000
-"""[samples] Number fitted in later searches, and number used where many variables are regressed together. Changed by:
-as before."""
+"""[samples] Later searches fit this many, and regressions on many variables use as many. Changed by: as before."""
 
 PLAYS = 32
 """[plays] Number of thresholds of a fit. Half as many leave up to 1.4 times the noise in records without an effect,
 because of the gaps between thresholds; more leave no less. Set by: tune none (commit 9f9a31e, seeds not recorded)."""
 
 FIRST_STEPS = 2
-"""[steps] Number that a search takes from each start while shapes are screened. Changed by: blind single."""
+"""[steps] A search takes this many from each start while shapes are screened. Changed by: blind single."""
 
 SCREENING_STEPS = 2
-"""[steps] Number that it then takes from the best start; repeated while the error still falls. Changed by: blind
-single."""
+"""[steps] It then takes this many from the best start, again while the error still falls. Changed by: blind single."""
 
 FALLING = 0.8
 """[share of the error] A search continues if `SCREENING_STEPS` bring its error below this share. The minimum of a
@@ -242,12 +238,11 @@ IDLE = 0.01
 behind a large effect, every start of the next one may be worse than having none. Changed by: blind pair."""
 
 KEPT = 5
-"""[shapes] Number followed up after the screening: those with the smallest held-out errors. Changed by: blind
+"""[shapes] After the screening, this many with the smallest held-out errors are followed up. Changed by: blind
 single."""
 
 ALSO_KEPT = 2
-"""[shapes] Number followed up besides: those of the others with the smallest fitted errors. Changed by: blind
-single."""
+"""[shapes] Of the others, this many with the smallest fitted errors are followed up too. Changed by: blind single."""
 
 SHAPES_OF_ONE = 2
 """[shapes] At most this many of those belong to one effect, so that other effects have the remaining places. Changed
@@ -255,30 +250,30 @@ by: blind single."""
 
 TWIN = 0.02
 """[share of the errors] An effect whose fitted and held-out errors are within this of a kept one's is followed up too;
-otherwise chance would decide whether a lag or a delay is dropped. So is a shape with fewer numbers than those of its
-effect that are kept: a front that bends one way left 1 % more than one that bends both ways, and was dropped for it.
-Set by (the latter): second_plants single 8001. Changed by: acceptance::a_twin_follows."""
+otherwise chance would decide whether a lag or a delay is dropped. So is a shape with fewer numbers than the kept shapes
+of its effect: a front that bends one way left 1 % more than one that bends both ways, and was dropped for it. Set by
+(the latter): second_plants single 8001. Changed by: acceptance::a_twin_follows."""
 
 PROMISING = 2.0
 """[times the error of the best shape] A shape with larger fitted and held-out errors is not searched jointly. Changed
 by: blind pair."""
 
 JOINT_STEPS = 5
-"""[steps] Number of a joint search before the shapes are compared again. Changed by: blind single."""
+"""[steps] A joint search takes this many before the shapes are compared again. Changed by: blind single."""
 
 HOPEFUL = 1.3
 """[times the held-out error of the best shape] A shape with a larger error after those steps is searched no further.
 Changed by: blind single."""
 
 RINGING_STARTS = 3
-"""[frequencies] Number of frequencies at which the error rings from which a resonance is searched for. Changed by:
+"""[frequencies] The search for a resonance starts from this many frequencies at which the error rings. Changed by:
 blind single with resonance."""
 
 BREAKS = 4
-"""[breaks] Number in the dead-zone sum that is tried as an asymmetry. Changed by: blind single with asymmetry."""
+"""[breaks] The dead-zone sum that is tried as an asymmetry has this many. Changed by: blind single with asymmetry."""
 
 FINER_BREAKS = 8
-"""[breaks] Number in the sum that is tried next where that one helps: each interval is halved. Derived."""
+"""[breaks] If that sum helps, one with this many is tried next: each interval is halved. Derived."""
 
 TANH_BEND, TANH_SIDE = 0.3, 2.0
 """[1], [half ranges] Curvature and place of the tanh envelopes that are further starts: each is bent one way over the
@@ -343,8 +338,7 @@ acceptance::the_longest_stretch."""
 
 THIN_STRAIGHT = 0.3
 """[times the noise] A stretch may be left out if the prediction deviates from a straight line over it by at most this,
-and the drive by at most what moves the output that far. Changed by:
-acceptance::a_bump_of_the_prediction."""
+and the drive by no more than moves the output that far. Changed by: acceptance::a_bump_of_the_prediction."""
 
 THIN_TURNING = 0.03
 """[times the noise] The same limit at a turning point, which the plays remember: a tenth of it. Changed by:
@@ -432,7 +426,7 @@ WIDE_DRIVE = 0.3
 acceptance::a_narrow_record_shows_no_scale."""
 
 OTHER_UNIT = 30.0
-"""[times the median width] A drive wider than this is in another unit, and the others are not measured by it. It lies
+"""[times the median width] A drive wider than this is in another unit, and is no measure for the others. It lies
 between the ratio of a large swing to small loops and a factor of 1000 between units. Changed by:
 acceptance::a_drive_in_another_unit_is_no_measure."""
 
@@ -499,7 +493,7 @@ CARRIER_SHARE = 0.5
 Changed by: acceptance::harmonics_of_a_carrier."""
 
 HARMONICS = 10
-"""[harmonics] Number of multiples of that line that the actuator's response has. Changed by:
+"""[harmonics] The actuator's response has this many multiples of that line. Changed by:
 acceptance::harmonics_of_a_carrier."""
 
 LINE_PERIODS = 8
@@ -519,8 +513,8 @@ SPECTRUM_PARTS = (8, 64)
 every five seconds. Set by: disturbances (commit 8380866)."""
 
 SURROUNDINGS, SURROUNDINGS_OF_PARTS = 40, 12
-"""[bins] Number on either side with which a peak is compared, in the spectrum of a record and in the mean spectrum of
-its parts. Changed by: acceptance::surroundings_of_a_line."""
+"""[bins] A peak is compared with this many on either side, in the spectrum of a record and in the mean spectrum of its
+parts. Changed by: acceptance::surroundings_of_a_line."""
 
 SAME_BINS = 1.5
 """[bins] Lines closer than this are one line: less than the two bins of half the main lobe of a Hann window.
@@ -531,14 +525,14 @@ SAME_RINGING = 0.02
 single."""
 
 SAME_LINE = 0.05
-"""[share of the frequency or pitch] A line within this of a stronger one is what remains of that. Changed by:
+"""[share of the frequency or pitch] A line within this of a stronger one is a remainder of it. Changed by:
 acceptance::the_rest_of_a_line."""
 
 MOST_LINES = 4
 """[lines] At most this many are searched for: mains, two harmonics and a ripple. Changed by: blind foreign."""
 
 CRESTS = 5
-"""[bins] Number of the highest bins of a spectrum that are examined: `MOST_LINES` and one of the drive. Derived."""
+"""[bins] This many of the highest bins of a spectrum are examined: `MOST_LINES` and one of the drive. Derived."""
 
 SEEN_IN = 0.4
 """[share of the records that are long enough] A line counts if at least this share of the records has it, or if it has
@@ -549,8 +543,8 @@ COMMON_SHARE = 0.6
 share: most. Changed by: acceptance::pitches_of_a_pass."""
 
 STEADY_SHARE = 0.5
-"""[share] A line is steady if the phase and amplitude fitted to one half of a record remove at least this of what the
-other half's own fit removes. Changed by: acceptance::a_line_that_fades."""
+"""[share] A line is steady if the phase and amplitude fitted to one half of a record remove at least this share of the
+amount that the other half's own fit removes. Changed by: acceptance::a_line_that_fades."""
 
 AMPLITUDE_SAMPLES = 2.2
 """[samples per period] With fewer, the amplitude of a line cannot be measured: Nyquist's two, and a tenth more.
@@ -569,12 +563,11 @@ CONVERTER_STEP = 0.02
 Changed by: acceptance::a_pitch_of_the_converter."""
 
 POSITION_BINS = 4096
-"""[bins] Number into which the range is divided, and in which errors are averaged, to find a pitch: enough for pitches
-of a thousandth of the range. Changed by: acceptance::the_finest_pitch."""
+"""[bins] To find a pitch, the range is divided into this many, and errors are averaged in each: enough for pitches of a
+thousandth of the range. Changed by: acceptance::the_finest_pitch."""
 
 PITCHES = 3
-"""[pitches] Number of the strongest that are examined. Changed by:
-acceptance::pitches_that_are_examined."""
+"""[pitches] This many of the strongest are examined. Changed by: acceptance::pitches_that_are_examined."""
 
 PASS_SAMPLES, PASS_PITCHES = 32, 3.0
 """[samples], [pitches] A pass, up or down, that confirms a ripple has at least these. Changed by:
@@ -663,8 +656,7 @@ VARIABLE_SHARE = 0.1
 acceptance::a_variable_that_matters."""
 
 VARIABLE_BINS = 24
-"""[bins] Number with which a function of one variable is described. Changed by:
-acceptance::folds."""
+"""[bins] A function of one variable is described with this many. Changed by: acceptance::folds."""
 
 FOLD_BLOCKS = 16
 """[blocks] Samples alternate between fit and test in this many blocks, which are longer than errors are correlated.
@@ -678,8 +670,8 @@ MEMORY_WINS = 1.25
 acceptance::memory_in_place_of_one_variable."""
 
 RATE_FREE_SHARE = 0.75
-"""[share] An error does not depend on rates if drive and memory alone explain at least this of what they explain
-together with rates. Changed by: acceptance::rate_free."""
+"""[share] An error does not depend on rates if drive and memory alone explain at least this share of the part that they
+explain together with rates. Changed by: acceptance::rate_free."""
 
 REPEATABLE_SHARE = 0.5
 """[share of the error's variance] An error is repeatable if at least this returns with the drive: most of it.
@@ -696,11 +688,10 @@ half of `VARIABLE_SHARE`. Derived."""
 # Whether an inverse does more than records bear out ------------------------------------------------------------
 
 WILDER = 2.0
-"""[times] An inverse whose drive has second differences up to this times those of the plain inverse's is as calm:
-hysteresis alone turns a drive that often. Changed by: acceptance::a_drive_that_is_rougher."""
+"""[times] An inverse whose drive has second differences up to this times the plain inverse's counts as calm: hysteresis
+alone turns a drive that often. Changed by: acceptance::a_drive_that_is_rougher."""
 
 BEYOND_GAIN = 3.0
-"""[times the gain] What an inverse with effects moves the plain model's output by, at most, in held-out rms that the
-effects explain, or in noise if that is more. It takes out what they explain: 0.85 to 0.97 times that for creep, a lag
-and relaxing plays at three speeds, noise at 0.1 % of the output. Changed by:
-acceptance::an_output_that_moves_further."""
+"""[times the gain] Largest change that an inverse with effects makes to the plain model's output, in held-out rms that
+the effects explain, or in noise if that is larger. It was 0.85 to 0.97 times that for creep, a lag and relaxing plays
+at three speeds, with noise at 0.1 % of the output. Changed by: acceptance::an_output_that_moves_further."""

@@ -38,14 +38,14 @@ With 1e-4 to 1e-2 eight cases of `benchmarks.second_plants` (seeds 29000 on) hav
 within 0.5 %."""
 
 CROSSINGS = 2
-"""[changes of side] A component of the start that goes from one limit beyond the other is measured from that one; at
-the second time it stays there, so that the search for those at a limit ends. With 1, 3 of 600 pairs of records, with
+"""[changes of side] A start component that moves from one limit past the other is then measured from the other; the
+second time it stays there, so that the search for components at a limit ends. With 1, 3 of 600 pairs of records, with
 two time constants that are nearly equal, ended up to 8e-4 above the least error; with 2, 4 and 8 none did by more than
 1e-6 (`test_start_transients::test_nearly_equal_responses`, seeds 0 to 599)."""
 
 RESTARTS = 4
-"""[searches] Most for start memories beside the same effects. Each has to lower the error by `BETTER` for another to
-follow, so that this bounds the time alone."""
+"""[searches] Most for start memories with the same effects. Another follows only if one lowers the error by `BETTER`,
+so this only bounds the time."""
 
 
 class _Block:
@@ -116,7 +116,7 @@ class _Block:
         return self._behind(_stacked([part.extended(columns) for part, columns in parts]), self.held)
 
     def _of(self, other: Actuator, sums: Sums) -> Array:
-        """The prediction of other numbers with the same weights and offset."""
+        """The prediction with other numbers, and the same weights and offset."""
         rows, constant = other.columns(self._item, self._p, sums)
         moved = rows[0] + constant
         if other.bends:
@@ -141,7 +141,7 @@ class _Block:
         return self._behind(whole, self._side != 0.0)
 
     def limit(self, p: Array, slacks: Array) -> bool:
-        """Take the weights and slacks of `opened` as solved; whether that leaves a component beyond its limits."""
+        """Accept the weights and slacks that solve `opened`. Returns whether a component is then beyond its limits."""
         if self._free == 1:  # an offset, which has no limit
             return False
         total, first = float(np.sum(p)), self._whole[: self._free]
@@ -160,7 +160,7 @@ class _Block:
         return bool(np.any(beyond | opposite))
 
     def _behind(self, whole: Array, limited: Bools) -> Array:
-        """The triangle behind the components that are free; the plays carry the others, which follow their weights."""
+        """The triangle without the free components; the plays carry the others, which follow their weights."""
         n = self._free
         if limited.any():
             carried = whole[:, :n][:, limited] @ (self._side * self._most)[limited]
@@ -179,7 +179,7 @@ def _solved(blocks: Sequence[_Block], plays: int) -> tuple[Array, Array]:
     """The system of all records and its best weights, with the free components of each record within their limits.
 
     Components that are found beyond a limit get a slack from it, which is solved for with the weights (nnls), until
-    none is beyond. That ends, since none loses its slack before it has changed sides `CROSSINGS` times.
+    none is beyond. This terminates, since each keeps its slack until it has changed sides `CROSSINGS` times.
     """
     whole = reduction.triangle(*(block.system() for block in blocks))
     solution = pi.non_negative(whole, np.arange(plays))
@@ -314,7 +314,7 @@ def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> 
 
 
 def on_equal_terms(fitted: Fitted, other: Fitted, items: Sequence[Item]) -> Fitted:
-    """A fit whose weights are found anew with the start states free that another one leaves free."""
+    """A fit whose weights are solved for again, with the same free start states as in another one."""
     here, like = fitted.actuator, other.actuator
     blocks = [_Block(here, item, fitted.weights, like) for item in items if item.known.any()]
     whole, best = _solved(blocks, len(fitted.weights))
@@ -325,11 +325,11 @@ def on_equal_terms(fitted: Fitted, other: Fitted, items: Sequence[Item]) -> Fitt
 
 
 def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> Fitted:
-    """The fit with start memories that fit beside its effects, for records whose memory was found without a history.
+    """The fit with start memories found in the presence of its effects, for records with a memory but no history.
 
-    What an effect does was part of the memory that was found without it. The output less what the effects do is what
-    the plays have to explain, so that their weights are known in the search for a memory (`start.of_model`). The
-    numbers are then fitted anew to `quick`, and so on until the error no longer falls by `BETTER`.
+    A memory found without the effects includes part of their response. The plays only have to explain the output less
+    that response, and their weights are known in the search for a memory (`start.of_model`). The numbers are then
+    refitted to `quick`, again and again until the error no longer falls by `BETTER`.
     """
     if not any(map(restarts, items)):
         return fitted
@@ -342,7 +342,7 @@ def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> F
         if structure.starts == fitted.structure.starts:
             break
         search = begun(structure, quick, fitted.shape, fitted.weights)
-        if not search.now.rms < fitted.rms:  # the memories found for these numbers do not help
+        if not search.now.rms < fitted.rms:  # the new memories do not help
             break
         search = search.further(little=COARSE)
         if not search.now.rms < (1.0 - acceptance.BETTER) * fitted.rms:
@@ -352,7 +352,7 @@ def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> F
 
 
 def restarts(item: Item) -> bool:
-    """Whether a record's start memory was found without a history, and may change with the effects beside it."""
+    """Whether a record's start memory was found without a history, and may change with the effects."""
     return item.history is None and item.turns is not None
 
 
@@ -388,7 +388,7 @@ def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fit
 
 
 DRAWS = 400
-"""Random shapes from which an interval is taken: an end of it then scatters by 0.13 standard deviations."""
+"""Random shapes per interval, whose ends then scatter by 0.13 standard deviations."""
 
 HALVINGS = 20
 """Bisections between the fitted shape and an inadmissible one, down to a millionth of an interval's width."""
@@ -401,7 +401,7 @@ Numbers = Mapping[str, object]
 
 @dataclass(frozen=True)
 class Sure:
-    """Low and high end for every number, under the keys of the entries: for the front's stage, and for each part."""
+    """Low and high end of every number, keyed as in the entries, for the front's stage and for each part."""
 
     front: dict[str, object]
     parts: tuple[dict[str, object], ...]

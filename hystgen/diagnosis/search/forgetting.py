@@ -1,9 +1,9 @@
-"""Whether the hysteresis itself is no play sum: minor loops stay open, and depend on what was before, at any speed.
+"""Whether the hysteresis itself is not a play sum: its minor loops stay open and depend on the past, at any speed.
 
-A play sum forgets a minor loop when it closes, and nothing else. Friction, Bouc-Wen and Duhem plants forget a little on
-all of the drive's way. An element of such a kind is fitted beside the plays, as an effect is, and judged by the same
-rules; it has no name in the catalogue and is written nowhere. At one speed way and time are the same: there it can
-take the place of creep, of a lag or of a rate dependence, and those the place of it.
+A play sum forgets a minor loop when it closes, and nothing else. Friction, Bouc-Wen and Duhem plants forget a little
+all along the drive's way. Such an element is fitted beside the plays like an effect, and judged by the same rules; it
+is not in the catalogue and never written to a file. At one speed, way and time are equivalent: it can then replace
+creep, a lag or a rate dependence, and they can replace it.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ Array = NDArray[np.float64]
 NAME = "forgetting"
 
 BALANCE = 0.9
-"""Balance from which a search starts: between Dahl's element, 1, and one that turns back as it went, 0.5."""
+"""Balance from which a search starts: between Dahl's element, 1, and one that returns the way it came, 0.5."""
 
 WEIGHT = 5.0
-"""[mean slopes of the records] Largest weight of the element, with which it lags: a friction of five times the stage's
-stiffness has no inverse. One that leads is left to plays with negative weights, which a play sum does not have."""
+"""[mean slopes of the records] Largest weight of the element, which lags at positive ones: a friction of five times the
+stage's stiffness has no inverse. A leading element would be plays of negative weight, which a play sum lacks."""
 
 LOOP = 0.1
 """[share of the drive range] Width of the minor loop that is said to stay open, as in `docs/plants.md`."""
 
 WITHIN = 0.01, 1.0
 """[shares of the drive range] Least and largest way over which the element forgets: below, plays of the smallest
-thresholds do as it does; above, it is a straight line and a memory of the start."""
+thresholds act alike; above, it is a straight line and a memory of the start."""
 
 STARTS = 5
-"""[widths] Number from which it is searched for, each about three times the one before."""
+"""[widths] Number from which a search starts, each about three times the one before."""
 
 STEPS = 12
-"""[steps] Of the search from the best width: three numbers and linear weights, which most searches settle in six."""
+"""[steps] For the search from the best width: most searches settle three numbers and linear weights in six."""
 
 
 class Forgetting(Effect):
@@ -78,11 +78,11 @@ class Forgetting(Effect):
 
 
 def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
-    """The element, where records bear it out beside the effects that were found, or better than these; else None.
+    """The element, if the records support it in addition to the effects found, or better than them; else None.
 
-    The element is first tried in place of all names of the `outcome`, then of those that depend on time, then beside
-    them. Names that explain more stand. Where chance alone could decide between the two, they stand if the drive takes
-    ways of equal length in different times: what follows time and what does not would then not look alike.
+    The element is first tried in place of all names of the `outcome`, then of those that depend on time, then in
+    addition to all. Names that explain more stand. Where only chance separates the two, the names stand if the drive
+    takes equal ways in different times, since effects of time and of way then differ.
     """
     none, now = outcome.refitted, outcome.fitted
     if records.one_loop or not selection.leaves_enough(none, records):
@@ -100,10 +100,10 @@ def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
 
 
 def _bases(outcome: Outcome, records: Records) -> Iterator[tuple[Fitted, tuple[str, ...]]]:
-    """Models beside whose plays the element is tried, with the names in whose place it would stand.
+    """The models to which the element is added, with the names that it would replace.
 
-    The refitted one; then one that has what does not depend on time: of the effects found, or, if there are none, the
-    best that was tried, since the part of a Duhem plant that forgets is seen only beside its bent middle line.
+    The refitted one; then one with the effects found that do not depend on time or, if none was found, with the best
+    one tried, since the forgetting of a Duhem plant shows only next to its bent middle line.
     """
     now = outcome.fitted
     names = tuple(dict.fromkeys(each.name for each in outcome.found))
@@ -131,7 +131,7 @@ def _without(now: Fitted, names: Sequence[str], records: Records) -> Fitted:
 
 
 def withheld(outcome: Outcome, found: NotAPlaySum | None, records: Records) -> Outcome:
-    """The outcome without the names in whose place the element stands."""
+    """The outcome without the names that the element replaces."""
     if found is None or not found.in_place_of:
         return outcome
     ranked = selection.refused(outcome.rankings, Refusal("forgets", found.after))
@@ -193,7 +193,7 @@ def _element(now: Fitted, records: Records) -> Tried:
 
 
 def _borne_out(now: Fitted, tried: Tried, records: Records) -> bool:
-    """Whether the element has the merit of a name, and takes most of what it finds."""
+    """Whether the element deserves a name, and removes most of the gap."""
     merit = selection.merit_of(now, tried, records)
     if merit is None or not merit.worth(records.gap, records):
         return False
@@ -202,7 +202,7 @@ def _borne_out(now: Fitted, tried: Tried, records: Records) -> bool:
 
 
 def _replaces(alone: Tried, named: Fitted, records: Records, shown: bool) -> bool:
-    """Whether the element stands in place of what was named."""
+    """Whether the element replaces the named effects."""
     both = [(alone.fitted.errors(items), named.errors(items)) for items in (records.held, records.to_fit)]
     if all(rms(mine) <= (1.0 - acceptance.BETTER) * rms(theirs) for mine, theirs in both) and any(
         selection.difference(theirs, mine) <= acceptance.P_SURE for mine, theirs in both
@@ -225,7 +225,7 @@ def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, recor
 
 
 def _open(fitted: Fitted, element: Forgetting, low: float, high: float) -> float:
-    """How far a minor loop in the middle of the drive is from closing, as a share of its height; the plays close."""
+    """How far a minor loop in the middle of the drive is from closing, as a share of its height; plays close it."""
     begin = 0.5 * (low + high)
     end = begin + LOOP * (high - low)
     v = np.array([low, high, low, end, begin, end])

@@ -1,8 +1,8 @@
 """Whether the inverse of a model with effects does more than the recordings bear out.
 
-Each inverse gets the recorded outputs as its reference. The drive that the effects make of them goes into the plain
-model, and that of the plain inverse into the model with effects: if either model were the stage, this is the error that
-the compensator of the other would leave. A right effect changes the output by about as much as it explains.
+Each inverse gets the recorded outputs as its reference. The drive of the inverse with effects goes into the plain
+model, and the plain inverse's drive into the model with effects: if either model were the stage, this would be the
+error under the other's compensator. A right effect changes the output by about as much as it explains.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ SAMPLES = 6_000
 """Most of a record that is taken, from its start: as many as the screening of effects compares."""
 
 SMOOTHED = 5
-"""[samples] A recorded output becomes a reference by two means over this many; the noise that is left is taken off."""
+"""[samples] A recorded output becomes a reference by averaging over this many twice; residual noise is subtracted."""
 
 SEED = 1
-"""Of the noise whose way through the inverse is not counted, so that the same records give the same answer."""
+"""Seed of the noise through the inverses, whose effect is subtracted, so that the same records give the same answer."""
 
 
 @dataclass(frozen=True)
 class Wild:
-    """An inverse that does more than recordings bear out.
+    """An inverse that does more than the recordings support.
 
-    `moves`: rms output of the plain model behind it, less the reference, and `other` the same the other way round;
-    `gain`: held-out rms that the effects explain, all in output units; `wilder`: second differences of its drive, rms,
-    over those of the plain inverse's.
+    `moves`: rms of the plain model's output for its drive, less the reference, and `other` with the two models
+    exchanged; `gain`: held-out rms that the effects explain, all in output units; `wilder`: rms second differences of
+    its drive over those of the plain inverse's drive.
     """
 
     moves: float
@@ -48,9 +48,9 @@ class Wild:
 
 
 def wild(extended: Model, plain: Model, held: Sequence[Item], gain: float, noise: float) -> Wild | None:
-    """What the inverse with the effects does beyond their `gain`, in the worst held-out record; None if it does not.
+    """How far the inverse with effects exceeds their `gain` in the worst held-out record; None if it does not.
 
-    What the noise of the reference, let through by both inverses, moves the output by is taken off.
+    The output's response to the reference's noise, passed through both inverses, is subtracted.
     """
     found = [each for item in held if (each := _over(extended, plain, item, gain, noise)) is not None]
     worst = max(found, key=lambda each: each.moves, default=None)
@@ -87,12 +87,12 @@ def _over(extended: Model, plain: Model, item: Item, gain: float, noise: float) 
 
 
 def _moved(model: Model, v: Array, t: Array, extra: dict[str, Array]) -> Array:
-    """The output for a drive, wherever that goes."""
+    """The output for a drive, even out of range."""
     return model.chain.simulate([model.run(v, t, extra)])[0]
 
 
 def _drive(model: Model, u: Array, t: Array, extra: dict[str, Array]) -> Array:
-    """The drive for a reference, without an end of its range."""
+    """The drive for a reference, without limits of its range."""
     model.inverse()
     return model.compensator.drives(model.run(u, t, extra), (-math.inf, math.inf))
 

@@ -69,7 +69,7 @@ class Actuator(Ordered):
     )
     """Gain and offset over a run, kept with the effect and the run, since the `id` of a deleted one may be reused."""
     starts: Starts = ()
-    """Start memories found beside the effects: the turns of an item, and those that replace them."""
+    """Start memories found in the presence of the effects: an item's turns, and the turns that replace them."""
 
     def columns(self, item: Item, p: Array | None = None, sums: Sums | None = None) -> tuple[Array, Array]:
         """Rows that the weights multiply, up to the output map, and the constant that is added to them.
@@ -137,7 +137,7 @@ class Actuator(Ordered):
         return total[item.compared] if self._needed == _FILTERED else total
 
     def _plays(self, item: Item) -> Array:
-        """(n + 1, N) plays after the effects that bend them; those of the last few hypotheses are cached."""
+        """(n + 1, N) plays after the effects that bend them; the last few hypotheses are cached."""
         if not self.bending:
             return self._moved(item)
         by = (self._moving, self.bending, self._needed == _MOVED)
@@ -191,9 +191,9 @@ class Actuator(Ordered):
     def level(self, h: Array, item: Item, p: Array) -> tuple[Array, Array, Array]:
         """The best offset (N,) in front of a sensor and behind a limit, and the change of the output with it (N,).
 
-        It includes the responses to an unknown start state, which a sensor also sees, but not drift added behind the
-        sensor: about the wrong offset its curve would be a different one. Also returns the responses' part of the
-        output (at the compared samples), to first order; their factors are within the limits of `largest`.
+        It includes the responses to an unknown start state, which a sensor also sees and which move it along its curve,
+        but not drift added behind the sensor. Also returns the responses' part of the output (at the compared samples),
+        to first order; their factors are within the limits of `largest`.
         """
         y = item.y[item.compared] - self.added(item.run)[item.compared]
         free = self._free(item) if self._needed == _MAPPED else self.nuisances(item)
@@ -320,8 +320,8 @@ def _within(columns: Array, y: Array, low: Array, high: Array) -> Array:
 class Part:
     """An effect in a hypothesis: its catalogue name and the candidate whose numbers are fitted.
 
-    `usual`: the candidate with its usual range, if that was widened; `firm`: whether it may not be, since farther off
-    the effect would be a different one, or since its author set the range.
+    `usual`: the candidate with its usual range, if that was widened; `firm`: whether the range is fixed, since the
+    effect would be a different one beyond it, or since its author set it.
     """
 
     name: str
@@ -345,7 +345,7 @@ def kept(effect: Effect) -> Part:
 class Structure:
     """Thresholds, a front and effects; its shape is the front's, then the numbers of each effect.
 
-    `starts`: as of an `Actuator`.
+    `starts`: as in an `Actuator`.
     """
 
     thresholds: Array

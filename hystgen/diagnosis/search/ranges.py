@@ -21,8 +21,8 @@ from hystgen.identification.joint import DIFFERENCE
 Array = NDArray[np.float64]
 
 BISECTIONS = 4
-"""Of the way beyond a range, where the schema does not allow all of it: the limit is found to a sixteenth of that way,
-which decides only how far a search may go."""
+"""Bisections of the way beyond a range where the schema does not allow all of it: they find the limit to a sixteenth of
+that way, which decides only how far a search may go."""
 
 LEAST, LARGEST = "least", "largest"
 
@@ -33,7 +33,7 @@ not widened; only noise is left, so that none was tried."""
 
 @dataclass(frozen=True)
 class End:
-    """A number at an end of its range or beyond it, as `AtEnd` says; `part`: of the structure, with its `name`."""
+    """A number at an end of its range or beyond it, described by `AtEnd`; `part`: in the structure, called `name`."""
 
     part: int
     name: str
@@ -59,7 +59,7 @@ def _parts_at_an_end(now: Fitted) -> list[int]:
 def widened(part: Part, numbers: Array, thresholds: tuple[float, ...]) -> Part:
     """The part with `acceptance.WIDER` times the usual width beyond each end at which a number stands.
 
-    As far as the schema allows, and the part itself if it allows nothing.
+    As far as the schema allows; the part itself if it allows nothing.
     """
     if part.firm:
         return part
@@ -75,9 +75,9 @@ def widened(part: Part, numbers: Array, thresholds: tuple[float, ...]) -> Part:
 
 
 def _allowed(candidate: Candidate, numbers: Array, j: int, way: float, thresholds: tuple[float, ...]) -> float:
-    """Largest share of a way from number j on at which the schema allows another effect than at its beginning.
+    """Largest share of a way from number j at which the schema allows an effect unlike the one at its beginning.
 
-    A search looks a little beyond a range, for a slope.
+    The schema has to allow a little more, for a search's slope.
     """
     here = _made(candidate, numbers, thresholds)
 
@@ -108,8 +108,8 @@ def _made(candidate: Candidate, numbers: Array, thresholds: tuple[float, ...]) -
 
 
 def ends(now: Fitted, leaves: float | None, only_noise: bool) -> tuple[End, ...]:
-    """The numbers at an end of their usual range or beyond it; `leaves`: held-out rms of a wider range that was tried
-    in vain, None for none."""
+    """The numbers at an end of their usual range or beyond it; `leaves`: held-out rms of a wider range tried in vain,
+    None without one."""
     found = []
     for k in _parts_at_an_end(now):
         part, x = now.structure.parts[k], now.structure.pieces(now.shape)[1][k]
@@ -134,7 +134,7 @@ def ends(now: Fitted, leaves: float | None, only_noise: bool) -> tuple[End, ...]
 def _number(
     build: Callable[[Array], Effect], numbers: Array, j: int, largest: bool, value: float
 ) -> tuple[str, float]:
-    """Key of number j, at an end of its range, in the parameter file, and what stands there where j has a value."""
+    """The parameter file's key of number j, which is at an end of its range, and its entry for a `value` of j."""
     at, near = numbers.copy(), numbers.copy()
     at[j], near[j] = value, numbers[j] - (DIFFERENCE if largest else -DIFFERENCE)
     here, there = build(numbers), build(near)

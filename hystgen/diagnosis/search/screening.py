@@ -36,7 +36,7 @@ SLOPE_PLACES = 201
 class Option:
     """One way to extend a hypothesis. `front`: it adds a memoryless part in front, which is named after the fit.
 
-    `structure`: with all numbers free; `alone`: with only those of the extension free, from `starts`. `beyond`: label
+    `structure`: with all numbers free; `alone`: with only the extension's numbers free, from `starts`. `beyond`: label
     of the simpler option that it contains and after which it is tried; `grown`: a start from the numbers of that one.
     """
 
@@ -174,12 +174,12 @@ class Tried:
         return self.names[0]
 
     def numbers(self, held: Sequence[Item]) -> int:
-        """Number of its free numbers, with those of a record: free start responses may explain a drift."""
+        """Number of its free numbers, including a record's free components: a start response may explain a drift."""
         return free_numbers(self.fitted, held)
 
 
 def free_numbers(fitted: Fitted, held: Sequence[Item]) -> int:
-    """Number of a hypothesis' free numbers, with those of a record."""
+    """Number of free numbers of a hypothesis, including the free components of one record."""
     return len(fitted.shape) + max(len(fitted.actuator.nuisances(item)) for item in held)
 
 
@@ -237,10 +237,10 @@ class Records:
         )
 
     def terms(self, now: Fitted, other: Fitted) -> list[Fitted]:
-        """A hypothesis, and the same with the weights that suit the start states which another one leaves free.
+        """A hypothesis, and a copy whose weights are refitted with the same free start states as in another one.
 
-        Those of an effect that is slow against the records follow whatever is slow. If the weights had to follow it
-        alone, they would be worse than with free states, and the difference would count for the effect.
+        Free states of an effect that is slow against the records follow any slow error. Weights that had to follow it
+        alone would be worse than with free states, and the difference would count in favour of the effect.
         """
         if all(len(other.actuator.nuisances(item)) == 1 for item in self.quick):
             return [now]
@@ -259,7 +259,7 @@ class Records:
             return _followed_up(searches, _screened(searches, pool), pool)
 
     def restarted(self, fitted: Fitted) -> Fitted:
-        """The fit with start memories found beside its effects (`fits.restarted`)."""
+        """The fit with start memories found in the presence of its effects (`fits.restarted`)."""
         return fits.restarted(fitted, [*self.to_fit, *self.held], self.quick)
 
     def residual(self, fitted: Fitted) -> float:
@@ -308,8 +308,8 @@ class _Screened:
 
 
 _SCREEN, _JOIN, _POLISH, _RESTART = range(4)
-"""Stages of a search: a few steps of only the option, a few of the whole hypothesis, the rest to its end, and start
-memories found anew."""
+"""Stages of a search: a few steps of only the option, a few of the whole hypothesis, the remaining steps, and a new
+search for start memories."""
 
 
 class _Trial(NamedTuple):
@@ -341,7 +341,7 @@ class _Numbers(NamedTuple):
 
 @dataclass(frozen=True)
 class _Searches:
-    """The searches of one round, for every option beside a hypothesis; `rough`: the same with fewer thresholds."""
+    """The searches of one round, for every option added to a hypothesis; `rough`: the same with fewer thresholds."""
 
     now: Fitted
     rough: Fitted
@@ -399,7 +399,7 @@ class _Searches:
         return search.found(task.weights)
 
     def _restarted(self, option: Option, task: _Trial) -> Fitted:
-        """The fit of a task with start memories found beside its effects."""
+        """The fit of a task with start memories found in the presence of its effects."""
         assert task.shape is not None
         assert task.weights is not None
         return self.records.restarted(Fitted(option.structure, task.shape, task.weights, task.rms))
@@ -409,7 +409,7 @@ def _while_falling(search: Search, steps: int) -> Search:
     """The search after `steps` steps, and as many again for as long as they lower the error by enough (`FALLING`).
 
     Steps that all fail are not the end: each damps the next one more, and one that is short enough lowers the error. A
-    cubic sensor far from straight was judged where its search began.
+    strongly cubic sensor was once judged at the start of its search.
     """
     for _ in range(acceptance.LONGER):
         before, search = search.now, search.further(steps, fits.COARSE)

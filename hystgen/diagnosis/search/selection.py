@@ -35,7 +35,8 @@ FRONTS = "asymmetry", "saturation"
 """Names of effects that are a front."""
 
 EXTENDED, REFITTED, GIVEN, IDENTIFIED = "extended", "refitted", "given", "identified"
-"""The models that may be written: with the effects, the nominal one refitted or as given, and that of `identify`."""
+"""The models that may be written: with the effects, the nominal one refitted or as given, and the one from
+`identify`."""
 
 
 # Merit of an effect, and the choice among several similar ones -----------------------------------------------
@@ -88,8 +89,8 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
 
     It has none if chance explains the difference, if it removes too little to stand out of the noise, if it hardly
     shows in the held-out or in the fitted records, if records of only one loop do not support a name, or if it is a
-    limit that hardly more than the very end of the drive meets. Chance does not halve an error to which nothing was
-    fitted, however few the events in which that shows.
+    limit that hardly acts except at the very end of the drive. Chance does not halve an error to which nothing was
+    fitted, however few events show it.
 
     `least`: the rms to be removed, as a multiple of the remaining error or the noise; by default the threshold for a
     first or a further effect.
@@ -168,9 +169,9 @@ def leaves_enough(now: Fitted, records: Records) -> bool:
 
 
 def _without_merit(terms: Sequence[Fitted], best: Tried, items: Sequence[Item]) -> list[Array]:
-    """Errors of a hypothesis with the start states and offset that an effect leaves free, which are not its merit.
+    """Errors of a hypothesis with the start states and offset free that an effect leaves free: they are not its merit.
 
-    Or with those that the hypothesis itself leaves free, if the error is then smaller. `terms` as of `Records.terms`.
+    Or with those that the hypothesis itself leaves free, if the error is then smaller. `terms`: from `Records.terms`.
     """
     now = terms[0]
     return min(now.errors(items), *(each.errors(items, best.fitted) for each in terms), key=rms)
@@ -184,9 +185,9 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     effect). Or its held-out error is within a few per cent, and its fitted error is equal, or larger by chance, or, if
     a number of the best is at an end of its range, larger by less than an effect is worth. Where an amount of the best
     is the largest that is tried, all that are alike are about as good: so much creep can follow a lag as well. With
-    equal numbers of parameters all records decide, held-out ones if those hardly differ, or else their `place`: a lag,
-    which every amplifier has, before a delay. A candidate with a far larger fitted error than another is not the best
-    because of a small lead on held-out records, which may consist mostly of yet another effect.
+    equal numbers of parameters, all records decide, then the held-out ones if the errors hardly differ, then `place`: a
+    lag, which every amplifier has, before a delay. A candidate with a far larger fitted error than another is not the
+    best because of a small lead on held-out records, which may consist mostly of yet another effect.
     """
     if not tried:
         return []
@@ -237,8 +238,8 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
 
 
 ORDER = "creep", "resonance", "lag", "delay", "rate_dependence", "asymmetry"
-"""The first of equal effects, in their order. What every amplifier or converter has, a lag or a delay, comes before
-plays that are late, and an asymmetric actuator before a nonlinear sensor."""
+"""The first of equal effects, in their order. A lag or a delay, which every amplifier or converter has, comes before
+late plays, and an asymmetric actuator before a nonlinear sensor."""
 
 
 def place(name: str) -> int:
@@ -307,7 +308,7 @@ def left_open(now: Fitted, best: Tried, tried: Sequence[Tried], records: Records
 
 
 def _explains_most(now: Fitted, tried: Tried, records: Records) -> bool:
-    """Whether it removes most of the held-out error above the noise."""
+    """Whether an effect removes most of the held-out error above the noise."""
     return takes_most(tried.held_out, records.residual(now), records.noise)
 
 
@@ -317,7 +318,7 @@ def takes_most(residual: float, gap: float, noise: float) -> bool:
 
 
 def bear_two(records: Records) -> bool:
-    """Whether records can support a second name, or one beside an effect that the model already has."""
+    """Whether records can support a second name, or one in addition to an effect that the model already has."""
     return not (records.one_loop and records.one_speed)
 
 
@@ -337,8 +338,8 @@ class Explained:
 
 
 def explained(now: Fitted, none: Fitted, records: Records) -> tuple[Explained, Explained]:
-    """What effects explain of the held-out and of the fitted records, with the start states and offsets free that they
-    leave free; `none`: the model without them."""
+    """The part of the held-out and of the fitted error that effects explain, with the start states and offsets free
+    that they leave free; `none`: the model without them."""
     held, to_fit = (
         Explained(rms(none.errors(group, now)), rms(now.errors(group)), records.noise)
         for group in (records.held, records.to_fit)
@@ -352,7 +353,7 @@ def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
     Both for held-out and for fitted records. Many effects can remove a part of a disturbance; the remaining error
     distinguishes it from a real effect. Records of one loop support no name if more than noise remains, and too few
     compared samples none at all. Where much remains, no number of an effect may be at an end of its range unless nine
-    tenths are explained: so strong, slow or fast an effect follows some of anything, but not nearly all of it.
+    tenths are explained: an effect so strong, slow or fast can follow part of any error, but not nearly all of it.
     """
     if records.compared < acceptance.FEW_COMPARED:
         return Refusal("few", records.compared, acceptance.FEW_COMPARED)
@@ -428,7 +429,7 @@ class Ranked:
 
 @dataclass(frozen=True)
 class Withdrawal:
-    """Effects that were accepted at first but not in the end (`borne_out`): what they would have explained."""
+    """Effects that were accepted at first but not in the end (`borne_out`), and the part that they explained."""
 
     names: tuple[str, ...]
     refused: Refusal
@@ -487,8 +488,8 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array 
 def no_worse_than(other: Fitted, outcome: Outcome, records: Records, written: str = GIVEN) -> Outcome:
     """The outcome, or another model if that predicts held-out records better.
 
-    The model as given: a refit that predicts them worse is not a better model; if effects were named, the difference
-    has to count. The model that `identify` finds by itself: by more than equal errors differ.
+    The model as given replaces a refit that predicts worse; if effects were named, it has to be better by `BETTER`. The
+    model that `identify` finds by itself has to be better by `EQUAL`.
     """
     least, left = records.residual(other), records.residual(outcome.fitted)
     named = acceptance.BETTER if outcome.found else 0.0
@@ -516,7 +517,7 @@ def again(fitted: Fitted, ready: Prepared) -> Fitted:
 
 
 def invertible(outcome: Outcome, records: Records, floor: float) -> tuple[Outcome, Weights]:
-    """The outcome with p_0 raised to the floor of `identify`, and the weights; errors are those of that model."""
+    """The outcome with p_0 raised to the floor of `identify`, and the weights; its errors are those of this model."""
     fitted, made = fits.invertible(outcome.fitted, records.full, floor)
     if fitted is outcome.fitted:
         return outcome, made
@@ -588,9 +589,9 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
 
 
 def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found], float | None]:
-    """The effects fitted to all samples, without those that then turn out to be needless.
+    """The effects fitted to all samples, without any that this makes needless.
 
-    Also the held-out rms that wider ranges leave which were tried in vain, None for none.
+    Also returns the held-out rms with wider ranges that were tried in vain, None without any.
     """
     now = fits.fit(now.structure, records.full, now.shape, now.weights)
     kept, rest, _ = _without_needless(now, found, records)
@@ -603,9 +604,10 @@ def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted
 
 
 def _widened(now: Fitted, records: Records) -> tuple[Fitted, float | None]:
-    """The hypothesis with wider ranges for the numbers at an end of theirs, as long as held-out records gain by it.
+    """The hypothesis with wider ranges for numbers at an end of theirs, as long as held-out errors fall.
 
-    Also the held-out rms of the widest that was tried in vain, None for none. Where only noise is left none is tried.
+    Also returns the held-out rms with the widest range tried in vain, None without one. If only noise remains, none is
+    tried.
     """
     for _ in range(acceptance.WIDENINGS):
         if is_noise(records.residual(now), records.noise):
@@ -683,8 +685,8 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
     """The latest step with a rival in place of its best, and the step that this makes possible; None to keep the best.
 
     Which of several alike effects is present shows with the next one: if nothing more qualifies after the accepted one,
-    or the remaining error is larger, or the same error takes more numbers, it was the wrong one. If the next effect is
-    itself a rival, `_exchanged` examines what else fits beside it.
+    or the remaining error is larger then, or the same error takes more numbers, it was the wrong one. If the next
+    effect is itself a rival, `_exchanged` examines what else fits beside it.
 
     If nothing more qualifies, the accepted effect may be the right one in a wrong shape: a simpler one that is about as
     good takes part of the place of the next effect, which then spoils the held-out records. `_exchanged` finds the
@@ -718,10 +720,10 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
 
 
 def _beside_another(latest: _Step, failed: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
-    """A step to another effect that the accepted one hides, and the step from there to that one; None without such.
+    """A step to another effect that the accepted one hides, and the step from there to the accepted one, or None.
 
-    An effect of many numbers also follows what another one does, such as a fast state of creep plays that relax. Beside
-    it the other has nothing left to explain, while it does not follow well enough by itself. The two are tried in the
+    An effect of many numbers also follows other effects, as a fast state of creep follows relaxing plays. In its
+    presence the other has nothing left to explain, although it follows the other only roughly. The two are tried in the
     other order if the accepted one leaves so much that a verdict would begin with it.
     """
     left = records.residual(failed.now)
@@ -747,7 +749,7 @@ def _hidden(now: Fitted, tried: Tried, records: Records) -> bool:
 
 
 def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step] | None:
-    """Two effects that hide each other: neither qualifies by itself, but each does beside the other.
+    """Two effects that hide each other: neither qualifies by itself, but each does with the other.
 
     Returns the first, and the step from it to both. The search begins with the effect that explains most on held-out
     records, and with each that is certain on fitted ones. Without the first, the other may leave less of the gap than
@@ -812,11 +814,11 @@ def _without_needless(
 def _exchanged(
     now: Fitted, found: list[Found], less: dict[str, Fitted], names: Collection[str], records: Records
 ) -> tuple[Fitted, list[Found]]:
-    """Replace earlier effects by others, or other shapes, that are better beside the later ones.
+    """Replace earlier effects by others, or other shapes, that are better with the later ones.
 
     The first of two was chosen while the second was missing, and may have taken part of its place; the second was
-    chosen beside a wrong first one. Rivals, too, are judged beside all the others. `less`: the model without an effect,
-    if known; `names`: effects that were among the best in some round, the only ones worth another search.
+    chosen next to a wrong first one. Rivals, too, are judged together with all the others. `less`: the model without an
+    effect, if known; `names`: effects that were among the best in some round, the only ones worth another search.
     """
     latest = found[-1].name
     for _ in range(acceptance.MOST_EXCHANGES):
@@ -824,7 +826,7 @@ def _exchanged(
             fitted = None if old.name == latest else less.get(old.name) or without_effect(now, old.name, records)
             if fitted is None:
                 continue
-            start = _without_refit(now, old.name, records)  # a refit without it could move the others' numbers far off
+            start = _without_refit(now, old.name, records)  # a refit without it could move the others' numbers far
             step = _step(fitted, 0.0, records, lambda option: option.name in names, start, acceptance.FIRST_REMOVES)
             if step is None or step.merit is None:
                 continue
@@ -848,10 +850,10 @@ def _exchanged(
 
 
 def _that_replaces(now: Fitted, name: str, step: _Step, records: Records) -> _Step | None:
-    """The step with the effect to which that of a name gives way, or None: its best, or one of fewer numbers, as good.
+    """The step with the effect that replaces the named one, or None: its best, or an equally good one of fewer numbers.
 
     The best of a step is chosen by errors that differ by a few per cent, which no records bear out near the noise. A
-    shape of the effect itself with as few numbers as another effect stands, unless that one leaves less.
+    shape of the effect itself is preferred to another effect of as many numbers, unless that leaves less.
     """
     every = [*records.to_fit, *records.held]
     fitted, found = now, None
@@ -874,10 +876,10 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
     """Whether an effect gives way to a better one: one with a smaller error, one with fewer numbers and no larger error
     on equal terms, or an equal one with an earlier `place`.
 
-    With no more numbers all records decide if they differ and held-out ones hardly do; between two effects with as many
-    numbers the order is that of `simplest_first`. Of two effects that the records do not separate the one with fewer
-    numbers stands, since more can follow another effect; of two shapes of one effect, whose name is no question, the
-    one with the smaller error.
+    With no more numbers, all records decide if they differ and held-out ones hardly do; between two effects of equally
+    many numbers, the order of `simplest_first` decides. Of two effects that the records do not separate the one with
+    fewer numbers stands, since more can follow another effect; of two shapes of one effect, whose name is no question,
+    the one with the smaller error.
     """
     held, residual = records.held, records.residual(now)
     fewer = free_numbers(now, held) - best.numbers(held)
@@ -900,7 +902,7 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
 def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
     """The effects with a rival in place of the latest and another shape of an earlier one, if that is better.
 
-    The shape of the earlier one was chosen while the latest was missing, and the latest beside that shape: where each
+    The shape of the earlier one was chosen while the latest was missing, and the latest next to that shape: where each
     holds the other in its place, no exchange of a single one finds the two that belong together.
     """
     others = {each.name: each for each in reversed(rivals(step.best, step.tried, records))}

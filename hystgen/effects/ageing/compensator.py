@@ -21,14 +21,14 @@ from hystgen.plays.slots import Counts, Reals, zero
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
 
 DECADES = 6
-"""[decades of the longest travel] What the table of a gain covers; beyond it the gain keeps its last value. A travel of
-a few moves over the range is then covered for a million of them, in 65 pieces (1560 bytes in float32) where the gain
-falls by 5 % per decade; each decade costs 11 pieces. Set by: benchmarks/chosen_numbers.py decades."""
+"""[decades of the longest travel] Range of a gain's table; beyond it the gain keeps its last value. A law with a travel
+of a few moves over the range is then covered for a million times as many, in 65 pieces (1560 bytes in float32) where
+the gain falls by 5 % per decade; each decade costs 11 pieces. Set by: benchmarks/chosen_numbers.py decades."""
 
 TABLE_ERROR = 1e-6
-"""[share of the output] A table differs from the gain by at most this, about the rounding of ten operations in float32.
-A piece of a logarithm of 5 % per decade then reaches 1.23 times as far as its begin: `0.05/2.3 * 6/384 * 0.23^4`. Set
-by: benchmarks/chosen_numbers.py decades."""
+"""[share of the output] Largest difference between a table and its gain, about the rounding of ten operations in
+float32. A piece of a logarithmic law of 5 % per decade then ends at 1.23 times its beginning: `0.05/2.3 * 6/384 *
+0.23^4`. Set by: benchmarks/chosen_numbers.py decades."""
 
 
 def gain(effect: Ageing, travelled: float) -> float:
@@ -52,9 +52,9 @@ def steepness(effect: Ageing, travelled: float) -> float:
 
 
 def pieces(effect: Ageing) -> Array:
-    """The gain as cubic pieces (m, 6): where each begins, 1 over its length, and the coefficients of the share of it.
+    """The gain as cubic pieces (m, 6): the beginning of each, 1 over its length, and coefficients in the share passed.
 
-    A piece has the gain's values and slopes at its ends, and is as long as TABLE_ERROR lets it.
+    A piece matches the gain's values and slopes at its ends, and is as long as TABLE_ERROR allows.
     """
     several = isinstance(effect, SeveralAgeing)
     travels = effect.travels if several else (effect.travel,)  # type: ignore[union-attr]
@@ -81,7 +81,7 @@ def _piece(effect: Ageing, at: float, length: float) -> tuple[float, ...]:
 
 
 def _error(effect: Ageing, row: tuple[float, ...]) -> float:
-    """Largest difference at places inside a piece."""
+    """Largest difference from the gain at points inside a piece."""
     at, inverse, *c = row
     shares = np.linspace(0.0, 1.0, 17)[1:-1]
     curve = ((c[3] * shares + c[2]) * shares + c[1]) * shares + c[0]
@@ -105,12 +105,12 @@ def problems(effect: Ageing, span: float) -> Iterator[str]:
 
 @dataclass(frozen=True)
 class Aged(One):
-    """The block of an effect."""
+    """The block of an ageing effect."""
 
     effect: Ageing
 
     def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
-        """It as a gain; the C takes the gain at the travel one sample before, from a table."""
+        """Properties of the gain; the C reads the gain at the travel one sample earlier, from a table."""
         late = most_at_once(self.effect, speed.step) + TABLE_ERROR if emitted else 0.0
         return Gained(1.0, LEAST_GAIN, LARGEST_GAIN, TABLE_ERROR * output * emitted, late * output)
 
@@ -119,7 +119,7 @@ class Aged(One):
         return size * LARGEST_GAIN
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
-        """Largest input that it is solved for, by outputs within a size."""
+        """Largest input that the inverse gives for outputs within `asked`."""
         return asked / LEAST_GAIN
 
 
@@ -144,7 +144,7 @@ KIND = Kind(
 
 
 class AgeingTables(NamedTuple):
-    """All ageing of a model: `piece` (m, 6), those of each from `first` (k + 1) on; `number` (k, 5); `turns` (k,)."""
+    """All ageing of a model: `piece` (m, 6), each block's from `first` (k + 1) on; `number` (k, 5); `turns` (k,)."""
 
     first: Counts
     piece: Reals
@@ -219,7 +219,7 @@ def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> b
 
 @jit
 def ageing_reset(t: AgeingTables, s: AgeingState, j: int) -> None:
-    """As in the parameter file: nothing has been travelled."""
+    """Return to the state of the parameter file: nothing has been travelled."""
     ageing_set_travel(t, s, j, zero(t.number[j, LAST]))
 
 
@@ -265,13 +265,13 @@ def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) ->
 
 
 @jit(inline=True)
-def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return y * s.block[j, INVERSE]
 
 
 @jit(inline=True)
-def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
     return s.block[j, GAIN] * x
 

@@ -30,14 +30,14 @@ from hystgen.effects.thermal.fixed import GAIN_BITS, LARGEST, LEAST, ONE, RECIPR
 from hystgen.plays.slots import zero
 
 SHARE_BITS = 20
-"""Fraction bits of the share of a piece: a gain changes along one by a hundredth, so that it has 27."""
+"""Fraction bits of the share of a piece; the gain changes by a hundredth along a piece, so it gets 27."""
 
 CUBIC_ERROR = 8.0 * 2.0**-GAIN_BITS
-"""[share of what passes] Error of a gain from a piece of a cubic: four coefficients and products, and a share that is
-rounded to 20 bits, where the gain changes by a hundredth."""
+"""[share of the signal] Error of a gain from a cubic piece: four coefficients and products, and a share rounded to 20
+bits while the gain changes by a hundredth."""
 
 LONGEST = 2**61
-"""Drive codes that a travel is counted to at most, 5e8 times a range in q31; beyond, the gain keeps its last value."""
+"""Most drive codes that a travel counts, 5e8 times a range in q31; beyond, the gain keeps its last value."""
 
 
 KIND = Kind(
@@ -54,9 +54,9 @@ def constants(t: AgeingTables) -> Iterator[Constants]:
 
 
 def tables(rows: Sequence[tuple[Array, int]], lsb: float, bits: int) -> AgeingTables:
-    """Pieces of the gain and Newton steps of each ageing, for drive codes of `lsb`.
+    """Pieces of the gain and Newton steps of each ageing effect, for drive codes of `lsb`.
 
-    `bits`: of a gain below a code that sets it. Raises OverflowError.
+    `bits`: how many bits a gain has below the code that sets it. Raises OverflowError.
     """
     piece: list[list[int]] = []
     number: list[list[int]] = []
@@ -84,14 +84,14 @@ def tables(rows: Sequence[tuple[Array, int]], lsb: float, bits: int) -> AgeingTa
 
 @dataclass(frozen=True)
 class AgeingFormats(Coded):
-    """A block: pieces of the gain, and Newton steps."""
+    """An ageing block with its pieces of the gain and Newton steps."""
 
     one: Aged
     pieces: Array
     turns: int
 
     def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
-        """It as a gain, for inputs within a size."""
+        """The gain's properties, for inputs within a size."""
         begun = 0.5 * at.drive_lsb * abs(floating.steepness(self.one.effect, 0.0))  # pieces begin at whole codes
         wrong = floating.TABLE_ERROR + begun + CUBIC_ERROR
         late = floating.most_at_once(self.one.effect, speed.step) + wrong / LEAST_GAIN + RECIPROCAL_ERROR
@@ -105,7 +105,7 @@ def formats(one: Aged, about: FixedSurroundings, *_: float) -> AgeingFormats:
 
 
 def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> AgeingTables:
-    """As `tables`."""
+    """The tables of several blocks, by `tables`."""
     rows = [(each.pieces, each.turns) for each in blocks]
     return tables(rows, float(about.drive_lsb), GAIN_BITS - (about.code_bits - 2))
 
@@ -153,7 +153,7 @@ def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> b
 
 @jit
 def ageing_reset(t: AgeingTables, s: AgeingState, j: int) -> None:
-    """As in the parameter file: nothing has been travelled."""
+    """Return to the state of the parameter file: nothing has been travelled."""
     ageing_set_travel(t, s, j, zero(t.number[j, LAST]))
 
 
@@ -187,13 +187,13 @@ def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) ->
 
 
 @jit
-def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return times(y, s.block[j, INVERSE], GAIN_BITS)
 
 
 @jit
-def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
     return times(x, s.block[j, GAIN], GAIN_BITS)
 

@@ -30,7 +30,7 @@ class _Ageing(Effect):
 
     @classmethod
     def _candidate(cls, label: str, about: About) -> Candidate:
-        """A loss; a stage that gains over its travel does so for another reason, such as the room's temperature."""
+        """A loss only: a stage that gains over its travel has another reason to, such as the room's temperature."""
         total = max(about.travel, 1e-12)
 
         def build(x: Array) -> Effect:
@@ -87,7 +87,7 @@ class ExponentialAgeing(_Ageing):
 
 
 class SeveralAgeing(_Ageing):
-    """Gain `1 - sum loss_i (1 - exp(-D/travel_i))`: losses that end at several distances, wear of different speeds.
+    """Gain `1 - sum loss_i (1 - exp(-D/travel_i))`: losses that end at several distances, wear at different speeds.
 
     With two of them it can follow laws between the exponential and the logarithmic one, which spread over decades of
     travel.

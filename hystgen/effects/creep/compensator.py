@@ -1,4 +1,4 @@
-"""Creep as a block: exactly invertible, since a state answers a move at once by a known share."""
+"""Creep as a block: exactly invertible, since each state follows a move at once by a known share."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ RATE, EARLY, LATE, WEIGHT = 0, 1, 2, 3
 @dataclass(frozen=True)
 class CreepNumbers(One):
     """Constants of a block `y_k = d h_k + sum X_i`, `X_i <- E_i X_i + c_i (b0_i h_(k-1) + b1_i h_k)` at even steps, in
-    double precision: d is the share of a step that arrives at once, c_i >= 0 the weights. `terms` (m, 4): of each state
-    1 - E, c b0, c b1, c.
+    double precision: d is the share of a step that arrives at once, c_i >= 0 the weights. `terms` (m, 4): 1 - E, c b0,
+    c b1, c of each state.
 
     Solved, `h_k = (y_k - sum (E_i X_i + c_i b0_i h_(k-1)))/(d + sum c_i b1_i)`: for d > 0 the inverse is stable
     whatever the time constants are, since the response is strictly positive real.
@@ -58,7 +58,7 @@ class CreepNumbers(One):
 
     @property
     def remembers(self) -> bool:
-        """Whether it has states that see what it gets."""
+        """Whether it has states that follow its input."""
         return True
 
     @property
@@ -69,22 +69,22 @@ class CreepNumbers(One):
         return 1.0 / around if around > 0.0 else 2.0 / self.slope - 1.0 / self.rest
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output for inputs within `size`, and of the inverse as such."""
+        """Roundings of the output for inputs within `size`, and of the inverse itself."""
         rate, weight = self.terms[:, RATE], self.terms[:, WEIGHT]
         states = (16.0 + len(self.terms)) * float(np.sum(weight)) + u * float(np.sum(weight / rate))
         found = u * size * (states + 4.0 * self.rest)
         return found, found
 
     def solved(self, error: float, size: float, u: float, same: bool) -> float:
-        """Error of the input that it is solved for, by one of the output; `same`: its states have seen the same."""
+        """Error of the inverse for an error of the output; `same`: the states have seen the same inputs."""
         return (1.0 / self.slope if same else self.backward) * (error + self.rounding(size, u)[1])
 
     def seen(self) -> float:
-        """Factor by which states that see its input multiply an error of that."""
+        """Factor by which states that follow the input multiply an error of the input."""
         return self.slope * self.backward
 
     def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
-        """What it makes of frequencies, behind other blocks."""
+        """The responses with this block added behind the others."""
         rate, early, late, _ = self.terms.T[:, :, None]
         states = np.sum((early * z + late) / (1.0 - (1.0 - rate) * z), axis=0)
         passed = found.passed * (self.slope - float(np.sum(late)) + states)
@@ -95,7 +95,7 @@ class CreepNumbers(One):
         return size * self.rest * margin.slack + 1.0
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
-        """Largest input that it is solved for, by outputs within a size and after inputs `given`."""
+        """Largest input that the inverse gives, for outputs within `asked` and after inputs within `given`."""
         moved = given + (asked + given * self.rest) / self.slope
         return max(moved, asked / self.rest) * margin.slack + 1.0
 
@@ -116,8 +116,8 @@ def numbers(effect: ExponentialCreep | LogarithmicCreep, seconds: float) -> Cree
 def shares(terms: Array) -> Array:
     """Constants (m, 2) of the states in floating point: 1 - E, and `k = c (1 - b1)`.
 
-    What a state adds to the next output for an input of 0 there, `A = E X + c b0 h`, follows `A += (1 - E)(k h - A)`,
-    since `b0 + b1 = 1 - E`.
+    A state's share of the next output at an input of 0, `A = E X + c b0 h`, follows `A += (1 - E)(k h - A)`, since `b0
+    + b1 = 1 - E`.
     """
     return np.column_stack([terms[:, RATE], terms[:, WEIGHT] - terms[:, LATE]])
 
@@ -137,8 +137,8 @@ KIND = Kind(
 
 
 class CreepTables(NamedTuple):
-    """All creep blocks of a model: `block` (k, 4), the states of each from `first` (k + 1) on in `term` (m, 2),
-    in fixed point more of either."""
+    """All creep blocks of a model: `block` (k, 4), the states of each from `first` (k + 1) on in `term` (m, 2); both
+    have more columns in fixed point."""
 
     block: Reals
     first: Counts
@@ -146,7 +146,7 @@ class CreepTables(NamedTuple):
 
 
 def tables(blocks: Sequence[CreepNumbers], reals: Callable[[Any, str], Any]) -> CreepTables:
-    """The tables of several blocks in floating point; `reals`: numbers, with a name, as those of the arithmetic."""
+    """The tables of several blocks in floating point; `reals`: converts named numbers to the arithmetic."""
     rows = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in blocks]
     return CreepTables(
         reals(rows, "constants of the creep").reshape(len(rows), 4),
@@ -163,8 +163,8 @@ def constants(t: CreepTables) -> Iterator[Constants]:
 
 
 class CreepState(NamedTuple):
-    """`block` (k, 2): the output at the next sample for an input of 0, or in fixed point for the same input as at the
-    last one, which is the second column; `state` (m, 2): in two parts."""
+    """`block` (k, 2): the output at the next sample for an input of 0, or in fixed point for an unchanged input, and
+    that input; `state` (m, 2): in two parts."""
 
     block: Reals
     state: Reals
@@ -189,7 +189,7 @@ def creep_rest(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
 
 
 @jit(inline=True)
-def creep_resting(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+def creep_resting(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y once everything has settled."""
     return y * t.block[j, INVERSE_REST]
 
@@ -225,7 +225,7 @@ ARITHMETIC = Realized(
 
 
 class UnevenCreep(Block):
-    """Creep in double precision at steps of any length, by these functions."""
+    """Creep in double precision at steps of any length, by the functions above."""
 
     def __init__(self, effect: ExponentialCreep | LogarithmicCreep) -> None:
         self._numbers = functools.lru_cache(maxsize=64)(functools.partial(numbers, effect))
@@ -234,8 +234,8 @@ class UnevenCreep(Block):
         self.state = memory(self.table, np.float64)
 
     def _of_steps(self, seconds: float, later: float) -> CreepTables:
-        """As `tables`, with the states on their way to the next output, by the E and b0 of the next step; an input has
-        the share `(E b1 + b0)/(1 - E)` in it, with the b1 of this one."""
+        """The `tables` of a step, whose states are advanced to the next output by the E and b0 of the next step; they
+        see a share `(E b1 + b0)/(1 - E)` of an input, with the b1 of this step."""
         now, following = self._numbers(seconds), self._numbers(later)
         rate, late = following.terms[:, RATE], now.terms[:, LATE] - following.terms[:, LATE]
         found = tables([now], lambda values, _: np.array(values))
@@ -248,7 +248,7 @@ class UnevenCreep(Block):
         self.table = self._tables(seconds, later or seconds)
 
     def call(self, verb: str, x: float) -> float:
-        """What a function makes of x."""
+        """The result of a verb for x."""
         return float(FUNCTIONS[verb](self.table, self.state, 0, x))
 
 

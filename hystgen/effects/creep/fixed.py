@@ -1,8 +1,8 @@
-"""Creep as a block in fixed point: states of 64 bits that hold what the next sample gives for an unchanged input.
+"""Creep as a block in fixed point: 64-bit states that predict the next sample for an unchanged input.
 
 With `A` the prediction, `X = A + c b1 (x - before)` and `A <- X + (1 - E)(c x - X)`, the same recursion as in floating
-point. At rest every state is `c x` whatever its rate is, and it approaches that by a real positive pole, so that what
-rounding leaves is a dead band, and no cycle.
+point. At rest every state is `c x` whatever its rate is, and it approaches that by a real positive pole, so that
+rounding leaves a dead band but no limit cycle.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
     """Bits of the states below a signal's, and those dropped before a product, for inputs up to `size`.
 
     `code`: bits of a signal below an output code. Raises OverflowError where the slowest state would stall more than a
-    quarter of a code from where it goes.
+    quarter of a code from its target.
     """
     slowest = float(np.min(effect.terms[:, 0]))
     states = max(float(np.sum(effect.terms[:, 3])) * size, 1.0)
@@ -74,7 +74,7 @@ class CreepFormats(Coded):
         return found + missed(self.direct) * size + signal
 
     def solved(self, error: float, at: Sought) -> float:
-        """Error of the input that it is solved for, by one of the output."""
+        """Error of the inverse for an error of the output."""
         one = self.one
         moved = at.asked + at.size * one.rest
         own = one.slope * (missed(1.0 / one.slope) * moved + 0.5 * at.signal)
@@ -83,7 +83,7 @@ class CreepFormats(Coded):
         return gain * (error + self.there(at.size, at.signal) + own + states)
 
     def residual(self, missed: float, same: bool) -> float:
-        """The error of an output that the inverse makes of one of the sum of the plays."""
+        """Error of the output after the inverse, for an error of the play sum."""
         return missed * (self.one.slope * (1.0 / self.one.slope if same else self.one.backward))
 
 
@@ -129,7 +129,7 @@ def creep_rest(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
 
 
 @jit
-def creep_resting(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+def creep_resting(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y once everything has settled."""
     return times(y, t.block[j, INVERSE_REST], t.block[j, INVERSE_REST + 1])
 

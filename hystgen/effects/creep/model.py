@@ -25,12 +25,12 @@ half the first, one gets no name and two are 3 and 7 % worse; with half the seco
 changes none by 2 %."""
 
 SHORTER = 1.0
-"""[decades] A search for the ends of a logarithmic spectrum begins this far inside those of the recorded times. Set by:
-the same plants; half improves one by 2 %, twice changes none."""
+"""[decades] A search for the ends of a logarithmic spectrum begins this far inside the range of the recorded times. Set
+by: the same plants; half improves one by 2 %, twice changes none."""
 
 SHORTEST = 0.3
-"""[decades] Least width of such a spectrum: a factor of two, less than one of its states represents. That of the
-recorded times (`span`) is never less."""
+"""[decades] Least width of such a spectrum: a factor of two, less than one of its states represents. Recorded times
+(`span`) are never narrower."""
 
 LOGARITHMIC = "creep, logarithmic"
 
@@ -46,7 +46,7 @@ def creep(
     """Add the first-order filters of every column of `u` (N, R), each times its weight, to `total`.
 
     `step` (N - 1): the row of `decay`, `early` and `late` (., T) that applies; `states` (T, R): where the filters
-    begin. Several columns side by side, or all filters of one column, since each alone waits for its own previous
+    begin. Several columns, or all filters of one column, run side by side, since each alone waits for its own previous
     sample.
     """
     taus, rows = states.shape
@@ -162,10 +162,10 @@ class ExponentialCreep(_Creep):
 class LogarithmicCreep(_Creep):
     """Creep along log t: after a step of the play sum `y = h (1 + g log10(t/t_0))` for t between t_min and t_max.
 
-    The law is that of the piezo literature (Jung, Shim, Gweon: New open-loop actuating method of piezoelectric
-    actuators for removing hysteresis and creep, Rev. Sci. Instrum. 71, 2000); it is realised by states with equal
-    weights and time constants spread evenly over log t from t_min to t_max, and a gain with which a step has its full
-    height at t_0.
+    The law is from the piezo literature (Jung, Shim, Gweon: New open-loop actuating method of piezoelectric actuators
+    for removing hysteresis and creep, Rev. Sci. Instrum. 71, 2000); it is realised by states with equal weights and
+    time constants spread evenly over log t from t_min to t_max, and a gain with which a step has its full height at
+    t_0.
     """
 
     shape: Literal["logarithmic"] = Field(description="a spectrum of states, even over log t")
@@ -177,7 +177,7 @@ class LogarithmicCreep(_Creep):
     settled: ClassVar[tuple[str, ...]] = ("t0", "t_min", "t_max")
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """t_min < t_max, and no more decades than there may be states for."""
+        """t_min < t_max, at most 12 decades apart."""
         if not self.t_min < self.t_max:
             yield ("t_max",), f"{self.t_max!r} is not above t_min = {self.t_min!r}; give seconds, t_min < t_max"
         elif self.t_max > 1e12 * self.t_min:
@@ -211,7 +211,7 @@ class LogarithmicCreep(_Creep):
         return _fading(run, self.spectrum()[0][::PER_DECADE])
 
     def largest(self, run: Run) -> Array:
-        """Each represents the states of a decade, which lag behind the play sum by its span at most."""
+        """Each represents the states of a decade, which lag behind the play sum by at most its span."""
         tau, weight = self.spectrum()
         return np.full(len(tau[::PER_DECADE]), PER_DECADE * weight)
 

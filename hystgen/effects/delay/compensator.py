@@ -18,19 +18,19 @@ from hystgen.effects.part import ChainPart, Function, One, Realized, Surrounding
 from hystgen.plays.slots import Counts, Reals
 
 MOST_SAMPLES = 2**15
-"""Samples that a drive may wait: what a counter of 16 bits addresses, and more memory than small cores have."""
+"""Most samples that a drive may wait: within a 16-bit counter, and more memory than small cores have."""
 
 
 class DelayTables(NamedTuple):
-    """`share`: of the step after the oldest sample, the part that is over, (1,), in fixed point a factor (2,);
-    `samples` that wait, 0 without a delay."""
+    """`share` (1,): how much of the step after the oldest sample is over; in fixed point a factor (2,); `samples`: how
+    many wait, 0 without a delay."""
 
     share: Reals
     samples: int
 
 
 class Waiting(NamedTuple):
-    """The samples that wait (n,), and the place of the oldest one (1,)."""
+    """The samples that wait (n,), and the index of the oldest one (1,)."""
 
     sample: Reals
     oldest: Counts
@@ -67,7 +67,7 @@ def delay_rest(line: Waiting, v: Any) -> None:
 
 @jit
 def delay_next(line: Waiting) -> Any:
-    """The place after that of the oldest sample."""
+    """The index after the oldest sample's."""
     following = line.oldest[0] + 1
     return following if following < len(line.sample) else 0
 
@@ -99,17 +99,17 @@ def memory(t: DelayTables, dtype: Any) -> Waiting:
 
 
 def verbs(delayed: Function) -> Verbs:
-    """What a delay does in an arithmetic, by the function of this name."""
+    """The verbs of a delay in one arithmetic, from its function `delayed`."""
 
     @jit
-    def rest(t: DelayTables, line: Waiting, j: int, v: Any) -> Any:  # noqa: ARG001  as of every block
-        """The drive has always been v. Returns the one that leaves the delay."""
+    def rest(t: DelayTables, line: Waiting, j: int, v: Any) -> Any:  # noqa: ARG001  block interface
+        """The drive has always been v. Returns the delayed drive."""
         delay_rest(line, v)
         return delayed(t, line)
 
     @jit
-    def absorb(t: DelayTables, line: Waiting, j: int, v: Any) -> Any:  # noqa: ARG001  as of every block
-        """The drive is v at this sample. Returns the one that leaves the delay."""
+    def absorb(t: DelayTables, line: Waiting, j: int, v: Any) -> Any:  # noqa: ARG001  block interface
+        """The drive is v at this sample. Returns the delayed drive."""
         delay_put(line, v)
         return delayed(t, line)
 
@@ -117,7 +117,7 @@ def verbs(delayed: Function) -> Verbs:
 
 
 def tables(waits: Sequence[Wait], about: Surroundings, share: Callable[[float], Any]) -> DelayTables:
-    """The tables of all delays of a model, which follow one another; `share`: that of an arithmetic."""
+    """The tables of a model's delays, which add up to one; `share`: converts a share to the arithmetic."""
     waited, waiting = numbers(math.fsum(one.time for one in waits), about.seconds)
     return DelayTables(share(waited) if waiting else share(0.0)[:0], waiting)
 
@@ -135,4 +135,4 @@ DELAY = ChainPart(
     "wait", "a delay", called("delay", lambda effect: effect.time > 0.0),
     lambda effect, *_: Wait(effect.time), ARITHMETIC, lambda: FIXED_ARITHMETIC, forward=True, joined=True,
 )
-"""A delay as a part of the chain: what the amplifier of the forward operator gets of the drive."""
+"""A delay as a part of the chain: the drive as the amplifier of the forward operator receives it."""

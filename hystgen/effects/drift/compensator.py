@@ -1,4 +1,4 @@
-"""Drift from a clock of the compensator's own: samples since it was set, counted exactly."""
+"""Drift from the compensator's own clock: samples since it was set, counted exactly."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def numbers(effect: LinearDrift | CurvedDrift, seconds: float, farthest: float, 
 
 
 def constants(t: Reals) -> list[Constants]:
-    """The numbers of the clock of a model, of tables (k, 8)."""
+    """The numbers of a model's clock, from tables (k, 8)."""
     return [Constants(KIND, row[:ONE], (5, 0)) for row in t]
 
 
@@ -44,14 +44,14 @@ def memory(t: Reals, dtype: Any) -> Reals:
 
 
 @jit
-def clock_start(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  as of every block
+def clock_start(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  block interface
     """Start the clock at the drive absorbed last."""
     s[j, HIGH] = zero(s[j, HIGH])
     s[j, LOW] = zero(s[j, LOW])
 
 
 @jit
-def clock_tick(t: Reals, s: Reals, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  as of every block
+def clock_tick(t: Reals, s: Reals, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  block interface
     """One sample later."""
     following = s[j, LOW] + t[j, ONE]
     if following >= t[j, CARRY]:
@@ -74,7 +74,7 @@ def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
 
 
 def verbs(memory: Function, start: Function, tick: Function, drift: Function, one: int, most: int) -> Verbs:
-    """What a clock does, by its functions in an arithmetic and the places of 1 and of the farthest lead in tables."""
+    """The verbs of a clock from its functions in an arithmetic; `one`, `most`: columns of 1 and the farthest lead."""
 
     @jit
     def added(t: Reals, s: Reals, j: int) -> Any:
@@ -83,7 +83,7 @@ def verbs(memory: Function, start: Function, tick: Function, drift: Function, on
 
     @jit
     def lead(t: Reals, s: Reals, j: int, filled: int) -> None:
-        """A reference has come: the next one lies one sample further ahead, up to the preview."""
+        """A reference has arrived: the next one lies one sample further ahead, up to the preview."""
         following = t[j, one]
         if filled:
             following = following + s[j, LEAD]
@@ -112,4 +112,4 @@ CLOCK = ChainPart(
     ARITHMETIC, late("drift"),
     kinds=(KIND,),
 )
-"""Drift as a part of the chain: what a clock adds to the displacement."""
+"""Drift as a part of the chain: a clock's contribution to the displacement."""

@@ -1,7 +1,7 @@
-"""Drift from a clock of the compensator's own, in fixed point: summed sample by sample, without rounding.
+"""Drift from the compensator's own clock in fixed point: summed sample by sample, without rounding.
 
-Its change in a sample, and what that changes by, are constants of 60 bits below a signal; the sum is kept as whole
-signals and the part of one. The clock stops where the drift has left what an offset may be, for good.
+The change per sample, and the change of that, are constants with 60 bits below a signal; the sum is kept as whole
+signals and a fraction. The clock stops once the drift has left the range of offsets for good.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from hystgen.effects.part import FixedSurroundings, Realized
 from hystgen.plays.slots import Reals, zero
 
 MOST_SAMPLES = 2**44
-"""Samples that are counted: half a year at 1 MHz. A drift that has gone nowhere by then stays where it is."""
+"""Most samples that are counted: half a year at 1 MHz. A drift still in range by then stays where it is."""
 
 STATE_BITS = 58
-"""Bits of a change in a sample, without its sign: some of them in a row are summed with references ahead of time."""
+"""Bits of a change per sample, without its sign: references ahead of time sum several of them."""
 
 KIND = Kind("clock", own=(), letters="wwwwb", memory="wwwww")
 
@@ -34,7 +34,7 @@ WHOLE, PART, GAINED, COUNT = 0, 1, 3, 4
 
 @dataclass(frozen=True)
 class ClockNumbers:
-    """The table (7,) of a clock, and by how many signals its drift may be wrong."""
+    """The table (7,) of a clock, and the largest error of its drift in signals."""
 
     table: list[int]
     error: float
@@ -44,7 +44,7 @@ def numbers(
     effect: LinearDrift | CurvedDrift, step: float, signal: Fraction, farthest: float, ahead: int
 ) -> ClockNumbers:
     """The constants for samples `step` seconds apart, signals of `signal` output units, and a drift of `farthest`
-    signals either way. Raises OverflowError if the drift needs larger numbers than there are before it stays beyond."""
+    signals either way. Raises OverflowError if the drift does not fit the numbers before it stays beyond that."""
     rate, change = (Fraction(x) for x in (effect.rate, getattr(effect, "change", 0.0)))
     own = Fraction(step)
     twice = change * own * own / signal
@@ -82,7 +82,7 @@ def _samples(slope: float, twice: float, farthest: float) -> int:
 
 
 def constants(t: Reals) -> list[Constants]:
-    """The numbers of the clock of a model, of tables (k, 7)."""
+    """The numbers of a model's clock, from tables (k, 7)."""
     return [Constants(KIND, row[:ONE], (3, 0)) for row in t]
 
 
@@ -95,7 +95,7 @@ def memory(t: Reals, dtype: Any) -> Reals:
 
 
 @jit
-def clock_start(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  as of every block
+def clock_start(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  block interface
     """Start the clock at the drive absorbed last."""
     s[j, WHOLE] = zero(s[j, WHOLE])
     s[j, PART] = s[j, WHOLE]
@@ -104,7 +104,7 @@ def clock_start(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  as of ever
 
 
 @jit
-def clock_tick(t: Reals, s: Reals, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  as of every block
+def clock_tick(t: Reals, s: Reals, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  block interface
     """One sample later."""
     if s[j, COUNT] >= t[j, SAMPLES]:
         return

@@ -23,7 +23,7 @@ class _Drift(Effect):
     )
 
     def time_scale(self, drive_range: float) -> float:
-        """It never ends."""
+        """Infinite: drift never ends."""
         return math.inf
 
 

@@ -19,17 +19,17 @@ from hystgen.effects.part import ChainPart, Led, Margin, One, Realized, Response
 from hystgen.plays.slots import Counts, Reals, zero
 
 LONG_STEP = 2.0
-"""[time constants in a step] From here on the lag is inverted exactly. The pole of that inverse is then above -0.53, so
-that what it does to one sample falls to 1 % in seven; its gain from reference to drive is 4.2 where the lead has 2.2,
-and with steps half as long it would be 13. The lead leaves 0.3 % of a sine of 40 steps. Set by:
+"""[time constants in a step] From this step on the lag is inverted exactly. The pole of that inverse is then above
+-0.53, so the response to one sample falls to 1 % in seven; its gain from reference to drive is 4.2, against 2.2 for the
+lead, and would be 13 with steps half as long. The lead leaves 0.3 % of a sine of 40 steps. Set by:
 benchmarks/chosen_numbers.py lag."""
 
 
 MOST_LED = 2.0
 """[times the move before] Largest move of a target that is led in full in front of two branches, so that a step is not
-led beyond its end, from where there is no way back but a turn. A step of 0.2 um out of a slow ramp goes 0.002 um beyond
-its end, without a limit 0.1. A sine of 100 samples from rest is missed by 0.0032 um rms with 2 and with any more, by
-0.0045 with 1. Set by: benchmarks/chosen_numbers.py branches."""
+led beyond its end, from which only a turn leads back. A step of 0.2 um out of a slow ramp overshoots by 0.002 um,
+without the limit by 0.1. The error on a sine of 100 samples from rest is 0.0032 um rms with 2 or more, 0.0045 with 1.
+Set by: benchmarks/chosen_numbers.py branches."""
 
 
 @dataclass(frozen=True)
@@ -47,16 +47,16 @@ class LagNumbers(One):
 
     @property
     def room(self) -> float:
-        """The same, for results on the way."""
+        """The same gain, for intermediate results."""
         return 2.0 / self.row[LATE if self.exact else RATE]
 
     @property
     def misses(self) -> bool:
-        """Whether what arrives differs from what it was solved for."""
+        """Whether the output differs from the one solved for."""
         return not self.exact
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
-        """Roundings of the output for inputs within `size`; those of the inverse are in `led`."""
+        """Roundings of the output for inputs within `size`; `led` has the inverse's."""
         return u * size * (8.0 + u / self.row[RATE]), 0.0
 
     def led(self, error: float, drive: float, u: float, same: bool, turning: bool) -> float:
@@ -75,7 +75,7 @@ class LagNumbers(One):
         return (goal + states) * (1.0 if same else 2.0 - rate) / rate + u * drive * (2.0 + 6.0 / rate)
 
     def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
-        """What it makes of frequencies, behind other blocks."""
+        """The responses with this lag added to the other blocks."""
         rate, second, late, _ = self.row
         if self.exact:
             return found._replace(led=found.led * (1.0 - (1.0 - rate) * z) / (late + second * z))
@@ -84,15 +84,15 @@ class LagNumbers(One):
 
     @property
     def fineness(self) -> float:
-        """Bits that its lead takes from a signal in front of the plays, 0 for none."""
+        """Bits of a signal in front of the plays that its lead costs, 0 for none."""
         return 0.0 if self.exact else math.log2(4.0 / self.row[RATE])
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
-        """Largest input that it is solved for, by outputs within a size and after inputs `given`."""
+        """Largest input that the inverse gives, for outputs within `asked` and after inputs within `given`."""
         return self.sizes(given, asked, margin.turning).answer
 
     def sizes(self, given: float, asked: float, turning: bool) -> LagSizes:
-        """Those of its signals."""
+        """Sizes of its signals."""
         return LagSizes(self.exact, self.row[RATE], self.row[LATE], given, asked, turning)
 
 
@@ -117,13 +117,12 @@ class LagSizes:
 def numbers(effect: Lag, seconds: float, turning: bool = False, exact: bool | None = None) -> LagNumbers:
     """The constants of a lag at steps of `seconds`.
 
-    `turning`: what follows differs with the direction in which the lag arrives, so that it is led in any case; `exact`:
-    as asked for.
+    `turning`: blocks behind the lag depend on its direction of arrival, so it is always led; `exact`: overrides this.
 
-    Of `a_k = E a_(k-1) + b0 v_(k-1) + b1 v_k`, for steps T well below tau, the inverse is a pole near -1, which rings.
+    For steps T well below tau, the inverse of `a_k = E a_(k-1) + b0 v_(k-1) + b1 v_k` has a pole near -1 and rings.
     With `theta = b0/(1 - E)` and `x_k = E x_(k-1) + (1 - E) v_k`, which is exactly invertible, `a_k = (1 - theta) x_k +
     theta x_(k-1)` for even steps: x is led to `a + theta (a - a_before)`. What remains is `theta^2` times the second
-    difference of the wanted a. For T >= 2 tau the pole fades within a few samples, and the inverse is the exact one.
+    difference of the wanted a. For T >= 2 tau the pole fades within a few samples, and the exact inverse is used.
     """
     if exact is None:
         exact = seconds >= LONG_STEP * effect.time_constant and not turning
@@ -133,10 +132,11 @@ def numbers(effect: Lag, seconds: float, turning: bool = False, exact: bool | No
 
 
 def shifted(theta: float, turning: bool = False) -> float:
-    """Largest error of what a lag is led to, for errors up to 1 of what is asked, if it has seen the same drives.
+    """Largest error of a lag's goal, for errors up to 1 of the output asked for, if it has seen the same drives.
 
-    The target before is what its drive led to: it keeps `W = theta^2 + theta (1 - theta) W` of the errors before. In
-    front of two branches (`turning`) the move that is led is off by what two targets are, or `MOST_LED` times that.
+    The previous target follows from the drive that led to it: it keeps `W = theta^2 + theta (1 - theta) W` of earlier
+    errors. In front of two branches (`turning`) the led move is off by the errors of two targets, or `MOST_LED` times
+    those.
     """
     if turning:
         return 1.0 + 2.0 * MOST_LED * theta
@@ -151,8 +151,8 @@ HIGH, LOW, WANTED, ASKED, ANSWER, EARLIER = range(6)
 REACHED, BEFORE = HIGH, LOW
 
 HALVES = 16
-"""[steps] Halvings of the search for a lead. They end at most 2^-16 of it below, which costs less than 2e-5 of the way
-and never overshoots; the tests of overshoot hold it."""
+"""[steps] Halvings of the search for a lead. They end at most 2^-16 of the lead below it, which costs less than 2e-5 of
+the way and never overshoots; the tests of overshoot check that."""
 
 
 KIND = Kind(
@@ -178,7 +178,7 @@ class LagTables(NamedTuple):
 
 
 def tables(lags: Sequence[LagNumbers], reals: Callable[[Any, str], Any], braked: int = 0) -> LagTables:
-    """The tables of several lags in floating point; `reals`: numbers, with a name, as those of the arithmetic."""
+    """The tables of several lags in floating point; `reals`: converts named numbers to the arithmetic."""
     return LagTables(
         np.array([int(one.exact) for one in lags], dtype=np.int64),
         reals([one.row for one in lags], "constants of the lag").reshape(len(lags), 4),
@@ -246,13 +246,13 @@ def lag_absorb(t: LagTables, s: Reals, j: int, x: Any) -> Any:
 
 @jit
 def steady_missed(t: LagTables, way: Any) -> Any:
-    """What the only lag of a model misses of a way in its first sample."""
+    """How far a model's only lag falls short of a move in its first sample."""
     return t.block[0, THETA] * way
 
 
 @jit
 def steady_led(way: Any, moved: Any) -> Any:
-    """The part of a target's move that is led, `MOST_LED` times the one before at most."""
+    """The led part of a target's move, at most `MOST_LED` times the move before."""
     most = moved + moved
     least = most - most
     if most < 0:
@@ -264,9 +264,9 @@ def steady_led(way: Any, moved: Any) -> Any:
 def steady_solve(
     t: LagTables, s: Reals, y: Any, moved: Any, rises: int, applied: Any, little: Any
 ) -> tuple[Any, Any]:
-    """The input that leads the only lag of a model to the output y without taking it back from the direction `rises`,
-    and the way there from the output asked for before, to which it had `moved`. A brake sees the part of that way which
-    is led, and what the input before was short of."""
+    """The input that leads a model's only lag to the output y without turning it back from the direction `rises`, and
+    the move to y from the output asked for before, to which it had `moved`. A brake sees only the led part of the move,
+    and the previous input's shortfall."""
     way = y - s[0, ASKED]
     missed = s[0, EARLIER] - s[0, WANTED]
     s[0, WANTED] = y - steady_led(way, moved)
@@ -278,7 +278,7 @@ def steady_solve(
 
 
 @jit
-def steady_kept(t: LagTables, s: Reals, v: Any, rises: int, applied: Any, little: Any) -> Any:  # noqa: ARG001  as in fixed point
+def steady_kept(t: LagTables, s: Reals, v: Any, rises: int, applied: Any, little: Any) -> Any:  # noqa: ARG001  used in fixed point
     """The input v if it is ahead of x by `little` or more, in the direction `rises`. Else one with which x comes to
     rest without going back: the last one, `applied`, or one ahead of x by `little`."""
     x = s[0, HIGH]
@@ -292,8 +292,8 @@ def steady_kept(t: LagTables, s: Reals, v: Any, rises: int, applied: Any, little
 
 @jit
 def steady_absorb(s: Reals, before: Any) -> None:
-    """The lag has followed from x = `before`. What rounding took from a sum is known exactly unless x has moved by more
-    than its own size, and could then take x back."""
+    """The lag has followed from x = `before`. The rounding error of a sum is known exactly unless x has moved by more
+    than its own size; it could then take x back, and is dropped."""
     x = s[0, HIGH]
     way = x - before
     if (-way if way < 0 else way) >= (-before if before < 0 else before):
@@ -305,15 +305,14 @@ def steady_absorb(s: Reals, before: Any) -> None:
 
 @jit
 def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: Any, halves: int) -> Any:
-    """The drive from which the only lag of a model does not overshoot, though its drive comes back by `falling` or
+    """The drive at which a model's only lag does not overshoot, although the drive comes back by at most `falling` or
     `rising` a step.
 
-    `near`: the drive in reach that is nearest to the answer, `short` of it. A target that moves on by `way` a step
-    takes a lead of `way/(1 - E)`. With m beyond that, which shrinks by `back` a step, the lag gains at most
-    `(1 - E)(m + back/2)^2/(2 back)` on the target, and is to gain `left`. Up to `left = (1 - E) back/2` it arrives
-    in one step; and a drive no farther than where the lag is to arrive never overshoots. Where nothing limits the
-    drive its lead is right as it is, so that it gives way by what it is short of the answer and was before at most.
-    `halves`: of the search for m.
+    `near`: the reachable drive nearest to the answer, `short` of it. A target that moves on by `way` a step takes a
+    lead of `way/(1 - E)`. With a lead m beyond that, which shrinks by `back` a step, the lag gains at most `(1 - E)(m +
+    back/2)^2/(2 back)` on the target; it has to gain `left`. Up to `left = (1 - E) back/2` it arrives in one step, and
+    a drive no farther than the lag's destination never overshoots. A lead that nothing limits is right as it is: the
+    drive gives way by at most its shortfalls from the answer, now and before. `halves`: of the search for m.
     """
     n = t.block[0]
     missed = s[0, EARLIER] - s[0, WANTED]
@@ -337,7 +336,7 @@ def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: 
 
 @jit
 def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any, halves: int) -> Any:
-    """By how much a lead exceeds the largest that comes back in time, within `room`; `most` gains `size` at once."""
+    """Excess of a lead over the largest one that comes back in time, within `room`; `most` gains `size` at once."""
     margin = back * half
     over = lead - most
     if most > margin:
@@ -359,7 +358,7 @@ def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any
 
 @jit
 def steady_state(s: Reals) -> Any:
-    """Where the lag is."""
+    """The state of the lag."""
     return s[0, HIGH]
 
 
@@ -373,15 +372,15 @@ ARITHMETIC = Realized(
 
 
 ALL_HALVES = 64
-"""[steps] Halvings after which nothing is left in double precision, which has 53 bits."""
+"""[steps] Halvings that exhaust double precision, which has 53 bits."""
 
 
 class UnevenLag(Block):
-    """A lag in double precision at steps of any length: led by the first of two rows, inverted exactly by the second,
-    which also says what arrives.
+    """A lag in double precision at steps of any length: the first of two rows leads it, the second inverts it exactly
+    and gives its output.
 
-    `rises`: the direction in which it is to arrive, where what follows has two branches; then it is led however short
-    it is if `always_led`, since a drive that is rounded does not arrive exactly.
+    `rises`: the direction of arrival, where two branches follow; with `always_led` the lag is then led however short it
+    is, since a rounded drive does not arrive exactly.
     """
 
     def __init__(self, effect: Lag) -> None:
@@ -400,11 +399,11 @@ class UnevenLag(Block):
 
     @property
     def patience(self) -> float:
-        """The share of the way to another branch that it misses in the first sample of a turn."""
+        """The share of the way to the other branch that it falls short in the first sample of a turn."""
         return 0.0 if self.exact else float(self.table.block[0, THETA])
 
     def call(self, verb: str, x: float) -> float:
-        """What a function makes of x; for `solve` it may be asked several times."""
+        """The result of a verb for x; `solve` may be called several times."""
         t, s = self.table, self.state
         if verb == "rest":
             self.moved = 0.0
@@ -428,13 +427,13 @@ class UnevenLag(Block):
         return float(x)
 
     def steady(self, v: float) -> float:
-        """The drive nearest to v that does not take the lag back from the direction in which it is to arrive."""
+        """The drive nearest to v that does not turn the lag back from its direction of arrival."""
         if self.rises is None or self.exact:
             return v
         return float(steady_kept(self.table, self.state, v, int(self.rises()), self.state[0, HIGH], 0.0))
 
     def braked(self, near: float, short: float, falling: float, rising: float) -> float:
-        """The drive from which it does not overshoot, as `braked`."""
+        """The drive at which it does not overshoot, by `braked`."""
         return self.steady(float(braked(self.table, self.state, near, short, falling, rising, ALL_HALVES)))
 
 

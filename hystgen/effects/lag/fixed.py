@@ -1,7 +1,7 @@
 """A lag as a block in fixed point: the same split as in floating point, with states that have bits below a signal's.
 
-Instead of the input that was to lead to the output asked for, which can be as large as the lead, the state keeps the
-move `lead` of the lag that it was to make: what another input makes of it is `c` of the difference of two moves.
+Instead of the input solved for, which can be as large as the lead, the state keeps the lag's intended move `lead`; with
+another input, the target falls short by `1 - theta` of the difference of the two moves.
 """
 
 from __future__ import annotations
@@ -73,12 +73,12 @@ class LagFormats(Coded):
 
     @property
     def follows(self) -> float:
-        """What a change of its input in one sample is of the output."""
+        """Change of the output for a change of the input in one sample, as a share."""
         rate, theta, *_ = self.one.row
         return 1.0 if self.one.exact else rate * (1.0 + 2.0 * theta)
 
     def led(self, error: float, code: float, same: bool, turning: bool) -> float:
-        """Error of the input for one of the output asked for; `code`: rounding of the input."""
+        """Error of the input for an error of the output asked for; `code`: rounding of the input."""
         rate, second, late, _ = self.one.row
         _, kept, answer = self._roundings
         if not self.one.exact:  # its states have seen the same drives
@@ -121,7 +121,7 @@ HIGH, WANTED, ASKED, LEAD, EARLIER = range(5)
 NEXT, BEFORE = 0, 1
 
 COARSE = 2**30 - 1
-"""Largest of the numbers that a lead is searched with, so that the square of a sum of two fits 64 bits."""
+"""Largest number in the search for a lead, so that the square of a sum of two fits 64 bits."""
 
 
 @jit
@@ -180,7 +180,7 @@ def lag_absorb(t: LagTables, s: Reals, j: int, x: Any) -> Any:
 
 @jit
 def steady_missed(t: LagTables, way: Any) -> Any:
-    """What the only lag of a model misses of a way in its first sample."""
+    """How far a model's only lag falls short of a move in its first sample."""
     bits = t.block[0, BITS]
     return nearest(scaled(t, 0, way << bits, SECOND), bits)
 
@@ -189,7 +189,7 @@ def steady_missed(t: LagTables, way: Any) -> Any:
 def steady_solve(
     t: LagTables, s: Reals, y: Any, moved: Any, rises: int, applied: Any, little: Any
 ) -> tuple[Any, Any]:
-    """As in floating point; an input that is kept leads nowhere."""
+    """As in floating point; an input that is kept has no move."""
     bits = t.block[0, BITS]
     way = y - (s[0, ASKED] >> bits)
     missed = s[0, EARLIER] - s[0, WANTED]
@@ -220,7 +220,7 @@ def steady_kept(t: LagTables, s: Reals, v: Any, rises: int, applied: Any, little
 
 @jit
 def steady_absorb(s: Reals, before: Any) -> None:
-    """The lag has followed; nothing is lost to rounding that could take it back."""
+    """The lag has followed; rounding loses nothing that could take it back."""
 
 
 # ---------------------------------------------------------------- braked_fixed.c
@@ -228,7 +228,7 @@ def steady_absorb(s: Reals, before: Any) -> None:
 
 @jit
 def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: Any, code: Any, drop: Any) -> Any:
-    """As in floating point; `code`: a drive code, with all as signals; a lead is searched with `drop` bits less."""
+    """As in floating point; `code`: a drive code; all arguments are signals; the search drops `drop` bits."""
     bits = t.block[0, BITS]
     missed = s[0, EARLIER] - s[0, WANTED]
     room = short + scaled(t, 0, -missed if missed < 0 else missed, INVERSE)
@@ -252,7 +252,7 @@ def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: 
 
 @jit
 def braked_over(t: LagTables, size: Any, lead: Any, back: Any, room: Any, drop: Any) -> Any:
-    """As in floating point, in numbers to search with."""
+    """As in floating point, in the coarse numbers of the search."""
     margin = back >> 1
     most = coarsely(t, size, drop) if size <= margin else size
     if most > margin:
@@ -281,7 +281,7 @@ def braked_lead(size: Any, lead: Any, margin: Any, way: Any) -> Any:
 
 @jit
 def coarse(x: Any, drop: Any) -> Any:
-    """A signal as a number to search with."""
+    """A signal as a coarse number of the search."""
     x = x >> drop
     if x > COARSE:
         return zero(x) + COARSE
@@ -290,7 +290,7 @@ def coarse(x: Any, drop: Any) -> Any:
 
 @jit
 def coarsely(t: LagTables, x: Any, drop: Any) -> Any:
-    """`x/(1 - E)` of numbers to search with."""
+    """`x/(1 - E)` in coarse numbers."""
     return coarse(scaled(t, 0, x << (t.block[0, BITS] + drop), INVERSE), drop)
 
 

@@ -41,7 +41,7 @@ LOWEST, HIGHEST = -0.8, 2.5
 """Amplitudes of a bump from which a search starts."""
 
 EVEN = 1e-6
-"""A density that is as far below its ends as above them, within this share, has a bump and no dip."""
+"""A density as far below its ends as above them, within this share, counts as a bump, not as a dip."""
 
 
 class _Noncongruent(Effect):
@@ -60,7 +60,7 @@ class _Noncongruent(Effect):
 
     @abstractmethod
     def bend(self, i: int, row: Array, thresholds: Array, weight: float, total: Array) -> None:
-        """Add to `total` (N,) what the play of a given number above 0 gains, times `weight`."""
+        """Add `weight` times the change that bending makes to play `i` > 0 to `total` (N,)."""
 
     def bent(self, rows: Array, thresholds: Array) -> Array:
         """The drive itself, and the bent plays."""
@@ -70,7 +70,7 @@ class _Noncongruent(Effect):
         return out
 
     def bent_sum(self, p: Array, rows: Array, thresholds: Array) -> Array:
-        """Their sum; plays of weight 0 need not be bent."""
+        """The sum of the bent plays; plays of weight 0 need not be bent."""
         total: Array = p @ rows
         for i in range(1, len(rows)):
             if p[i] != 0.0:

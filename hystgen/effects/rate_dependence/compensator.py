@@ -1,4 +1,4 @@
-"""How plays that depend on the rate move in one step, for a compensator."""
+"""One step of rate-dependent plays, for a compensator."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate, 
 class Movement:
     """Where plays (n + 1) are after a step in which their input goes straight from `x` to `w`.
 
-    Plays that relax move as in the forward model. Thresholds that grow with the rate have an inverse that does not grow
-    without bound only while `sum p_i beta_i < T/2 sum p_i` over every number of plays that slide together. Where they
-    do not, plays that relax with time constants beta_i stand in for them: they lag as far behind on ramps, and their
-    inverse is stable.
+    Plays that relax move as in the forward model. Thresholds that grow with the rate have a bounded inverse only while
+    `sum p_i beta_i < T/2 sum p_i` holds for every number of plays that slide together. Where it does not, plays that
+    relax with time constants beta_i stand in for them: they lag as far behind on ramps, and their inverse is stable.
     """
 
     def __init__(self, effect: RelaxingPlays | ThresholdRate, thresholds: Array, weights: Array) -> None:
@@ -30,7 +29,7 @@ class Movement:
             self.taus = np.array(effect.betas)
 
     def by_threshold(self, seconds: float) -> bool:
-        """Whether thresholds that grow with the rate are taken as they are."""
+        """Whether the growing thresholds are used as they are."""
         if self.betas is None:
             return False
         p = self.weights
@@ -60,26 +59,27 @@ BEGIN, C0, C1, C2, C3 = range(5)
 """Columns of a piece: where it begins, and the coefficients of a cubic in the distance from there."""
 
 LEAST_STRETCH = 1e-6
-"""[largest thresholds] Stretches below count as proportional to what they yield; a range has some 1e5 of them."""
+"""[largest thresholds] Below this a stretch loses a fixed share of itself; a range has some 1e5 of these."""
 
 LEAST_YIELD = 2.0**-40
-"""Share of a stretch that it yields in a step, below which it counts as proportional: as good as none in 2^28 steps."""
+"""Share of a stretch that it loses in a step, below which the loss counts as proportional: next to nothing in 2^28
+steps."""
 
 LONGEST = 4.0
-"""Most times that a piece ends at where it begins: steeper laws than a dashpot's are cubic over two octaves."""
+"""Largest ratio of a piece's end to its beginning: even laws steeper than a dashpot's are cubic over two octaves."""
 
 YIELD_ERROR = 1e-3
-"""Largest relative error of what a stretch yields: of the lag of plays behind their input it is a share of
+"""Largest relative error of the loss of a stretch: plays' lag behind their input is off by a share of
 `YIELD_ERROR/exponent`, while records determine time constants to 1 % at best."""
 
 
 def nonlinear(effect: Effect) -> TypeGuard[RelaxingPlays]:
-    """Whether plays have a dashpot that takes its table."""
+    """Whether plays have a dashpot that needs the table."""
     return isinstance(effect, RelaxingPlays) and effect.exponent != 1.0 and effect.time_constant > 0.0
 
 
 def yielded(effect: RelaxingPlays, scale: float, seconds: float, x: float) -> tuple[float, float]:
-    """What a stretch x > 0 loses while nothing moves but the play, and its slope.
+    """The loss of a stretch x > 0 in a step in which only the play moves, and its slope.
 
     `e' = -(scale/tau) (e/scale)^m` has the solution `e^(1-m) = x^(1-m) + (m - 1) T scale^(1-m)/tau`.
     """
@@ -93,10 +93,9 @@ def yielded(effect: RelaxingPlays, scale: float, seconds: float, x: float) -> tu
 
 
 def seen(effect: RelaxingPlays, scale: float, seconds: float, way: float) -> float:
-    """How far into the step `way` the input counts as standing still, as a share.
+    """The share of the move `way` up to which the input counts as standing still.
 
-    Exact for a linear dashpot as stiff as this one is when plays lag steadily behind an input that moves by `way` in
-    every step.
+    Exact for a linear dashpot as stiff as this one in steady motion by `way` a step.
 
     With `s = T f'(e)`, `E = exp(-s)` and `M = (1 - E)/s`: `(1 - M)/(1 - E)`, 1/2 for s = 0.
     """
@@ -106,9 +105,9 @@ def seen(effect: RelaxingPlays, scale: float, seconds: float, way: float) -> flo
 
 
 def pieces(effect: RelaxingPlays, scale: float, seconds: float, top: float) -> Array:
-    """What stretches up to `top` yield in a step, in rows (K, 5)."""
+    """The loss of stretches up to `top` in a step, in rows (K, 5)."""
     more = effect.exponent - 1.0
-    share = 1.0 / -more if more < 0.0 else LEAST_YIELD  # of what yields all within the step, or hardly anything
+    share = 1.0 / -more if more < 0.0 else LEAST_YIELD  # of a stretch that is lost within the step, or hardly at all
     begins = scale * math.exp(min(math.log(share * effect.time_constant / seconds) / more, 700.0))
     at = min(max(LEAST_STRETCH * scale, begins), top)
     rows: list[tuple[float, ...]] = [(0.0, 0.0, yielded(effect, scale, seconds, at)[0] / at, 0.0, 0.0)]
@@ -129,7 +128,7 @@ def _piece(effect: RelaxingPlays, scale: float, seconds: float, at: float, ratio
 
 
 def _fits(effect: RelaxingPlays, scale: float, seconds: float, row: tuple[float, ...], end: float) -> bool:
-    """Whether a piece rises, and is near enough to the law at places inside."""
+    """Whether a piece rises, and is close enough to the law at points inside."""
     at, *c = row
     inside = np.linspace(at, end, 17)
     on = inside - at
@@ -141,11 +140,11 @@ def _fits(effect: RelaxingPlays, scale: float, seconds: float, row: tuple[float,
 def stretch_error(
     effect: RelaxingPlays, scale: float, seconds: float, rows: Array, ways: tuple[float, float], held: Array
 ) -> float:
-    """How much farther or less far plays may be stretched by the table than by the law.
+    """Largest difference between the stretches of plays by the table and by the law.
 
-    `ways`: of their input, the largest in a step and the largest in all; `held` (K,): by how much rounding may change
-    what a piece gives. Of two plays, one by the law and one by the table, neither gains on the other once it is
-    stretched by that much less.
+    `ways`: the largest move of the input in a step, and overall; `held` (K,): rounding error of the loss on each piece.
+    Of two plays, one by the law and one by the table, neither gains on the other once it is stretched by that much
+    less.
     """
     end = LONGEST * rows[-1, BEGIN] if len(rows) > 1 else LEAST_STRETCH * scale
     x = np.append(0.0, np.geomspace(1e-3 * (rows[1, BEGIN] if len(rows) > 1 else end), end, 6000))

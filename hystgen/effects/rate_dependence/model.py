@@ -93,7 +93,7 @@ def bent_decay(x: float) -> float:
 def taylor(e: float, c1: float, q0: float, m: float, step: float) -> tuple[float, float]:
     """Increment of `e` over a step of `e' = speed - q`, `q` as `e^m`, by six terms from `c1` on, and the last of them.
 
-    The terms `q_k` of q follow from `e q' = m q e'`; those of e from the second on are `-step q_(k-1)/k`.
+    The terms `q_k` of q follow from `e q' = m q e'`; the terms of e from the second on are `-step q_(k-1)/k`.
     """
     d = 1.0 / e
     q1 = m * c1 * q0 * d
@@ -248,7 +248,7 @@ class _RateDependence(Effect):
 
     @abstractmethod
     def follow(self, chosen: Places, w: Array, run: Run, thresholds: Array, start: Array, out: Array) -> None:
-        """Write the plays with these numbers, all above 0, into rows (len(chosen), N)."""
+        """Write the plays with these indices, all above 0, into rows (len(chosen), N)."""
 
     def plays(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
         """The drive itself, and the plays."""
@@ -258,7 +258,7 @@ class _RateDependence(Effect):
         return out
 
     def summed(self, p: Array, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-        """The sum of those with a weight."""
+        """The weighted sum, without plays of weight 0."""
         chosen = 1 + np.flatnonzero(p[1:])
         rows = np.empty((1 + len(chosen), len(w)))
         rows[0] = w

@@ -1,6 +1,6 @@
 """A mode: its poles at samples, and as a block of the forward operator.
 
-The block keeps how far the output lies `off` its input, and the `rate` of that, both 0 at rest, so that rounding ends
+The block keeps the distance `off` of the output from the input, and its `rate`, both 0 at rest, so that rounding ends
 with the motion. Only the forward operator has it: the zeros of a second-order system sampled with straight input, near
 -0.27 and -3.7, cannot be inverted.
 """
@@ -22,7 +22,7 @@ from hystgen.effects.resonance.model import Resonance
 from hystgen.plays.slots import Reals, zero
 
 MOST_SAMPLES = 2**20
-"""Samples that sums over a free oscillation are taken over one by one; what comes behind is bounded as a whole."""
+"""Samples of a free oscillation that are summed one by one; the rest has one bound."""
 
 FADED = 45.0
 """Time constants after which an oscillation is below the last bit of a double."""
@@ -41,11 +41,11 @@ def denominator(effect: Resonance, step: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class ModeNumbers(One):
-    """A mode at one step length, and sums of sizes over all samples of what it does.
+    """A mode at one step length, and its responses summed in size over all samples.
 
-    `table`: (5,) what `off` and `rate` lose of themselves in a step, how they turn into each other, and what a change
-    of the input adds to both; `largest` and `fastest`: output and rate for inputs within 1; `off_after`, `rate_after`:
-    all that one disturbance of `off`, and of `rate`, makes of the output, `turned` and `slowed` of the rate.
+    `table` (5,): the changes of `off` and `rate` by themselves in a step, their coupling, and their responses to a
+    change of the input; `largest` and `fastest`: output and rate for inputs within 1; `off_after`, `rate_after`: summed
+    response of the output to a disturbance of `off`, and of `rate`; `turned`, `slowed`: the same for the rate.
     """
 
     table: tuple[float, ...]
@@ -75,7 +75,7 @@ class ModeNumbers(One):
 
 
 def numbers(effect: Resonance, seconds: float) -> ModeNumbers:
-    """Those at steps of `seconds`: the responses are closed forms, their sums go on until they have faded."""
+    """The numbers at steps of `seconds`, from responses in closed form, summed until they have faded."""
     zeta, angle = effect.damping, 2.0 * math.pi * effect.frequency * seconds
     slow = zeta if zeta < 1.0 else 1.0 / (zeta + math.sqrt(zeta * zeta - 1.0))
     count = int(min(math.ceil(FADED / (slow * angle)) + 2, MOST_SAMPLES))
@@ -111,7 +111,7 @@ KIND = Kind("mode", ("keep", "turn", "swing", "lead", "push"), ("before", "off",
 
 
 def constants(t: Reals) -> Iterator[Constants]:
-    """The numbers of each mode, of tables (k, 5)."""
+    """The numbers of each mode, from tables (k, 5)."""
     for row in t:
         yield Constants(KIND, row, (6, 0))
 
@@ -122,7 +122,7 @@ def memory(t: Reals, dtype: Any) -> Reals:
 
 
 @jit
-def mode_rest(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+def mode_rest(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """Everything has settled at the input x. Returns the output."""
     s[j, BEFORE] = x
     s[j, OFF] = zero(x)

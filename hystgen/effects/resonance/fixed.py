@@ -1,7 +1,7 @@
 """A mode as a block of the forward operator in fixed point, with states that have bits below a signal's.
 
-The change of the input counts whole in `off`, less what the output follows of it in the same step: for a mode far
-below the sample rate a small factor, to 31 bits of its own.
+A change of the input enters `off` in full, less the part that the output follows in the same step: for a mode far below
+the sample rate that is a small factor, with 31 bits of its own.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ KIND = Kind("mode", own=("rest", "absorb"), reading=("absorb",), letters="fffffb
 
 
 def constants(t: Reals) -> Iterator[Constants]:
-    """The numbers of each mode, of tables (k, 13)."""
+    """The numbers of each mode, from tables (k, 13)."""
     for row in t:
         yield Constants(KIND, row, (12, 0))
 
 
 def largest_state(one: ModeNumbers, size: float) -> float:
-    """Of `off` and `rate`, for inputs up to `size`."""
+    """The largest `off` or `rate` for inputs up to `size`."""
     return max(1.0 + one.largest, one.fastest) * size
 
 
@@ -59,7 +59,7 @@ def rounding(one: ModeNumbers, table: Any, size: float) -> float:
     keep, turn, swing, lead, push = one.table
 
     def products(own: float, enters: float) -> float:
-        """Of what a step adds to a state: two products with states, and one with a change of the input."""
+        """Roundings of a step's change of a state: two products with states, and one with a change of the input."""
         found = state * (1.0 + 2.0**drop * (abs(own) + abs(turn)) + 0.5 * 2.0**lift)
         found += most * sum(missed(x * 2.0**drop) * 2.0**-drop for x in (own, turn))
         scale = 2.0 ** (bits - lift)

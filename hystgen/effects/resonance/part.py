@@ -1,8 +1,8 @@
-"""A mode that carries a share of the motion, as a block: unlike a whole one it passes the rest at once, and has an
+"""A mode that carries a share of the motion, as a block: unlike a whole mode, it passes the rest at once and has an
 inverse.
 
-It keeps how far the output lies `off` the input, and the `rate` of that, both 0 at rest, as `compensator` does of a
-whole mode. What a change of the input adds to both is a share of what it adds there; the free oscillation is the same.
+It keeps the distance `off` of the output from the input, and its `rate`, both 0 at rest, as `compensator` does for a
+whole mode. A change of the input adds a share of what it adds to a whole mode; the free oscillation is the same.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ BEFORE, OFF, RATE = range(3)
 
 
 def rest(t: Any, s: Any, x: Any) -> Any:
-    """Everything has settled at the input x; the output."""
+    """Everything has settled at the input x. Returns the output."""
     s[BEFORE] = x
     s[OFF] = product(t[NONE], x)
     s[RATE] = product(t[NONE], x)
     return x
 
 
-def resting(t: Any, y: Any) -> Any:  # noqa: ARG001  as of every block
+def resting(t: Any, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input of the settled output y."""
     return y
 
@@ -36,7 +36,7 @@ def solve(t: Any, s: Any, y: Any) -> Any:
 
 
 def absorb(t: Any, s: Any, x: Any) -> Any:
-    """The input is x at this sample; the output."""
+    """The input is x at this sample. Returns the output."""
     change = x - s[BEFORE]
     off = s[OFF]
     rate = s[RATE]

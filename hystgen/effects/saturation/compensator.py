@@ -9,7 +9,7 @@ from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturati
 
 
 def unsaturated(effect: TanhSaturation | HardSaturation | Stops, y: Array) -> Array:
-    """The input (N,) that gives the output `y` (N,); for an output out of reach, that of the nearest one in reach."""
+    """The input (N,) that gives the output `y` (N,); for an output out of reach, of the nearest within reach."""
     if isinstance(effect, TanhSaturation):
         most = np.nextafter(1.0, 0.0)
         share = np.clip((y - effect.centre) / effect.level, -most, most)

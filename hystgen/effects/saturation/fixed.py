@@ -11,11 +11,11 @@ from hystgen.plays.slots import TANH, Counts, Reals
 
 
 class Saturations(NamedTuple):
-    """All that saturates, in order from the plays.
+    """All saturations, in order from the plays.
 
-    `kind` (k,): TANH or DEAD_ZONE, the latter for straight pieces; `piece` (k, 6): of straight pieces the ends between
-    which nothing changes, the slope beyond them and 1 over that, as factors. `bends`: two curves for each k, there and
-    back.
+    `kind` (k,): TANH, or DEAD_ZONE for straight pieces; `piece` (k, 6): for straight pieces, the ends between which
+    nothing changes, the slope beyond them and 1 over it, as factors. `bends`: two curves for each k, forward and
+    inverse.
     """
 
     kind: Counts
@@ -41,7 +41,7 @@ def stops(t: Saturations, j: int, x: Any, slope: int) -> Any:
 
 @jit
 def saturated(t: Saturations, x: Any) -> Any:
-    """What saturates makes of x."""
+    """x behind all saturations."""
     y = x
     for j in range(len(t.kind)):
         if t.kind[j] == TANH:
@@ -53,7 +53,7 @@ def saturated(t: Saturations, x: Any) -> Any:
 
 @jit
 def unsaturated(t: Saturations, y: Any) -> tuple[Any, int]:
-    """What gives y behind what saturates, and whether nothing does."""
+    """The input of all saturations for the output y, and whether no input gives it."""
     x = y
     limited = 0
     for j in range(len(t.kind) - 1, -1, -1):

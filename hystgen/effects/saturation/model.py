@@ -12,7 +12,7 @@ from hystgen.basics.quantities import NotNegative, Number, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run
 
 LEVELS = (np.array([-0.02]), np.array([-0.1]), np.array([-0.3]))
-"""Starts within the output: a limit beyond what was measured does nothing, and neither does a small change of it."""
+"""Starts within the output: a limit beyond the measured range does nothing, even if it changes a little."""
 
 
 MIDDLE = 0.5
@@ -136,7 +136,7 @@ class Stops(_Saturation):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Where they begin and how much they give, tried if a hard limit explains something."""
+        """Position and give of the stops, tried if a hard limit helps."""
         low, high = about.drive
         wide = about.output_range
         bottom, top = (wide * v / (high - low) for v in about.drive)  # for plays without hysteresis

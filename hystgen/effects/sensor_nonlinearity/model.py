@@ -13,7 +13,7 @@ from hystgen.basics.quantities import Number, Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Problem, Run, curve, not_as_many
 
 BENT = 1.0
-"""Parabolas from which a search starts, 10 % at the range's end: from a straight sensor its step may overshoot."""
+"""Parabolas from which a search starts, 10 % at the range's end: from a straight sensor it may overshoot."""
 
 PIECES = (6, 12)
 """Pieces of the monotone curves that are tried if a cubic helps. For a root over the range, six leave 1.3 times the
@@ -80,8 +80,8 @@ CUBIC = "sensor, cubic"
 class SensorCurve(_Sensor):
     """Sensor that reads `values` at `knots` and, between them, a smooth curve that rises everywhere; straight beyond.
 
-    Pieces of cubics whose slopes at the knots are harmonic means of the pieces' own: the curve then has no turning
-    point (F. N. Fritsch, J. Butland, SIAM Journal on Scientific and Statistical Computing 5, 1984, 300-304).
+    Cubic pieces whose slopes at the knots are harmonic means of the pieces' own: the curve then has no turning point
+    (F. N. Fritsch, J. Butland, SIAM Journal on Scientific and Statistical Computing 5, 1984, 300-304).
     """
 
     shape: Literal["curve"] = Field(description="a curve through points, which rises everywhere")
@@ -95,7 +95,7 @@ class SensorCurve(_Sensor):
     settled: ClassVar[tuple[str, ...]] = ("knots", "values")
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
-        """As many values as knots, and both rise."""
+        """As many values as knots, both rising."""
         yield from not_as_many("values", self.values, "knots", self.knots)
         for key in ("knots", "values"):
             for k, (one, other) in enumerate(zip(getattr(self, key)[:-1], getattr(self, key)[1:], strict=True), 1):

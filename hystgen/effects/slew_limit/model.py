@@ -13,7 +13,7 @@ from hystgen.basics.quantities import Positive
 from hystgen.effects.base import About, Array, Candidate, Compensated, Effect, Place, Run
 
 BELOW = (0.3, 0.5, 0.7, 1.0, 1.6, 2.2)
-"""Starts below the fastest recorded rate, in decades: a limit that acts never, or always, leaves no trace."""
+"""Starts below the fastest recorded rate, in decades: a limit that never or always acts leaves no trace."""
 
 BESIDE = 10.0
 """[times] A step of the drive is at least this many times faster than the changes next to it; those of a smooth drive
@@ -27,7 +27,8 @@ MIDDLE = 0.5
 one average ends and the next begins halfway between the times of both."""
 
 LEAST = 3.0
-"""The same of the least rate: a step from sample to sample is faster than all else by a hundred times and more."""
+"""Decades from the fastest recorded rate down to the least one: a step from sample to sample is more than a hundred
+times faster than anything else."""
 
 
 @jit
@@ -61,11 +62,10 @@ def limit(u: Array, up: Array, down: Array, out: Array, off: Array) -> None:
 def sudden(t: Array, u: Array, edge: float, times: Array, drive: Array, given: NDArray[np.intp]) -> int:
     """Write the drive with sudden edges into `times` and `drive`, and the position of each sample; returns its length.
 
-    An edge is a change within one sample or two, `BESIDE` times as fast as those next to it. With `edge` 1/2 it happens
+    An edge is a change within one sample or two, `BESIDE` times as fast as its neighbours. With `edge` 1/2 it happens
     at the mean time of the change: halfway between two samples or, if a converter that averages shows a sample on the
-    way, as long before the end of that sample as the sample is far along the step. With another `edge` it happens as
-    much earlier or later as between two samples. A linear filter distinguishes it from a straight edge only by second
-    differences.
+    way, as long before the end of that sample as the sample is far along the step. Another `edge` moves it by as much
+    as between two samples. A linear filter distinguishes it from a straight edge only by second differences.
     """
     times[0], drive[0], given[0] = t[0], u[0], 0
     n, k, last = 1, 0, len(u) - 1
@@ -227,7 +227,7 @@ class SuddenSlewLimit(_SlewLimit):
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:
-        """Tried if a limit helps: one rate, one for each direction, and either with another time of the steps."""
+        """Tried if a limit helps: one rate, one for each direction, and both with another position of the steps."""
         both = "rising and falling"
         return [
             cls._candidate(SUDDEN, 1, about, beyond=STRAIGHT, grown=lambda x: x),

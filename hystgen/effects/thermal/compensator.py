@@ -18,8 +18,8 @@ from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnH
 from hystgen.plays.slots import Counts, Reals, zero
 
 LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
-"""[times] A gain set from outside is kept between these: one beyond them is a fault of its sensor, or a wrong unit. Set
-by fixed point: with `fixed.GAIN_BITS` fraction bits, 2 is the end of what a gain and its reciprocal can be."""
+"""[times] A gain set from outside is kept between these: one beyond them means a faulty sensor or a wrong unit. Set by
+fixed point: with `fixed.GAIN_BITS` fraction bits, 2 is the limit of a gain and of its reciprocal."""
 
 MOST_CHANGE = 0.25
 """[share of the gain] The largest change of a gain in one sample that the C follows: five Newton steps from the last
@@ -48,12 +48,12 @@ def constants(t: Reals) -> Iterator[Constants]:
 
 @dataclass(frozen=True)
 class Warm(One):
-    """The block of an effect."""
+    """The block of a thermal effect."""
 
     effect: LoggedThermal | OwnHeat
 
     def gained(self, speed: Speed, output: float, u: float, emitted: bool) -> Gained:
-        """It as a gain; the C leaves out the heat of one sample."""
+        """Properties of the gain; the C leaves out the heat of one sample."""
         effect = self.effect
         if isinstance(effect, LoggedThermal):
             return Gained(1.0, LEAST_GAIN, LARGEST_GAIN, 0.0, 0.0)
@@ -72,7 +72,7 @@ class Warm(One):
         return size * LARGEST_GAIN + margin.span
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
-        """Largest input that it is solved for, by outputs within a size."""
+        """Largest input that the inverse gives for outputs within `asked`."""
         return (asked + margin.span) / LEAST_GAIN
 
 
@@ -83,9 +83,9 @@ def tables(blocks: Sequence[Warm], about: FloatSurroundings) -> Any:
 
 
 def numbers(effect: LoggedThermal, span: float) -> tuple[float, ...]:
-    """Constants of a block behind which the output spans `span`: rates, reference, and between which temperatures.
+    """Constants of a block behind which the output spans `span`: rates, reference, and the limits of the temperature.
 
-    Outside of them the gain would leave its limits, or the offset alone would be as large as the span.
+    Beyond them the gain would leave its limits, or the offset alone would exceed the span.
     """
     ends = [math.inf]
     if effect.gain_per_degree:
@@ -109,7 +109,7 @@ def memory(t: Reals, dtype: Any) -> Reals:
 
 @jit
 def gain_reset(t: Reals, s: Reals, j: int) -> None:
-    """As in the parameter file: gain 1, offset 0."""
+    """Return to the state of the parameter file: gain 1, offset 0."""
     s[j, GAIN] = t[j, ONE]
     s[j, INVERSE] = t[j, ONE]
     s[j, OFFSET] = zero(t[j, ONE])
@@ -143,13 +143,13 @@ def gain_heat(t: Reals, s: Reals, j: int, temperature: Any) -> bool:
 
 
 @jit(inline=True)
-def gain_solve(t: Reals, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+def gain_solve(t: Reals, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return (y - s[j, OFFSET]) * s[j, INVERSE]
 
 
 @jit(inline=True)
-def gain_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+def gain_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
     return s[j, GAIN] * x + s[j, OFFSET]
 
@@ -165,17 +165,17 @@ HEAT_RATE, PER_AMOUNT, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, HEAT_ONE, HEAT_T
 HIGH, LOW, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET, BEGUN, AT = range(7)
 
 FRICTION_PLAYS = 16
-"""Plays that stand for all that rub: loops then warm as all of them do within a 1000th of the warmest rise, see
-`coarseness`. Set by: tests/test_fixed_chain.py -k fastest_rate; with 8 plays the bound was 6.7 times the error there,
-with 16 it is 5.3 times."""
+"""Plays that represent the continuum of rubbing plays: loops warm as with the continuum, within a 1000th of the warmest
+rise, see `coarseness`. Set by: tests/test_fixed_chain.py -k fastest_rate; with 8 plays the bound was 6.7 times the
+error there, with 16 it is 5.3 times."""
 
 HEAT_STATE = AT + FRICTION_PLAYS
 """Numbers of a block's state."""
 
 
 class HeatTables(NamedTuple):
-    """Own heat of a model: `number` (k, 7), the number of Newton steps, `turns` (k,), and thresholds of the plays that
-    rub (k, 16), with `plays` (k,) of them: 0 where the heat is that of the drive's square."""
+    """Own heat of a model: `number` (k, 7), Newton steps `turns` (k,), thresholds of the rubbing plays (k, 16), and
+    their number `plays` (k,): 0 where the drive's square is the heat."""
 
     number: Reals
     turns: Counts
@@ -189,7 +189,7 @@ def reach(effect: HysteresisHeating, ends: tuple[float, float]) -> float:
 
 
 def thresholds(effect: OwnHeat, ends: tuple[float, float]) -> list[float]:
-    """Of the plays that stand for all that rub, in the middles of equal parts of their reach; none without friction."""
+    """Thresholds of the rubbing plays, in the middles of equal parts of their reach; none without friction."""
     if not isinstance(effect, HysteresisHeating):
         return []
     half = 0.5 * reach(effect, ends) / FRICTION_PLAYS
@@ -197,13 +197,13 @@ def thresholds(effect: OwnHeat, ends: tuple[float, float]) -> list[float]:
 
 
 def padded(rows: Sequence[Sequence[Any]]) -> NDArray[Any]:
-    """Thresholds as in `HeatTables`: as many in each row."""
+    """Thresholds as in `HeatTables`, padded to equal rows."""
     return np.array([[*row, *[0] * (FRICTION_PLAYS - len(row))] for row in rows]).reshape(-1, FRICTION_PLAYS)
 
 
 def per_amount(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> float:
-    """Final rise by a unit of what warms in each step: the change of the drive's signed square, or the ways of the
-    plays that rub, each times the odd number that its threshold is of the first."""
+    """Final rise per unit of heat in each step: of the change of the drive's signed square, or of the rubbing plays'
+    moves, each times its threshold as an odd multiple of the first."""
     if not isinstance(effect, HysteresisHeating):
         return effect.heating * 0.25 / seconds
     cell = reach(effect, ends) / FRICTION_PLAYS
@@ -211,8 +211,8 @@ def per_amount(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> fl
 
 
 def most_amount(effect: OwnHeat, ends: tuple[float, float], move: float) -> float:
-    """Largest amount in a step in which the drive moves by `move` within `ends`: a play with threshold r moves by no
-    more than the drive can go beyond r."""
+    """Largest heat of a step in which the drive moves by `move` within `ends`: a play with threshold r moves by no more
+    than the drive can go beyond r."""
     if isinstance(effect, HysteresisHeating):
         span = ends[1] - ends[0]
         ways = (min(move, max(span - r, 0.0)) for r in thresholds(effect, ends))
@@ -228,7 +228,7 @@ def lost(effect: OwnHeat, seconds: float) -> float:
 
 
 def risen(effect: OwnHeat, rise: float, heat: float, seconds: float) -> float:
-    """The temperature's rise after a step whose heat, kept up, would raise it to `heat`."""
+    """The temperature's rise after a step whose heat would, if kept up, raise it to `heat`."""
     return rise + lost(effect, seconds) * (heat - rise)
 
 
@@ -238,8 +238,8 @@ def most_at_once(effect: OwnHeat, ends: tuple[float, float], move: float, second
 
 
 def farthest(effect: OwnHeat, ends: tuple[float, float], span: float, seconds: float) -> float:
-    """Largest move of the drive within `ends` that may be repeated in every step without getting hotter than what the C
-    follows. `span`: as of `heat_numbers`."""
+    """Largest move of the drive within `ends` that may be repeated in every step without getting hotter than the C can
+    follow. `span`: as in `heat_numbers`."""
     hottest = heat_numbers(effect, ends, span, seconds)[HOTTEST_RISE]
     amount = hottest / per_amount(effect, ends, seconds) if effect.heating else math.inf
     if isinstance(effect, HysteresisHeating):
@@ -251,23 +251,23 @@ def farthest(effect: OwnHeat, ends: tuple[float, float], span: float, seconds: f
 
 
 def reached(effect: OwnHeat, ends: tuple[float, float], move: float, seconds: float) -> tuple[float, float, float]:
-    """The warmest rise that a drive which moves by at most `move` a step within `ends` comes to, and the least and the
-    largest gain on the way."""
+    """The largest rise from a drive that moves by at most `move` a step within `ends`, and the least and the largest
+    gain on the way."""
     warmest = most_at_once(effect, ends, move, seconds) / lost(effect, seconds)
     gain = min(max(1.0 + effect.gain_per_degree * warmest, LEAST_GAIN), LARGEST_GAIN)
     return warmest, min(gain, 1.0), max(gain, 1.0)
 
 
 def coarseness(effect: OwnHeat, ends: tuple[float, float], move: float, seconds: float) -> float:
-    """How far the rise can be from that by all plays that rub, degrees, if the drive moves by at most `move` a step.
+    """How far the rise can be from the rise by the continuum of plays, degrees, for moves up to `move` a step.
 
-    At the way 2x behind a turning point the plays up to x follow. With the middles of n cells of width h in their place
-    the loss a unit of way is wrong by `g(x) = x^2/2 - h sum r_i`, which within a cell is first positive, then negative,
-    and `|integral of g from 0 to x| <= 0.0873 h^2 x`, reached at `x = (3/4)^(1/3) h`. By rainflow counting the loss of
-    any drive is that of whole runs from a turning point, with x from 0 on, but for runs that were under way when it
-    began. In each direction their x only grows from there on, so that they are wrong by at most the integral of the
-    negative parts of 2 g over the reach, `h reach^2/8 (1 + 2/(3n))`; that of the positive ones is less. The temperature
-    forgets, which gives no later loss less weight than an earlier one.
+    After a move of 2x from a turning point, the plays up to x follow. With the middles of n cells of width h instead,
+    the loss per unit of the move is wrong by `g(x) = x^2/2 - h sum r_i`, which within a cell is first positive, then
+    negative, and `|integral of g from 0 to x| <= 0.0873 h^2 x`, reached at `x = (3/4)^(1/3) h`. By rainflow counting,
+    any drive consists of whole runs from a turning point, with x from 0 on, and of runs that were under way when it
+    began. In each direction the x of the latter only grows, so they are wrong by at most the integral of the negative
+    parts of 2 g over the reach, `h reach^2/8 (1 + 2/(3n))`; the positive parts contribute less. The temperature
+    forgets, so no later loss has less weight than an earlier one.
     """
     if not isinstance(effect, HysteresisHeating):
         return 0.0
@@ -278,11 +278,11 @@ def coarseness(effect: OwnHeat, ends: tuple[float, float], move: float, seconds:
 
 
 def misjudged(effect: OwnHeat, speed: Speed, u: float, emitted: bool) -> float:
-    """How wrong the plays that rub are about the rise, degrees; `emitted`: as of all plays that rub."""
+    """Error of the rise from the rubbing plays, degrees; `emitted`: against the continuum of plays."""
     rubbing = thresholds(effect, speed.ends)
     if not rubbing:
         return 0.0
-    # each play stands by a rounding off, and one that stays because another one does by three
+    # each play is off by one rounding, or by three if it stays because another one does
     amount = len(rubbing) ** 2 * 4.0 * u * (max(map(abs, speed.ends)) + rubbing[-1])
     amount += (len(rubbing) + 3.0) * u * most_amount(effect, speed.ends, speed.step)
     found = amount * per_amount(effect, speed.ends, speed.seconds)
@@ -342,7 +342,7 @@ def heat_memory(t: HeatTables, dtype: Any) -> Reals:
 
 @jit
 def heat_reset(t: HeatTables, s: Reals, j: int) -> None:
-    """As warm as its surroundings."""
+    """Return to the temperature of the surroundings."""
     s[j, HIGH] = zero(t.number[j, HEAT_ONE])
     s[j, LOW] = zero(t.number[j, HEAT_ONE])
     s[j, HEAT_GAIN] = t.number[j, HEAT_ONE]
@@ -353,7 +353,7 @@ def heat_reset(t: HeatTables, s: Reals, j: int) -> None:
 
 @jit
 def heat_way(before: Any, v: Any) -> Any:
-    """How far the square of the drive, with its sign, has moved."""
+    """The move of the drive's signed square."""
     way = (v * v if v >= zero(v) else -(v * v)) - (before * before if before >= zero(v) else -(before * before))
     return way if way >= zero(v) else -way
 
@@ -379,13 +379,13 @@ def heat_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> None:
 
 
 @jit(inline=True)
-def heat_solve(t: HeatTables, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+def heat_solve(t: HeatTables, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return (y - s[j, HEAT_OFFSET]) * s[j, HEAT_INVERSE]
 
 
 @jit(inline=True)
-def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
     return s[j, HEAT_GAIN] * x + s[j, HEAT_OFFSET]
 
@@ -398,15 +398,15 @@ FRICTION_KIND = Kind(
 
 
 def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
-    """The plays that rub of each block; None where none do."""
+    """The rubbing plays of each block; None where none rub."""
     for row, plays in zip(t.threshold, map(int, t.plays), strict=True):
         yield Constants(FRICTION_KIND, (), (plays, 0), row[:plays, None], (plays,)) if plays else None
 
 
 @jit
 def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
-    """The drive has moved to v; at first the plays rest at `before`. Returns the sum of their ways, each times the odd
-    number that its threshold is of the first one. Where a play stays, wider ones do."""
+    """The drive has moved to v; at first the plays rest at `before`. Returns the sum of their moves, each times its
+    threshold as an odd multiple of the first. Where a play stays, wider ones do too."""
     one = t.number[j, HEAT_ONE]
     if not s[j, BEGUN]:
         s[j, BEGUN] = one
@@ -451,4 +451,4 @@ HEAT_PART = ChainPart(
     late("thermal", "HEAT_ARITHMETIC"),
     kinds=(HEAT_KIND, FRICTION_KIND),
 )
-"""Temperatures as parts of the chain: those that the caller sets, and those of own heat."""
+"""Temperatures as parts of the chain: set by the caller, or from own heat."""

@@ -1,4 +1,4 @@
-"""CodedGain and offset behind the plays in fixed point."""
+"""Gain and offset behind the plays in fixed point."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ ONE = 1 << GAIN_BITS
 LEAST, LARGEST = int(LEAST_GAIN * ONE), int(LARGEST_GAIN * ONE)
 
 LINEAR_ERROR, RECIPROCAL_ERROR = (last_bits * 2.0**-GAIN_BITS for last_bits in (1.0, 4.0))
-"""[share of what passes] Errors of a gain linear in a temperature: a product; and of the reciprocal of a gain of at
-least 1/2: that of a linear one's error twice, and a step of Newton's."""
+"""[share of the signal] Errors of a gain linear in a temperature: one product; and of the reciprocal of a gain of at
+least 1/2: twice the error of a linear one, and a Newton step."""
 
 FACTOR_ERROR = 2.0**-MANTISSA_BITS
-"""[share of a product] Error of a factor: half of its last bit. That of a temperature's reference is the same."""
+"""[share of a product] Error of a factor: half of its last bit. A temperature's reference has the same error."""
 
 TEMPERATURE_BITS = 37
-"""Fraction bits of a temperature inside, so that temperatures of 512 degC are multiplied like any signal."""
+"""Fraction bits of an internal temperature, so that temperatures of 512 degC are multiplied like any signal."""
 
 
 KIND = Kind("gain", reading=(), own=("solve", "absorb"), letters="ffwwwb", memory="iiw")
@@ -55,8 +55,8 @@ def constants(t: Reals) -> Iterator[Constants]:
 
 
 def tables(rows: Sequence[tuple[float, ...]], level: float, bits: int, degrees: float) -> Reals:
-    """All gains of a model, `rows` as `numbers` has them; `level`: signals per unit of the output, `bits`: of a
-    temperature below a code, of which the largest is `degrees`. Raises OverflowError."""
+    """All gains of a model, with `rows` as in `numbers`; `level`: signals per unit of the output, `bits`: how many a
+    temperature has below a code; `degrees`: the largest code. Raises OverflowError."""
     found = []
     whole = 2.0**TEMPERATURE_BITS
     for row in rows:
@@ -75,7 +75,7 @@ class GainFormats(Coded):
     numbers: tuple[float, ...]
 
     def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
-        """It as a gain, for inputs within a size."""
+        """The gain's properties, for inputs within a size."""
         return linear(self.one.effect, size, at, 2.0 ** -(TEMPERATURE_BITS + 1), 0.0, LEAST_GAIN, LARGEST_GAIN, at.span)
 
 
@@ -83,7 +83,7 @@ def linear(
     effect: LoggedThermal | OwnHeat, size: float, at: Coding, wrong: float, at_once: float, least: float,
     largest: float, offset: float,
 ) -> CodedGain:
-    """A gain linear in a temperature that is `wrong` and moves `at_once` by so many degrees."""
+    """A gain linear in a temperature that is off by `wrong` degrees and moves by `at_once` degrees in a sample."""
     degree = abs(effect.gain_per_degree) * size + abs(effect.offset_per_degree) / at.output_lsb
     there = wrong * degree + LINEAR_ERROR * size + FACTOR_ERROR * offset
     back = (wrong + at_once) * degree / least + RECIPROCAL_ERROR * size + FACTOR_ERROR * offset / least
@@ -97,7 +97,7 @@ def formats(one: Warm, about: FixedSurroundings, *_: float) -> GainFormats:
 
 
 def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> Reals:
-    """As `tables`."""
+    """The tables of several gains, by `tables`."""
     degrees = about.code_max / 2.0**about.temperature
     return tables([each.numbers for each in blocks], about.level, TEMPERATURE_BITS - about.temperature, degrees)
 
@@ -115,7 +115,7 @@ def reciprocal(gain: Any) -> Any:
 
 @jit
 def followed(gain: Any, before: Any, turns: Any) -> Any:
-    """The same for a gain that has moved, by Newton steps from the reciprocal before."""
+    """The reciprocal of a gain that has moved, by Newton steps from the one before."""
     half = 1 << (GAIN_BITS - 1)
     inverse = before
     for _ in range(turns):
@@ -125,8 +125,8 @@ def followed(gain: Any, before: Any, turns: Any) -> Any:
 
 
 @jit
-def gain_reset(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  as in floating point
-    """As in the parameter file: gain 1, offset 0."""
+def gain_reset(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  used in floating point
+    """Return to the state of the parameter file: gain 1, offset 0."""
     s[j, GAIN] = ONE
     s[j, INVERSE] = ONE
     s[j, OFFSET] = zero(s[j, OFFSET])
@@ -155,13 +155,13 @@ def gain_heat(t: Reals, s: Reals, j: int, temperature: Any) -> bool:
 
 
 @jit
-def gain_solve(t: Reals, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+def gain_solve(t: Reals, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return times(y - s[j, OFFSET], s[j, INVERSE], GAIN_BITS)
 
 
 @jit
-def gain_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+def gain_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
     return times(x, s[j, GAIN], GAIN_BITS) + s[j, OFFSET]
 
@@ -172,7 +172,7 @@ RISE_BITS = 59
 """Bits of the largest rise of the temperature that a drive can make."""
 
 AMOUNT_BITS = 50
-"""Bits of what warms in a step, and of a temperature, in a product."""
+"""Bits of a step's heat, and of a temperature, in a product."""
 
 HEAT_KIND = Kind(
     "heat", counts=("turns", "coarse", "lift", "drop"), reading=(), own=("solve", "absorb"), letters="ffffw",
@@ -185,8 +185,8 @@ RISE, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET = range(4)
 
 @dataclass(frozen=True)
 class Heat(Coded):
-    """Own heat in fixed point: its table, thresholds of plays that rub, and how far the temperature can be from that of
-    the same recursion without rounding, degrees."""
+    """Own heat in fixed point: its table, thresholds of the rubbing plays, and the largest error of the temperature
+    against the same recursion without rounding, degrees."""
 
     table: tuple[int, ...]
     thresholds: tuple[int, ...]
@@ -196,7 +196,7 @@ class Heat(Coded):
     one: Warm | None = None
 
     def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
-        """It as a gain, for inputs within a size."""
+        """The gain's properties, for inputs within a size."""
         assert self.one is not None
         effect: Any = self.one.effect
         wrong = self.error + floating.coarseness(effect, *speed)
@@ -209,8 +209,8 @@ class Heat(Coded):
 def heat(
     numbers: tuple[float, ...], thresholds: Sequence[float], largest: int, lsb: float, level: float, code_bits: int
 ) -> Heat:
-    """For `numbers` as `heat_numbers` has them, `thresholds` as the function of that name, drives up to `largest` codes
-    of `lsb` and `code_bits` bits, and `level` signals a unit of the output. Raises OverflowError."""
+    """Own heat from `numbers` as in `heat_numbers`, `thresholds` as in the function of that name, drives up to
+    `largest` codes of `lsb` and `code_bits` bits, and `level` signals a unit of the output. Raises OverflowError."""
     rate, per_amount, per_degree, offset_per_degree, hottest, *_ = numbers
     if thresholds:
         bits = STATE_BITS - code_bits  # of a play below a drive code
@@ -246,7 +246,7 @@ def heat_formats(one: Warm, about: FixedSurroundings, *_: float) -> Heat:
     return replace(found, turns=turns, one=one)
 
 
-def heat_tables(rows: Sequence[Heat], about: FixedSurroundings) -> HeatTables:  # noqa: ARG001  as of every block
+def heat_tables(rows: Sequence[Heat], about: FixedSurroundings) -> HeatTables:  # noqa: ARG001  block interface
     """The tables of several blocks."""
     return HeatTables(
         np.array([one.table for one in rows], dtype=np.int64).reshape(-1, BITS_BELOW + 1),
@@ -264,8 +264,8 @@ def heat_constants(t: HeatTables) -> Iterator[Constants]:
 
 
 @jit
-def heat_reset(t: HeatTables, s: Reals, j: int) -> None:  # noqa: ARG001  as in floating point
-    """As warm as its surroundings."""
+def heat_reset(t: HeatTables, s: Reals, j: int) -> None:  # noqa: ARG001  used in floating point
+    """Return to the temperature of the surroundings."""
     s[j, RISE] = zero(s[j, RISE])
     s[j, HEAT_GAIN] = ONE
     s[j, HEAT_INVERSE] = ONE
@@ -275,7 +275,7 @@ def heat_reset(t: HeatTables, s: Reals, j: int) -> None:  # noqa: ARG001  as in 
 
 @jit
 def heat_way(before: Any, v: Any) -> Any:
-    """How far the square of the drive, with its sign, has moved."""
+    """The move of the drive's signed square."""
     way = (v * v if v >= 0 else -(v * v)) - (before * before if before >= 0 else -(before * before))
     return way if way >= 0 else -way
 
@@ -300,13 +300,13 @@ def heat_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> None:
 
 
 @jit
-def heat_solve(t: HeatTables, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  as of every block
+def heat_solve(t: HeatTables, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return times(y - s[j, HEAT_OFFSET], s[j, HEAT_INVERSE], GAIN_BITS)
 
 
 @jit
-def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  as of every block
+def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
     return times(x, s[j, HEAT_GAIN], GAIN_BITS) + s[j, HEAT_OFFSET]
 
@@ -314,7 +314,7 @@ def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001
 # ---------------------------------------------------------------- friction_fixed.c
 
 STATE_BITS = 31
-"""Bits of a play that rubs, without its sign: a drive has 15 or 31 of them with it."""
+"""Bits of a rubbing play, without its sign: a drive has 15 or 31 of them with it."""
 
 FRICTION_KIND = Kind(
     "friction", (), (), Rows("play", letters="w", memory="i"), counts=("n", "bits"), flags=("begun",),
@@ -323,7 +323,7 @@ FRICTION_KIND = Kind(
 
 
 def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
-    """The plays that rub of each block; None where none do."""
+    """The rubbing plays of each block; None where none rub."""
     for row, plays, numbers in zip(t.threshold, map(int, t.plays), t.number, strict=True):
         counts = (plays, int(numbers[BITS_BELOW]))
         yield Constants(FRICTION_KIND, (), (2 * plays, 0), row[:plays, None], counts) if plays else None

@@ -18,7 +18,7 @@ COLUMN = "temperature"
 SELF_HEATING = "thermal, self-heating"
 
 SHARES = (0.3, 0.15, 0.5)
-"""Shares of the way down from the longest time constant to the shortest from which searches start."""
+"""Starts of searches, as shares of the way from the longest time constant down to the shortest."""
 
 SMALLEST, LARGEST, REACH = -2.0, 0.5, -0.8
 """[decimal logarithms of ranges of the drive] Reach of the rubbing elements: bounds and start of a search."""
@@ -275,8 +275,8 @@ def _of_row(x: Array, row: tuple[int | None, int | None], about: About) -> tuple
 
 
 def _kept(share: Array) -> Array:
-    """Coefficients of the temperature and of the heat of each step, for steps in time constants; the next step's has no
-    part in it."""
+    """Coefficients of the temperature and of the heat of each step, for steps in time constants; the next step's heat
+    has no part in it."""
     return np.stack([np.exp(-share), -np.expm1(-share), np.zeros(len(share))])
 
 

@@ -1,9 +1,9 @@
 """tanh and atanh with the bits of the C kernels `c_runtime/front/{tanh,atanh}_{f32,f64}.c`.
 
-The same operations in the same order on numbers of the same format, for float32 and float64 alike: every constant
-comes from a table of the format, because a Python float next to a float32 would widen it once numba compiles the
-function. They run on numpy scalars (`tanh.py_func`), and unchanged when compiled. The method is described in the
-comments of the C files; the numbers are those of `c_runtime/front/fit_coefficients.py`.
+The same operations in the same order on numbers of the same format, for float32 and float64 alike: every constant comes
+from a table of the format, because a Python float next to a float32 would widen it once numba compiles the function.
+They run on numpy scalars (`tanh.py_func`), and unchanged when compiled. The method is described in the comments of the
+C files; the numbers come from `c_runtime/front/fit_coefficients.py`.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ class FixedMemory(NamedTuple):
 
     real: Reals
     counts: Counts
-    output: Reals  # (n): of each corner, as the three that follow
+    output: Reals  # (n): for each corner, like the next three
     input: Reals
     top: Counts
     rose: Counts
@@ -176,7 +176,7 @@ def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
 
 @jit
 def solve(t: FixedPlayTables, m: FixedMemory, output: Any, following: Any) -> tuple[Any, Kink]:
-    """The input that gives `output`, at most a little outside the range, and the kink it is counted from.
+    """The input for `output`, at most a little outside the range, and the kink from which it is counted.
 
     May turn back, but moves nothing. The same plays are known to follow up to the output `following`, along the move.
     """
@@ -199,8 +199,8 @@ def next_output(t: FixedPlayTables, m: FixedMemory, kink: Kink) -> Any:
 
 @jit
 def move_to_solution(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
-    """Move the plays to an input near the one that was solved for from a kink. Returns the output, along the move, at
-    which another play begins to follow."""
+    """Move the plays to an input near the one solved for from a kink. Returns the output, along the move, at which
+    another play begins to follow."""
     following = next_output(t, m, kink)
     moved = gained(t, m, kink, to)
     if moved < 0 or kink[0] + moved > following:  # by rounding, or it was limited

@@ -1,4 +1,4 @@
-"""Plays of the corner engine in floating point: `c_runtime/plays/corners_float.c`, and what both arithmetics share."""
+"""Plays of the corner engine in floating point: `c_runtime/plays/corners_float.c`, and code for both arithmetics."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.plays.slots import Counts, Reals
 
-# places in `Memory.real`: the plays, then what an operator keeps beside them
+# places in `Memory.real`: the plays, then the operator's own numbers
 (INPUT, OUTPUT, NEXT, CAP, BEHIND, FROM, BASE, BEGIN, START, GAIN, SIGN, UNDO_INPUT, UNDO_OUTPUT, BEFORE, RETURNED,
  DRIVE, UNDO_DRIVE, REFERENCE, LEVEL) = range(19)  # fmt: skip  (CAP .. SIGN: in floating point)
 # and in `Memory.counts`
 (K, DEPTH, RISING, LIMITED, UNDO_K, UNDO_DEPTH, UNDO_RISING, STEPPED, COMMITTED, REPEAT, BITS, STATUS,
  ASCENDING, UNDO_ASCENDING, ON, SOUGHT) = range(16)  # fmt: skip  (ON: in fixed point; SOUGHT: with effects)
-# `here` and `undo` of the operators in C: where the first numbers of each are, in `Memory.real` and `Memory.counts`
+# `here` and `undo` of the operators in C: the indices of their first numbers in `Memory.real` and `Memory.counts`
 HERE, UNDO = (INPUT, K), (UNDO_INPUT, UNDO_K)
 BOTTOM = 2  # `rose` of the bottom, which is opposite to both directions
 # places in `Curve.constant`
@@ -38,10 +38,10 @@ class Curve(NamedTuple):
 class Start(NamedTuple):
     """`hystgen_start_t`: a start memory."""
 
-    center: Reals  # (1 or n + 1, 2): input and output of the sum while plays 0 .. k hold what play k does
+    center: Reals  # (1 or n + 1, 2): input and output of the sum while plays 0 .. k hold play k's value
     step: int  # 0: one for all plays, 1: one for each
     risen: int  # plays up to this one are left by rising moves, the others by falling ones
-    bottom: Reals  # output, and the inputs that a falling and a rising move have passed it at
+    bottom: Reals  # output, and the inputs at which a falling and a rising move passed it
     top: int  # plays from here on cannot move within the range
 
 
@@ -50,7 +50,7 @@ class Memory(NamedTuple):
 
     real: Reals
     counts: Counts
-    output: Reals  # (n + 1): of each corner, as the three that follow
+    output: Reals  # (n + 1): for each corner, like the next three
     passed: Reals  # (n + 1, 2): input at which a falling and a rising move have passed it, along the move
     top: Counts
     rose: Counts
@@ -121,8 +121,7 @@ def turn_back(t: Curve, m: Memory) -> None:
 
 @jit
 def find_segment(step: Reals, k: int, end: int, way: Any) -> int:
-    """The last of segments k .. end - 1 that begins before `way`, as segment k does; `step` are all ways, or all
-    reaches."""
+    """The last of segments k .. end - 1 that begins before `way`; segment k does. `step`: all ways, or all reaches."""
     middle = (k + end) // 2
     while middle > k:
         if way > step[middle]:
