@@ -54,7 +54,10 @@ static hystgen_real_t hystgen_braked_over(hystgen_real_t size, hystgen_real_t mo
         }
         over = lead - low;
     }
-    return over > room ? room : over < -room ? -room : over;
+    if (over > room) {
+        return room;
+    }
+    return over < -room ? -room : over;
 }
 
 /* The drive from which the lag does not overshoot. `near` is the reachable drive nearest to the
@@ -71,9 +74,8 @@ HYSTGEN_APART hystgen_real_t hystgen_braked_drive(const hystgen_lag_table_t *t,
         return near;
     }
     const hystgen_real_t move = lag->asked - self->earlier;
-    const hystgen_real_t way = move > HYSTGEN_SLEW_RISING     ? HYSTGEN_SLEW_RISING
-                               : move < -HYSTGEN_SLEW_FALLING ? -HYSTGEN_SLEW_FALLING
-                                                              : move;
+    const hystgen_real_t most = move > HYSTGEN_SLEW_RISING ? HYSTGEN_SLEW_RISING : move;
+    const hystgen_real_t way = most < -HYSTGEN_SLEW_FALLING ? -HYSTGEN_SLEW_FALLING : most;
     const hystgen_real_t left = (lag->asked - lag->high) + (t->theta * way - way);
     const hystgen_real_t ahead = near - (lag->high + way * t->inverse_rate);
     return left < 0 ? near + hystgen_braked_over(-left, -left * t->inverse_rate, -ahead,

@@ -37,9 +37,10 @@ static int64_t hystgen_braked_absorb(const hystgen_lag_table_t *t, hystgen_brake
 /* A signal as a number to search with, which has fewer bits. */
 static int32_t hystgen_braked_coarse(int64_t x) {
     const int64_t coarse = x >> HYSTGEN_BRAKED_DROP;
-    return coarse > HYSTGEN_BRAKED_MOST    ? HYSTGEN_BRAKED_MOST
-           : coarse < -HYSTGEN_BRAKED_MOST ? -HYSTGEN_BRAKED_MOST
-                                           : (int32_t)coarse;
+    if (coarse > HYSTGEN_BRAKED_MOST) {
+        return HYSTGEN_BRAKED_MOST;
+    }
+    return coarse < -HYSTGEN_BRAKED_MOST ? -HYSTGEN_BRAKED_MOST : (int32_t)coarse;
 }
 
 /* The lead, a signal, with which the lag goes on by x, a state, in a step: x/(1 - E). */
@@ -72,7 +73,8 @@ HYSTGEN_APART int64_t hystgen_braked_along(const hystgen_lag_table_t *t,
     const int64_t most = rising * ((int64_t)1 << t->bits);
     const int64_t least = -falling * ((int64_t)1 << t->bits);
     const int64_t move = self->lag.asked - self->earlier;
-    const int64_t way = move > most ? most : move < least ? least : move;
+    const int64_t inside = move > most ? most : move;
+    const int64_t way = inside < least ? least : inside;
     const int64_t left =
         self->lag.asked - self->lag.high + hystgen_lag_scaled(t, way, &t->theta) - way;
     const int64_t down = hystgen_nearest(way, t->bits) + falling;
@@ -118,7 +120,10 @@ HYSTGEN_APART int32_t hystgen_braked_most(const hystgen_lag_table_t *t,
 /* By how much the lead is cut: what it exceeds that by, within the room. */
 static int32_t hystgen_braked_over(const hystgen_lag_table_t *t, const hystgen_brake_t *brake) {
     const int32_t over = brake->lead - hystgen_braked_most(t, brake);
-    return over > brake->room ? brake->room : over < -brake->room ? -brake->room : over;
+    if (over > brake->room) {
+        return brake->room;
+    }
+    return over < -brake->room ? -brake->room : over;
 }
 
 /* The drive from which the lag does not overshoot. `near` is the reachable drive nearest to the
