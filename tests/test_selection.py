@@ -568,7 +568,8 @@ def test_a_wider_range_where_a_number_is_at_its_end() -> None:
     assert found.actuator.effects[0].gain_per_degree == pytest.approx(0.4, rel=0.01)  # type: ignore[attr-defined]
     assert records.residual(found) < 1.1 * records.noise < records.residual(now)
     (end,) = ranges.ends(found, leaves, False)
-    assert (end.key, end.end, end.usual, end.why) == ("gain_per_degree", "largest", pytest.approx(0.2), "beyond")
+    at = end.found
+    assert (at.key, at.end, at.usual, at.why) == ("gain_per_degree", "largest", pytest.approx(0.2), "beyond")
     assert fits.part_at_an_end(found, 0)  # it is no less unlikely for having been found
     records, now = of_warm(0.1)
     assert ranges.wider(now, records) is None
@@ -583,8 +584,8 @@ def test_a_wider_range_without_a_gain_on_held_out_records_is_left(monkeypatch: p
     found, leaves = selection._widened(now, records)
     assert found is now
     (end,) = ranges.ends(found, leaves, False)
-    assert (end.why, end.reached) == ("no less", pytest.approx(0.6))
-    assert end.leaves == leaves
+    assert (end.found.why, end.found.reached) == ("no less", pytest.approx(0.6))
+    assert end.found.leaves == leaves
     assert leaves is not None
     assert leaves > 0.95 * records.residual(now)
     monkeypatch.setattr(selection, "is_noise", lambda *_: True)

@@ -13,12 +13,12 @@ static hystgen_reach_t hystgen_input_further(const hystgen_tables_t *t, hystgen_
     return step > (hystgen_sum_t)w - t->least ? t->least : (hystgen_reach_t)(w - step);
 }
 
-/* The input of the plays that gives `output`; now they give `here`. Lets the plays follow one by
-   one until the next would be too much. The output still to go, `left`, only shrinks, so that no
-   sum exceeds the first one, whatever the plays hold. */
+/* The input of the plays that gives `output`. Lets the plays follow one by one until the next would
+   be too much. The output still to go, `left`, only shrinks, so that no sum exceeds the first one,
+   whatever the plays hold. */
 HYSTGEN_API hystgen_reach_t hystgen_loop_solve(const hystgen_tables_t *t,
-                                               const hystgen_play_t *play, hystgen_sum_t here,
-                                               hystgen_sum_t output) {
+                                               const hystgen_play_t *play, hystgen_sum_t output) {
+    const hystgen_sum_t here = hystgen_loop_output(t, play);
     const bool rising = output > here;
     hystgen_sum_t left = rising ? output - here : here - output;
     hystgen_reach_t w = play[0];

@@ -6,11 +6,15 @@
 #include "compensator/chain/signals.c"
 
 /* Input of the plays at which their sum is h; now it is `level`. The plays are summed up again
-   where that is not kept, as without effects, or lacks bits, as in fixed point. */
+   where that is not kept, as without effects, or lacks bits, as in fixed point, whose kernel does
+   that. */
 static inline hystgen_reach_t hystgen_input_of(const hystgen_play_t *play, hystgen_signal_t level,
                                                hystgen_signal_t h) {
 #if defined(HYSTGEN_CHAIN) && !defined(HYSTGEN_FIXED)
     return hystgen_loop_solve(&hystgen_model_tables, play, level, h);
+#elif defined(HYSTGEN_FIXED)
+    (void)level;
+    return hystgen_loop_solve(&hystgen_model_tables, play, hystgen_asked(h));
 #else
     (void)level;
     return hystgen_loop_solve(&hystgen_model_tables, play,

@@ -53,8 +53,7 @@ HYSTGEN_APART hystgen_sum_t hystgen_relaxing_follow(hystgen_play_t *play, hystge
    play 1 rests; from there on they are solved for like plain ones, with smaller slopes. */
 static hystgen_reach_t hystgen_relaxing_input(hystgen_play_t *play, hystgen_sum_t sum) {
     play[0] = play[1];
-    return hystgen_loop_solve(&hystgen_relaxing_tables, play,
-                              hystgen_loop_output(&hystgen_relaxing_tables, play), sum);
+    return hystgen_loop_solve(&hystgen_relaxing_tables, play, sum);
 }
 #else
 /* The plays follow their input w. Returns their sum. */

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 196ddfbbe5bc51546001c813bfe669e77bfcfbac84ffce030316e8ef3ae700ba, without this line
+ * Text: sha256 d523155a88ae855d1fb24c97b8870aee70340c041e48a1476ff574e05504dc45, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -271,7 +271,8 @@ static inline bent_real_t bent_applied_drive(bent_real_t v) {
 }
 
 /* Input of the plays at which their sum is h; now it is `level`. The plays are summed up again
-   where that is not kept, as without effects, or lacks bits, as in fixed point. */
+   where that is not kept, as without effects, or lacks bits, as in fixed point, whose kernel does
+   that. */
 static inline bent_real_t bent_input_of(const bent_real_t *play, bent_real_t h) {
     return bent_loop_solve(&bent_model_tables, play, bent_loop_output(&bent_model_tables, play), h);
 }
