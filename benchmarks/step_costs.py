@@ -28,9 +28,11 @@ from hystgen.compensator.chain.costs import OPERATORS, PER_PLAY
 from hystgen.model import Model
 
 PLAYS = (1, 4, 16, 64)
+"""[plays] Factors of four, between which `engines.dearest` is straight: engine loop takes so much for each play."""
 FEW, MANY = 1, engine_costs.CODE_PLAYS
+"""[plays] The least there is, and those for which code is measured; parts that are paid per play have both."""
 SAMPLES = 300
-"""Samples of each record: with 1000 the dearest of ten plays takes at most 2 % more (float32 and q31, both cores)."""
+"""[samples] Of each record: with 1000 the dearest of ten plays takes at most 2 % more (float32 and q31, both cores)."""
 
 Measured = dict[str, tuple[int, ...]]
 """By operator: instructions on each core, then bytes of stack on each."""
