@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import os
 import re
 import subprocess
 import sys
@@ -1188,6 +1189,17 @@ def test_an_own_effect_with_wrong_candidates_is_named(tmp_path: Path, answer: st
     (own,) = effects.load_user_effects(path)
     with pytest.raises(EffectsError, match=re.escape(said)):
         own.candidates(about)
+
+
+def test_an_edit_that_keeps_second_and_size_is_seen(tmp_path: Path) -> None:
+    path = tmp_path / "own.py"
+    seen = []
+    for edition in (1, 2):
+        path.write_text(f"{OWN}EDITION = {edition}\n")
+        os.utime(path, (1e9, 1e9))
+        (own,) = effects.load_user_effects(path)
+        seen.append(vars(sys.modules[own.__module__])["EDITION"])
+    assert seen == [1, 2]
 
 
 def test_an_output_that_is_not_finite_is_refused() -> None:

@@ -9,10 +9,20 @@ import os
 import sys
 import traceback
 from pathlib import Path
+from typing import NoReturn
 
 from hystgen.basics.problems import EffectsError
 from hystgen.effects import own
 from hystgen.effects.base import USER, Effect, Place
+
+
+class _AsItStands(importlib.machinery.SourceFileLoader):
+    """Loads a file as it stands now: Python's cache of bytecode knows a file by its second and size alone, and would
+    answer with the one before an edit that changes neither."""
+
+    def path_stats(self, path: str) -> NoReturn:
+        raise OSError("not to be cached")
+
 
 METHODS = {
     Place.DRIVE: ("drive",),
@@ -43,7 +53,7 @@ def load_user_effects(path: str | os.PathLike[str]) -> tuple[type[Effect], ...]:
         ) from None
     name = f"hystgen_user_effects_{mark}"
     if name not in sys.modules:
-        spec = importlib.util.spec_from_loader(name, importlib.machinery.SourceFileLoader(name, str(file)))
+        spec = importlib.util.spec_from_loader(name, _AsItStands(name, str(file)))
         assert spec is not None
         assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)
