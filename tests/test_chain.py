@@ -402,15 +402,15 @@ def test_drift_is_counted_from_set_offset_on_and_survives_a_correction() -> None
 
 def test_a_clock_counts_beyond_the_digits_of_a_float() -> None:
     one = compiled(model("drifting"), "float32").tables
-    state = np.zeros((1, 3), np.float32)
+    state = drift.memory(one.of("clock"), np.float32)
     with jit.plain():
         for start in (0.0, 2.0**24 - 2.0):
             state[0] = 0.0, start, 0.0
             for _ in range(5):
                 drift.clock_tick(one.of("clock"), state, 0, 0.0, 0.0)
-            assert float(state[0, drift.HIGH]) * 2.0**24 + float(state[0, drift.LOW]) == start + 5.0
+            assert float(state.high[0]) * 2.0**24 + float(state.low[0]) == start + 5.0
         seconds = (2.0**24 + 3.0) * T
-        limited = min(0.05 * seconds + 0.005 * seconds**2, float(one.of("clock")[0, drift.FARTHEST]))
+        limited = min(0.05 * seconds + 0.005 * seconds**2, float(one.of("clock").farthest[0]))
         assert float(drift.clock_drift(one.of("clock"), state, 0, np.float32(0.0))) == pytest.approx(limited, rel=1e-6)
 
 

@@ -294,13 +294,14 @@ class Realized:
     """A kind of block in one arithmetic: its verbs, its constants from its tables, and the tables of its blocks; in
     fixed point the tables come from `formats`, made from a block, the surroundings, and the largest input and output.
 
-    `beside`: constants of an additional struct for each block.
+    `kinds`: in its C; `beside`: constants of an additional struct for each block.
     """
 
     verbs: Verbs
     constants: Callable[[Any], Iterable[Constants]]
     tables: Callable[[Sequence[Any], Any], Any]
     formats: Callable[[Any, FixedSurroundings, float, float], Any] = lambda one, *_: one
+    kinds: tuple[Kind, ...] = ()
     beside: Callable[[Any], Iterable[Constants | None]] = lambda _: ()
 
 
@@ -328,8 +329,8 @@ def given(place: Place) -> Callable[[Any], bool]:
 class ChainPart:
     """One kind of block. `name`: in C; `words`: in messages; `takes`: whether it is the block of an effect; `one`:
     makes a block from an effect, a step length, and whether it may be `turning`; `calls`: of the interface that it
-    serves; `forward`: only the forward operator has it; `joined`: all of them form one block; `kinds`: in its C, in
-    floating point; `coded`: loads its fixed-point version, for models in fixed point."""
+    serves; `forward`: only the forward operator has it; `joined`: all of them form one block; `coded`: loads its
+    fixed-point version, for models in fixed point."""
 
     name: str
     words: str
@@ -340,7 +341,6 @@ class ChainPart:
     calls: tuple[str, ...] = ()
     forward: bool = False
     joined: bool = False
-    kinds: tuple[Kind, ...] = ()
 
     @functools.cached_property
     def fixed(self) -> Realized:

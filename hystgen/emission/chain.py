@@ -6,14 +6,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from hystgen.emission.compensator import Effects, Field, Form, Glue, Stage, Table, Writer, entries
+import numpy as np
+
+from hystgen.emission.compensator import Effects, Field, Form, Glue, Stage, Table, Writer
 from hystgen.emission.runtime import template
-from hystgen.emission.text import operand
+from hystgen.emission.text import literal, operand
 from hystgen.plays import slots
 
 if TYPE_CHECKING:
+    from hystgen.basics.structures import Struct
     from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.effects.kinds import Constants, Kind
 
@@ -50,7 +53,7 @@ class Block:
         """The fields of its memory."""
         kind, rows = self.kind, self.kind.rows
         found = [Field(f"{kind.name}_t", self.name)]
-        if rows and (rows.state or rows.memory):
+        if rows and rows.state:
             found.append(Field(f"{kind.name}_state_t", f"{self.name}_state", count=len(self.constants.rows)))
         return found
 
@@ -73,13 +76,23 @@ class Block:
     def tables(self, writer: Writer) -> list[Table]:
         """Its table, after the table of its rows if it has one."""
         kind, constants = self.kind, self.constants
-        numbers = [entries(constants.table, kind.letters)] * (len(constants.table) > 0)
-        numbers += map(str, constants.counts)
+        numbers = members(kind.table, constants.table)
         if not kind.rows:
             return [writer.block(f"{kind.tabled}_table_t", self.name, numbers)]
-        rows = [entries(row, kind.rows.letters) for row in constants.rows]
+        rows = [", ".join(members(kind.rows.table, row)) for row in constants.rows]
         of_rows = writer.rows(f"{kind.name}_{kind.rows.name}_t", f"{self.name}_{kind.rows.name}", rows, len(rows))
         return [of_rows, writer.block(f"{kind.name}_table_t", self.name, [of_rows.name, *numbers])]
+
+
+def members(kind: type[Struct], one: Any) -> list[str]:
+    """The members of a structure as written in C."""
+    return [_written(one[name]) for name in kind.members()]
+
+
+def _written(number: Any) -> str:
+    if isinstance(number, np.void):
+        return f"{{{', '.join(_written(number[name]) for name in number.dtype.names or ())}}}"
+    return f"{{{', '.join(map(literal, number))}}}" if isinstance(number, np.ndarray) else literal(number)
 
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
@@ -182,7 +195,7 @@ def effects(
     tables = [table for block in largest for table in block.tables(writer)]
     numbers = dict(zip(NUMBERS, t.number, strict=False))
     constants = [(name, operand(value), NUMBERS[name]) for name, value in numbers.items()]
-    constants += [("LEAD", operand(row[-1]), "samples that references come ahead") for row in t.of("clock")]
+    constants += [("LEAD", operand(row["most_ahead"]), "samples that references come ahead") for row in t.of("clock")]
     constants.append(("WAITING", f"{t.of('wait').samples}u", "samples of the drive that wait"))
     if t.of("wait").samples:
         waited, share = form.waited(t, writer)

@@ -216,7 +216,7 @@ class Fixed(Form):
     def reference_temperature(self, t: ChainTables) -> float:
         from hystgen.effects.thermal import fixed as thermal
 
-        degrees: float = t.of("gain")[0, thermal.REFERENCE].item() / 2.0**thermal.TEMPERATURE_BITS
+        degrees: float = t.of("gain").reference[0].item() / 2.0**thermal.TEMPERATURE_BITS
         return degrees
 
     def tap(self, t: ChainTables, writer: Writer) -> Table:

@@ -211,7 +211,7 @@ def kept_branch(compiled: Compiled) -> float:
     points, so their values there bound all values in between.
     """
     static, t = compiled.static, compiled.tables
-    theta = ahead_of(compiled.ones)[0].row[1] if t.turning else 0.0
+    theta = ahead_of(compiled.ones)[0].second if t.turning else 0.0
     unit = 1.0
     if compiled.codes is not None:
         unit = float(compiled.codes.drive_lsb) / 2.0 ** float(t.number[DRIVE_BITS])

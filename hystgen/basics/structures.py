@@ -1,0 +1,97 @@
+"""Structures of named numbers, declared once: the arrays of the bit reference, and the structs of the C.
+
+    class LagState(Struct):
+        high: Real  # comments say what a number is, as in C
+        low: Real
+
+`LagState.zeros(3, np.float32)` is the memory of three lags, one structured array. `s.high[1]` is a number of the second
+one, in Python and in compiled code, where numba takes such an array as it is.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Self, TypeAlias, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+Numbers: TypeAlias = NDArray[Any]
+
+Real: TypeAlias = Annotated[Numbers, "real_t"]
+Flag: TypeAlias = Annotated[Numbers, "bool"]
+Int64: TypeAlias = Annotated[Numbers, "int64_t"]
+Int32: TypeAlias = Annotated[Numbers, "int32_t"]
+UInt32: TypeAlias = Annotated[Numbers, "uint32_t"]
+UInt8: TypeAlias = Annotated[Numbers, "uint8_t"]
+Signal: TypeAlias = Annotated[Numbers, "signal_t"]
+Number: TypeAlias = Annotated[Numbers, "number_t"]
+Count: TypeAlias = Annotated[Numbers, "uint_least16_t"]
+SmallCount: TypeAlias = Annotated[Numbers, "uint_least8_t"]
+FourInt32: TypeAlias = Annotated[Numbers, "int32_t", 4]
+
+
+class Struct(np.ndarray[Any, np.dtype[Any]]):
+    """Structures of one kind, an array of them; each member is an array of numbers or structures.
+
+    Numbers of type `Real` have the type of the arithmetic. All others are int64 here, however narrow they are in C.
+    """
+
+    if not TYPE_CHECKING:  # its members are declared
+
+        def __getattr__(self, name: str) -> Any:
+            """The member of this name, kept so that only its first use costs time."""
+            if name not in self.members():
+                raise AttributeError(name)
+            kind, _ = self.members()[name]
+            found = self[name].view(kind if isinstance(kind, type) else np.ndarray)
+            setattr(self, name, found)
+            return found
+
+    @classmethod
+    @functools.cache
+    def members(cls) -> Mapping[str, tuple[type[Struct] | str, int]]:
+        """Members by name, in order: a structure or the type in C without prefix, and the length of an array or 0."""
+        found: dict[str, tuple[type[Struct] | str, int]] = {}
+        for name, hint in get_type_hints(cls, include_extras=True).items():
+            if get_origin(hint) is Annotated:
+                kind, *length = get_args(hint)[1:]
+                found[name] = kind, sum(length)
+            elif isinstance(hint, type) and issubclass(hint, Struct):
+                found[name] = hint, 0
+        return found
+
+    @classmethod
+    @functools.cache
+    def layout(cls, real: np.dtype[Any]) -> np.dtype[Any]:
+        """The structured type of numpy in an arithmetic with numbers of type `real`."""
+        taken = [name for name in cls.members() if hasattr(np.ndarray, name)]
+        assert not taken, f"{cls.__name__}: arrays have attributes {taken}"
+        fields: list[Any] = []
+        for name, (kind, length) in cls.members().items():
+            number = kind.layout(real) if isinstance(kind, type) else real if kind == "real_t" else np.int64
+            fields.append((name, number, (length,)) if length else (name, number))
+        return np.dtype(fields)
+
+    @classmethod
+    def zeros(cls, count: int, real: DTypeLike = np.int64) -> Self:
+        """As many structures, with all numbers 0."""
+        return np.zeros(count, cls.layout(np.dtype(real))).view(cls)
+
+    @classmethod
+    def of(cls, rows: Iterable[Sequence[Any]], real: DTypeLike = np.int64) -> Self:
+        """A structure for each row, whose entries are its members in order; a structure in it is a tuple."""
+        return np.array([tuple(row) for row in rows], cls.layout(np.dtype(real))).view(cls)
+
+
+class Factor(Struct):
+    """A real factor, mantissa / 2^shift."""
+
+    mantissa: Int32
+    shift: UInt8
+
+
+def declared(name: str, members: Iterable[str], word: Any) -> type[Struct]:
+    """A structure with these members, all of one type, such as `Real`."""
+    return type(name, (Struct,), {"__annotations__": dict.fromkeys(members, word)})
