@@ -402,7 +402,7 @@ def test_drift_is_counted_from_set_offset_on_and_survives_a_correction() -> None
 
 def test_a_clock_counts_beyond_the_digits_of_a_float() -> None:
     one = compiled(model("drifting"), "float32").tables
-    state = drift.memory(one.of("clock"), np.float32)
+    state = drift.ClockState.zeros(1, np.float32)
     with jit.plain():
         for start in (0.0, 2.0**24 - 2.0):
             state[0] = 0.0, start, 0.0

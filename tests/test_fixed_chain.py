@@ -18,6 +18,7 @@ from modelfiles import BRAKED, CALM, CHAINS, INVERSE_ALONE, STEADY, TANH, chain
 
 from hystgen.arithmetic import ARITHMETICS, factors
 from hystgen.basics import jit
+from hystgen.basics.structures import memory_of
 from hystgen.compensator import reference
 from hystgen.compensator.chain import bounds, moving, moving_fixed, tables
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
@@ -656,7 +657,7 @@ def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int, rubs: bo
     row, thresholds = thermal.heat_numbers(effect, ends, 20.0, seconds), thermal.thresholds(effect, ends)
     one = thermal_fixed.heat(row, 4, thresholds, largest, lsb, 2.0**20, about.code_bits)
     t = thermal_fixed.heat_tables([one])
-    state = thermal_fixed.heat_memory(t, np.int64)
+    state = memory_of(thermal_fixed.FixedHeatMemory)(t, np.int64)
     rng = np.random.default_rng(bits)
     steps = rng.integers(-largest // 50, largest // 50, 2000)
     v = np.cumsum(2 * np.abs(steps) if rubs else steps)  # small loops hardly rub

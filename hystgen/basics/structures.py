@@ -11,7 +11,7 @@ one, in Python and in compiled code, where numba takes such an array as it is.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Self, TypeAlias, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -95,3 +95,19 @@ class Factor(Struct):
 def declared(name: str, members: Iterable[str], word: Any) -> type[Struct]:
     """A structure with these members, all of one type, such as `Real`."""
     return type(name, (Struct,), {"__annotations__": dict.fromkeys(members, word)})
+
+
+def memory_of(kind: type[Any]) -> Callable[[Any, DTypeLike], Any]:
+    """Makes the memory of blocks, all 0, for their tables and the type of `Real`.
+
+    `kind`: a structure, one for each entry of the tables; or a NamedTuple of structures, each of them one for each
+    entry of the tables' field of that name.
+    """
+
+    def memory(t: Any, real: DTypeLike) -> Any:
+        if issubclass(kind, Struct):
+            return kind.zeros(len(t), real)
+        fields = get_type_hints(kind).items()
+        return kind(*(each.zeros(len(getattr(t, name)), real) for name, each in fields))
+
+    return memory

@@ -31,7 +31,7 @@ def parts(t: ChainTables, operator: str) -> list[str]:
     kinds = [int(kind) for kind in (t.behind.kind if t.fixed else t.behind.stage_kind)]
     found = Counter(dict(zip(NAMES, t.counts.tolist(), strict=True)) | {
         "delay": t.number_of("wait"), "lag": exact.count(0), "lag_exact": exact.count(1),
-        "friction": t.of("heat").plays.any(), "preview": len(t.tap),
+        "friction": t.of("heat").friction.n.any(), "preview": len(t.tap),
         "slew": t.slew, "braked": t.braked,
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),
         "relaxing": t.moving.scanned, "dilated": t.moving.used and not t.moving.scanned,

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct
+from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct, memory_of
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import ChainPart, FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs, called, late
@@ -201,11 +201,6 @@ def constants(t: AgeingTables) -> Iterator[Constants]:
         yield Constants(KIND, row, (5 + 2 * int(row["turns"]), 1), t.piece[first : first + row["n"]])
 
 
-def memory(t: AgeingTables, dtype: Any) -> AgeingState:
-    """Memory of all gains."""
-    return AgeingState.zeros(len(t.block), dtype)
-
-
 @jit
 def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
     """The gain at a travel; past the last piece it stays constant."""
@@ -300,8 +295,8 @@ def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # no
 
 ARITHMETIC = Realized(
     Verbs(
-        memory, absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move, set_gain=ageing_set,
-        set_travel=ageing_set_travel, travelled=ageing_travelled,
+        memory_of(AgeingState), absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
+        set_gain=ageing_set, set_travel=ageing_set_travel, travelled=ageing_travelled,
     ),
     constants, tables, kinds=(KIND,),
 )

@@ -11,7 +11,7 @@ import numpy as np
 from hystgen.arithmetic.factors import LARGEST as MOST
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Factor, Flag, FourInt32, Int32, Int64, Struct, UInt8
+from hystgen.basics.structures import Count, Factor, Flag, FourInt32, Int32, Int64, Struct, UInt8, memory_of
 from hystgen.effects.ageing import compensator as floating
 from hystgen.effects.ageing.compensator import Aged, AgeingPiece, ageing_travelled
 from hystgen.effects.kinds import Constants, Rows
@@ -75,11 +75,6 @@ def constants(t: FixedAgeingTables) -> Iterator[Constants]:
     """The numbers of each gain."""
     for row, first in zip(t.block, t.first, strict=False):
         yield Constants(KIND, row, (8 + 2 * int(row["turns"]), 2), t.piece[first : first + row["n"]])
-
-
-def memory(t: FixedAgeingTables, dtype: Any) -> FixedAgeingState:  # noqa: ARG001  as in floating point
-    """Memory of all gains."""
-    return FixedAgeingState.zeros(len(t.block))
 
 
 def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> FixedAgeingTables:
@@ -221,7 +216,7 @@ def ageing_absorb(t: FixedAgeingTables, s: FixedAgeingState, j: int, x: Any) -> 
 
 ARITHMETIC = Realized(
     Verbs(
-        memory, absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
+        memory_of(FixedAgeingState), absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
         set_gain=ageing_set, set_travel=ageing_set_travel, travelled=ageing_travelled,
     ),
     constants, made, formats, kinds=(KIND,),

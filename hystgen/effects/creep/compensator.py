@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Real, Struct
+from hystgen.basics.structures import Count, Real, Struct, memory_of
 from hystgen.effects.base import Array, Block, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
 from hystgen.effects.kinds import Constants, Kind, Rows
@@ -197,11 +197,6 @@ def constants(t: CreepTables) -> Iterator[Constants]:
         yield Constants(KIND, row, (1 + 2 * int(row["n"]), 1), t.term[first : first + row["n"]])
 
 
-def memory(t: CreepTables, dtype: Any) -> CreepMemory:
-    """Memory of all blocks."""
-    return CreepMemory(CreepState.zeros(len(t.block), dtype), CreepTermState.zeros(len(t.term), dtype))
-
-
 @jit
 def creep_rest(t: CreepTables, s: CreepMemory, j: int, x: Any) -> Any:
     """Everything has settled at the input x. Returns the output."""
@@ -244,7 +239,7 @@ def creep_absorb(t: CreepTables, s: CreepMemory, j: int, x: Any) -> Any:
 
 
 ARITHMETIC = Realized(
-    Verbs(memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
+    Verbs(memory_of(CreepMemory), creep_rest, creep_absorb, creep_resting, creep_solve), constants,
     lambda blocks, about: tables(blocks, about.reals), kinds=(KIND,),
 )
 
@@ -258,7 +253,7 @@ class UnevenCreep(Block):
         self._numbers = functools.lru_cache(maxsize=64)(functools.partial(numbers, effect))
         self._tables = functools.lru_cache(maxsize=256)(self._of_steps)
         self.advance(1.0)
-        self.state = memory(self.table, np.float64)
+        self.state: CreepMemory = memory_of(CreepMemory)(self.table, np.float64)
 
     def _of_steps(self, seconds: float, later: float) -> CreepTables:
         """The `tables` of a step, whose states are advanced to the next output by the E and b0 of the next step; they

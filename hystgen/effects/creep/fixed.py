@@ -17,7 +17,7 @@ import numpy as np
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Factor, Int64, Struct, UInt8
+from hystgen.basics.structures import Count, Factor, Int64, Struct, UInt8, memory_of
 from hystgen.effects.creep import compensator as floating
 from hystgen.effects.creep.compensator import CreepNumbers
 from hystgen.effects.kinds import Constants, Kind, Rows
@@ -82,11 +82,6 @@ def constants(t: FixedCreepTables) -> Iterator[Constants]:
     """The numbers of each block."""
     for row, first in zip(t.block, t.first, strict=False):
         yield Constants(KIND, row, (2 + 6 * int(row["n"]), 2), t.term[first : first + row["n"]])
-
-
-def memory(t: FixedCreepTables, dtype: Any) -> FixedCreepMemory:  # noqa: ARG001  as in floating point
-    """Memory of all blocks."""
-    return FixedCreepMemory(FixedCreepState.zeros(len(t.block)), FixedCreepTermState.zeros(len(t.term)))
 
 
 def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
@@ -211,6 +206,6 @@ def creep_absorb(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: Any) -> An
 
 
 ARITHMETIC = Realized(
-    Verbs(memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
+    Verbs(memory_of(FixedCreepMemory), creep_rest, creep_absorb, creep_resting, creep_solve), constants,
     tables, formats, kinds=(KIND,),
 )

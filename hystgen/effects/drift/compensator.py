@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Real, Struct
+from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.part import ChainPart, FloatSurroundings, Function, Realized, Verbs, called, late
@@ -57,11 +57,6 @@ def numbers(effect: LinearDrift | CurvedDrift, seconds: float, farthest: float, 
 def constants(t: ClockNumbers) -> list[Constants]:
     """The numbers of a model's clock."""
     return [Constants(KIND, row, (5, 0)) for row in t]
-
-
-def memory(t: ClockNumbers, dtype: Any) -> ClockState:
-    """Memory of the clock of a model."""
-    return ClockState.zeros(len(t), dtype)
 
 
 @jit
@@ -125,7 +120,9 @@ def tables(effects: Sequence[LinearDrift | CurvedDrift], about: FloatSurrounding
     return ClockNumbers.of(rows, rows.dtype)
 
 
-ARITHMETIC = Realized(verbs(memory, clock_start, clock_tick, clock_drift), constants, tables, kinds=(KIND,))
+ARITHMETIC = Realized(
+    verbs(memory_of(ClockState), clock_start, clock_tick, clock_drift), constants, tables, kinds=(KIND,)
+)
 
 CLOCK = ChainPart(
     "clock", "drift", called("drift"), lambda effect, *_: effect,

@@ -12,7 +12,7 @@ from fractions import Fraction
 from typing import Any
 
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Int64, Struct, UInt8
+from hystgen.basics.structures import Int64, Struct, UInt8, memory_of
 from hystgen.effects.drift import compensator as floating
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
@@ -113,11 +113,6 @@ def constants(t: FixedClockNumbers) -> list[Constants]:
 # ---------------------------------------------------------------- clock_fixed.c
 
 
-def memory(t: FixedClockNumbers, dtype: Any) -> FixedClockState:  # noqa: ARG001  as in floating point
-    """Memory of the clock of a model."""
-    return FixedClockState.zeros(len(t))
-
-
 @jit
 def clock_start(t: FixedClockNumbers, s: FixedClockState, j: int) -> None:  # noqa: ARG001  block interface
     """Start the clock at the drive absorbed last."""
@@ -158,6 +153,6 @@ def formats(effect: LinearDrift | CurvedDrift, about: FixedSurroundings, *_: flo
 
 
 ARITHMETIC = Realized(
-    floating.verbs(memory, clock_start, clock_tick, clock_drift), constants,
+    floating.verbs(memory_of(FixedClockState), clock_start, clock_tick, clock_drift), constants,
     lambda clocks, _: FixedClockNumbers.of([one.table for one in clocks]), formats, kinds=(KIND,),
 )

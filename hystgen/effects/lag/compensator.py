@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Real, Struct
+from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Block, decays
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag.model import Lag
@@ -236,11 +236,6 @@ def constants(t: LagTables) -> Iterator[Constants]:
         yield Constants(EXACT_KIND, inverted, (3, 3)) if exact else Constants(kind, led, (3, 2))
 
 
-def memory(t: LagTables, dtype: Any) -> LagMemory:
-    """Memory of all lags."""
-    return LagMemory(BrakedState.zeros(len(t.exact), dtype), ExactState.zeros(len(t.exact), dtype))
-
-
 @jit
 def lag_rest(t: LagTables, s: LagMemory, j: int, x: Any) -> Any:
     """Everything has settled at the input x. Returns the output."""
@@ -412,7 +407,7 @@ def steady_state(s: LagMemory) -> Any:
 
 LED = Led(steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked, HALVES)
 ARITHMETIC = Realized(
-    Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
+    Verbs(memory_of(LagMemory), lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
     lambda blocks, about: tables(blocks, about.reals, about.braked), kinds=(KIND, EXACT_KIND, BRAKED_KIND),
 )
 
@@ -437,7 +432,7 @@ class UnevenLag(Block):
         self.moved = 0.0
         self._of_step = functools.lru_cache(maxsize=64)(functools.partial(_uneven, effect))
         self.advance(1.0)
-        self.state = memory(self.table, np.float64)
+        self.state: LagMemory = memory_of(LagMemory)(self.table, np.float64)
         self.begun = self.state.led[0].copy()
 
     def advance(self, seconds: float, later: float | None = None) -> None:

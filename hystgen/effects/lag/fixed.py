@@ -17,7 +17,7 @@ import numpy as np
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Factor, Int64, Struct, UInt8
+from hystgen.basics.structures import Factor, Int64, Struct, UInt8, memory_of
 from hystgen.effects.kinds import VERBS, Constants
 from hystgen.effects.lag import compensator as floating
 from hystgen.effects.lag.compensator import HALVES, LagNumbers, LagSizes, shifted, steady_led
@@ -96,11 +96,6 @@ def constants(t: FixedLagTables) -> Iterator[Constants]:
     kind = BRAKED_KIND if t.braked else KIND
     for exact, led, inverted in zip(t.exact, t.led, t.inverted, strict=True):
         yield Constants(EXACT_KIND, inverted, (8, 4)) if exact else Constants(kind, led, (8, 4))
-
-
-def memory(t: FixedLagTables, dtype: Any) -> FixedLagMemory:  # noqa: ARG001  as in floating point
-    """Memory of all lags."""
-    return FixedLagMemory(FixedBrakedState.zeros(len(t.exact)), FixedExactState.zeros(len(t.exact)))
 
 
 @dataclass(frozen=True)
@@ -353,6 +348,6 @@ def coarsely(t: FixedLagTables, x: Any, drop: Any) -> Any:
 
 LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked)
 ARITHMETIC = Realized(
-    Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
+    Verbs(memory_of(FixedLagMemory), lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
     tables, formats, kinds=(KIND, EXACT_KIND, BRAKED_KIND),
 )

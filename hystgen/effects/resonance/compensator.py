@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Real, Struct
+from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Array
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.part import ChainPart, FloatSurroundings, Margin, One, Realized, Verbs, called, late
@@ -139,11 +139,6 @@ def constants(t: ModeTable) -> Iterator[Constants]:
         yield Constants(KIND, row, (6, 0))
 
 
-def memory(t: ModeTable, dtype: Any) -> ModeState:
-    """Memory of all modes."""
-    return ModeState.zeros(len(t), dtype)
-
-
 @jit
 def mode_rest(t: ModeTable, s: ModeState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """Everything has settled at the input x. Returns the output."""
@@ -165,7 +160,7 @@ def mode_absorb(t: ModeTable, s: ModeState, j: int, x: Any) -> Any:
     return x + s.off[j]
 
 
-ARITHMETIC = Realized(Verbs(memory, mode_rest, mode_absorb), constants, tables, kinds=(KIND,))
+ARITHMETIC = Realized(Verbs(memory_of(ModeState), mode_rest, mode_absorb), constants, tables, kinds=(KIND,))
 
 MODE = ChainPart(
     "mode", "resonance", called("resonance", lambda effect: effect.block is None),

@@ -14,7 +14,7 @@ from typing import Any
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Factor, Int64, Struct, UInt8
+from hystgen.basics.structures import Factor, Int64, Struct, UInt8, memory_of
 from hystgen.effects.kinds import Constants
 from hystgen.effects.part import Coded, Realized, Verbs
 from hystgen.effects.resonance import compensator
@@ -53,11 +53,6 @@ def constants(t: FixedModeTable) -> Iterator[Constants]:
     """The numbers of each mode."""
     for row in t:
         yield Constants(KIND, row, (12, 0))
-
-
-def memory(t: FixedModeTable, dtype: Any) -> FixedModeState:  # noqa: ARG001  as in floating point
-    """Memory of all modes."""
-    return FixedModeState.zeros(len(t))
 
 
 def largest_state(one: ModeNumbers, size: float) -> float:
@@ -142,7 +137,7 @@ def mode_absorb(t: FixedModeTable, s: FixedModeState, j: int, x: Any) -> Any:
 
 
 ARITHMETIC = Realized(
-    Verbs(memory, mode_rest, mode_absorb), constants,
+    Verbs(memory_of(FixedModeState), mode_rest, mode_absorb), constants,
     lambda modes, _: FixedModeTable.of([each.row for each in modes]),
     lambda one, about, given, _: ModeFormats(one, row(one, given * 2.0**about.bits)),
     kinds=(KIND,),

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Flag, Real, Struct
+from hystgen.basics.structures import Count, Flag, Real, Struct, memory_of
 from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import ChainPart, FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs, called, late
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
@@ -119,11 +119,6 @@ def numbers(effect: LoggedThermal, span: float) -> tuple[float, float, float, fl
         effect.gain_per_degree, effect.offset_per_degree, effect.reference,
         effect.reference + max(down, -largest), effect.reference + min(up, largest),
     )
-
-
-def memory(t: GainNumbers, dtype: Any) -> GainState:
-    """Memory of all gains."""
-    return GainState.zeros(len(t), dtype)
 
 
 @jit
@@ -242,12 +237,12 @@ error there, with 16 it is 5.3 times."""
 
 
 class HeatTables(NamedTuple):
-    """Own heat of a model: `block` (k,); the plays that rub, of each block from `first` (k + 1) on in `play` (m,), and
-    their number `plays` (k,): 0 where the drive's square is the heat."""
+    """Own heat of a model: `block` (k,), `friction` (k,), without plays where the drive's square is the heat; the plays
+    that rub, of each block from `first` (k + 1) on in `play` (m,)."""
 
     block: HeatNumbers
+    friction: FrictionTable
     first: Counts
-    plays: Counts
     play: FrictionPlay
 
 
@@ -272,10 +267,9 @@ def thresholds(effect: OwnHeat, ends: tuple[float, float]) -> list[float]:
     return [(2 * i + 1) * half for i in range(FRICTION_PLAYS)]
 
 
-def rubbing(rows: Sequence[Sequence[Any]]) -> tuple[Counts, Counts]:
-    """Where the thresholds of each block begin, as in `HeatTables`, and their number."""
-    counts = np.array([len(row) for row in rows], dtype=np.int64)
-    return np.concatenate([np.zeros(1, np.int64), np.cumsum(counts)]), counts
+def firsts(rows: Sequence[Sequence[Any]]) -> Counts:
+    """Where the thresholds of each block begin, and those of the last one end."""
+    return np.cumsum([0, *map(len, rows)]).astype(np.int64)
 
 
 def per_amount(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> float:
@@ -405,7 +399,8 @@ def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
     play = about.reals([(r,) for each in widths for r in each], "thresholds")
     return HeatTables(
         HeatNumbers.of([(*row[:-2], n, *row[-2:]) for row, n in zip(rows, turns, strict=True)], rows.dtype),
-        *rubbing(widths),
+        FrictionTable.of([(len(each),) for each in widths]),
+        firsts(widths),
         FrictionPlay.of(play, play.dtype),
     )
 
@@ -414,14 +409,6 @@ def heat_constants(t: HeatTables) -> Iterator[Constants]:
     """The numbers of each block."""
     for row in t.block:
         yield Constants(HEAT_KIND, row, (7 + 2 * int(row["turns"]), 1))
-
-
-def heat_memory(t: HeatTables, dtype: Any) -> HeatMemory:
-    """Memory of all blocks."""
-    k = len(t.block)
-    return HeatMemory(
-        HeatState.zeros(k, dtype), FrictionState.zeros(k, dtype), FrictionPlayState.zeros(len(t.play), dtype)
-    )
 
 
 @jit
@@ -445,7 +432,7 @@ def heat_way(before: Any, v: Any) -> Any:
 @jit
 def heat_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> None:
     """The drive has moved to v."""
-    amount = friction_move(t, s, j, before, v) if t.plays[j] else heat_way(before, v)
+    amount = friction_move(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
     high = s.block.high[j]
     change = (t.block.per_amount[j] * amount - t.block.rate[j] * high) + s.block.low[j]
     following = high + change
@@ -477,8 +464,8 @@ def heat_absorb(t: HeatTables, s: HeatMemory, j: int, x: Any) -> Any:  # noqa: A
 
 def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
     """The rubbing plays of each block; None where none rub."""
-    for n, first in zip(t.plays.tolist(), t.first, strict=False):
-        (row,) = FrictionTable.of([(n,)])
+    for row, first in zip(t.friction, t.first, strict=False):
+        n = int(row["n"])
         yield Constants(FRICTION_KIND, row, (n, 0), t.play[first : first + n]) if n else None
 
 
@@ -510,11 +497,11 @@ def friction_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> 
 
 
 ARITHMETIC = Realized(
-    Verbs(memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
+    Verbs(memory_of(GainState), absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
     constants, tables, kinds=(KIND,),
 )
 HEAT_ARITHMETIC = Realized(
-    Verbs(heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
+    Verbs(memory_of(HeatMemory), absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
     heat_constants, heat_tables, kinds=(HEAT_KIND, FRICTION_KIND), beside=friction_constants,
 )
 

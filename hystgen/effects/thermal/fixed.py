@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from hystgen.arithmetic.factors import MANTISSA_BITS, factor, times
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Factor, Int32, Int64, Struct, UInt8
+from hystgen.basics.structures import Count, Factor, Int32, Int64, Struct, UInt8, memory_of
 from hystgen.effects.kinds import Constants, Rows
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
 from hystgen.effects.thermal import compensator as floating
@@ -64,11 +64,6 @@ KIND = replace(floating.KIND, table=FixedGainTable, state=FixedGainState)
 def constants(t: FixedGainTable) -> Iterator[Constants]:
     """The numbers of each gain."""
     yield from (Constants(KIND, row, (2, 2)) for row in t)
-
-
-def memory(t: FixedGainTable, dtype: Any) -> FixedGainState:  # noqa: ARG001  as in floating point
-    """Memory of all gains."""
-    return FixedGainState.zeros(len(t))
 
 
 def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> FixedGainTable:
@@ -240,13 +235,12 @@ FRICTION_KIND = replace(
 
 
 class FixedHeatTables(NamedTuple):
-    """Own heat of a model, as in floating point; `friction` (k,): of the plays that rub."""
+    """Own heat of a model, as in floating point."""
 
     block: FixedHeatTable
-    first: Counts
-    plays: Counts
-    play: FixedFrictionPlay
     friction: FixedFrictionTable
+    first: Counts
+    play: FixedFrictionPlay
 
 
 class FixedHeatMemory(NamedTuple):
@@ -323,9 +317,9 @@ def heat_tables(rows: Sequence[Heat]) -> FixedHeatTables:
     """The tables of several blocks."""
     return FixedHeatTables(
         FixedHeatTable.of([one.table for one in rows]),
-        *floating.rubbing([one.thresholds for one in rows]),
-        FixedFrictionPlay.of([(r,) for one in rows for r in one.thresholds]),
         FixedFrictionTable.of([(len(one.thresholds), one.bits) for one in rows]),
+        floating.firsts([one.thresholds for one in rows]),
+        FixedFrictionPlay.of([(r,) for one in rows for r in one.thresholds]),
     )
 
 
@@ -333,12 +327,6 @@ def heat_constants(t: FixedHeatTables) -> Iterator[Constants]:
     """The numbers of each block."""
     for row in t.block:
         yield Constants(HEAT_KIND, row, (12 + 2 * int(row["turns"]), 2))
-
-
-def heat_memory(t: FixedHeatTables, dtype: Any) -> FixedHeatMemory:  # noqa: ARG001  as in floating point
-    """Memory of all blocks."""
-    k = len(t.block)
-    return FixedHeatMemory(FixedHeatState.zeros(k), FrictionState.zeros(k), FixedFrictionPlayState.zeros(len(t.play)))
 
 
 @jit
@@ -362,7 +350,7 @@ def heat_way(before: Any, v: Any) -> Any:
 def heat_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: Any, v: Any) -> None:
     """The drive has moved to v."""
     n = t.block
-    amount = friction_move(t, s, j, before, v) if t.plays[j] else heat_way(before, v)
+    amount = friction_move(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
     warmer = times(nearest(amount, n.coarse[j]), n.per_amount.mantissa[j], n.per_amount.shift[j]) << n.lift[j]
     lost = times(s.block.rise[j] >> n.drop[j], n.rate.mantissa[j], n.rate.shift[j])
     s.block.rise[j] = s.block.rise[j] + (warmer - lost)
@@ -430,10 +418,10 @@ def friction_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: Any, v
 
 
 ARITHMETIC = Realized(
-    Verbs(memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
+    Verbs(memory_of(FixedGainState), absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
     constants, made, formats, kinds=(KIND,),
 )
 HEAT_ARITHMETIC = Realized(
-    Verbs(heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
+    Verbs(memory_of(FixedHeatMemory), absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
     heat_constants, lambda rows, _: heat_tables(rows), heat_formats, (HEAT_KIND, FRICTION_KIND), friction_constants,
 )
