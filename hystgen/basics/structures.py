@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Self, TypeAlias, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Self, TypeAlias, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -29,25 +29,27 @@ Signal: TypeAlias = Annotated[Numbers, "signal_t"]
 Number: TypeAlias = Annotated[Numbers, "number_t"]
 Count: TypeAlias = Annotated[Numbers, "uint_least16_t"]
 SmallCount: TypeAlias = Annotated[Numbers, "uint_least8_t"]
+TwoReals: TypeAlias = Annotated[Numbers, "real_t", 2]
 FourInt32: TypeAlias = Annotated[Numbers, "int32_t", 4]
 
 
 class Struct(np.ndarray[Any, np.dtype[Any]]):
     """Structures of one kind, an array of them; each member is an array of numbers or structures.
 
-    Numbers of type `Real` have the type of the arithmetic. All others are int64 here, however narrow they are in C.
+    A `Real` or `Signal` has the type of the arithmetic. All other numbers are int64 here, however narrow they are in C.
     """
 
-    if not TYPE_CHECKING:  # its members are declared
+    def __array_finalize__(self, _: object) -> None:
+        """Give a new array its members as attributes."""
+        if self.dtype.names:
+            plain = self.view(np.ndarray)
+            for name, (kind, _length) in self.members().items():
+                setattr(self, name, plain[name].view(kind) if isinstance(kind, type) else plain[name])
 
-        def __getattr__(self, name: str) -> Any:
-            """The member of this name, kept so that only its first use costs time."""
-            if name not in self.members():
-                raise AttributeError(name)
-            kind, _ = self.members()[name]
-            found = self[name].view(kind if isinstance(kind, type) else np.ndarray)
-            setattr(self, name, found)
-            return found
+    def __setstate__(self, state: Any) -> None:
+        """Unpickle, which fills an array that had no members yet."""
+        super().__setstate__(state)
+        self.__array_finalize__(None)
 
     @classmethod
     @functools.cache
@@ -70,7 +72,8 @@ class Struct(np.ndarray[Any, np.dtype[Any]]):
         assert not taken, f"{cls.__name__}: arrays have attributes {taken}"
         fields: list[Any] = []
         for name, (kind, length) in cls.members().items():
-            number = kind.layout(real) if isinstance(kind, type) else real if kind == "real_t" else np.int64
+            number = real if kind in ("real_t", "signal_t") else np.int64
+            number = kind.layout(real) if isinstance(kind, type) else np.dtype(number)
             fields.append((name, number, (length,)) if length else (name, number))
         return np.dtype(fields)
 

@@ -30,7 +30,7 @@ from hystgen.compensator.step import Operations
 from hystgen.front import compensator, curve
 from hystgen.plays import loop
 from hystgen.plays.corners.corners_fixed import new_fixed_memory
-from hystgen.plays.corners.corners_float import STATUS, new_memory
+from hystgen.plays.corners.corners_float import new_memory
 from hystgen.plays.slots import (
     CODE_MAX,
     DRIVE_MAX,
@@ -121,7 +121,7 @@ def _corner_operations(
         """Return 0: there are no other calls."""
         return t.limits[ZERO]
 
-    run = step.run_of(init, reset, forward_step, inverse_step, inverting.inverse_commit, itself, STATUS, other)
+    run = step.run_of(init, reset, forward_step, inverse_step, inverting.inverse_commit, itself, other)
     return Operations(init, visit, run, forward_step, inverse_step, front_forward, front_inverse)
 
 

@@ -14,23 +14,7 @@ from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import FixedTables, Tables, clamp_drive, inverse_clamp
-from hystgen.plays.loop import (
-    ANSWER,
-    ASCENDING,
-    BITS,
-    DRIVE,
-    HAS_PENDING,
-    LEVEL,
-    PENDING,
-    REFERENCE,
-    REPEAT,
-    STATUS,
-    STEPPED,
-    State,
-    loop_absorb,
-    loop_rest,
-    loop_start,
-)
+from hystgen.plays.loop import State, loop_absorb, loop_rest, loop_start
 from hystgen.plays.slots import (
     DOMAIN,
     HELD,
@@ -64,10 +48,10 @@ class Operations(NamedTuple):
 @jit(inline=True)
 def inverse_answer(s: State, v: Any) -> Any:
     """Leave drive v pending and return it."""
-    s.real[ANSWER] = v
-    s.real[PENDING] = v
-    s.counts[HAS_PENDING] = 1
-    s.counts[STEPPED] = 1
+    s.step.answer[0] = v
+    s.step.pending[0] = v
+    s.step.has_pending[0] = 1
+    s.step.stepped[0] = 1
     return v
 
 
@@ -75,9 +59,9 @@ def inverse_answer(s: State, v: Any) -> Any:
 def inverse_fits(t: Tables | FixedTables, s: State, v: Any, ascending: int) -> bool:
     """Whether the move to v lies on the branch for which v was computed."""
     inside = clamp_drive(t, v)
-    if inside == s.real[DRIVE]:
-        return bool(s.counts[ASCENDING] == ascending)
-    return bool((inside > s.real[DRIVE]) == (ascending != 0))
+    if inside == s.step.drive[0]:
+        return bool(s.step.ascending[0] == ascending)
+    return bool((inside > s.step.drive[0]) == (ascending != 0))
 
 
 class PlayOperations(NamedTuple):
@@ -99,17 +83,17 @@ def plays_of(
     def begin(t: Tables | FixedTables, s: State, which: int) -> None:
         """The part that init and reset share, once the plays are set; `which` as in `Tables.applied`."""
         drive = t.applied[which]
-        s.counts[ASCENDING] = t.ascending[which]
-        s.counts[HAS_PENDING] = 0
-        s.counts[REPEAT] = 0
-        s.counts[STEPPED] = 0
-        s.counts[BITS] = 0
-        s.real[PENDING] = drive
-        s.real[DRIVE] = drive
-        s.real[LEVEL] = output(t, s)
-        s.counts[STATUS] = 0
-        s.real[REFERENCE] = s.real[LEVEL]
-        s.real[ANSWER] = s.real[LEVEL]
+        s.step.ascending[0] = t.ascending[which]
+        s.step.has_pending[0] = 0
+        s.step.repeated[0] = 0
+        s.step.stepped[0] = 0
+        s.step.bits[0] = 0
+        s.step.pending[0] = drive
+        s.step.drive[0] = drive
+        s.step.last[0] = output(t, s)
+        s.step.status[0] = 0
+        s.step.reference[0] = s.step.last[0]
+        s.step.answer[0] = s.step.last[0]
 
     @jit
     def init(t: Tables | FixedTables, s: State, inverse: int) -> None:
@@ -130,17 +114,17 @@ def plays_of(
     def set_drive(t: Tables | FixedTables, s: State, v: Any) -> None:
         """Move the actuator to drive v; with two branches, the direction of the move picks one."""
         if t.branches:
-            if v > s.real[DRIVE]:
-                s.counts[ASCENDING] = 1
-            elif v < s.real[DRIVE]:
-                s.counts[ASCENDING] = 0
-        s.real[DRIVE] = v
+            if v > s.step.drive[0]:
+                s.step.ascending[0] = 1
+            elif v < s.step.drive[0]:
+                s.step.ascending[0] = 0
+        s.step.drive[0] = v
 
     @jit(inline=True)
     def arrive(t: Tables | FixedTables, s: State, v: Any) -> Any:
         """Move the actuator to drive v. Returns the input of the plays."""
         set_drive(t, s, v)
-        return front_forward(t, v, s.counts[ASCENDING])
+        return front_forward(t, v, s.step.ascending[0])
 
     @jit
     def inverse_choose(t: Tables | FixedTables, s: State, level: Any, w: Any) -> tuple[Any, int]:
@@ -148,29 +132,29 @@ def plays_of(
         other one; if neither fits, the drive holds."""
         if not t.branches:
             return front_inverse(t, w, 1)  # type: ignore[no-any-return]
-        up = s.counts[ASCENDING]
-        if level > s.real[LEVEL]:
+        up = s.step.ascending[0]
+        if level > s.step.last[0]:
             up = 1
-        elif level < s.real[LEVEL]:
+        elif level < s.step.last[0]:
             up = 0
         v, limited = front_inverse(t, w, up)
         if inverse_fits(t, s, v, up):
             return v, limited
-        back = clamp_drive(t, v) - s.real[DRIVE]
-        if up == s.counts[ASCENDING] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
-            return s.real[DRIVE], limited
+        back = clamp_drive(t, v) - s.step.drive[0]
+        if up == s.step.ascending[0] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
+            return s.step.drive[0], limited
         v, limited = front_inverse(t, w, 1 - up)
         if inverse_fits(t, s, v, 1 - up):
             return v, limited
-        return s.real[DRIVE], limited
+        return s.step.drive[0], limited
 
     @jit
     def inverse_drive(t: Tables | FixedTables, s: State, level: Any, w: Any) -> Any:
         """The drive that gives w."""
         v, limited = inverse_choose(t, s, level, w)
-        s.real[LEVEL] = level
+        s.step.last[0] = level
         if limited:
-            s.counts[BITS] |= DOMAIN
+            s.step.bits[0] |= DOMAIN
         return v
 
     return PlayOperations(init, reset, arrive, inverse_drive)
@@ -198,10 +182,9 @@ def run_of(
     inverse_step: Callable[..., Any],
     inverse_commit: Callable[..., Any],
     plays: Callable[..., Any],
-    place: int,
     other: Callable[..., Any],
 ) -> Callable[..., Any]:
-    """`Operations.run` of any engine; `place`: of the status in the counts of the memory."""
+    """`Operations.run` of any engine."""
 
     @jit
     def run(t: Any, s: Any, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
@@ -223,7 +206,7 @@ def run_of(
                     answers[i] = answer
             else:
                 answers[i] = other(t, s, inverse, call, x[i])
-            status[i] = read(m.counts, place, op[i])
+            status[i] = read(m.step, op[i])
 
     return run
 
@@ -243,23 +226,23 @@ def operations_of(
         """Answer one sample of the forward operator."""
         m = plays(s)
         if not finite(t, v):
-            m.counts[STATUS] |= HELD
-            return m.real[ANSWER]
+            m.step.status[0] |= HELD
+            return m.step.answer[0]
         inside = clamp_drive(t, v)
         if inside != v:
-            m.counts[STATUS] |= INPUT_CLAMPED
+            m.step.status[0] |= INPUT_CLAMPED
         forward_absorb(t, s, inside)
-        m.real[ANSWER], bits = shown(t, s)
-        m.counts[STATUS] |= bits
-        return m.real[ANSWER]
+        m.step.answer[0], bits = shown(t, s)
+        m.step.status[0] |= bits
+        return m.step.answer[0]
 
     @jit
     def inverse_take(t: Any, s: Any) -> None:
         """Absorb the pending drive."""
         m = plays(s)
-        if m.counts[HAS_PENDING]:
-            inverse_absorb(t, s, m.real[PENDING])
-            m.counts[HAS_PENDING] = 0
+        if m.step.has_pending[0]:
+            inverse_absorb(t, s, m.step.pending[0])
+            m.step.has_pending[0] = 0
 
     @jit
     def inverse_step(t: Any, s: Any, u: Any) -> Any:
@@ -267,20 +250,20 @@ def operations_of(
         m = plays(s)
         inverse_take(t, s)
         if not finite(t, u):
-            m.counts[STATUS] |= HELD
+            m.step.status[0] |= HELD
             unread(t, s)
             return inverse_answer(m, held(t, s))
         level = inverse_clamp(t, u)
         if level != u:
-            m.counts[STATUS] |= INPUT_CLAMPED
+            m.step.status[0] |= INPUT_CLAMPED
         if stands(t, s, u):
-            m.counts[STATUS] |= m.counts[BITS]
-            return inverse_answer(m, m.real[ANSWER])
+            m.step.status[0] |= m.step.bits[0]
+            return inverse_answer(m, m.step.answer[0])
         v = sought(t, s, level)
         inside = clamp_drive(t, v)
         if inside != v:
-            m.counts[BITS] |= OUTPUT_CLAMPED
-        m.counts[STATUS] |= m.counts[BITS]
+            m.step.bits[0] |= OUTPUT_CLAMPED
+        m.step.status[0] |= m.step.bits[0]
         return inverse_answer(m, inside)
 
     @jit
@@ -288,16 +271,16 @@ def operations_of(
         """Replace the last answer by the drive that was really applied."""
         m = plays(s)
         if not finite(t, applied):
-            m.counts[STATUS] |= HELD
+            m.step.status[0] |= HELD
             return
         v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
         if v != applied:
-            m.counts[STATUS] |= INPUT_CLAMPED
-        m.counts[REPEAT] = 0
-        m.real[PENDING] = v
-        m.counts[HAS_PENDING] = 1
+            m.step.status[0] |= INPUT_CLAMPED
+        m.step.repeated[0] = 0
+        m.step.pending[0] = v
+        m.step.has_pending[0] = 1
 
-    run = run_of(init, reset, forward_step, inverse_step, inverse_commit, plays, STATUS, other)
+    run = run_of(init, reset, forward_step, inverse_step, inverse_commit, plays, other)
     return Operations(init, visit, run, forward_step, inverse_step, *front)
 
 
@@ -333,8 +316,8 @@ def made_of(
     def visit(t: Tables | FixedTables, s: State, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
         """Move the actuator to drive v before the next sample."""
         absorb(t, s, v)
-        s.real[LEVEL], bits = output(t, s)
-        s.counts[STATUS] |= bits
+        s.step.last[0], bits = output(t, s)
+        s.step.status[0] |= bits
 
     @jit(inline=True)
     def unread(t: Tables | FixedTables, s: State) -> None:
@@ -343,21 +326,21 @@ def made_of(
     @jit(inline=True)
     def held(t: Tables | FixedTables, s: State) -> Any:  # noqa: ARG001  the same call for every chain
         """The last answer again."""
-        return s.real[ANSWER] if s.counts[STEPPED] else s.real[DRIVE]
+        return s.step.answer[0] if s.step.stepped[0] else s.step.drive[0]
 
     @jit(inline=True)
     def stands(t: Tables | FixedTables, s: State, u: Any) -> bool:  # noqa: ARG001
         """Whether the last answer holds for reference u; u becomes the last reference."""
-        if s.counts[REPEAT] and u == s.real[REFERENCE]:
+        if s.step.repeated[0] and u == s.step.reference[0]:
             return True
-        s.real[REFERENCE] = u
-        s.counts[REPEAT] = 1
+        s.step.reference[0] = u
+        s.step.repeated[0] = 1
         return False
 
     @jit(inline=True)
     def sought(t: Tables | FixedTables, s: State, level: Any) -> Any:
         """The drive for the limited reference `level`."""
-        s.counts[BITS] = 0
+        s.step.bits[0] = 0
         return inverse_drive(t, s, level, inverse_solve(t, s, level))
 
     @jit(inline=True)

@@ -274,7 +274,7 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
         Field("bool", "moving", "a drive was applied"),
         *[
             Field("bool", "has_pending"),
-            Field("bool", "repeat", "the last answer still stands for `reference`"),
+            Field("bool", "repeated", "the last answer still stands for `reference`"),
             Field("bool", "stepped", "a step has answered"),
             Field("bool", "filled", "there are references"),
             Field("unsigned int", "bits", "of the last step"),

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 97a57af2a7341e3488bb7b4f755b1752585244e45504086bef13d4e1e0afbb62, without this line
+ * Text: sha256 7997ee1685e2a996284bce8038761ce6f7ffbf0ce48193b3e7e2b0ca15a08b5c, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -113,7 +113,7 @@ typedef struct {
     curved_real_t drive; /* where the plays are */
     curved_real_t undo_drive;
     curved_real_t reference; /* of the last step */
-    bool repeat;             /* the last answer still stands for `reference` */
+    bool repeated;           /* the last answer still stands for `reference` */
     bool limited;            /* no drive gives it; here rather than on the stack */
     uint_least8_t bits;      /* status of that answer */
     unsigned int status;
