@@ -13,7 +13,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.compensator.chain.layout import ARRIVING_BITS, Compiled
+from hystgen.compensator.chain.layout import Compiled
 from hystgen.compensator.fixed_tables import build
 from hystgen.effects.lag import fixed as lag
 from hystgen.effects.thermal import fixed as thermal
@@ -206,7 +206,7 @@ def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") ->
         return 2 ** (bits + int(np.max(dropped, initial=0)))
 
     ends = [*t.plays.limits[[PLAY_MIN, PLAY_MAX]].tolist(), *t.plays.start.tolist()]
-    drive = max(map(abs, t.plays.limits[:2].tolist())) * 2 ** int(t.number[ARRIVING_BITS])
+    drive = max(map(abs, t.plays.limits[:2].tolist())) * 2 ** int(t.number.arriving_bits[0])
     led = most(t.of("lag").led.drop, 50)
     rubbed = int(t.limits[CODE_MAX]) * most(t.of("heat").friction.bits, 0)
     numbers = {

@@ -165,9 +165,9 @@ def test_a_quiet_drive_stands_still(name: str, arithmetic: str) -> None:
     drive, output, unit = 1.0, 1.0, 1.0
     if numbers.codes:
         drive, output = float(numbers.codes.drive_lsb), float(numbers.codes.output_lsb)
-        unit = drive / 2.0 ** int(numbers.tables.number[layout.DRIVE_BITS])
+        unit = drive / 2.0 ** int(numbers.tables.number.drive_bits[0])
     error = np.abs(one.simulate(v * drive, t=t) / output - u)
-    kept = 2.0 * unit * float(numbers.tables.number[layout.DITHER]) + 0.5 * drive * (numbers.codes is not None)
+    kept = 2.0 * unit * float(numbers.tables.number.dither[0]) + 0.5 * drive * (numbers.codes is not None)
     allowed = 1.1 * one.cascade.pi.slopes[-1] * one.cascade.front_slopes[1] * kept / output  # creep adds 10 %
     allowed += 2e-8 * (high - low) + np.max(np.abs(np.diff(u, 2))) / 8.0 * (name == "late")  # between two samples
     for end in (120 + held, len(u)):
@@ -393,7 +393,7 @@ def test_drift_is_counted_from_set_offset_on_and_survives_a_correction() -> None
                                  (slots.OP_EXPECTED, 0.0)])  # fmt: skip
     assert float(trimmed[-1]) == float(answer[-1]), "a sensor that sees what is expected changes nothing"
     assert drifted > 0.1
-    span = float(numbers.tables.number[layout.FARTHEST])
+    span = float(numbers.tables.number.farthest_offset[0])
     far = chain("far", "name: drift, rate: 1.0e+4", compensate="drift")
     late, _ = run_calls(model("far", far), [(slots.OP_STEP, 0.0)] * 50 + [(slots.OP_EXPECTED, 0.0)])
     none, _ = run_calls(model("far", far), [(slots.OP_STEP, 0.0), (slots.OP_EXPECTED, 0.0)])

@@ -242,7 +242,7 @@ BOUNDS = {
     "lines that ask `.fixed`": (21, 10),
     "lines with `Any`": (720, 300),
     "`fmt: skip`": (1, 30),
-    "tuples of numbered slots": (34, 0),
+    "tuples of numbered slots": (32, 0),
     "files that name an effect outside its folder": (38, 0),
     "files of C": (99, 120),
     "lines of C": (6_862, 5_000),

@@ -11,7 +11,7 @@ one, in Python and in compiled code, where numba takes such an array as it is.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Any, Self, TypeAlias, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -83,7 +83,7 @@ class Struct(np.ndarray[Any, np.dtype[Any]]):
         return np.zeros(count, cls.layout(np.dtype(real))).view(cls)
 
     @classmethod
-    def of(cls, rows: Iterable[Sequence[Any]], real: DTypeLike = np.int64) -> Self:
+    def of(cls, rows: Iterable[Any], real: DTypeLike = np.int64) -> Self:
         """A structure for each row, whose entries are its members in order; a structure in it is a tuple."""
         return np.array([tuple(row) for row in rows], cls.layout(np.dtype(real))).view(cls)
 

@@ -28,7 +28,7 @@ NUMBERS = {
     "SLEW_RISING_REST": "and what rounding took from that",
     "SLEW_FALLING_REST": "",
 }
-"""Macros for the first places of `ChainTables.number`."""
+"""Macros for members of `ChainTables.number`."""
 
 
 @dataclass(frozen=True)
@@ -188,12 +188,11 @@ def effects(
     compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[Stage], writer: Writer
 ) -> Effects:
     """Tables and macros of a model's effects; `behind`: its stages of saturation."""
-    from hystgen.compensator.chain.layout import DITHER
 
     t, chain = compiled.tables, Chain.of(compiled.tables, operators)
     largest = max(map(chain.blocks, operators), key=len)  # the forward operator has the inverse's blocks, and modes
     tables = [table for block in largest for table in block.tables(writer)]
-    numbers = dict(zip(NUMBERS, t.number, strict=False))
+    numbers = {name: t.number[name.lower()][0] for name in NUMBERS}
     constants = [(name, operand(value), NUMBERS[name]) for name, value in numbers.items()]
     constants += [("LEAD", operand(row["most_ahead"]), "samples that references come ahead") for row in t.of("clock")]
     constants.append(("WAITING", f"{t.of('wait').samples}u", "samples of the drive that wait"))
@@ -205,7 +204,7 @@ def effects(
         tables.append(form.tap(t, writer))
     constants += [
         ("QUIET", f"{t.quiet}u", "equal references after which the drive stands still"),
-        ("DITHER", operand(t.number[DITHER]), "signal by which a drive at rest goes to and fro"),
+        ("DITHER", operand(t.number.dither[0]), "signal by which a drive at rest goes to and fro"),
         ("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"),
         *form.effects(t),
     ]

@@ -7,7 +7,7 @@ from __future__ import annotations
 from typing import Any
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.chain.layout import ARRIVING_BITS, LARGEST_LEVEL, LEVEL_DROP, ChainTables
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.moving_fixed import asked, level
 from hystgen.compensator.chain.step import ChainState
 from hystgen.plays.corners import corners_fixed
@@ -89,7 +89,7 @@ def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
 def seen(t: ChainTables, m: FixedMemory, kept: Reals, w: Any) -> None:
     """The kink before a solution w that is refined: plays that begin to follow at w do not count."""
     x = along(m, w)
-    if t.number[ARRIVING_BITS] > 0 and x > along(m, m.here.input[0]):
+    if t.number.arriving_bits[0] > 0 and x > along(m, m.here.input[0]):
         keep(kept, find(t.plays, m, x - 1, False))
 
 
@@ -107,17 +107,17 @@ def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
 @jit
 def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
     """As in engine loop: the signal in front of the plays that gives their sum h, with more bits than their input w."""
-    bits = t.number[ARRIVING_BITS]
+    bits = t.number.arriving_bits[0]
     if bits == 0:
         return a
     m = s.corners
     whole = a << bits
     x = along(m, w)
     on = x - along(m, m.here.input[0])
-    if h > t.number[LARGEST_LEVEL] or h < -t.number[LARGEST_LEVEL] or on < 0:
+    if h > t.number.largest_level[0] or h < -t.number.largest_level[0] or on < 0:
         return whole
     k = s.kink[2] + 1 if on > 0 else 1
-    left = along(m, h << t.number[LEVEL_DROP]) - s.kink[0] - t.plays.slope[k] * (x - s.kink[1])
+    left = along(m, h << t.number.level_drop[0]) - s.kink[0] - t.plays.slope[k] * (x - s.kink[1])
     size = -left if left < 0 else left
     if size > t.plays.slope[k]:
         return whole

@@ -14,18 +14,7 @@ import numpy as np
 
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Flag, Real, Signal, Struct, UInt32
-from hystgen.compensator.chain.layout import (
-    DITHER,
-    FALLING,
-    FALLING_REST,
-    FARTHEST,
-    OFFSET,
-    RISING,
-    RISING_REST,
-    SHARE,
-    ChainTables,
-    OwnChainTables,
-)
+from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.compensator.chain.parts import BESIDE, LED, PARTS, parts_with
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat
 from hystgen.compensator.chain.sides import Blocks, moves, resetting, sides_of, told
@@ -180,7 +169,7 @@ def made_of(
     @jit(inline=True)
     def displacement(t: ChainTables, s: ChainState, y: Any) -> Any:
         """The displacement: the result of the output side after saturation, plus the offsets."""
-        offset = t.number[OFFSET] + s.own.offset[0]
+        offset = t.number.output_offset[0] + s.own.offset[0]
         for j in range(s.counts[CLOCK]):
             offset = offset + clock_added(t.blocks[CLOCK], s.blocks[CLOCK], j)
         return bent(t.behind, y) + offset
@@ -188,7 +177,7 @@ def made_of(
     @jit(inline=True)
     def undisplaced(t: ChainTables, s: ChainState, u: Any) -> tuple[Any, int]:
         """The result that the output side has to give for the displacement u, and whether there is none."""
-        offset = t.number[OFFSET] + s.own.offset[0]
+        offset = t.number.output_offset[0] + s.own.offset[0]
         for j in range(s.counts[CLOCK]):
             filled, moving = s.line.filled[0], s.own.moving[0]
             offset = offset + clock_ahead(t.blocks[CLOCK], s.blocks[CLOCK], j, filled, moving)
@@ -260,14 +249,14 @@ def made_of(
             s.steady.rises[0] = 0
         last = drive_signal(t, s.own.applied[0])
         moved, rises = s.steady.moved[0], s.steady.rises[0]
-        v, s.steady.way[0] = led_solve(t.blocks[LED], s.blocks[LED], a, moved, rises, last, t.number[DITHER])
+        v, s.steady.way[0] = led_solve(t.blocks[LED], s.blocks[LED], a, moved, rises, last, t.number.dither[0])
         return v
 
     @jit
     def steady_hold(t: ChainTables, s: ChainState, v: Any) -> Any:
         """The drive v, or one that keeps the lag on its branch."""
         last = drive_signal(t, s.own.applied[0])
-        return led_kept(t.blocks[LED], s.blocks[LED], v, s.steady.rises[0], last, t.number[DITHER])
+        return led_kept(t.blocks[LED], s.blocks[LED], v, s.steady.rises[0], last, t.number.dither[0])
 
     # ---------------------------------------------------------------- quiet.c
 
@@ -290,7 +279,7 @@ def made_of(
     @jit
     def quiet_drive(t: ChainTables, s: ChainState, a: Any, v: Any) -> Any:
         """The drive for a in front of the plays: v, which leads there, or one that stands still."""
-        most = t.number[DITHER]
+        most = t.number.dither[0]
         away = v - a
         if s.quiet.equal[0] > t.quiet:
             most = most + most
@@ -302,7 +291,7 @@ def made_of(
         if s.quiet.equal[0] == t.quiet:
             return a
         last = drive_signal(t, s.own.applied[0])
-        if a - last > t.number[DITHER] or last - a > t.number[DITHER]:
+        if a - last > t.number.dither[0] or last - a > t.number.dither[0]:
             return a
         return last
 
@@ -383,10 +372,10 @@ def made_of(
         """The drive nearest to v that the amplifier reaches in one step from `before` with rounding remainder `rest`,
         and its own remainder."""
         if v > before or (v == before and rest < 0):
-            drive, left = ramp(before, rest, t.number[RISING], t.number[RISING_REST])
+            drive, left = ramp(before, rest, t.number.slew_rising[0], t.number.slew_rising_rest[0])
             beyond = v > drive or (v == drive and left < 0)
         else:
-            drive, left = ramp(before, rest, -t.number[FALLING], -t.number[FALLING_REST])
+            drive, left = ramp(before, rest, -t.number.slew_falling[0], -t.number.slew_falling_rest[0])
             beyond = v < drive or (v == drive and left > 0)
         return (drive, left) if beyond else (v, t.limits[ZERO])
 
@@ -546,10 +535,10 @@ def made_of(
             s.plays.step.status[0] |= HELD
             return
         inside = d
-        if inside > t.number[FARTHEST]:
-            inside = t.number[FARTHEST]
-        elif inside < -t.number[FARTHEST]:
-            inside = -t.number[FARTHEST]
+        if inside > t.number.farthest_offset[0]:
+            inside = t.number.farthest_offset[0]
+        elif inside < -t.number.farthest_offset[0]:
+            inside = -t.number.farthest_offset[0]
         if inside != d:
             s.plays.step.status[0] |= LIMITED_SETTING
         s.own.offset[0] = inside
@@ -613,7 +602,7 @@ def made_of(
         elif call == OP_TRAVELLED:
             return travelled_by(s.blocks[AGED], 0)
         elif call == OP_CORRECT:
-            correct(t, s, x, t.number[SHARE])
+            correct(t, s, x, t.number.share[0])
         elif call == OP_EXPECTED:
             return expected(t, s)
         return t.limits[ZERO]
