@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 
+from hystgen import effects
 from hystgen.planning.grid import MOVE, SLOW_SAMPLES, Grid, Tempo
 
 EDGE = 4
@@ -204,14 +205,25 @@ def _reversals(course: Course, seed: int, turns: int, slowest: float) -> None:
 
 @dataclass(frozen=True)
 class RecordKind:
-    """A record: file name, purpose, the effects it shows, waveform and time between samples."""
+    """A record: file name, purpose, waveform and time between samples."""
 
     name: str
     purpose: str
-    shows: tuple[str, ...]
     draw: Callable[[Course], None]
     every: Callable[[Tempo], int]
     held_out: bool = False
+
+    @property
+    def shows(self) -> tuple[str, ...]:
+        """Names of the effects that it shows, the plainest first."""
+        shown_by = {name: effects.shapes(name)[0].shown_by for name in effects.CATALOGUE}
+        shown_by[effects.BEND] = BEND_SHOWN_BY
+        places = {name: records[self.name] for name, records in shown_by.items() if self.name in records}
+        return tuple(sorted(places, key=places.__getitem__))
+
+
+BEND_SHOWN_BY = {"slow": 1, "multisine": 1, "slow_minor": 2, "slow_reversals": 2}
+"""Records that show a bent front, as `Effect.shown_by`."""
 
 
 def _fast(tempo: Tempo) -> int:
@@ -232,66 +244,64 @@ LONG_HOLDS = (1.0, 0.0, 0.5, 1.0, 0.5, 0.0)
 RECORDS = (
     RecordKind(
         "slow", "One slow full loop, then nested ones: the hysteresis itself, and its bends at every amplitude.",
-        ("asymmetry", "saturation", "sensor_nonlinearity"), _slow, _lasting(1.0),
+        _slow, _lasting(1.0),
     ),
     RecordKind(
         "fast_triangles", "The same loops at the rate limit and two and four times slower: how they widen with rate.",
-        ("rate_dependence", "lag", "delay", "slew_limit"), _triangles, _fast,
+        _triangles, _fast,
     ),
     RecordKind(
         "fast_steps", "Full-scale and smaller steps with resolved edges: a tail is a lag, a shift a delay, a straight "
         "slope a slew limit, ringing a resonance.",
-        ("lag", "delay", "slew_limit", "resonance"), partial(_steps, hold=130, levels=FULL_STEPS), _fast,
+        partial(_steps, hold=130, levels=FULL_STEPS), _fast,
     ),
     RecordKind(
         "holds", "Long holds after moves both ways: creep follows the last move, drift does not.",
-        ("creep", "drift", "thermal"), partial(_steps, hold=100, levels=LONG_HOLDS), _lasting(4.0, 700),
+        partial(_steps, hold=100, levels=LONG_HOLDS), _lasting(4.0, 700),
     ),
     RecordKind(
         "staircase", "Steps of other sizes and speeds, to judge the findings of the fast records.",
-        ("lag", "delay", "slew_limit", "resonance"), _staircase, _fast, True,
+        _staircase, _fast, True,
     ),
     RecordKind(
         "slow_minor", "Equal small loops at three biases, reached from both sides: congruent or not.",
-        ("noncongruent", "asymmetry", "sensor_nonlinearity"), _slow_minor, _lasting(1.0),
+        _slow_minor, _lasting(1.0),
     ),
     RecordKind(
         "fast_minor", "Small loops at high rate with many reversals: a lag opens the smallest ones, plays do not.",
-        ("rate_dependence", "lag", "noncongruent"), _fast_minor, _fast,
+        _fast_minor, _fast,
     ),
     RecordKind(
         "slow_reversals", "Random turning points with pauses, to judge the findings of the slow records.",
-        ("creep", "asymmetry", "saturation", "sensor_nonlinearity", "noncongruent"),
         partial(_reversals, seed=2, turns=14, slowest=3.0), _lasting(1.25, 600), True,
     ),
     RecordKind(
         "sweep", "A sine from slow to an eighth of the sampling rate: the peak of a resonance, the phase of a lag.",
-        ("resonance", "lag", "delay"), _sweep, _fast,
+        _sweep, _fast,
     ),
     RecordKind(
         "cycles", "Many equal full loops: they accumulate travel and heat; later ones differ from earlier ones.",
-        ("ageing", "thermal"), _cycles, _lasting(1.0, 720),
+        _cycles, _lasting(1.0, 720),
     ),
     RecordKind(
         "settling", "Nested loops and short holds at a medium pace, while it cools: creep and rate in between.",
-        ("creep", "rate_dependence", "thermal"), _settling, _middle,
+        _settling, _middle,
     ),
     RecordKind(
         "fast_reversals", "Random turning points at random speeds near the limit, to judge.",
-        ("rate_dependence", "lag", "delay", "slew_limit"), partial(_reversals, seed=3, turns=40, slowest=4.0), _fast,
-        True,
+        partial(_reversals, seed=3, turns=40, slowest=4.0), _fast, True,
     ),
     RecordKind(
         "multisine", "Equal periods of an odd multisine with random phases: noise without a model, even nonlinearity.",
-        ("asymmetry", "sensor_nonlinearity", "resonance"), _multisine, _fast,
+        _multisine, _fast,
     ),
     RecordKind(
         "reversals", "Random turning points at a medium pace, to judge what lies between slow and fast.",
-        ("creep", "rate_dependence", "noncongruent"), partial(_reversals, seed=5, turns=25, slowest=3.0), _middle, True,
+        partial(_reversals, seed=5, turns=25, slowest=3.0), _middle, True,
     ),
     RecordKind(
         "slow_again", "The first record once more: changes in the session due to neither rate nor amplitude.",
-        ("drift", "ageing", "thermal"), _slow, _lasting(1.0),
+        _slow, _lasting(1.0),
     ),
 )
 """The records of a session, in order."""
