@@ -23,7 +23,7 @@ ROUND = 3
 """Samples over which every drive is averaged: a sharper corner would lie between samples, where no record sees it."""
 
 
-class Course:
+class Waveform:
     """A drive being built up: codes sample by sample, counted from the lowest; positions are shares of the range.
 
     `pace`: samples of a quick full-scale move.
@@ -89,118 +89,118 @@ def sine(turns: float) -> float:
     return total
 
 
-def _ends(course: Course, pace: float) -> None:
+def _ends(drive: Waveform, pace: float) -> None:
     """Moves to the top and the bottom: the history of the next record."""
-    course.go(1.0, pace)
-    course.go(0.0, pace)
-    course.hold(EDGE)
+    drive.go(1.0, pace)
+    drive.go(0.0, pace)
+    drive.hold(EDGE)
 
 
-def _triangles(course: Course) -> None:
+def _triangles(drive: Waveform) -> None:
     for slower, cycles in ((1, 4), (2, 2), (4, 1)):
         for _ in range(cycles):
-            course.go(1.0, slower * course.pace)
-            course.go(0.0, slower * course.pace)
-    _nested(course, 2 * course.pace)
+            drive.go(1.0, slower * drive.pace)
+            drive.go(0.0, slower * drive.pace)
+    _nested(drive, 2 * drive.pace)
 
 
-def _nested(course: Course, pace: float) -> None:
+def _nested(drive: Waveform, pace: float) -> None:
     for k in range(6):
-        course.go(1.0 - 0.08 * k, pace)
-        course.go(0.08 * (k + 1), pace)
+        drive.go(1.0 - 0.08 * k, pace)
+        drive.go(0.08 * (k + 1), pace)
 
 
-def _slow(course: Course) -> None:
+def _slow(drive: Waveform) -> None:
     for k in range(5):
-        course.go(1.0 - 0.1 * k, 75)
-        course.go(0.1 * k, 75)
+        drive.go(1.0 - 0.1 * k, 75)
+        drive.go(0.1 * k, 75)
 
 
-def _minor(course: Course, pace: float, size: float = 0.25) -> None:
-    course.go(1.0, pace)
-    course.go(0.0, pace)
+def _minor(drive: Waveform, pace: float, size: float = 0.25) -> None:
+    drive.go(1.0, pace)
+    drive.go(0.0, pace)
     for bias in (0.02, 0.5 - 0.5 * size, 0.98 - size):
-        course.go(bias + size, pace)
+        drive.go(bias + size, pace)
         for _ in range(2):
-            course.go(bias, pace)
-            course.go(bias + size, pace)
-    course.go(1.0, pace)
+            drive.go(bias, pace)
+            drive.go(bias + size, pace)
+    drive.go(1.0, pace)
     for bias in (0.98 - size, 0.5 - 0.5 * size, 0.02):
-        course.go(bias, pace)
-        course.go(bias + size, pace)
-        course.go(bias, pace)
+        drive.go(bias, pace)
+        drive.go(bias + size, pace)
+        drive.go(bias, pace)
 
 
-def _slow_minor(course: Course) -> None:
-    _minor(course, 60)
+def _slow_minor(drive: Waveform) -> None:
+    _minor(drive, 60)
 
 
-def _fast_minor(course: Course) -> None:
-    _minor(course, 3 * course.pace)
-    _minor(course, course.pace)
+def _fast_minor(drive: Waveform) -> None:
+    _minor(drive, 3 * drive.pace)
+    _minor(drive, drive.pace)
     for bias in (0.15, 0.5, 0.85):
-        course.go(bias, course.pace)
+        drive.go(bias, drive.pace)
         for _ in range(4):
-            course.go(bias + 0.1, course.pace)
-            course.go(bias - 0.1, course.pace)
+            drive.go(bias + 0.1, drive.pace)
+            drive.go(bias - 0.1, drive.pace)
 
 
-def _steps(course: Course, hold: int, levels: Sequence[float]) -> None:
-    course.hold(hold // 3)
+def _steps(drive: Waveform, hold: int, levels: Sequence[float]) -> None:
+    drive.hold(hold // 3)
     for level in levels:
-        course.go(level)
-        course.hold(hold)
+        drive.go(level)
+        drive.hold(hold)
 
 
-def _sweep(course: Course, samples: int = 1100) -> None:
+def _sweep(drive: Waveform, samples: int = 1100) -> None:
     """Frequency rises with time squared to an eighth of the sampling rate; amplitude falls as the limit requires."""
-    first, last = 1.0 / (16.0 * course.pace), 1.0 / 8.0
+    first, last = 1.0 / (16.0 * drive.pace), 1.0 / 8.0
     turns, values = 0.0, []
     for k in range(samples):
         x = k / samples
         frequency = first + (last - first) * x * x
-        values.append(min(1.0, 1.0 / (6.0 * course.pace * frequency)) * -sine(turns + 0.25))
+        values.append(min(1.0, 1.0 / (6.0 * drive.pace * frequency)) * -sine(turns + 0.25))
         turns += frequency
-    course.wave(values)
+    drive.wave(values)
 
 
-def _multisine(course: Course, period: int = 240, periods: int = 4) -> None:
+def _multisine(drive: Waveform, period: int = 240, periods: int = 4) -> None:
     """Odd harmonics with random phases, in whole periods."""
     phases = random.Random(1)
     lines = [(line, phases.random()) for line in range(1, 24, 2)]
     one = [sum(sine(line * k / period + phase) / line for line, phase in lines) for k in range(period)]
-    course.wave([*(one * periods), one[0]])
+    drive.wave([*(one * periods), one[0]])
 
 
-def _cycles(course: Course) -> None:
+def _cycles(drive: Waveform) -> None:
     for _ in range(28):
-        course.go(1.0, MOVE)
-        course.go(0.0, MOVE)
+        drive.go(1.0, MOVE)
+        drive.go(0.0, MOVE)
 
 
-def _settling(course: Course) -> None:
-    _nested(course, course.pace)
-    _steps(course, 50, (1.0, 0.3, 0.7, 0.0))
+def _settling(drive: Waveform) -> None:
+    _nested(drive, drive.pace)
+    _steps(drive, 50, (1.0, 0.3, 0.7, 0.0))
 
 
-def _staircase(course: Course) -> None:
-    course.hold(2 * course.pace)
+def _staircase(drive: Waveform) -> None:
+    drive.hold(2 * drive.pace)
     for level, slower in (
         (0.35, 0), (0.8, 2), (0.55, 0), (1.0, 0), (0.0, 0), (0.9, 0), (0.45, 4), (0.65, 0), (0.2, 0)
     ):
-        course.go(level, slower * course.pace)
-        course.hold(70)
+        drive.go(level, slower * drive.pace)
+        drive.hold(70)
 
 
-def _reversals(course: Course, seed: int, turns: int, slowest: float) -> None:
+def _reversals(drive: Waveform, seed: int, turns: int, slowest: float) -> None:
     """Random turning points at random speeds, with an occasional hold; both ends come first."""
     chance = random.Random(seed)
-    course.go(1.0, slowest * course.pace)
-    course.go(0.0, slowest * course.pace)
+    drive.go(1.0, slowest * drive.pace)
+    drive.go(0.0, slowest * drive.pace)
     for _ in range(turns):
-        course.go(0.02 + 0.96 * chance.random(), (1.0 + (slowest - 1.0) * chance.random()) * course.pace)
+        drive.go(0.02 + 0.96 * chance.random(), (1.0 + (slowest - 1.0) * chance.random()) * drive.pace)
         if chance.random() < 0.2:
-            course.hold(2 * course.pace)
+            drive.hold(2 * drive.pace)
 
 
 @dataclass(frozen=True)
@@ -209,7 +209,7 @@ class RecordKind:
 
     name: str
     purpose: str
-    draw: Callable[[Course], None]
+    draw: Callable[[Waveform], None]
     every: Callable[[Tempo], int]
     held_out: bool = False
 
@@ -310,16 +310,16 @@ RECORDS = (
 def written(record: RecordKind, grid: Grid, tempo: Tempo, every: int) -> list[int]:
     """The codes of a record, which ends with moves to the top and the bottom: the history of the next."""
     pace = tempo.move if every == tempo.fast else 2 * MOVE
-    course = Course(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), pace)
-    course.hold(EDGE)
-    record.draw(course)
-    _ends(course, pace)
-    return course.rounded()
+    drive = Waveform(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), pace)
+    drive.hold(EDGE)
+    record.draw(drive)
+    _ends(drive, pace)
+    return drive.rounded()
 
 
 def lead_in(grid: Grid, tempo: Tempo, every: int) -> list[int]:
     """Moves to the top and the bottom, the history of the first record, slow enough for any stage."""
-    course = Course(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), 2 * MOVE)
-    course.hold(EDGE)
-    _ends(course, 2 * MOVE)
-    return course.rounded()
+    drive = Waveform(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), 2 * MOVE)
+    drive.hold(EDGE)
+    _ends(drive, 2 * MOVE)
+    return drive.rounded()
