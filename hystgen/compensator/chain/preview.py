@@ -21,11 +21,6 @@ from hystgen.effects.resonance.model import Resonance
 from hystgen.parameters.schema import MOST_REFERENCES
 from hystgen.plays.slots import Counts, Reals
 
-WELL_DAMPED = 0.7
-"""[damping ratio] From here on a mode is inverted rather than shaped or notched. It overshoots a step by
-`exp(-pi z/sqrt(1 - z^2))`, at most 4.6 %, while the half period that a shaper waits for is 1.4 times the undamped one
-and grows without bound towards 1. Both are closed forms; no run set it."""
-
 
 class Taps(NamedTuple):
     """Weights of the reference from sample `first` to `first + len(weights) - 1`, counted from the present one."""
@@ -47,11 +42,6 @@ By = Literal["inverse", "shaper", "notch"]
 """How modes are compensated."""
 
 
-def rings(mode: Resonance, by: By) -> bool:
-    """Whether a mode is compensated by a shaper or a notch."""
-    return by != "inverse" and mode.damping < WELL_DAMPED
-
-
 def taps(
     delay: float, modes: Sequence[Resonance], seconds: float, number: int = 3, corner: int = 0, by: By = "inverse"
 ) -> Taps:
@@ -69,7 +59,7 @@ def taps(
     weights = np.array([1.0 - share, share] if share > 0.0 else [1.0])
     first = whole
     for mode in modes:
-        if rings(mode, by):
+        if mode.rings(by):
             row = shaper(mode, seconds) if by == "shaper" else notch(mode, seconds)
             weights = np.convolve(weights, row)
             first -= len(row) - 1
@@ -181,7 +171,7 @@ class Shaped(NamedTuple):
 
 def shaped(modes: Sequence[Resonance], seconds: float, by: By) -> Shaped | None:
     """The modes that `by` keeps from ringing; None if there are none."""
-    found = tuple(mode for mode in modes if rings(mode, by))
+    found = tuple(mode for mode in modes if mode.rings(by))
     return Shaped(by, found, seconds, taps(0.0, found, seconds, by=by)) if found else None
 
 
