@@ -88,7 +88,7 @@ class Gain:
         led, _, answers = self._answers(at)
         least = self.static.front_slopes[0]
         if not self._moving_plays:
-            least *= moving.least_slope(self.static, self.parts.plays)
+            least *= self._flattest
         return np.asarray(np.abs(led) * np.max([1.0 / np.abs(answer) for _, answer in answers], axis=0) / least)
 
     def _answers(self, at: Array) -> tuple[NDArray[np.complex128], float, list[tuple[float, NDArray[np.complex128]]]]:
@@ -129,6 +129,11 @@ class Gain:
     def _moving_plays(self) -> list[RelaxingPlays | ThresholdRate]:
         """The effect that makes plays depend on the rate, if there is one."""
         return [each for each in self.parts.plays if isinstance(each, RelaxingPlays | ThresholdRate)]
+
+    @cached_property
+    def _flattest(self) -> float:
+        """Least slope of the plays, bent or not."""
+        return moving.least_slope(self.static, self.parts.plays)
 
     @cached_property
     def _steepest(self) -> Array:
