@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,9 +12,9 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Array
+from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
 from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import ChainPart, FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs, called, late
-from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE
 from hystgen.plays.slots import Counts, Reals, zero
 
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
@@ -100,7 +99,7 @@ def problems(effect: Ageing, span: float) -> Iterator[str]:
     """Why the C cannot follow the gain."""
     change = most_at_once(effect, span)
     if len(pieces(effect)) == 0 or change > MOST_CHANGE:
-        yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST_CHANGE:.0%}"
+        yield too_fast(change)
 
 
 @dataclass(frozen=True)
@@ -121,12 +120,6 @@ class Aged(One):
     def asked(self, given: float, asked: float, margin: Margin) -> float:
         """Largest input that the inverse gives for outputs within `asked`."""
         return asked / LEAST_GAIN
-
-
-def turns(effect: Ageing, span: float, roundoff: float) -> int:
-    """Newton steps after which the reciprocal of the gain is exact up to rounding."""
-    left = max(most_at_once(effect, span), 1e-9)
-    return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
 
 
 # ---------------------------------------------------------------- ageing.c
@@ -161,7 +154,7 @@ def tables(blocks: Sequence[Aged], about: FloatSurroundings) -> AgeingTables:
         np.cumsum([0, *map(len, rows)]).astype(np.int64),
         about.reals(np.concatenate([np.empty((0, 6)), *rows]), "travels of the ageing"),
         about.reals([(1.0, 2.0, LEAST_GAIN, LARGEST_GAIN, x) for x in last], "travels of the ageing").reshape(-1, 5),
-        np.array([turns(one.effect, span, about.roundoff) for one in blocks], dtype=np.int64),
+        np.array([newton_steps(most_at_once(one.effect, span), about.roundoff) for one in blocks], dtype=np.int64),
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,19 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
+from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
 from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import ChainPart, FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs, called, late
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
 from hystgen.plays.slots import Counts, Reals, zero
-
-LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
-"""[times] A gain set from outside is kept between these: one beyond them means a faulty sensor or a wrong unit. Set by
-fixed point: with `fixed.GAIN_BITS` fraction bits, 2 is the limit of a gain and of its reciprocal."""
-
-MOST_CHANGE = 0.25
-"""[share of the gain] The largest change of a gain in one sample that the C follows: five Newton steps from the last
-reciprocal leave `0.25^32`, less than the rounding of double precision. A limit of 0.5 would take six of them in every
-sample, one of 0.9 nine. Set by: benchmarks/chosen_numbers.py newton."""
 
 # ---------------------------------------------------------------- gain.c
 
@@ -304,16 +295,13 @@ def heat_numbers(effect: OwnHeat, ends: tuple[float, float], span: float, second
 
 def heat_problems(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> Iterator[str]:
     """Why the C cannot follow the gain."""
-    change = abs(effect.gain_per_degree) * most_at_once(effect, ends, ends[1] - ends[0], seconds) / LEAST_GAIN
-    if change > MOST_CHANGE:
-        yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST_CHANGE:.0%}"
+    if (change := heat_change(effect, ends, seconds)) > MOST_CHANGE:
+        yield too_fast(change)
 
 
-def heat_turns(effect: OwnHeat, ends: tuple[float, float], seconds: float, roundoff: float) -> int:
-    """Newton steps after which the reciprocal of the gain is exact up to rounding."""
-    change = abs(effect.gain_per_degree) * most_at_once(effect, ends, ends[1] - ends[0], seconds) / LEAST_GAIN
-    left = max(change, 1e-9)
-    return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
+def heat_change(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> float:
+    """Largest relative change of the gain in one move over the range."""
+    return abs(effect.gain_per_degree) * most_at_once(effect, ends, ends[1] - ends[0], seconds) / LEAST_GAIN
 
 
 def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
@@ -323,7 +311,7 @@ def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
     rubbing = [thresholds(each, ends) for each in effects]
     return HeatTables(
         about.reals([heat_numbers(e, ends, about.span, seconds) for e in effects], "temperatures").reshape(-1, 7),
-        np.array([heat_turns(each, ends, seconds, about.roundoff) for each in effects], dtype=np.int64),
+        np.array([newton_steps(heat_change(each, ends, seconds), about.roundoff) for each in effects], dtype=np.int64),
         about.reals(padded(rubbing), "thresholds"),
         np.array([len(each) for each in rubbing], dtype=np.int64),
     )
