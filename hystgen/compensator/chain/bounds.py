@@ -32,7 +32,7 @@ from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, ahead_of, crossing, lead
 from hystgen.compensator.chain.parts import SENT, Parts
 from hystgen.effects.part import Gained, Speed
-from hystgen.effects.rate_dependence import compensator as dashpot
+from hystgen.effects.plays import DASHPOT, DILATED, RELAXING, SEEN
 from hystgen.effects.saturation.model import TanhSaturation
 from hystgen.front.tanh import kernels
 from hystgen.plays import slots
@@ -114,18 +114,18 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float,
     size = 3.0 * max(abs(low), abs(high)) + float(r[-1])
     steep = 1.0 + abs(moving.steepest_bend(static, compiled.parts.plays))
     play = 4.0 * u * size
-    if t.moves == moving.RELAXING:
+    if t.moves == RELAXING:
         slow = t.first[1:].astype(float)
         play = 8.0 * u * size / float(np.min(slow))
         if emitted:
             play += compiled.largest_way / 4.0  # contact within a step counts from the first touch
-    if t.moves == moving.DASHPOT:
-        effect, way = next(filter(dashpot.nonlinear, compiled.parts.plays)), compiled.largest_way
+    if t.moves == DASHPOT:
+        (mover,), way = moving.movers(static, compiled.parts.plays), compiled.largest_way
         rows, ways = t.yields.astype(float), (way, moving.largest_stretch(static))
-        stretched = dashpot.stretch_error(effect, float(r[-1]), compiled.seconds, rows, ways, np.zeros(len(rows)))
+        stretched = mover.stretch_error(compiled.seconds, rows, ways, np.zeros(len(rows)))
         play = 8.0 * u * size + stretched
         if emitted:
-            play += float(t.number[moving.SEEN]) * way  # where the input counts as standing still
+            play += float(t.number[SEEN]) * way  # where the input counts as standing still
     summed = (12.0 + len(static.pi.weights)) * u * size * steep
     width = 3.0 * (high - low) * 2.0 ** -t.halves + u * size
     return play, float(np.sum(p)) * summed, float(np.sum(p)) * steep * width
@@ -255,7 +255,7 @@ def condition(compiled: Compiled) -> str:
         return together(SAME, UNSLEWED, still)
     missed = any(one.misses for one in ahead_of(compiled.ones))
     remembered = compiled.static.pi.n > 0 or any(one.remembers for one in compiled.behind)
-    dilated = compiled.tables.moving.moves == moving.DILATED
+    dilated = compiled.tables.moving.moves == DILATED
     return together(SAME, still) if dilated or compiled.tables.turning or (missed and remembered) else ""
 
 
@@ -274,7 +274,7 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     only_seen = 0.0  # error of the sum that the inverse undoes; only creep behind plays with a limited drive sees it
     if compiled.tables.moving.used:
         least = moving.least_slope(static, compiled.parts.plays) * (1.0 if same else 0.5)
-        if compiled.tables.moving.moves == moving.DILATED:
+        if compiled.tables.moving.moves == DILATED:
             least = min(least, moving.least_dilated(static, compiled.parts.plays, compiled.seconds))
         gain = 1.0 / least / static.front_slopes[0]
         pairs = zip(_moving(compiled, arithmetic, True), _moving(compiled, "float64", False), strict=True)

@@ -29,9 +29,6 @@ from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, together
 from hystgen.compensator.chain.bounds import SAME, STILL
 from hystgen.compensator.chain.layout import DITHER, ChainTables, ahead_of, largest_way
 from hystgen.compensator.chain.moving import (
-    DASHPOT,
-    DILATED,
-    PLAIN,
     Bumps,
     least_dilated,
     least_slope,
@@ -42,7 +39,7 @@ from hystgen.compensator.chain.moving import (
 from hystgen.compensator.chain.parts import BEHIND, LED, NAMES, Parts
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, upward
 from hystgen.effects.part import Coded, CodedGain, Coding, Sought, Speed
-from hystgen.effects.rate_dependence import compensator as dashpot
+from hystgen.effects.plays import DASHPOT, DILATED, PLAIN
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 
 DOUBLE = 2.0**-40
@@ -259,9 +256,8 @@ class Bounds:
         """How far plays with a nonlinear dashpot can be from the model's: by the table, and by treating the input as
         standing still within a step."""
         t = self.tables.moving
-        effect = next(filter(dashpot.nonlinear, self.parts.plays))
         seen = float(t.seen[0]) / 2.0 ** int(t.seen[1])
-        return yield_error(t, effect, self.static, self.seconds, step, way) + seen * way
+        return yield_error(t, self.static, self.parts.plays, self.seconds, step, way) + seen * way
 
     @cached_property
     def _steepest(self) -> float:

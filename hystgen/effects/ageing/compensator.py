@@ -11,10 +11,22 @@ import numpy as np
 
 from hystgen.basics.jit import jit
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
-from hystgen.effects.base import Array
+from hystgen.effects.base import Array, Place
 from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import ChainPart, FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs, called, late
+from hystgen.effects.part import (
+    ChainPart,
+    FloatSurroundings,
+    Gained,
+    Margin,
+    One,
+    Realized,
+    Setting,
+    Speed,
+    Verbs,
+    called,
+    late,
+)
 from hystgen.plays.slots import Counts, Reals, zero
 
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
@@ -95,9 +107,12 @@ def most_at_once(effect: Ageing, span: float) -> float:
     return max(abs(gain(effect, x + span) / gain(effect, x) - 1.0) for x in places)
 
 
-def problems(effect: Ageing, span: float) -> Iterator[str]:
+def problems(effect: Ageing, at: Setting) -> Iterator[str]:
     """Why the C cannot follow the gain."""
-    change = most_at_once(effect, span)
+    if effect in at.listed[1:]:
+        yield "one gain follows the travel, and there is another one"
+        return
+    change = most_at_once(effect, at.ends[1] - at.ends[0])
     if len(pieces(effect)) == 0 or change > MOST_CHANGE:
         yield too_fast(change)
 
@@ -277,9 +292,11 @@ ARITHMETIC = Realized(
     constants, tables,
 )
 
-AGEING = ChainPart(
-    "ageing", "ageing", called("ageing"), lambda effect, *_: Aged(effect),
+PART = ChainPart(
+    "ageing", "ageing", Place.GAIN, called("ageing"), lambda effect, *_: Aged(effect),
     ARITHMETIC, late("ageing"), calls=("set_gain", "travel", "set_travel"),
-    kinds=(KIND,),
+    kinds=(KIND,), problems=problems, code=("ageing",),
 )
 """Ageing as a part of the chain: a gain over the travel, which the caller may set."""
+
+PARTS = (PART,)

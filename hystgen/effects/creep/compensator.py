@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
-from hystgen.effects.base import Array, Block, decays
+from hystgen.effects.base import Array, Block, Place, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
 from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import ChainPart, Margin, One, Realized, Responses, Verbs, called, late
@@ -254,10 +254,12 @@ class UnevenCreep(Block):
 
 FUNCTIONS: dict[str, Any] = {"rest": creep_rest, "resting": creep_resting, "solve": creep_solve, "absorb": creep_absorb}
 
-CREEP = ChainPart(
-    "creep", "creep", called("creep"),
+PART = ChainPart(
+    "creep", "creep", Place.LINEAR, called("creep"),
     lambda effect, seconds, _: numbers(effect, seconds),
     ARITHMETIC, late("creep"),
-    kinds=(KIND,),
+    kinds=(KIND,), code=("creep",),
 )
 """Creep as a part of the chain."""
+
+PARTS = (PART,)

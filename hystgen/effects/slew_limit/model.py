@@ -110,6 +110,7 @@ class _SlewLimit(Effect):
 
     place: ClassVar[Place] = Place.DRIVE
     order: ClassVar[int] = 1
+    slews: ClassVar[bool] = True
     compensated: ClassVar[Compensated] = "none"
     compensation: ClassVar[str] = "the drive is kept within it, so the memory matches the actuator's"
 

@@ -11,9 +11,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
+from hystgen.effects.base import Place
 from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import ChainPart, FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs, called, late
+from hystgen.effects.part import (
+    ChainPart,
+    FloatSurroundings,
+    Gained,
+    Margin,
+    One,
+    Realized,
+    Setting,
+    Speed,
+    Unmeasured,
+    Verbs,
+    called,
+    late,
+)
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
 from hystgen.plays.slots import Counts, Reals, zero
 
@@ -293,9 +307,9 @@ def heat_numbers(effect: OwnHeat, ends: tuple[float, float], span: float, second
     return loss, per, effect.gain_per_degree, effect.offset_per_degree, hottest, 1.0, 2.0
 
 
-def heat_problems(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> Iterator[str]:
+def heat_problems(effect: OwnHeat, at: Setting) -> Iterator[str]:
     """Why the C cannot follow the gain."""
-    if (change := heat_change(effect, ends, seconds)) > MOST_CHANGE:
+    if (change := heat_change(effect, at.ends, at.seconds)) > MOST_CHANGE:
         yield too_fast(change)
 
 
@@ -428,15 +442,24 @@ HEAT_ARITHMETIC = Realized(
 )
 
 GAIN_PART = ChainPart(
-    "gain", "a temperature", called("thermal", lambda effect: bool(effect.columns)),
+    "gain", "a temperature", Place.GAIN, called("thermal", lambda effect: bool(effect.columns)),
     lambda effect, *_: Warm(effect), ARITHMETIC, late("thermal"), calls=("set_temperature",),
-    kinds=(KIND,),
+    kinds=(KIND,), code=("gain",),
 )
 
 HEAT_PART = ChainPart(
-    "heat", "own heat", called("thermal", lambda effect: not effect.columns),
+    "heat", "own heat", Place.GAIN, called("thermal", lambda effect: not effect.columns),
     lambda effect, *_: Warm(effect), HEAT_ARITHMETIC,
     late("thermal", "HEAT_ARITHMETIC"),
-    kinds=(HEAT_KIND, FRICTION_KIND),
+    kinds=(HEAT_KIND, FRICTION_KIND), problems=heat_problems,
+    unmeasured=Unmeasured(
+        "self_heating",
+        "the drive's own heat, open loop: its temperature drifts with the room's; measure it, or have it "
+        "followed by emit.compensation.compensate: [self_heating]",
+        "thermal from the drive's own heat (the temperature is not measured, and drifts with the room's",
+    ),
+    code=("heat", "friction"), counted=lambda t, blocks: (blocks, int(t.plays.any())),
 )
 """Temperatures as parts of the chain: set by the caller, or from own heat."""
+
+PARTS = (HEAT_PART, GAIN_PART)
