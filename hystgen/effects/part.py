@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import importlib
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -13,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.effects.base import Array, Effect, Place
+from hystgen.effects.base import Array, Block, Effect, Place
 from hystgen.effects.kinds import Constants, Kind
 
 Function = Callable[..., Any]
@@ -31,6 +32,37 @@ class Led(NamedTuple):
     missed: Function
     braked: Function
     halves: int = 0
+
+
+class Leading(Block):
+    """The block that `Led` leads, in double precision. `rises`: the direction of arrival, where two branches follow;
+    with `always_led` it is then led however short a step is; `exact`: whether it is not led in this step."""
+
+    rises: Callable[[], bool] | None = None
+    always_led: bool = False
+    exact: bool = False
+
+    @property
+    @abstractmethod
+    def patience(self) -> float:
+        """The share of the way to the other branch that it falls short in the first sample of a turn."""
+
+    @abstractmethod
+    def braked(self, near: float, short: float, falling: float, rising: float) -> float:
+        """The drive at which it does not overshoot; `near`: the nearest in reach, `short` of the answer."""
+
+
+class Following(ABC):
+    """A gain behind the plays that follows the drive, in double precision at steps of any length; at the first sample
+    the drive `before` is NaN."""
+
+    @abstractmethod
+    def solve(self, y: float, before: float, drive: float, seconds: float) -> float:
+        """The input that gives the output y if the drive goes from `before` to `drive`."""
+
+    @abstractmethod
+    def move(self, before: float, drive: float, seconds: float) -> None:
+        """The drive has gone there."""
 
 
 @dataclass(frozen=True)
@@ -354,6 +386,9 @@ class ChainPart:
 
     `problems`: why the C cannot include an effect; `unmeasured`: if nothing measures it; `code`: parts of its code in
     `hystgen.compensator.chain.costs`, and `counted`: how many of each there are in its tables, by default its blocks.
+
+    In double precision at steps of any length: `uneven` makes the block of an effect, `following` that of one behind
+    the plays that follows the drive; `no_inverse`: why there is no inverse.
     """
 
     name: str
@@ -371,6 +406,9 @@ class ChainPart:
     unmeasured: Unmeasured | None = None
     code: tuple[str, ...] = ()
     counted: Callable[[Any, int], Iterable[int]] = lambda _, blocks: (blocks,)
+    uneven: Callable[[Any], Block | None] = lambda _: None
+    following: Callable[[Any], Following | None] = lambda _: None
+    no_inverse: Callable[[Any], Iterable[str]] = lambda _: ()
 
     @functools.cached_property
     def fixed(self) -> Realized:

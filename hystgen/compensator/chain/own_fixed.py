@@ -20,6 +20,7 @@ from hystgen.compensator.chain import own
 from hystgen.compensator.chain.own import Linear, OwnTables
 from hystgen.effects.base import Effect, Place
 from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.own import Instance
 from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Setting, Sought, given
 from hystgen.plays.fixed import nearest
 
@@ -222,5 +223,5 @@ def part(name: str, place: Place, blocks: Sequence[OwnBlock] = (), effects: Sequ
         lambda effect, seconds, _: own.linear(effect, seconds),
         own.arithmetic(blocks, effects, own.GLUE, lambda every, about: own.build(every, about.reals)),
         lambda: own.arithmetic(blocks, effects, (product, entered, left), lambda rows, _: build(rows), format_of),
-        joined=True, problems=problems, counted=lambda *_: (),
+        joined=True, problems=problems, uneven=Instance, counted=lambda *_: (),
     )

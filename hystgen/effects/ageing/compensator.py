@@ -17,6 +17,7 @@ from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
+    Following,
     Gained,
     Margin,
     One,
@@ -180,6 +181,24 @@ def constants(t: AgeingTables) -> Iterator[Constants]:
         yield Constants(KIND, t.number[j, LEAST:], (5 + 2 * turns, 1), pieces, (len(pieces), turns))
 
 
+class UnevenAgeing(Following):
+    """The gain in double precision."""
+
+    def __init__(self, effect: Ageing) -> None:
+        self.effect, self.travelled = effect, 0.0
+
+    def _travel(self, before: float, drive: float) -> float:
+        return self.travelled + (0.0 if math.isnan(before) else abs(drive - before))
+
+    def solve(self, y: float, before: float, drive: float, seconds: float) -> float:
+        """The input that gives the output y if the drive goes from `before` to `drive`."""
+        return y / gain(self.effect, self._travel(before, drive))
+
+    def move(self, before: float, drive: float, seconds: float) -> None:
+        """The drive has gone there."""
+        self.travelled = self._travel(before, drive)
+
+
 class AgeingState(NamedTuple):
     """`block` (k, 4): travel in two parts, gain and its reciprocal; `own` (k,): whether the gain follows the travel."""
 
@@ -295,7 +314,7 @@ ARITHMETIC = Realized(
 PART = ChainPart(
     "ageing", "ageing", Place.GAIN, called("ageing"), lambda effect, *_: Aged(effect),
     ARITHMETIC, late("ageing"), calls=("set_gain", "travel", "set_travel"),
-    kinds=(KIND,), problems=problems, code=("ageing",),
+    kinds=(KIND,), problems=problems, code=("ageing",), following=UnevenAgeing,
 )
 """Ageing as a part of the chain: a gain over the travel, which the caller may set."""
 

@@ -17,8 +17,6 @@ from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import ChainPart, Margin, One, Realized, Responses, Verbs, called, late
 from hystgen.plays.slots import Counts, Reals, zero
 
-EFFECTS = (ExponentialCreep, LogarithmicCreep)
-
 
 def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:
     """Why there is no inverse."""
@@ -258,7 +256,7 @@ PART = ChainPart(
     "creep", "creep", Place.LINEAR, called("creep"),
     lambda effect, seconds, _: numbers(effect, seconds),
     ARITHMETIC, late("creep"),
-    kinds=(KIND,), code=("creep",),
+    kinds=(KIND,), code=("creep",), uneven=UnevenCreep, no_inverse=problems,
 )
 """Creep as a part of the chain."""
 

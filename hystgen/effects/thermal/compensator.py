@@ -17,6 +17,7 @@ from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
+    Following,
     Gained,
     Margin,
     One,
@@ -28,7 +29,7 @@ from hystgen.effects.part import (
     called,
     late,
 )
-from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
+from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat, lost_on
 from hystgen.plays.slots import Counts, Reals, zero
 
 # ---------------------------------------------------------------- gain.c
@@ -432,6 +433,46 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
     return amount
 
 
+# ---------------------------------------------------------------- at steps of any length
+
+
+class UnevenHeat(Following):
+    """A temperature that follows the heat of a drive, with the turning points that friction remembers."""
+
+    def __init__(self, effect: OwnHeat) -> None:
+        self.effect, self.rise = effect, 0.0
+        self.first, self.corner, self.depth, self.up = math.nan, np.empty(16), 0, True
+
+    def _heat(self, before: float, drive: float, seconds: float) -> tuple[float, int, bool]:
+        """Final rise at the heat of a move, and the state of friction after it."""
+        effect = self.effect
+        if isinstance(effect, HysteresisHeating):
+            if self.depth == len(self.corner):
+                self.corner = np.append(self.corner, np.empty_like(self.corner))
+            energy, depth, up = lost_on(before, drive, self.first, effect.reach, self.corner, self.depth, self.up)
+            return effect.heating * energy / seconds, depth, up
+        return effect.heating * 0.25 * heat_way(before, drive) / seconds, 0, True
+
+    def _risen(self, before: float, drive: float, seconds: float) -> float:
+        """The rise after the drive has moved from `before`; unchanged at the first sample."""
+        if math.isnan(before) or math.isnan(drive) or seconds == 0.0:
+            return self.rise
+        return risen(self.effect, self.rise, self._heat(before, drive, seconds)[0], seconds)
+
+    def solve(self, y: float, before: float, drive: float, seconds: float) -> float:
+        """The input that gives the output y if the drive goes from `before` to `drive`."""
+        rise = self._risen(before, drive, seconds)
+        return (y - self.effect.offset_per_degree * rise) / (1.0 + self.effect.gain_per_degree * rise)
+
+    def move(self, before: float, drive: float, seconds: float) -> None:
+        """The drive has gone there."""
+        if math.isnan(before):
+            self.first = drive
+        elif seconds > 0.0:
+            self.rise = self._risen(before, drive, seconds)
+            _, self.depth, self.up = self._heat(before, drive, seconds)
+
+
 ARITHMETIC = Realized(
     Verbs(memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
     constants, tables,
@@ -451,7 +492,7 @@ HEAT_PART = ChainPart(
     "heat", "own heat", Place.GAIN, called("thermal", lambda effect: not effect.columns),
     lambda effect, *_: Warm(effect), HEAT_ARITHMETIC,
     late("thermal", "HEAT_ARITHMETIC"),
-    kinds=(HEAT_KIND, FRICTION_KIND), problems=heat_problems,
+    kinds=(HEAT_KIND, FRICTION_KIND), problems=heat_problems, following=UnevenHeat,
     unmeasured=Unmeasured(
         "self_heating",
         "the drive's own heat, open loop: its temperature drifts with the room's; measure it, or have it "
