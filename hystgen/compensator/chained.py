@@ -27,7 +27,6 @@ from hystgen.compensator.chain.step_float import ramp
 from hystgen.effects import CATALOGUE
 from hystgen.effects.base import Array, Block, Effect, Place, Run
 from hystgen.effects.part import Following, Leading
-from hystgen.effects.saturation.compensator import unsaturated
 from hystgen.parameters.schema import Compensation
 
 EVEN = 1e-3
@@ -209,9 +208,6 @@ class Compensator:
             lags[0].rises, lags[0].always_led = lambda: self.actuator.rises, as_emitted
             self.actuator.led_by = lags[0]
 
-    def _called(self, name: str) -> list[Any]:
-        return [effect for effect in self.effects if effect.name == name]
-
     def drives(self, reference: Run, ends: tuple[float, float], asked: NDArray[np.bool_] | None = None) -> Array:
         """Drives (N,) within `ends` for the reference in `reference.v`; see `answers`."""
         return self.answers(reference, ends, asked)[0]
@@ -309,8 +305,8 @@ class Compensator:
         wanted = reference.v - self.static.output_offset
         for effect in (each for part in BESIDE for each in self.parts.blocks[part.name]):
             wanted = wanted - np.where(asked, effect.added(reference), 0.0)
-        for effect in reversed(self._called("saturation")):
-            wanted = unsaturated(effect, wanted)
+        for each in reversed(self.parts.maps):
+            wanted = each.undone(wanted)
         t, how = reference.t, self.how
         modes = self.parts.modes if how.resonance != "none" else []
         if not (modes or how.corner or how.noise_gain or how.drive_hold == "held" or how.preview is not None):

@@ -225,15 +225,10 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     """Multiplications in one step of the blocks in front of the plays and behind them, for each operator."""
     from hystgen.compensator.chain import blocks
     from hystgen.effects.lag import compensator as lag
-    from hystgen.effects.saturation.fixed import Saturations
 
-    counts, behind = _counts(t), t.behind
-    if isinstance(behind, Saturations):
-        kinds, envelope = list(map(int, behind.kind)), behind.bends.coefficient.shape[1]
-    else:
-        kinds, envelope = list(map(int, behind.stage_kind)), 2
+    counts, kinds = _counts(t), t.behind.kinds
     envelopes = kinds.count(slots.TANH)
-    stages = counts.factor * (len(kinds) - envelopes) + envelopes * envelope
+    stages = counts.factor * (len(kinds) - envelopes) + envelopes * t.behind.products
     everything, inverse = blocks.every(t, "forward"), blocks.every(t, "inverse")
     forward = sum(each.products[0] for each in everything) + counts.factor * bool(t.of("wait").samples)
     both = sum(sum(each.products) for each in inverse)

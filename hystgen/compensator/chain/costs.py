@@ -31,7 +31,7 @@ PER_PLAY = ("relaxing", "dilated", "dashpot", "polynomial", "centre")
 
 def found(t: ChainTables, operator: str) -> list[str]:
     """The parts that an operator of a model has; blocks of one kind share their code."""
-    kinds = [int(kind) for kind in (t.behind.kind if t.fixed else t.behind.stage_kind)]
+    kinds = t.behind.kinds
     counts: dict[str, int] = {
         "preview": len(t.tap), "slew": t.slew, "braked": t.braked, "quiet": t.quiet,
         "tanh": kinds.count(slots.TANH), "dead_zone": kinds.count(slots.DEAD_ZONE),

@@ -18,6 +18,7 @@ from hystgen.compensator.chain import own_fixed
 from hystgen.effects import CATALOGUE, shapes
 from hystgen.effects.base import Effect, Place
 from hystgen.effects.kinds import OwnBlock
+from hystgen.effects.maps import Map, MapPart
 from hystgen.effects.part import ChainPart
 from hystgen.effects.plays import Bender, Mover, PlaysPart
 from hystgen.plays.slots import Counts
@@ -39,6 +40,9 @@ MOVES: PlaysPart[Mover]
 BENDS: PlaysPart[Bender]
 (BENDS,) = (module.BENDS for module in _MODULES if hasattr(module, "BENDS"))
 """The effects that move plays, and that bend them."""
+
+MAPS: list[MapPart] = [module.MAPS for module in _MODULES if hasattr(module, "MAPS")]
+"""Maps of the output at the very end of the chain."""
 
 OWN_AHEAD, OWN_BEHIND = own_fixed.part("own_ahead", Place.DRIVE), own_fixed.part("own_behind", Place.LINEAR)
 
@@ -84,7 +88,7 @@ class Parts:
     name."""
 
     blocks: dict[str, list[Any]]
-    saturations: list[Any]
+    maps: list[Map]
     slew: list[Any]
     plays: list[Effect]
 
@@ -92,12 +96,10 @@ class Parts:
     def of(cls, effects: Sequence[Effect]) -> Parts:
         """Sort the effects of a chain."""
 
-        def called(name: str) -> list[Any]:
-            return [effect for effect in effects if effect.name == name]
-
         blocks = {part.name: [effect for effect in effects if part.takes(effect)] for part in PARTS}
         plays = [effect for effect in effects if effect.place is Place.PLAYS]
-        return cls(blocks, called("saturation"), [effect for effect in effects if effect.slews], plays)
+        maps = [part.of(effect) for effect in effects for part in MAPS if part.takes(effect)]
+        return cls(blocks, maps, [effect for effect in effects if effect.slews], plays)
 
     @property
     def delay(self) -> float:
