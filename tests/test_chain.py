@@ -786,7 +786,7 @@ def test_a_notch_is_two_poles_that_come_to_an_end(frequency: float, damping: flo
     mode = Resonance(name="resonance", frequency=frequency, damping=damping)
     found = preview.taps(0.0, [mode], T, by="notch")
     pole = math.exp(-2.0 * math.pi * frequency * T)
-    a1, a2 = resonance.denominator(mode, T)
+    a1, a2 = mode.denominator(T)
     zeros = np.array([1.0, a1, a2]) / (1.0 + a1 + a2)
     both = signal.lfilter(zeros * (1.0 - pole) ** 2, np.convolve([1.0, -pole], [1.0, -pole]), np.eye(1, 4000)[0])
     ages = np.arange(len(found.weights))

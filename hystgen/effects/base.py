@@ -233,6 +233,8 @@ class Effect(BaseModel):
     """whether the times of the samples matter"""
     pointwise: ClassVar[bool] = False
     """whether the answer of `bent` or `mapped` depends only on the sample itself, not on the run"""
+    slews: ClassVar[bool] = False
+    """whether it limits the rate of the drive, to its numbers `rate` and `falling_rate`"""
     columns: ClassVar[tuple[str, ...]] = ()
     """further columns that a record needs"""
     fades: ClassVar[bool] = False
