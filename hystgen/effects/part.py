@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 import importlib
 import math
-from collections.abc import Callable, Iterable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -13,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.effects.base import Array, Place
+from hystgen.effects.base import Array, Block, Effect, Place
 from hystgen.effects.kinds import Constants, Kind
 
 Function = Callable[..., Any]
@@ -31,6 +32,37 @@ class Led(NamedTuple):
     missed: Function
     braked: Function
     halves: int = 0
+
+
+class Leading(Block):
+    """The block that `Led` leads, in double precision. `rises`: the direction of arrival, where two branches follow;
+    with `always_led` it is then led however short a step is; `exact`: whether it is not led in this step."""
+
+    rises: Callable[[], bool] | None = None
+    always_led: bool = False
+    exact: bool = False
+
+    @property
+    @abstractmethod
+    def patience(self) -> float:
+        """The share of the way to the other branch that it falls short in the first sample of a turn."""
+
+    @abstractmethod
+    def braked(self, near: float, short: float, falling: float, rising: float) -> float:
+        """The drive at which it does not overshoot; `near`: the nearest in reach, `short` of the answer."""
+
+
+class Following(ABC):
+    """A gain behind the plays that follows the drive, in double precision at steps of any length; at the first sample
+    the drive `before` is NaN."""
+
+    @abstractmethod
+    def solve(self, y: float, before: float, drive: float, seconds: float) -> float:
+        """The input that gives the output y if the drive goes from `before` to `drive`."""
+
+    @abstractmethod
+    def move(self, before: float, drive: float, seconds: float) -> None:
+        """The drive has gone there."""
 
 
 @dataclass(frozen=True)
@@ -305,6 +337,27 @@ class Realized:
     beside: Callable[[Any], Iterable[Constants | None]] = lambda _: ()
 
 
+class Setting(NamedTuple):
+    """What decides whether the C can include an effect: all effects of its part in order, those up to a slew limit, the
+    operator, the length of a step, the `ends` of the drive's range, and whether the arithmetic is fixed point."""
+
+    listed: Sequence[Effect]
+    slewed: Sequence[Effect]
+    operator: str
+    seconds: float
+    ends: tuple[float, float]
+    whole: bool
+
+
+class Unmeasured(NamedTuple):
+    """An effect that nothing measures, which is compensated only if `emit.compensation.compensate` lists its `key`:
+    why the C does not include it otherwise, and why a known reference does not help."""
+
+    key: str
+    emitted: str
+    known: str
+
+
 def late(effect: str, name: str = "ARITHMETIC") -> Callable[[], Realized]:
     """A loader for the fixed-point version of an effect, which imports it when called."""
 
@@ -327,13 +380,21 @@ def given(place: Place) -> Callable[[Any], bool]:
 
 @dataclass(frozen=True)
 class ChainPart:
-    """One kind of block. `name`: in C; `words`: in messages; `takes`: whether it is the block of an effect; `one`:
-    makes a block from an effect, a step length, and whether it may be `turning`; `calls`: of the interface that it
-    serves; `forward`: only the forward operator has it; `joined`: all of them form one block; `coded`: loads its
-    fixed-point version, for models in fixed point."""
+    """One kind of block. `name`: in C; `words`: in messages; `place`: in the chain; `takes`: whether it is the block of
+    an effect; `one`: makes a block from an effect, a step length, and whether it may be `turning`; `calls`: of the
+    interface that it serves; `forward`: only the forward operator has it; `joined`: all of them form one block;
+    `coded`: loads its fixed-point version, for models in fixed point.
+
+    `problems`: why the C cannot include an effect; `unmeasured`: if nothing measures it; `code`: parts of its code in
+    `hystgen.compensator.chain.costs`, and `counted`: how many of each there are in its tables, by default its blocks.
+
+    In double precision at steps of any length: `uneven` makes the block of an effect, `following` that of one behind
+    the plays that follows the drive; `no_inverse`: why there is no inverse.
+    """
 
     name: str
     words: str
+    place: Place
     takes: Callable[[Any], bool]
     one: Callable[[Any, float, bool], Any]
     floating: Realized
@@ -341,6 +402,13 @@ class ChainPart:
     calls: tuple[str, ...] = ()
     forward: bool = False
     joined: bool = False
+    problems: Callable[[Any, Setting], Iterator[str]] = lambda *_: iter(())
+    unmeasured: Unmeasured | None = None
+    code: tuple[str, ...] = ()
+    counted: Callable[[Any, int], Iterable[int]] = lambda _, blocks: (blocks,)
+    uneven: Callable[[Any], Block | None] = lambda _: None
+    following: Callable[[Any], Following | None] = lambda _: None
+    no_inverse: Callable[[Any], Iterable[str]] = lambda _: ()
 
     @functools.cached_property
     def fixed(self) -> Realized:

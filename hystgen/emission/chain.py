@@ -111,7 +111,7 @@ def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
 
 MOVES = ("play", "dilated", "relaxing", "dashpot")
 BENDS = ("none", "polynomial", "centre")
-"""Files of the run time for how plays move and are bent, by the codes of `hystgen.compensator.chain.moving`."""
+"""Files of the run time for how plays move and are bent, by the codes of `hystgen.effects.plays`."""
 
 
 SETTINGS = {
@@ -216,7 +216,7 @@ def effects(
 
 def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[Stage]) -> Glue:
     """The glue of a model with effects."""
-    from hystgen.compensator.chain import moving
+    from hystgen.effects.plays import DASHPOT
 
     t, chain = compiled.tables, Chain.of(compiled.tables, operators)
     shape = Shape.of(t, form)
@@ -229,7 +229,7 @@ def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Seque
     calls = {"forward": every, "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))]}
     searched = t.moving.used and not t.moving.scanned
     n = len(t.threshold) - 1
-    kept = n * (t.moving.moves == moving.DASHPOT)
+    kept = n * (t.moving.moves == DASHPOT)
     fields = {op: instance(op, shape, chain.blocks(op), n, kept, searched) for op in operators}
     return Glue(fields, "\n".join(functions), calls)
 

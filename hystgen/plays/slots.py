@@ -58,15 +58,6 @@ class StepState(Struct):
 
 
 @jit(inline=True)
-def read(s: StepState, op: Any) -> Any:
-    """The status bits behind a call, then cleared; 0 if the call leaves them there."""
-    left = s.status[0] if op & OP_UNREAD else 0
-    bits = s.status[0] - left
-    s.status[0] = left
-    return bits
-
-
-@jit(inline=True)
 def zero(x: Any) -> Any:
     """0 of the type of a finite x."""
     return x - x

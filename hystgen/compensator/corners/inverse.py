@@ -6,6 +6,7 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import Tables, clamp_drive
+from hystgen.compensator.step import corners_of
 from hystgen.plays.corners.corners_float import (
     Memory,
     Start,
@@ -130,3 +131,6 @@ def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
     move_to_output(t.inverse, m, v)
     copy_place(m.undo, m.here)
     m.step.before[0] = m.here.input[0]
+
+
+OPERATIONS = corners_of(inverse_init, inverse_reset, inverse_visit, inverse_step, inverse_commit)

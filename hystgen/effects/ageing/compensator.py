@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -13,9 +13,23 @@ import numpy as np
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct, memory_of
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
+from hystgen.effects.base import Place
+from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import ChainPart, FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs, called, late
-from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE
+from hystgen.effects.part import (
+    ChainPart,
+    FloatSurroundings,
+    Following,
+    Gained,
+    Margin,
+    One,
+    Realized,
+    Setting,
+    Speed,
+    Verbs,
+    called,
+    late,
+)
 from hystgen.plays.slots import Counts, zero
 
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
@@ -62,6 +76,7 @@ class AgeingPiece(Struct):
     c3: Real
 
 
+@functools.lru_cache(maxsize=16)
 def pieces(effect: Ageing) -> AgeingPiece:
     """The gain as cubic pieces (m,) in double precision.
 
@@ -106,11 +121,14 @@ def most_at_once(effect: Ageing, span: float) -> float:
     return max(abs(gain(effect, x + span) / gain(effect, x) - 1.0) for x in places)
 
 
-def problems(effect: Ageing, span: float) -> Iterator[str]:
+def problems(effect: Ageing, at: Setting) -> Iterator[str]:
     """Why the C cannot follow the gain."""
-    change = most_at_once(effect, span)
+    if effect in at.listed[1:]:
+        yield "one gain follows the travel, and there is another one"
+        return
+    change = most_at_once(effect, at.ends[1] - at.ends[0])
     if len(pieces(effect)) == 0 or change > MOST_CHANGE:
-        yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST_CHANGE:.0%}"
+        yield too_fast(change)
 
 
 @dataclass(frozen=True)
@@ -131,12 +149,6 @@ class Aged(One):
     def asked(self, given: float, asked: float, margin: Margin) -> float:
         """Largest input that the inverse gives for outputs within `asked`."""
         return asked / LEAST_GAIN
-
-
-def turns(effect: Ageing, span: float, roundoff: float) -> int:
-    """Newton steps after which the reciprocal of the gain is exact up to rounding."""
-    left = max(most_at_once(effect, span), 1e-9)
-    return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
 
 
 # ---------------------------------------------------------------- ageing.c
@@ -186,11 +198,12 @@ def tables(blocks: Sequence[Aged], about: FloatSurroundings) -> AgeingTables:
     span = about.ends[1] - about.ends[0]
     given = [(LEAST_GAIN, LARGEST_GAIN, each.begin[-1] + 1.0 / each.inverse_length[-1], 1.0, 2.0) for each in curves]
     rows = about.reals(given, "travels of the ageing")
-    counts = [(len(each), turns(one.effect, span, about.roundoff)) for each, one in zip(curves, blocks, strict=True)]
+    counts = [*map(len, curves)]
+    turns = [newton_steps(most_at_once(one.effect, span), about.roundoff) for one in blocks]
     piece = about.reals([each.tolist() for curve in curves for each in curve], "travels of the ageing")
     return AgeingTables(
-        AgeingNumbers.of([(*row[:3], *two, *row[3:]) for row, two in zip(rows, counts, strict=True)], rows.dtype),
-        np.cumsum([0, *map(len, curves)]).astype(np.int64),
+        AgeingNumbers.of([(*row[:3], *n, *row[3:]) for row, *n in zip(rows, counts, turns, strict=True)], rows.dtype),
+        np.cumsum([0, *counts]).astype(np.int64),
         AgeingPiece.of(piece, piece.dtype),
     )
 
@@ -199,6 +212,24 @@ def constants(t: AgeingTables) -> Iterator[Constants]:
     """The numbers of each gain."""
     for row, first in zip(t.block, t.first, strict=False):
         yield Constants(KIND, row, (5 + 2 * int(row["turns"]), 1), t.piece[first : first + row["n"]])
+
+
+class UnevenAgeing(Following):
+    """The gain in double precision."""
+
+    def __init__(self, effect: Ageing) -> None:
+        self.effect, self.travelled = effect, 0.0
+
+    def _travel(self, before: float, drive: float) -> float:
+        return self.travelled + (0.0 if math.isnan(before) else abs(drive - before))
+
+    def solve(self, y: float, before: float, drive: float, seconds: float) -> float:
+        """The input that gives the output y if the drive goes from `before` to `drive`."""
+        return y / gain(self.effect, self._travel(before, drive))
+
+    def move(self, before: float, drive: float, seconds: float) -> None:
+        """The drive has gone there."""
+        self.travelled = self._travel(before, drive)
 
 
 @jit
@@ -301,8 +332,11 @@ ARITHMETIC = Realized(
     constants, tables, kinds=(KIND,),
 )
 
-AGEING = ChainPart(
-    "ageing", "ageing", called("ageing"), lambda effect, *_: Aged(effect),
+PART = ChainPart(
+    "ageing", "ageing", Place.GAIN, called("ageing"), lambda effect, *_: Aged(effect),
     ARITHMETIC, late("ageing"), calls=("set_gain", "travel", "set_travel"),
+    problems=problems, code=("ageing",), following=UnevenAgeing,
 )
 """Ageing as a part of the chain: a gain over the travel, which the caller may set."""
+
+PARTS = (PART,)

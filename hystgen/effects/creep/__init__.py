@@ -1,1 +1,5 @@
 """Creep."""
+
+from hystgen.effects.sources import Sources
+
+SOURCES = Sources(blocks=("creep{}.c",))

@@ -7,9 +7,10 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Real, Struct, memory_of
+from hystgen.effects.base import Place
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import ChainPart, FloatSurroundings, Function, Realized, Verbs, called, late
+from hystgen.effects.part import ChainPart, FloatSurroundings, Function, Realized, Unmeasured, Verbs, called, late
 from hystgen.plays.slots import zero
 
 # ---------------------------------------------------------------- clock.c
@@ -124,8 +125,17 @@ ARITHMETIC = Realized(
     verbs(memory_of(ClockState), clock_start, clock_tick, clock_drift), constants, tables, kinds=(KIND,)
 )
 
-CLOCK = ChainPart(
-    "clock", "drift", called("drift"), lambda effect, *_: effect,
+PART = ChainPart(
+    "clock", "drift", Place.ADDED, called("drift"), lambda effect, *_: effect,
     ARITHMETIC, late("drift"),
+    code=("clock",),
+    unmeasured=Unmeasured(
+        "drift",
+        "a clock that runs alone, and nothing says when it began; set_offset takes it from outside, and "
+        "emit.compensation.compensate: [drift] lets the module count from there",
+        "drift (a clock that runs alone; nothing says when it began",
+    ),
 )
 """Drift as a part of the chain: a clock's contribution to the displacement."""
+
+PARTS = (PART,)

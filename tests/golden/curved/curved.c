@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 a78f9f9cbdc78a41b7b6c4403503259946c13e5484aa78a21f1358b65cf65973, without this line
+ * Text: sha256 3dbb844c6f9f1b9795f7cebc4f5e0e9484aff6d5840cbf56dac0a1d913604729, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -460,7 +460,7 @@ CURVED_APART curved_play_t curved_front_forward(curved_real_t v) {
                                        CURVED_DEGREE, v);
 }
 
-/* v = G^-1[w]; sets `limited` if no drive gives w. */
+/* v = G^-1[w], or at an end of G for w beyond it. */
 CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool *limited) {
     const curved_ends_t *ends = &curved_back_ends;
     int64_t v;

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 edfefde0eab763767eeafdb6b778713776fc916db5889b41235ca5dc980fc1b4, without this line
+ * Text: sha256 74dea37961e82925f7f551cf4fb875b6f8be5aeffad8429f95c357510fd4e480, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -774,7 +774,7 @@ static two_branches_real_t two_branches_front_forward(two_branches_real_t v, boo
     return w;
 }
 
-/* v = G^-1[w]; sets `limited` if no drive gives w, on the branch of the drive's direction. */
+/* v = G^-1[w], on the branch of the drive's direction, or at an end of G for w beyond it. */
 static two_branches_real_t two_branches_front_inverse(two_branches_real_t w, bool ascending,
                                                       bool *limited) {
     two_branches_real_t v = w;
