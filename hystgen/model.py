@@ -328,6 +328,7 @@ class Model:
         """Output (N,) of the bit reference of a model with effects, and remarks; see `simulate`."""
         from hystgen.compensator.chain import run, tables
         from hystgen.compensator.chained import EVEN
+        from hystgen.effects import Place
 
         check_arithmetic(arithmetic)
         self.need_compensated(arithmetic, "inverse" if inverse else "forward")
@@ -340,9 +341,10 @@ class Model:
                 f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
                 "in double precision, which takes any sample times"
             )
-        if any(effect.name == "drift" for effect in self.effects) and abs(float(record.t[0])) > EVEN * seconds:
+        added = next((effect.name for effect in self.effects if effect.place is Place.ADDED), "")
+        if added and abs(float(record.t[0])) > EVEN * seconds:
             raise EffectsError(
-                f"drift is counted from the first sample, but t begins at {float(record.t[0]):g} s; give t from 0 on"
+                f"{added} is counted from the first sample, but t begins at {float(record.t[0]):g} s; give t from 0 on"
             )
         how = self.parameters.emit.compensation
         chosen = self.engine(engine, arithmetic=arithmetic)

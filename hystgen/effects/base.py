@@ -12,6 +12,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -249,6 +250,9 @@ class Effect(BaseModel):
     """how far a compensator can take the effect out"""
     compensation: ClassVar[str] = ""
     """how, one clause"""
+    mistaken: ClassVar[Mapping[str, tuple[str, str]]] = MappingProxyType({})
+    """doubts about an inverse where records could not tell the effect from another fault: by the name of that one, if
+    it was taken, and if this effect was"""
     block: ClassVar[OwnBlock | None] = None
     """compensator of a user's own effect; the catalogue's compensators are in their folders"""
 

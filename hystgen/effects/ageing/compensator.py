@@ -17,7 +17,6 @@ from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
-    Following,
     Gained,
     Margin,
     One,
@@ -181,7 +180,7 @@ def constants(t: AgeingTables) -> Iterator[Constants]:
         yield Constants(KIND, t.number[j, LEAST:], (5 + 2 * turns, 1), pieces, (len(pieces), turns))
 
 
-class UnevenAgeing(Following):
+class UnevenAgeing:
     """The gain in double precision."""
 
     def __init__(self, effect: Ageing) -> None:
@@ -315,6 +314,7 @@ PART = ChainPart(
     "ageing", "ageing", Place.GAIN, called("ageing"), lambda effect, *_: Aged(effect),
     ARITHMETIC, late("ageing"), calls=("set_gain", "travel", "set_travel"),
     kinds=(KIND,), problems=problems, code=("ageing",), following=UnevenAgeing,
+    longest=lambda t: float(t.number[0, LAST]),
 )
 """Ageing as a part of the chain: a gain over the travel, which the caller may set."""
 
