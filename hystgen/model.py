@@ -328,7 +328,6 @@ class Model:
         """Output (N,) of the bit reference of a model with effects, and remarks; see `simulate`."""
         from hystgen.compensator.chain import run, tables
         from hystgen.compensator.chained import EVEN
-        from hystgen.effects import Place
 
         check_arithmetic(arithmetic)
         self.need_compensated(arithmetic, "inverse" if inverse else "forward")
@@ -341,11 +340,12 @@ class Model:
                 f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
                 "in double precision, which takes any sample times"
             )
-        added = next((effect.name for effect in self.effects if effect.place is Place.ADDED), "")
-        if added and abs(float(record.t[0])) > EVEN * seconds:
-            raise EffectsError(
-                f"{added} is counted from the first sample, but t begins at {float(record.t[0]):g} s; give t from 0 on"
-            )
+        began = float(record.t[0])
+        for effect in self.effects:
+            if effect.from_start and abs(began) > EVEN * seconds:
+                raise EffectsError(
+                    f"{effect.name} is counted from the first sample, but t begins at {began:g} s; give t from 0 on"
+                )
         how = self.parameters.emit.compensation
         chosen = self.engine(engine, arithmetic=arithmetic)
         compiled = tables.build(self.chain, arithmetic, seconds, how, self._lsb, chosen)

@@ -12,7 +12,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -250,9 +249,15 @@ class Effect(BaseModel):
     """how far a compensator can take the effect out"""
     compensation: ClassVar[str] = ""
     """how, one clause"""
-    mistaken: ClassVar[Mapping[str, tuple[str, str]]] = MappingProxyType({})
+    mistaken: ClassVar[Mapping[str, tuple[str, str]]] = {}
     """doubts about an inverse where records could not tell the effect from another fault: by the name of that one, if
     it was taken, and if this effect was"""
+    shown_by: ClassVar[Mapping[str, int]] = {}
+    """records of a plan that show it, and its place among the effects that a record shows, 1 for the plainest"""
+    rank: ClassVar[float] = math.inf
+    """which of several effects that explain the records equally well is named: the one of lowest rank"""
+    from_start: ClassVar[bool] = False
+    """whether it counts the seconds from the first sample"""
     block: ClassVar[OwnBlock | None] = None
     """compensator of a user's own effect; the catalogue's compensators are in their folders"""
 
@@ -275,6 +280,10 @@ class Effect(BaseModel):
     def dead_time(self) -> float:
         """DRIVE: seconds before a change of the drive shows at all."""
         return 0.0
+
+    def corrected(self, resonance: str) -> str:
+        """How a compensator takes the effect out, one clause; `resonance`: what `emit.compensation.resonance` says."""
+        return self.compensation
 
     def time_scale(self, drive_range: float) -> float:
         """Longest time constant in s, or duration of a move over the drive's range; 0 for an effect without either, inf

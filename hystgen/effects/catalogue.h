@@ -4,7 +4,7 @@
 #include "effects/delay/forward.c"
 #include "effects/slew_limit/slewed.c"
 #endif
-#ifdef HYSTGEN_ASKS_BENDS
+#if defined(HYSTGEN_ASKS_BENDS) || defined(HYSTGEN_ASKS_MOVES)
 #include "effects/noncongruent/bent.c"
 #endif
 #ifdef HYSTGEN_ASKS_MOVES

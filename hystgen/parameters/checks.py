@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 Shapes = tuple["type[Effect]", ...]
 """Classes that share a name."""
 
-_FRONT = effects.CATALOGUE.index("saturation")
+_FRONT = effects.CATALOGUE.index(effects.LIMIT)
 
-EFFECT_NAMES = (*effects.CATALOGUE[:_FRONT], "asymmetry", *effects.CATALOGUE[_FRONT:])
+EFFECT_NAMES = (*effects.CATALOGUE[:_FRONT], effects.BEND, *effects.CATALOGUE[_FRONT:])
 """Names of effects: the folders of the catalogue and asymmetry, which is a memoryless stage of the model."""
 
 _PARTS: dict[str, type[BaseModel]] = {
@@ -412,8 +412,8 @@ class _Checker:
             self.add(name, "is missing; add the name of an effect")
         elif not isinstance(given, str):
             self.add(name, f"must be the name of an effect, not {shown(given)}; known are {', '.join(EFFECT_NAMES)}")
-        elif given == "asymmetry":
-            self.add(name, "asymmetry is not written here; make it a stage of model.memoryless")
+        elif given == effects.BEND:
+            self.add(name, f"{effects.BEND} is not written here; make it a stage of model.memoryless")
         elif given in EFFECT_NAMES or given in self.user:
             shapes = self.user[given] if given in self.user else effects.shapes(given)
             first = self._seen.setdefault(given, path_text(path))

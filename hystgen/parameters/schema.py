@@ -23,6 +23,7 @@ from pydantic_core import PydanticCustomError
 
 from hystgen.basics.names import MAX_NAME, MAX_UNIT, NAME_PATTERN
 from hystgen.basics.quantities import MAX_PLAYS, NotNegative, Number, Positive
+from hystgen.effects import Unmeasured
 
 MAX_STAGES = 16
 MAX_EFFECTS = 64
@@ -255,7 +256,7 @@ class Compensation(_Part):
         "move by a code now and then get larger leads",
     )
 
-    compensate: tuple[Literal["drift", "self_heating"], ...] = Field(
+    compensate: tuple[Unmeasured, ...] = Field(
         default=(),
         description="effects that are compensated although nothing measures them: a drift, counted from set_offset on, "
         "and the drive's own heat, or that of its loops",

@@ -19,7 +19,7 @@ from hystgen.basics.version import __version__
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.identification import MODEL_PARSIMONY
 from hystgen.identification.fit import HELD_OUT, Fit
-from hystgen.identification.quality import WORD_COLUMNS, Row, cells
+from hystgen.identification.quality import WORD_COLUMNS, ErrorRow, cells
 from hystgen.model import Model, cascade_of
 from hystgen.parameters.files import parameters_sha256
 from hystgen.records import Record, Source, in_units, read_records, several
@@ -30,7 +30,7 @@ from hystgen.report.html import Details, HtmlTable, Listing, Picture, Section, T
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from hystgen.identification import Row
+    from hystgen.identification import ErrorRow
 
 PAGE = "report.html"
 
@@ -134,12 +134,12 @@ def _kind(fit: Fit) -> str:
     return f"A generalized Prandtl-Ishlinskii model with {count} behind a tanh front with {branches}"
 
 
-def held_out_row(fit: Fit) -> Row | None:
+def held_out_row(fit: Fit) -> ErrorRow | None:
     """The row that judges the model; None if nothing was held out."""
     return next((row for row in fit.rows if row.part == "held out"), None)
 
 
-def _of_range(row: Row) -> str:
+def _of_range(row: ErrorRow) -> str:
     return percent(row.rms_percent / 100.0, of="the output range")
 
 

@@ -5,7 +5,6 @@
 #define HYSTGEN_CHAIN_MOVING_PLAYS_C
 #include "compensator/chain/model.h"
 #include "compensator/chain/signals.c"
-#define HYSTGEN_ASKS_BENDS
 #define HYSTGEN_ASKS_MOVES
 #include "effects/catalogue.h"
 

@@ -84,7 +84,7 @@ class Gain:
         led, _, answers = self._answers(at)
         least = self.static.front_slopes[0]
         if not self._moving_plays:
-            least *= moving.least_slope(self.static, self.parts.plays)
+            least *= self._flattest
         return np.asarray(np.abs(led) * np.max([1.0 / np.abs(answer) for _, answer in answers], axis=0) / least)
 
     def _answers(self, at: Array) -> tuple[NDArray[np.complex128], float, list[tuple[float, NDArray[np.complex128]]]]:
@@ -112,6 +112,11 @@ class Gain:
     def _moving_plays(self) -> bool:
         """Whether an effect makes plays depend on the rate."""
         return any(effect.moves_plays() for effect in self.parts.plays)
+
+    @cached_property
+    def _flattest(self) -> float:
+        """Least slope of the plays, bent or not."""
+        return moving.least_slope(self.static, self.parts.plays)
 
     @cached_property
     def _steepest(self) -> Array:

@@ -19,11 +19,6 @@ from hystgen.basics.problems import FormatError
 from hystgen.parameters.schema import MOST_REFERENCES
 from hystgen.plays.slots import Counts, Reals
 
-WELL_DAMPED = 0.7
-"""[damping ratio] From here on a mode is inverted rather than shaped or notched. It overshoots a step by
-`exp(-pi z/sqrt(1 - z^2))`, at most 4.6 %, while the half period that a shaper waits for is 1.4 times the undamped one
-and grows without bound towards 1. Both are closed forms; no run set it."""
-
 
 class Mode(Protocol):
     """An effect with a pair of poles; a setting of `emit.compensation` under its name tells how it is compensated."""
@@ -34,6 +29,7 @@ class Mode(Protocol):
     def frequency(self) -> float: ...
     @property
     def damping(self) -> float: ...
+    def rings(self, by: By, /) -> bool: ...
     def denominator(self, step: float, /) -> tuple[float, float]:
         """`a1`, `a2` of its poles over a step, `z^2 + a1 z + a2`."""
 
@@ -58,11 +54,6 @@ By = Literal["inverse", "shaper", "notch"]
 """How modes are compensated."""
 
 
-def rings(mode: Mode, by: By) -> bool:
-    """Whether a mode is compensated by a shaper or a notch."""
-    return by != "inverse" and mode.damping < WELL_DAMPED
-
-
 def taps(
     delay: float, modes: Sequence[Mode], seconds: float, number: int = 3, corner: int = 0, by: By = "inverse"
 ) -> Taps:
@@ -80,7 +71,7 @@ def taps(
     weights = np.array([1.0 - share, share] if share > 0.0 else [1.0])
     first = whole
     for mode in modes:
-        if rings(mode, by):
+        if mode.rings(by):
             row = shaper(mode, seconds) if by == "shaper" else notch(mode, seconds)
             weights = np.convolve(weights, row)
             first -= len(row) - 1
@@ -192,7 +183,7 @@ class Shaped(NamedTuple):
 
 def shaped(modes: Sequence[Mode], seconds: float, by: By) -> Shaped | None:
     """The modes that `by` keeps from ringing; None if there are none."""
-    found = tuple(mode for mode in modes if rings(mode, by))
+    found = tuple(mode for mode in modes if mode.rings(by))
     return Shaped(by, found, seconds, taps(0.0, found, seconds, by=by)) if found else None
 
 

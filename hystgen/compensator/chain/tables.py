@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 
 from hystgen.arithmetic import ARITHMETICS
@@ -16,6 +17,7 @@ from hystgen.parameters.schema import Compensation
 STANDARD = Compensation()
 
 
+@functools.lru_cache(maxsize=32)
 def build(
     chain: Chain,
     arithmetic: str,
@@ -27,7 +29,8 @@ def build(
     """The model in an arithmetic at steps of `seconds`; `lsb` as in `hystgen.compensator.tables.build`; `engine`:
     'corners' or 'loop', for plays that no effect moves or bends.
 
-    None of its effects is among the `refusals`. Raises FormatError if a number does not fit the arithmetic.
+    None of its effects is among the `refusals`. The result is shared by all who ask for the same: checking a model,
+    writing its C and running its reference each ask. Raises FormatError if a number does not fit the arithmetic.
     """
     if ARITHMETICS[arithmetic].fixed:
         return fixed_tables.build(chain, arithmetic, seconds, how, lsb, engine)

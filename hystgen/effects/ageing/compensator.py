@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -62,6 +63,7 @@ def steepness(effect: Ageing, travelled: float) -> float:
     return -math.fsum(loss / travel * math.exp(-travelled / travel) for loss, travel in pairs)
 
 
+@functools.lru_cache(maxsize=16)
 def pieces(effect: Ageing) -> Array:
     """The gain as cubic pieces (m, 6): the beginning of each, 1 over its length, and coefficients in the share passed.
 

@@ -32,6 +32,7 @@ class _Sensor(Effect):
     name: Literal["sensor_nonlinearity"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.OUTPUT
+    shown_by: ClassVar[Mapping[str, int]] = {"multisine": 2, "slow": 3, "slow_minor": 3, "slow_reversals": 4}
     order: ClassVar[int] = 1
     timed: ClassVar[bool] = False
     pointwise: ClassVar[bool] = True
