@@ -15,7 +15,9 @@
 #endif
 #endif
 #ifdef HYSTGEN_ASKS_LED
+#ifdef HYSTGEN_HAS_QUIET_DRIVE
 #include "effects/lag/quiet.c"
+#endif
 #ifdef HYSTGEN_FIXED
 #include "effects/lag/steady_fixed.c"
 #include "effects/lag/braked_fixed.c"

@@ -106,12 +106,12 @@ class Movement:
         self, seconds: float, begins: Sequence[int], end: int, step: float, bits: int
     ) -> list[tuple[int, ...]]:
         """`FixedMovingTables.yields` for stretches up to `end` steps, with knots at `begins` among others."""
-        from hystgen.effects.rate_dependence import fixed
-
-        dashpot = self.dashpot
-        if dashpot is None:
+        if not (dashpot := self.dashpot):
             return []
-        return fixed.whole_yields(lambda x: yielded(dashpot, self.scale, seconds, x), begins, end, step, bits)
+        found: list[tuple[int, ...]] = late("rate_dependence", "whole_yields")()(
+            lambda x: yielded(dashpot, self.scale, seconds, x), begins, end, step, bits
+        )
+        return found
 
     def stretch_error(self, seconds: float, rows: Array, ways: tuple[float, float], held: Array) -> float:
         """Largest difference between the stretches of plays by the table and by the law."""
