@@ -53,7 +53,7 @@ def _scalar(
     """Whether the number is the sample rate of the vectors; it is then added to `steps`."""
     if int(np.prod(shape)) != 1 or not is_named(name):
         return False
-    step = from_number(name, float(read()[0]), of)
+    step = from_number(name, float(np.ravel(read())[0]), of)
     steps += [step] if step else []
     return step is not None
 
@@ -102,9 +102,7 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
             elif kind in MATLAB_NUMBERS and one_dimension(shape):
                 vectors.add(name, one_dimension(shape))
                 columns.append(column(name, length=one_dimension(shape), read=partial(vectors.read, name)))
-            elif kind not in MATLAB_NUMBERS or not _scalar(
-                name, "", partial(_mat_variable, stream, name), shape, steps
-            ):
+            elif kind not in MATLAB_NUMBERS or not _scalar(name, "", partial(_mat_matrix, stream, name), shape, steps):
                 ignored.append(name)
                 if kind in MATLAB_NUMBERS and in_matrix(shape):
                     matrices[name] = shape, partial(_mat_matrix, stream, name)
@@ -121,10 +119,6 @@ def _mat_variables(stream: IO[bytes], names: Sequence[str]) -> dict[str, NDArray
 
 def _mat_matrix(stream: IO[bytes], name: str) -> NDArray[np.generic]:
     return _mat_variables(stream, [name])[name]
-
-
-def _mat_variable(stream: IO[bytes], name: str) -> NDArray[np.generic]:
-    return np.asarray(_mat_matrix(stream, name)).ravel()
 
 
 class _MatVectors:
