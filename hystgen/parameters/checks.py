@@ -23,6 +23,7 @@ from hystgen.parameters.yaml import Document
 
 if TYPE_CHECKING:
     from hystgen.effects import Effect
+    from hystgen.plays.density import Discretisation, Formula
 
 Shapes = tuple["type[Effect]", ...]
 """Classes that share a name."""
@@ -101,7 +102,7 @@ class _Checker:
         self.document = document
         self.user = user
         self.problems: list[Problem] = []
-        self.discretisation: Any = None
+        self.discretisation: Discretisation | None = None
         self.effects: list[Effect] = []
         self._mover: tuple[str, str] | None = None
         self._classes: dict[Path, type[Effect]] = {}
@@ -367,7 +368,7 @@ class _Checker:
         self._state(path[:-1], len(found.thresholds))
         self.discretisation = found
 
-    def _formula(self, path: Path) -> Any:
+    def _formula(self, path: Path) -> Formula | None:
         text = self.get(*path)
         if text is None:
             return None

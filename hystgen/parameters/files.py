@@ -14,54 +14,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from hystgen.basics.names import name_problem
 from hystgen.basics.problems import ParameterError, Path, Problem, path_text
-from hystgen.parameters.checks import EFFECT_NAMES, check
-from hystgen.parameters.schema import (
-    Compensation,
-    DeadZoneParameters,
-    DensityParameters,
-    DensityTable,
-    EmitDefaults,
-    ModelParameters,
-    Parameters,
-    PIParameters,
-    TanhBranch,
-    TanhParameters,
-    Units,
-    schema,
-)
+from hystgen.parameters.checks import check
+from hystgen.parameters.schema import Compensation, ModelParameters, PIParameters
+from hystgen.parameters.schema import Parameters as Parameters
 from hystgen.parameters.yaml import MAX_BYTES, read, resolve
 
 if TYPE_CHECKING:
     from hystgen.effects import Effect
-
-__all__ = [
-    "EFFECT_NAMES",
-    "MAX_BYTES",
-    "DeadZoneParameters",
-    "DensityParameters",
-    "DensityTable",
-    "EmitDefaults",
-    "ModelParameters",
-    "PIParameters",
-    "ParameterError",
-    "Parameters",
-    "Problem",
-    "TanhBranch",
-    "TanhParameters",
-    "Units",
-    "canonical_json",
-    "dump_parameters",
-    "load_parameters",
-    "located",
-    "make_parameters",
-    "name_problem",
-    "parameter_data",
-    "parameters_sha256",
-    "parse_parameters",
-    "schema",
-]
 
 _WIDTH = 100
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 from numpy.lib import format as npy
@@ -14,6 +14,9 @@ from hystgen.basics import extras
 from hystgen.records import mat_nesting
 from hystgen.records.columns import Column, Step, column, from_number, is_named
 from hystgen.records.reading import Matrix, Reading, Table, in_matrix, one_dimension
+
+if TYPE_CHECKING:
+    from numpy.lib.npyio import NpzFile
 
 MATLAB_NUMBERS = frozenset(
     ("double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
@@ -58,10 +61,11 @@ def _scalar(
     return step is not None
 
 
-def _npy_shape(archive: Any, file: str) -> tuple[int, ...]:
+def _npy_shape(archive: NpzFile, file: str) -> tuple[int, ...]:
     """Shape of an archived array of numbers, from its header alone; (0,) for anything else."""
+    assert archive.zip is not None, "open"
     with archive.zip.open(file) as member:
-        header: Mapping[tuple[int, int], Callable[..., Any]] = {
+        header: Mapping[tuple[int, int], Callable[[IO[bytes]], tuple[tuple[int, ...], bool, np.dtype]]] = {
             (1, 0): npy.read_array_header_1_0,
             (2, 0): npy.read_array_header_2_0,
         }
@@ -75,7 +79,7 @@ def _npy_shape(archive: Any, file: str) -> tuple[int, ...]:
     return tuple(shape) if dtype.kind in "fiub" else (0,)
 
 
-def _npy_vector(archive: Any, name: str) -> NDArray[np.generic]:
+def _npy_vector(archive: NpzFile, name: str) -> NDArray[np.generic]:
     return np.asarray(archive[name]).ravel()
 
 
