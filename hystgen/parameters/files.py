@@ -210,18 +210,12 @@ def _block(
         if value is None or (not wanted and key in defaults and value == defaults[key]):
             continue
         yield from _comment(note, indent)
-        if key == "memoryless" and value:
+        if key in ("memoryless", "effects") and value:
             yield f"{indent}{key}:"
-            for stage in value:
-                if stage.get("descending") == stage.get("ascending", ()):
-                    stage = {name: entry for name, entry in stage.items() if name != "descending"}
-                lines = [line for name, entry in stage.items() for line in _entry(name, entry, indent + "    ")]
-                yield f"{indent}  - {lines[0].lstrip()}"
-                yield from lines[1:]
-        elif key == "effects" and value:
-            yield f"{indent}{key}:"
-            for effect in value:
-                lines = [line for name, entry in effect.items() for line in _entry(name, entry, indent + "    ")]
+            for part in value:
+                if part.get("descending") == part.get("ascending", ()):
+                    part = {name: entry for name, entry in part.items() if name != "descending"}
+                lines = [line for name, entry in part.items() for line in _entry(name, entry, indent + "    ")]
                 yield f"{indent}  - {lines[0].lstrip()}"
                 yield from lines[1:]
         elif isinstance(value, dict) and key not in _FLOW:
