@@ -1,5 +1,4 @@
-/* Gains behind the plays and their reciprocals, in fixed point. Called by the files of effects that
-   change the gain. */
+/* Gains behind the plays and their reciprocals, in fixed point. Called by effects with a gain. */
 #ifndef HYSTGEN_GAINS_C
 #define HYSTGEN_GAINS_C
 #include "arithmetic/fixed.h"

@@ -3,16 +3,18 @@ functions in fixed point, curves of polynomials and straight pieces."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+
+from hystgen.arithmetic.factors import error as missed
 from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
-from hystgen.effects.base import Array, Effect
+from hystgen.effects.base import Array, Effect, Run
 from hystgen.effects.bend import Bends, bend
-from hystgen.plays.slots import TANH, Counts, Reals
+from hystgen.plays.slots import DEAD_ZONE, TANH, Counts, Reals
 
 
 class MapErrors(NamedTuple):
@@ -26,15 +28,13 @@ class MapErrors(NamedTuple):
 
 
 class Fitted(Protocol):
-    """A curve as fitted in fixed point."""
+    """A curve as fitted in fixed point: its error in signals, for the largest slope."""
 
-    def error(self, slope: float, /) -> float:
-        """Its error in signals, for the largest slope."""
+    def error(self, slope: float, /) -> float: ...
 
 
 class Wanted(NamedTuple):
-    """A curve to be fitted in fixed point, in output codes: its function, the ends of its argument, and its largest
-    value."""
+    """A curve to be fitted in fixed point, in output codes: function, ends of its argument, and largest value."""
 
     function: Callable[[float], float]
     low: float
@@ -50,51 +50,59 @@ class Whole(NamedTuple):
     output: float
 
 
-@dataclass(frozen=True)
-class Map(ABC):
-    """One such effect; sizes in fixed point are in output codes of `lsb`."""
+class Map:
+    """An effect that maps the output: between two ends nothing changes, and beyond them there is another slope, unless
+    a subclass says otherwise. Sizes in fixed point are in output codes of `lsb`."""
 
-    effect: Any
+    def __init__(self, effect: Effect, lower: float = 0.0, upper: float = 0.0, give: float = 0.0) -> None:
+        self.effect, self.lower, self.upper, self.give = effect, lower, upper, give
 
     def mapped(self, y: Array) -> Array:
-        """The output (N,) behind it."""
-        found: Array = self.effect.mapped(y, None)
-        return found
+        """The output (N,) behind it, which does not depend on the run."""
+        return self.effect.mapped(y, Run(y, y))
 
-    @abstractmethod
     def undone(self, y: Array) -> Array:
         """The input (N,) that gives the output `y` (N,); for an output out of reach, of the nearest within reach."""
+        inside = np.clip(y, self.lower, self.upper)
+        return inside if self.give == 0.0 else np.asarray(inside + (y - inside) / self.give)
 
-    @abstractmethod
     def stage(self, largest: float) -> tuple[int, int, list[float]]:
         """Kind, size and data as in `hystgen.front.stage.StageTables`; `largest`: the largest number below 1."""
+        ends, anchors, give = [self.lower, self.upper], [self.lower, self.lower, self.upper], self.give
+        over = 1.0 / give if give else 0.0
+        return DEAD_ZONE, 2, [*ends, *ends, *anchors, *anchors, give, 1.0, give, over, 1.0, over]
 
-    @abstractmethod
     def errors(self, found: MapErrors, u: float, kind: str) -> MapErrors:
         """Those of the maps behind it and of this one, in floating point with roundings `u`."""
+        size, give = float(np.max(np.abs(found.ends))), self.give
+        slope = found.slope / (give if 0.0 < give < 1.0 else 1.0)
+        return MapErrors(found.ends, slope, found.back + 8.0 * u * size * slope, found.there + 8.0 * u * size)
 
-    @abstractmethod
     def grown(self, size: float, lsb: float) -> float:
         """Largest output for inputs within a size."""
+        return size
 
-    @abstractmethod
     def asked(
         self, back: float, ends: tuple[float, float], still: float, lsb: float
     ) -> tuple[float, tuple[float, float] | None]:
         """Largest input to which an output within `back` is inverted, and the least and largest one if a curve does
         that; `ends`: of the settled input, `still`: the largest one."""
+        return back / self.give if self.give else max(abs(self.lower), abs(self.upper)) / lsb, None
 
-    @abstractmethod
     def curves(self, size: float, ends: tuple[float, float] | None, lsb: float) -> list[Wanted]:
         """Its curve for inputs within a size, and that of its inverse for results within `ends`, if it has any."""
+        return []
 
-    def pieces(self) -> tuple[float, float, float]:
-        """If it has no curves: the ends between which nothing changes, and the slope beyond them."""
-        return 0.0, 0.0, 0.0
-
-    @abstractmethod
     def whole_errors(self, found: MapErrors, curves: Sequence[Fitted], unit: Whole) -> MapErrors:
         """As `errors` in fixed point, in output codes."""
+        give, (ends, slope, back, there) = self.give, found
+        over = 1.0 / give if 0.0 < give < 1.0 else 1.0
+        slope, back = slope * over, back * over
+        if give:
+            size = max(map(abs, ends.tolist())) / unit.lsb
+            back += (0.5 + over) * unit.signal + missed(1.0 / give) * size
+            there += 1.0 * unit.signal + missed(give) * unit.output
+        return MapErrors(ends, slope, back, there)
 
 
 @dataclass(frozen=True)
@@ -102,10 +110,10 @@ class MapPart:
     """Effects that map the output: `takes` tells whether an effect is one, and `of` makes its map."""
 
     takes: Callable[[Effect], bool]
-    of: Callable[[Any], Map]
+    of: Callable[..., Map]
 
 
-# ---------------------------------------------------------------- in fixed point: bend.c, stops.c
+# ---------------------------------------------------------------- maps.c
 
 LOWER, UPPER, GIVE, INVERSE_GIVE = 0, 1, 2, 4
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import functools
 import importlib
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,8 @@ Function = Callable[..., Any]
 class Led(NamedTuple):
     """How to lead the only block in front of the plays where the blocks behind it depend on its way: its state, the
     input for an output, the input that is kept, the output of an input, the shortfall of a move in its first sample;
-    and the input that does not overshoot behind a slew limit, found by `halves` halvings."""
+    and the input that does not overshoot behind a slew limit, found by `halves` halvings in floating point, and in
+    fixed point among numbers up to `coarse`."""
 
     state: Function
     solve: Function
@@ -32,37 +32,31 @@ class Led(NamedTuple):
     missed: Function
     braked: Function
     halves: int = 0
+    coarse: int = 0
 
 
-class Leading(Block):
+@runtime_checkable
+class Leading(Protocol):
     """The block that `Led` leads, in double precision. `rises`: the direction of arrival, where two branches follow;
-    with `always_led` it is then led however short a step is; `exact`: whether it is not led in this step."""
+    with `always_led` it is then led however short a step is; `exact`: whether it is not led in this step; `patience`:
+    share of the way to the other branch that it falls short in the first sample of a turn; `braked`: the drive at which
+    it does not overshoot, from the nearest in reach, `short` of the answer."""
 
-    rises: Callable[[], bool] | None = None
-    always_led: bool = False
-    exact: bool = False
+    rises: Callable[[], bool] | None
+    always_led: bool
+    exact: bool
 
     @property
-    @abstractmethod
-    def patience(self) -> float:
-        """The share of the way to the other branch that it falls short in the first sample of a turn."""
-
-    @abstractmethod
-    def braked(self, near: float, short: float, falling: float, rising: float) -> float:
-        """The drive at which it does not overshoot; `near`: the nearest in reach, `short` of the answer."""
+    def patience(self) -> float: ...
+    def braked(self, near: float, short: float, falling: float, rising: float) -> float: ...
 
 
-class Following(ABC):
-    """A gain behind the plays that follows the drive, in double precision at steps of any length; at the first sample
-    the drive `before` is NaN."""
+class Following(Protocol):
+    """A gain behind the plays that follows the drive, in double precision at steps of any length: the input that gives
+    the output y if the drive goes from `before` to `drive`, and that it has gone there; NaN before the first sample."""
 
-    @abstractmethod
-    def solve(self, y: float, before: float, drive: float, seconds: float) -> float:
-        """The input that gives the output y if the drive goes from `before` to `drive`."""
-
-    @abstractmethod
-    def move(self, before: float, drive: float, seconds: float) -> None:
-        """The drive has gone there."""
+    def solve(self, y: float, before: float, drive: float, seconds: float) -> float: ...
+    def move(self, before: float, drive: float, seconds: float) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -358,14 +352,10 @@ class Unmeasured(NamedTuple):
     known: str
 
 
-def late(effect: str, name: str = "ARITHMETIC") -> Callable[[], Realized]:
+def late(effect: str, name: str = "ARITHMETIC") -> Callable[[], Any]:
     """A loader for the fixed-point version of an effect, which imports it when called."""
 
-    def realized() -> Realized:
-        found: Realized = getattr(importlib.import_module("hystgen.effects." + effect + ".fixed"), name)
-        return found
-
-    return realized
+    return lambda: getattr(importlib.import_module("hystgen.effects." + effect + ".fixed"), name)
 
 
 def called(name: str, only: Callable[[Any], bool] | None = None) -> Callable[[Any], bool]:
@@ -385,8 +375,9 @@ class ChainPart:
     interface that it serves; `forward`: only the forward operator has it; `joined`: all of them form one block;
     `coded`: loads its fixed-point version, for models in fixed point.
 
-    `problems`: why the C cannot include an effect; `unmeasured`: if nothing measures it; `code`: parts of its code in
-    `hystgen.compensator.chain.costs`, and `counted`: how many of each there are in its tables, by default its blocks.
+    `longest`: the longest travel that can be set, in its tables. `problems`: why the C cannot include an effect;
+    `unmeasured`: if nothing measures it; `code`: parts of its code in `hystgen.compensator.chain.costs`, and `counted`:
+    how many of each there are in its tables, by default its blocks.
 
     In double precision at steps of any length: `uneven` makes the block of an effect, `following` that of one behind
     the plays that follows the drive; `no_inverse`: why there is no inverse.
@@ -402,6 +393,7 @@ class ChainPart:
     calls: tuple[str, ...] = ()
     forward: bool = False
     joined: bool = False
+    longest: Callable[[Any], float] | None = None
     problems: Callable[[Any, Setting], Iterator[str]] = lambda *_: iter(())
     unmeasured: Unmeasured | None = None
     code: tuple[str, ...] = ()

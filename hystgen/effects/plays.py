@@ -5,21 +5,20 @@ The state of play i is where it would come to rest, and its contribution there. 
 
 from __future__ import annotations
 
-import importlib
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.effects.base import Array
 from hystgen.effects.bend import Bends
+from hystgen.effects.part import Function
 from hystgen.plays.slots import Counts, Reals
 
-Function = Callable[..., Any]
 T = TypeVar("T")
+F = TypeVar("F")
 
 PLAIN, DILATED, RELAXING, DASHPOT = range(4)
 STRAIGHT, POLYNOMIAL, CENTRE = range(3)
@@ -91,71 +90,45 @@ class Moved(NamedTuple):
     seen: float
 
 
-class Mover(ABC):
-    """How an effect moves the plays (n + 1) of a model, at steps of any length in double precision."""
+Response = tuple[float, NDArray[np.complex128], float]
 
-    @abstractmethod
-    def after(self, plays: Array, x: float, w: float, seconds: float) -> Array:
-        """The plays after a step in which their input goes straight from `x` to `w`, from where they were."""
 
-    @abstractmethod
-    def numbers(self, seconds: float, largest_step: float, span: float) -> Moved:
-        """Their constants at steps of `seconds`, for drive steps up to `largest_step` and stretches up to `span`."""
+class Mover(Protocol):
+    """How an effect moves the plays (n + 1) of a model, at steps of any length in double precision.
 
-    @abstractmethod
-    def moves(self, seconds: float) -> int:
-        """Their kind at steps of `seconds`."""
+    `after`: the plays after a step in which their input goes straight from `x` to `w`; `numbers`: their constants for
+    drive steps up to `largest_step` and stretches up to `span`; `moves`: their kind; `in_order`: whether none yields
+    faster than one with a smaller threshold; `stood_in_for`: whether others stand in for them, as only the inverse may;
+    `falling`: least change of the sum of those with a threshold per change of their input in one step, at most 0, for
+    contributions that rise by up to `steep` times their play; `responses`: for each number of plays that follow, slope
+    at rest, response (N,) at the factors `z` of a delay by one sample, and the part of it that comes at once;
+    `whole_yields`: the yields in fixed point, for stretches up to `end` steps, with knots at `begins` among others;
+    `stretch_error`: largest difference between stretches by the yields and by their law, for moves of the input within
+    `ways` in a step and overall, and rounding errors `held` (K,).
+    """
 
+    def after(self, plays: Array, x: float, w: float, seconds: float) -> Array: ...
+    def numbers(self, seconds: float, largest_step: float, span: float) -> Moved: ...
+    def moves(self, seconds: float) -> int: ...
     @property
-    @abstractmethod
-    def in_order(self) -> bool:
-        """Whether none yields faster than one with a smaller threshold."""
-
-    @abstractmethod
-    def stood_in_for(self, seconds: float) -> bool:
-        """Whether other plays stand in for these, as only the inverse may."""
-
-    def falling(self, seconds: float, steep: float) -> float:
-        """Least change of the sum of the plays with a threshold per change of their input in one step, at most 0, for
-        contributions that rise by up to `steep` times their play."""
-        return 0.0
-
-    @abstractmethod
-    def responses(
-        self, z: NDArray[np.complex128], seconds: float
-    ) -> Iterator[tuple[float, NDArray[np.complex128], float]]:
-        """For each number of plays that follow: slope at rest, response (N,) at the factors `z` of a delay by one
-        sample, and the part of it that comes at once."""
-
-    def whole_yields(self, seconds: float, begins: Sequence[int], end: int, step: float, bits: int) -> list[Any]:
-        """`FixedMovingTables.yields` for stretches up to `end` steps, with knots at `begins` among others."""
-        return []
-
-    def stretch_error(self, seconds: float, rows: Array, ways: tuple[float, float], held: Array) -> float:
-        """Largest difference between the stretches of plays by `yields` and by their law; `ways`: the largest move of
-        their input in a step, and overall; `held` (K,): rounding error of the yields on each piece."""
-        return 0.0
+    def in_order(self) -> bool: ...
+    def stood_in_for(self, seconds: float) -> bool: ...
+    def falling(self, seconds: float, steep: float) -> float: ...
+    def responses(self, z: NDArray[np.complex128], seconds: float) -> Iterator[Response]: ...
+    def whole_yields(
+        self, seconds: float, begins: Sequence[int], end: int, step: float, bits: int
+    ) -> list[tuple[int, ...]]: ...
+    def stretch_error(self, seconds: float, rows: Array, ways: tuple[float, float], held: Array) -> float: ...
 
 
 class Bent(NamedTuple):
-    """How plays are bent: their kind, coefficients (n, K), or (1, K) for all, and some of `MovingTables.number`."""
+    """How plays are bent: their kind, coefficients (n, K), or (1, K) for all, and some of `MovingTables.number`; `bump`
+    of play i > 0: a key that plays with the same bend share, and the difference between its contribution and itself."""
 
     bends: int
     curve: Array
     numbers: Mapping[int, float]
-
-
-class Bender(ABC):
-    """How an effect bends the plays of a model."""
-
-    @abstractmethod
-    def numbers(self) -> Bent:
-        """The constants."""
-
-    @abstractmethod
-    def bump(self, i: int) -> tuple[object, Callable[[float], float]]:
-        """A key that plays with the same bend share, and the difference between the contribution of play i > 0 and the
-        play."""
+    bump: Callable[[int], tuple[object, Callable[[float], float]]]
 
 
 class Moves(NamedTuple):
@@ -176,16 +149,11 @@ class Moves(NamedTuple):
 
 
 @dataclass(frozen=True)
-class PlaysPart(Generic[T]):
+class PlaysPart(Generic[T, F]):
     """An effect on plays: `of` makes what it tells of a model's plays, from the effect, thresholds and weights;
-    `floating`: its functions, `Moves` or the contribution of play i at z, of m, plays, i and z; `coded`: names the
-    module that has `ARITHMETIC`, the same in fixed point."""
+    `floating`: its functions, `Moves` or the contribution of play i at z, of m, plays, i and z; `coded` loads them in
+    fixed point."""
 
-    of: Callable[[Any, Array, Array], T]
-    floating: Any
-    coded: str
-
-    @property
-    def fixed(self) -> Any:
-        """Its functions in fixed point."""
-        return importlib.import_module(self.coded).ARITHMETIC
+    of: Callable[..., T]
+    floating: F
+    coded: Callable[[], F]

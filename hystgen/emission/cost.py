@@ -222,7 +222,7 @@ def _refined(t: ChainTables) -> bool:
 def chain_products(t: ChainTables) -> dict[str, int]:
     """Multiplications in one step of the blocks in front of the plays and behind them, for each operator."""
     from hystgen.compensator.chain import blocks
-    from hystgen.effects.lag import compensator as lag
+    from hystgen.compensator.chain.parts import LED, PARTS
 
     counts, kinds = _counts(t), t.behind.kinds
     envelopes = kinds.count(slots.TANH)
@@ -231,7 +231,8 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     forward = sum(each.products[0] for each in everything) + counts.factor * bool(t.of("wait").samples)
     both = sum(sum(each.products) for each in inverse)
     once, halving = counts.braked
-    led = t.braked * (once + halving * lag.HALVES) + counts.factor * (t.turning + len(t.tap))
+    found = PARTS[LED].floating.verbs.led
+    led = t.braked * (once + halving * (found.halves if found else 0)) + counts.factor * (t.turning + len(t.tap))
     return {"forward": forward + stages, "inverse": both + led + stages}
 
 

@@ -169,8 +169,7 @@ class Family(ABC):
     def chain_blocks(self) -> tuple[str, ...]:
         """The files of blocks, which models with effects carry themselves, even with a shared run time; callees before
         callers."""
-        blocks = sources.files(lambda each: (*each.blocks, *each.fixed * bool(self.ending)), self.ending)
-        drives = sources.files(lambda each: each.drives, self.ending)
+        blocks, drives = (sources.files(use, self.ending) for use in ("blocks", "drives"))
         return (*self.helpers, *blocks, "compensator/chain/drive_signal.c", *drives, "arithmetic/product.c")
 
     @property
@@ -222,7 +221,7 @@ class FixedFamily(Family):
     """Fixed point."""
 
     kind, ending, moves_apart = "fixed", "_fixed", True
-    chain_types, helpers = FIXED_CHAIN_TYPES, ("arithmetic/factors.c", "effects/gains.c", "effects/bend.c")
+    chain_types, helpers = FIXED_CHAIN_TYPES, ("arithmetic/factors.c", "effects/gains.c", "effects/maps.c")
     curves, codes, kernel_files = ("front/front.c",), ("compensator/code.c",), FIXED_KERNELS
 
     @property
@@ -328,16 +327,16 @@ class Variant:
         elif not self.moves:
             plays = (solve, f"{chain}plays.c", refined)
         elif not self.bends:
-            plays = (solve, *files(lambda each: each.scanned.get(self.moves, ())), refined)
+            plays = (solve, *files(f"{self.moves} alone"), refined)
         else:
-            bends, moves = files(lambda each: each.bends), files(lambda each: each.moves.get(self.moves, ()))
-            plays = (*bends, *moves, f"{chain}moving_plays.c", f"{chain}moving_search.c", refined)
-        brake = files(lambda each: each.brake) if self.braked else ()
+            moved = (*files("bends"), *files(self.moves))
+            plays = (*moved, f"{chain}moving_plays.c", f"{chain}moving_search.c", refined)
+        brake = files("brake") if self.braked else ()
         entered = () if self.chain else (f"{chain}drive_signal.c",)
-        signals = (*files(lambda each: each.limits), *entered, f"{chain}signals.c", *brake)
+        signals = (*files("limits"), *entered, f"{chain}signals.c", *brake)
         start = (*("compensator/loop_start.c",) * loops, f"{chain}chain_start.c")
         settings = (f"{chain}settings.c",) if self.chain else ()
-        travel = files(lambda each: each.calls.get("travel", ())) if self.ages else ()
+        travel = files("calls") if self.ages else ()
         calls = (f"{chain}chain.c", *start, f"{chain}chain_calls.c", *settings, *travel)
         return (*signals, *plays, *calls)
 

@@ -1,5 +1,4 @@
-/* Operators of engine loop: plays solved for their input. Called by plays.c and by
-   relaxing_plays.c. */
+/* Operators of engine loop: plays solved for their input. Called by plays.c and relaxing.c. */
 #ifndef HYSTGEN_CHAIN_PLAYS_SOLVE_C
 #define HYSTGEN_CHAIN_PLAYS_SOLVE_C
 #include "compensator/chain/model.h"

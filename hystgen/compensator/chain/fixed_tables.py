@@ -50,7 +50,6 @@ from hystgen.compensator.chain.moving import Bumps
 from hystgen.compensator.chain.parts import AHEAD, BEHIND, LED, NAMES, PARTS, Parts
 from hystgen.compensator.fixed_tables import TABLE_MAX, Builder, FixedCurve, lsbs, nearest
 from hystgen.effects import bend
-from hystgen.effects.lag.fixed import COARSE
 from hystgen.effects.maps import MapTables, Wanted
 from hystgen.effects.part import ChainPart, FixedSurroundings, Margin
 from hystgen.parameters.schema import Compensation
@@ -299,7 +298,9 @@ class _Builder:
         )
         levels = self.bits, self.drop, min(self.inner.slope[-1] * most >> self.drop, LARGEST)
         codes = self.inner.drive[0] - 2 * span, self.inner.drive[1] + 2 * span, 31 - self.about.code_bits
-        braked = max((span << drive_bits).bit_length() + 2 - COARSE.bit_length(), 0)
+        led = PARTS[LED].coded().verbs.led
+        coarse = led.coarse.bit_length() if led else 0
+        braked = max((span << drive_bits).bit_length() + 2 - coarse, 0)
         return FixedChainNumbers.of([(*common, *levels, *codes, drive_bits, self.finer, braked)])
 
     def _largest_step(self) -> float:
@@ -402,10 +403,9 @@ class _Builder:
         for each, size, ends in zip(self.parts.maps, self.sizes.mapped, self.sizes.inverted, strict=True):
             self.bends.append([self._bend(curve) for curve in each.curves(size, ends, float(self.output_lsb))])
             kinds.append(slots.TANH if self.bends[-1] else slots.DEAD_ZONE)
-            lower, upper, give = each.pieces()
-            over = self._need(lambda give=give: factor(1.0 / give if give else 0.0), "stops")  # type: ignore[misc]
-            limits = [min(max(self.signal(end), -most), most) for end in (lower, upper)]
-            pieces.append([*limits, *factor(give), *over])
+            over = self._need(functools.partial(factor, 1.0 / each.give if each.give else 0.0), "stops")
+            limits = [min(max(self.signal(end), -most), most) for end in (each.lower, each.upper)]
+            pieces.append([*limits, *factor(each.give), *over])
         curves = [one for pair in self.bends for one in pair or (None, None)]
         found = bend.bends(
             [one.curve.pieces if one else [] for one in curves],

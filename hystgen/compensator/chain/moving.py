@@ -15,36 +15,10 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.fixed_tables import FixedCurve, reciprocal
 from hystgen.compensator.layout import FixedTables
+from hystgen.effects import plays as at
 from hystgen.effects.base import Array, Effect
 from hystgen.effects.bend import bends
-from hystgen.effects.plays import (
-    BUMP,
-    DASHPOT,
-    DILATED,
-    HALF,
-    INVERSE_SCALE,
-    INVERSE_WIDTH,
-    LARGEST_INPUT,
-    LEAST_INPUT,
-    MIDDLE,
-    PLAIN,
-    POLYNOMIAL,
-    RELAXING,
-    SCALE,
-    SEEN,
-    STRAIGHT,
-    TANH_CENTRE,
-    FixedMovingTables,
-    Mover,
-    MovingTables,
-)
-
-__all__ = [
-    "BUMP", "DASHPOT", "DILATED", "INVERSE_SCALE", "INVERSE_WIDTH", "LARGEST_INPUT", "LEAST_INPUT", "MIDDLE",
-    "POLYNOMIAL", "RELAXING", "SCALE", "SEEN", "STRAIGHT", "TANH_CENTRE", "FixedMovingTables", "MovingTables",
-]
-"""What emission asks for here, beside the functions below."""
-
+from hystgen.effects.plays import *  # noqa: F403  emission asks for the codes here
 
 CELLS = 4096
 """Cells in which the slope of bent plays is computed: 1/4096 of the range is far below the width of any bump that a
@@ -58,7 +32,7 @@ FINEST_BUMP = 8
 step."""
 
 
-def movers(static: StaticModel, effects: Sequence[Effect], weights: Array | None = None) -> list[Mover]:
+def movers(static: StaticModel, effects: Sequence[Effect], weights: Array | None = None) -> list[at.Mover]:
     """What moves the plays: at most one effect; `weights`: other ones than the model's."""
     r, p = np.array(static.pi.thresholds), np.array(static.pi.weights) if weights is None else weights
     return [MOVES.of(effect, r, p) for effect in effects if effect.moves_plays()]
@@ -99,7 +73,7 @@ def problems(static: StaticModel, effects: Sequence[Effect], seconds: float) -> 
 
 def dilated(static: StaticModel, effects: Sequence[Effect], seconds: float) -> bool:
     """Whether thresholds grow with the rate and are emitted as such, not replaced by viscous plays."""
-    return any(mover.moves(seconds) == DILATED for mover in movers(static, effects))
+    return any(mover.moves(seconds) == at.DILATED for mover in movers(static, effects))
 
 
 def beyond_forward(static: StaticModel, effects: Sequence[Effect], seconds: float) -> Iterator[tuple[Effect, str]]:
@@ -151,7 +125,7 @@ def of_shifts(static: StaticModel, effects: Sequence[Effect], moves: int, shifts
     flat, steep = bent_slopes(static, effects)
     p = np.abs(static.pi.weights)
     error = float((p * steep)[1:] @ shifts)
-    if moves == DILATED or np.min(flat) < 0.0:
+    if moves == at.DILATED or np.min(flat) < 0.0:
         return error, error
     in_order = all(mover.in_order for mover in movers(static, effects))
     found = found_shifted(p * steep, p * flat, shifts, in_order)
@@ -198,30 +172,31 @@ def steepest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 def build(
     static: StaticModel, effects: Sequence[Effect], seconds: float, largest_step: float, dtype: Any
-) -> MovingTables:
+) -> at.MovingTables:
     """The tables of a model's plays, for effects without `problems` and drive steps up to `largest_step`."""
     n = static.pi.n
     low, high = static.play_range
     r, p = np.array(static.pi.thresholds), np.array(static.pi.weights)
     first, second, curve = np.zeros(n + 1), np.zeros(n + 1), np.zeros((n + 1, 1))
-    moves, kind, yields = PLAIN, STRAIGHT, np.zeros((0, 5))
-    number = np.zeros(SEEN + 1)
-    number[[LEAST_INPUT, LARGEST_INPUT, HALF]] = 2.0 * low - high, 2.0 * high - low, 0.5
+    moves, kind, yields = at.PLAIN, at.STRAIGHT, np.zeros((0, 5))
+    number = np.zeros(at.SEEN + 1)
+    number[[at.LEAST_INPUT, at.LARGEST_INPUT, at.HALF]] = 2.0 * low - high, 2.0 * high - low, 0.5
     for mover in movers(static, effects):
-        moves, first[1:], second[1:], yields, number[SEEN] = mover.numbers(seconds, largest_step, 3.0 * (high - low))
+        moves, first[1:], second[1:], yields, number[at.SEEN] = mover.numbers(seconds, largest_step, 3.0 * (high - low))
     for effect in effects:
         if effect.bends_plays():
-            kind, rows, numbers = BENDS.of(effect, r, p).numbers()
+            kind, rows, numbers, _ = BENDS.of(effect, r, p)
             curve = np.zeros((n + 1, rows.shape[1]))
             curve[1:] = rows
             number[list(numbers)] = list(numbers.values())
     halves = int(np.finfo(dtype).nmant) + 4
-    scanned = moves == RELAXING and kind == STRAIGHT and len(set(first[1:].tolist())) == 1 and float(np.min(p)) >= 0.0
+    alike = kind == at.STRAIGHT and len(set(first[1:].tolist())) == 1
+    scanned = moves == at.RELAXING and alike and float(np.min(p)) >= 0.0
     share = np.append(0.0, p[1:] * first[1:])
     inverse = 1.0 / (p[0] + np.cumsum(share)) if scanned else np.zeros(n + 1)
     given = (np.array(each, dtype=dtype) for each in (first, second, curve, number, share, inverse, yields))
     first, second, curve, number, share, inverse, yields = given
-    return MovingTables(moves, kind, first, second, curve, number, halves, int(scanned), share, inverse, yields)
+    return at.MovingTables(moves, kind, first, second, curve, number, halves, int(scanned), share, inverse, yields)
 
 
 def largest_bend(static: StaticModel, effects: Sequence[Effect]) -> float:
@@ -276,7 +251,7 @@ def build_fixed(
     bump: Bumps,
     step: float,
     largest_step: float,
-) -> FixedMovingTables:
+) -> at.FixedMovingTables:
     """The tables in fixed point, with inputs in steps of `step` and up to `farthest`. Raises OverflowError."""
     own = build(static, effects, seconds, largest_step, np.float64)
     first, second = (np.array([factor(x) for x in each], dtype=np.int64) for each in (own.first, own.second))
@@ -290,16 +265,16 @@ def build_fixed(
     for mover in movers(static, effects):
         begins = [round(x / step) for x in own.yields[:, 0].tolist()]
         rows = mover.whole_yields(seconds, begins, stretch_end, step, bits)
-    return FixedMovingTables(
+    return at.FixedMovingTables(
         own.moves, own.bends, own.scanned, first, second, farthest, relaxed, curves,
         np.array(bump.of, dtype=np.int64), bump.bits,
         np.array(rows, dtype=np.int64).reshape(-1, 7), bits, stretch_end,
-        np.array(factor(float(own.number[SEEN])), dtype=np.int64),
+        np.array(factor(float(own.number[at.SEEN])), dtype=np.int64),
     )
 
 
 def yield_error(
-    t: FixedMovingTables, static: StaticModel, effects: Sequence[Effect], seconds: float, step: float, way: float
+    t: at.FixedMovingTables, static: StaticModel, effects: Sequence[Effect], seconds: float, step: float, way: float
 ) -> float:
     """As `Mover.stretch_error`, for tables in fixed point with steps of `step`, plus the stretch lost to rounding."""
     rows, held = [], []

@@ -59,4 +59,4 @@ def asked(t: ChainTables, h: Any) -> Any:
     return inside << t.number.level_drop[0]
 
 
-PLAYS = operators(Kind(level, asked, loop_solve, MOVES.fixed, BENDS.fixed, search))
+PLAYS = operators(Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), search))

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.step import ChainState
-from hystgen.effects.plays import PLAIN, RELAXING, STRAIGHT, Function, Moves
+from hystgen.effects.part import Function
+from hystgen.effects.plays import PLAIN, RELAXING, STRAIGHT, Moves
 from hystgen.plays.loop import State, loop_absorb, loop_output
 from hystgen.plays.slots import Reals
 

@@ -19,8 +19,8 @@ from hystgen.effects import CATALOGUE, shapes
 from hystgen.effects.base import Effect, Place
 from hystgen.effects.kinds import OwnBlock
 from hystgen.effects.maps import Map, MapPart
-from hystgen.effects.part import ChainPart
-from hystgen.effects.plays import Bender, Mover, PlaysPart
+from hystgen.effects.part import ChainPart, Function
+from hystgen.effects.plays import Bent, Mover, Moves, PlaysPart
 from hystgen.plays.slots import Counts
 
 
@@ -35,9 +35,9 @@ def _catalogue() -> list[ModuleType]:
 _MODULES = _catalogue()
 _CATALOGUE: list[ChainPart] = [part for module in _MODULES for part in getattr(module, "PARTS", ())]
 
-MOVES: PlaysPart[Mover]
+MOVES: PlaysPart[Mover, Moves]
 (MOVES,) = (module.MOVES for module in _MODULES if hasattr(module, "MOVES"))
-BENDS: PlaysPart[Bender]
+BENDS: PlaysPart[Bent, Function]
 (BENDS,) = (module.BENDS for module in _MODULES if hasattr(module, "BENDS"))
 """The effects that move plays, and that bend them."""
 

@@ -1,5 +1,3 @@
 """Gain that falls with the distance travelled."""
 
-from hystgen.effects.sources import Sources
-
-SOURCES = Sources(blocks=("ageing{}.c",), calls={"travel": ("calls.c",)})
+SOURCES = {"blocks": ("ageing{}.c",), "calls": ("calls.c",)}

@@ -2,8 +2,6 @@
    functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_AGEING_AGEING_FIXED_C
 #define HYSTGEN_AGEING_AGEING_FIXED_C
-#include "arithmetic/fixed.h"
-#include "compensator/chain/model.h"
 #include "effects/gains.c"
 
 /* Fraction bits of a position within a piece, and one half. */

@@ -19,7 +19,6 @@ from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
-    Following,
     Gained,
     Margin,
     One,
@@ -214,7 +213,7 @@ def constants(t: AgeingTables) -> Iterator[Constants]:
         yield Constants(KIND, row, (5 + 2 * int(row["turns"]), 1), t.piece[first : first + row["n"]])
 
 
-class UnevenAgeing(Following):
+class UnevenAgeing:
     """The gain in double precision."""
 
     def __init__(self, effect: Ageing) -> None:
@@ -335,7 +334,7 @@ ARITHMETIC = Realized(
 PART = ChainPart(
     "ageing", "ageing", Place.GAIN, called("ageing"), lambda effect, *_: Aged(effect),
     ARITHMETIC, late("ageing"), calls=("set_gain", "travel", "set_travel"),
-    problems=problems, code=("ageing",), following=UnevenAgeing,
+    problems=problems, code=("ageing",), following=UnevenAgeing, longest=lambda t: float(t.block.last[0]),
 )
 """Ageing as a part of the chain: a gain over the travel, which the caller may set."""
 

@@ -1,5 +1,3 @@
 """Creep."""
 
-from hystgen.effects.sources import Sources
-
-SOURCES = Sources(blocks=("creep{}.c",))
+SOURCES = {"blocks": ("creep{}.c",)}

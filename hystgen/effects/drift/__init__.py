@@ -1,5 +1,3 @@
 """Drift of the output with session time."""
 
-from hystgen.effects.sources import Sources
-
-SOURCES = Sources(blocks=("clock.c",))
+SOURCES = {"blocks": ("clock.c",)}

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Real, Struct, memory_of
-from hystgen.effects.base import Place, decays
+from hystgen.effects.base import Block, Place, decays
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag.model import Lag
-from hystgen.effects.part import ChainPart, Leading, Led, Margin, One, Realized, Responses, Verbs, called, late
+from hystgen.effects.part import ChainPart, Led, Margin, One, Realized, Responses, Verbs, called, late
 from hystgen.plays.slots import Counts, zero
 
 LONG_STEP = 2.0
@@ -418,11 +418,13 @@ ALL_HALVES = 64
 """[steps] Halvings that exhaust double precision, which has 53 bits."""
 
 
-class UnevenLag(Leading):
+class UnevenLag(Block):
     """A lag in double precision at steps of any length: the first of two rows leads it, the second inverts it exactly
     and gives its output. With `always_led` it is led since a rounded drive does not arrive exactly."""
 
     def __init__(self, effect: Lag) -> None:
+        self.rises: Callable[[], bool] | None = None
+        self.always_led = False
         self.moved = 0.0
         self._of_step = functools.lru_cache(maxsize=64)(functools.partial(_uneven, effect))
         self.advance(1.0)

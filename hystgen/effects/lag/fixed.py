@@ -346,7 +346,7 @@ def coarsely(t: FixedLagTables, x: Any, drop: Any) -> Any:
     return coarse(scaled(t.led, 0, x << (t.led.bits[0] + drop), t.led.inverse_rate), drop)
 
 
-LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked)
+LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked, coarse=COARSE)
 ARITHMETIC = Realized(
     Verbs(memory_of(FixedLagMemory), lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
     tables, formats, kinds=(KIND, EXACT_KIND, BRAKED_KIND),

@@ -21,24 +21,14 @@ from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.effects.base import Array, Effect, decays
-from hystgen.effects.plays import (
-    DASHPOT,
-    DILATED,
-    RELAXING,
-    SEEN,
-    Function,
-    Moved,
-    Mover,
-    Moves,
-    MovingTables,
-    PlaysPart,
-)
+from hystgen.effects.part import Function, late
+from hystgen.effects.plays import DASHPOT, DILATED, RELAXING, SEEN, Moved, Moves, MovingTables, PlaysPart, Response
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate, dilated_plays, relaxed
 from hystgen.plays.loop import State
 from hystgen.plays.slots import Reals, zero
 
 
-class Movement(Mover):
+class Movement:
     """How plays (n + 1) move whose thresholds grow with the rate, or that relax.
 
     Plays that relax move as in the forward model. Thresholds that grow with the rate have a bounded inverse only while
@@ -96,10 +86,8 @@ class Movement(Mover):
         first, second = np.array([_viscous(seconds, tau) for tau in self.taus]).T
         return Moved(kind, first, second, no_yields, 0.0)
 
-    def responses(
-        self, z: NDArray[np.complex128], seconds: float
-    ) -> Iterator[tuple[float, NDArray[np.complex128], float]]:
-        """As `Mover.responses`; a nonlinear dashpot has a stretch that is too slow for its play to follow."""
+    def responses(self, z: NDArray[np.complex128], seconds: float) -> Iterator[Response]:
+        """As in `Mover`; a nonlinear dashpot has a stretch that is too slow for its play to follow."""
         p = self.weights
         if self.dashpot:
             yield float(np.sum(p)), np.full_like(z, p[0]), float(p[0])
@@ -114,14 +102,16 @@ class Movement(Mover):
             slope, response, at_once = slope + weight, response + weight * followed, at_once + weight * first
             yield slope, response, at_once
 
-    def whole_yields(self, seconds: float, begins: Sequence[int], end: int, step: float, bits: int) -> list[Any]:
+    def whole_yields(
+        self, seconds: float, begins: Sequence[int], end: int, step: float, bits: int
+    ) -> list[tuple[int, ...]]:
         """`FixedMovingTables.yields` for stretches up to `end` steps, with knots at `begins` among others."""
-        from hystgen.effects.rate_dependence import fixed
-
-        dashpot = self.dashpot
-        if dashpot is None:
+        if not (dashpot := self.dashpot):
             return []
-        return fixed.whole_yields(lambda x: yielded(dashpot, self.scale, seconds, x), begins, end, step, bits)
+        found: list[tuple[int, ...]] = late("rate_dependence", "whole_yields")()(
+            lambda x: yielded(dashpot, self.scale, seconds, x), begins, end, step, bits
+        )
+        return found
 
     def stretch_error(self, seconds: float, rows: Array, ways: tuple[float, float], held: Array) -> float:
         """Largest difference between the stretches of plays by the table and by the law."""
@@ -406,6 +396,6 @@ def relaxing_input(t: MovingTables, plays: Any, s: State, h: Any) -> Any:
 MOVES = PlaysPart(
     Movement,
     Moves(*movement(share_of, yields, seen, unchanged, unchanged), relaxing_follow, relaxing_input),
-    "hystgen.effects.rate_dependence.fixed",
+    late("rate_dependence"),
 )
 """Plays that depend on the rate as a part of the chain."""

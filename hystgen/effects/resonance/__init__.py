@@ -1,5 +1,3 @@
 """A mechanical mode of the stage."""
 
-from hystgen.effects.sources import Sources
-
-SOURCES = Sources(blocks=("mode.c",))
+SOURCES = {"blocks": ("mode.c",)}

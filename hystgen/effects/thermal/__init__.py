@@ -1,5 +1,3 @@
 """Gain and offset that follow a temperature."""
 
-from hystgen.effects.sources import Sources
-
-SOURCES = Sources(blocks=("heat.c", "gain{}.c", "friction.c"))
+SOURCES = {"blocks": ("heat.c", "gain{}.c", "friction.c")}

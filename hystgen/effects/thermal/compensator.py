@@ -17,7 +17,6 @@ from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import (
     ChainPart,
     FloatSurroundings,
-    Following,
     Gained,
     Margin,
     One,
@@ -502,7 +501,7 @@ def friction_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> 
 # ---------------------------------------------------------------- at steps of any length
 
 
-class UnevenHeat(Following):
+class UnevenHeat:
     """A temperature that follows the heat of a drive, with the turning points that friction remembers."""
 
     def __init__(self, effect: OwnHeat) -> None:

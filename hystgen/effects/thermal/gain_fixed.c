@@ -1,7 +1,5 @@
 /* Gain and offset behind the plays, set from outside, in fixed point. Called by the functions that
    emission writes for a chain, see compensator/chain/model.h. */
-#include "arithmetic/fixed.h"
-#include "compensator/chain/model.h"
 #include "effects/gains.c"
 
 static void hystgen_gain_init(hystgen_gain_t *self) {

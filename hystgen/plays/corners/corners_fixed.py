@@ -8,7 +8,7 @@ import numpy as np
 
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Count, Flag, Int32, Int64, Struct
-from hystgen.plays.corners.corners_float import Place
+from hystgen.plays.corners.corners_float import PlaceState
 from hystgen.plays.fixed import FixedPlayTables, divide_by_slope
 from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN, Reals, StepState
 
@@ -34,15 +34,15 @@ class FixedCorner(Struct):
 class FixedMemory(NamedTuple):
     """One instance in fixed point, as in floating point."""
 
-    here: Place
-    undo: Place
+    here: PlaceState
+    undo: PlaceState
     step: StepState
     corner: FixedCorner  # (n)
 
 
 def new_fixed_memory(plays: int, dtype: Any = np.int64) -> FixedMemory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
-    here, undo = Place.zeros(1, dtype), Place.zeros(1, dtype)
+    here, undo = PlaceState.zeros(1, dtype), PlaceState.zeros(1, dtype)
     return FixedMemory(here, undo, StepState.zeros(1, dtype), FixedCorner.zeros(max(plays, 1), dtype))
 
 

@@ -36,7 +36,7 @@ class Start(NamedTuple):
     top: int  # plays from here on cannot move within the range
 
 
-class Place(Struct):
+class PlaceState(Struct):
     """Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others."""
 
     input: Real  # of the play sum (forward: drive, inverse: output)
@@ -73,8 +73,8 @@ class Corner(Struct):
 class Memory(NamedTuple):
     """One instance; `undo`: where the plays were before the last step."""
 
-    here: Place
-    undo: Place
+    here: PlaceState
+    undo: PlaceState
     plays: PlaysState
     step: StepState
     corner: Corner  # (n + 1)
@@ -82,12 +82,12 @@ class Memory(NamedTuple):
 
 def new_memory(plays: int, dtype: Any) -> Memory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
-    here, undo = Place.zeros(1, dtype), Place.zeros(1, dtype)
+    here, undo = PlaceState.zeros(1, dtype), PlaceState.zeros(1, dtype)
     return Memory(here, undo, PlaysState.zeros(1, dtype), StepState.zeros(1, dtype), Corner.zeros(plays + 1, dtype))
 
 
 @jit
-def copy_place(to: Place, source: Place) -> None:
+def copy_place(to: PlaceState, source: PlaceState) -> None:
     """Copy a place field by field."""
     to.input[0] = source.input[0]
     to.output[0] = source.output[0]
