@@ -21,6 +21,7 @@ from hystgen.basics.structures import Factor, Struct
 from hystgen.compensator.chain import bounds, own, tables
 from hystgen.compensator.chain.parts import PARTS
 from hystgen.compensator.chain.run import answers
+from hystgen.compensator.chain.step import QuietState, RampState, SteadyState
 from hystgen.compensator.chained import Compensator
 from hystgen.compensator.reference import answers as computed
 from hystgen.effects import Run, load_user_effects
@@ -31,6 +32,7 @@ from hystgen.emission import runtime
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
 from hystgen.plays import slots
+from hystgen.plays.corners.corners_float import PlaceState, PlaysState
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "my_effect"
 T = 1e-3
@@ -528,14 +530,15 @@ def test_two_folders_give_one_file_of_both(tmp_path: Path) -> None:
     ("kind", "family"),
     [
         pytest.param(kind, family, id=f"{kind.name}-{name}")
-        for name, family in (("float", runtime.FloatFamily), ("fixed", runtime.FixedFamily))
+        for name, family in runtime.FAMILIES.items()
+        if name in ("float32", "q31")
         for part in PARTS
-        for kind in part.arithmetic(name == "fixed").kinds
+        for kind in part.arithmetic(name == "q31").kinds
     ],
 )
-def test_the_catalogue_s_blocks_are_what_their_c_says(kind: Kind, family: type[runtime.Family]) -> None:
+def test_the_catalogue_s_blocks_are_what_their_c_says(kind: Kind, family: runtime.Family) -> None:
     """Type, name and order of numbers in the headers of the run time are those that Python has declared."""
-    text = {piece.name: piece.text for piece in runtime._pieces(family.chain_types, {"HYSTGEN_FIXED"})}
+    text = {piece.name: piece.text for piece in runtime._pieces(family.chain_types, family.facts)}
     inside = {"hystgen_lag_t"}  # of another block's memory, in whose place its members stand
 
     def in_c(name: str) -> list[tuple[str, str, int]]:
@@ -546,7 +549,11 @@ def test_the_catalogue_s_blocks_are_what_their_c_says(kind: Kind, family: type[r
         return [each for one in own for each in (in_c(one[0]) if one[0] in inside else [one])]
 
     def in_python(struct: type[Struct]) -> list[tuple[str, str, int]]:
-        types = {"real_t": "hystgen_real_t", Factor: "hystgen_factor_t"}
+        fixed = family.kind == "fixed"
+        types = {
+            "real_t": "hystgen_real_t", Factor: "hystgen_factor_t",
+            "signal_t": "int64_t" if fixed else "hystgen_real_t", "narrow_t": "int32_t" if fixed else "hystgen_real_t",
+        }
         return [(str(types.get(type_, type_)), name, length) for name, (type_, length) in struct.members().items()]
 
     rows = [(f"hystgen_{kind.name}_{kind.rows.name}_t", f"*{kind.rows.name}", 0)] if kind.rows else []
@@ -556,8 +563,23 @@ def test_the_catalogue_s_blocks_are_what_their_c_says(kind: Kind, family: type[r
         assert in_c(rows[0][0]) == in_python(kind.rows.table)
         if kind.rows.state:
             assert in_c(f"hystgen_{kind.name}_state_t") == in_python(kind.rows.state)
-    functions = {piece.name for piece in runtime._pieces(family.chain_blocks, {"HYSTGEN_FIXED"})}
+    functions = {piece.name for piece in runtime._pieces(family.chain_blocks, family.facts)}
     assert {f"hystgen_{kind.name}_{verb}" for verb in kind.own} <= functions
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q31"])
+def test_the_memory_of_a_chain_is_named_as_in_c(arithmetic: str) -> None:
+    """Of plays, and of what a step keeps for a slew limit and a lag."""
+    family = runtime.FAMILIES[arithmetic]
+    text = {piece.name: piece.code for piece in runtime._pieces((*family.states, *family.chain_types), family.facts)}
+    same: list[tuple[str, type[Struct]]] = [
+        ("place", PlaceState), ("ramp", RampState), ("quiet", QuietState), ("steady", SteadyState),
+    ]
+    if family.kind == "float":
+        same.append(("plays", PlaysState))
+    for name, struct in same:
+        named = re.findall(r"\w+ (\w+);", text[f"hystgen_{name}_t"].partition("{")[2].rpartition("}")[0])
+        assert set(named) - {"here"} == set(struct.members()), name
 
 
 def test_a_block_says_what_it_does_to_signals() -> None:

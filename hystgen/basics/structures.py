@@ -25,7 +25,8 @@ Int64: TypeAlias = Annotated[Numbers, "int64_t"]
 Int32: TypeAlias = Annotated[Numbers, "int32_t"]
 UInt32: TypeAlias = Annotated[Numbers, "uint32_t"]
 UInt8: TypeAlias = Annotated[Numbers, "uint8_t"]
-Signal: TypeAlias = Annotated[Numbers, "signal_t"]
+Signal: TypeAlias = Annotated[Numbers, "signal_t"]  # a real in floating point, int64_t in fixed point
+Narrow: TypeAlias = Annotated[Numbers, "narrow_t"]  # a real in floating point, int32_t in fixed point
 Number: TypeAlias = Annotated[Numbers, "number_t"]
 Count: TypeAlias = Annotated[Numbers, "uint_least16_t"]
 SmallCount: TypeAlias = Annotated[Numbers, "uint_least8_t"]
@@ -36,7 +37,7 @@ FourInt32: TypeAlias = Annotated[Numbers, "int32_t", 4]
 class Struct(np.ndarray[Any, np.dtype[Any]]):
     """Structures of one kind, an array of them; each member is an array of numbers or structures.
 
-    A `Real` or `Signal` has the type of the arithmetic. All other numbers are int64 here, however narrow they are in C.
+    A `Real`, `Signal` or `Narrow` has the type of the arithmetic. Others are int64 here, however narrow they are in C.
     """
 
     def __array_finalize__(self, _: object) -> None:
@@ -66,13 +67,13 @@ class Struct(np.ndarray[Any, np.dtype[Any]]):
 
     @classmethod
     @functools.cache
-    def layout(cls, real: np.dtype[Any]) -> np.dtype[Any]:
+    def layout(cls, real: np.dtype[np.generic]) -> np.dtype[np.void]:
         """The structured type of numpy in an arithmetic with numbers of type `real`."""
         taken = [name for name in cls.members() if hasattr(np.ndarray, name)]
         assert not taken, f"{cls.__name__}: arrays have attributes {taken}"
         fields: list[Any] = []
         for name, (kind, length) in cls.members().items():
-            number = real if kind in ("real_t", "signal_t") else np.int64
+            number = real if kind in ("real_t", "signal_t", "narrow_t") else np.int64
             number = kind.layout(real) if isinstance(kind, type) else np.dtype(number)
             fields.append((name, number, (length,)) if length else (name, number))
         return np.dtype(fields)

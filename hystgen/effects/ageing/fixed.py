@@ -92,7 +92,7 @@ def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> Fi
 
     `bits`: how many bits a gain has below the code that sets it. Raises OverflowError.
     """
-    piece: list[tuple[Any, ...]] = []
+    piece: list[tuple[object, ...]] = []
     block = []
     for pieces, turns in rows:
         last, before = 0, len(piece)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Real, Struct, memory_of
+from hystgen.basics.structures import Real, Signal, Struct, memory_of
 from hystgen.effects.base import Array, Place
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.part import ChainPart, FloatSurroundings, Margin, One, Realized, Verbs, called, late
@@ -108,9 +108,9 @@ class ModeTable(Struct):
 class ModeState(Struct):
     """A mode."""
 
-    before: Real  # input of the last sample
-    off: Real  # output less input
-    rate: Real  # of `off`, per radian of the mode
+    before: Signal  # input of the last sample
+    off: Signal  # output less input
+    rate: Signal  # of `off`, per radian of the mode
 
 
 KIND = Kind("mode", ModeTable, ModeState, reading=("absorb",), own=("rest", "absorb"))

@@ -14,11 +14,11 @@ from typing import Any
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Factor, Int64, Struct, UInt8, memory_of
+from hystgen.basics.structures import Factor, Struct, UInt8, memory_of
 from hystgen.effects.kinds import Constants
 from hystgen.effects.part import Coded, Realized, Verbs
 from hystgen.effects.resonance import compensator
-from hystgen.effects.resonance.compensator import ModeNumbers
+from hystgen.effects.resonance.compensator import ModeNumbers, ModeState
 from hystgen.plays.fixed import nearest
 
 Row = tuple[tuple[int, int], tuple[int, int], tuple[int, int], tuple[int, int], tuple[int, int], int, int, int]
@@ -38,15 +38,7 @@ class FixedModeTable(Struct):
     lift: UInt8  # and bits that products with a change of the input leave out
 
 
-class FixedModeState(Struct):
-    """A mode, as in floating point."""
-
-    before: Int64
-    off: Int64
-    rate: Int64
-
-
-KIND = replace(compensator.KIND, table=FixedModeTable, state=FixedModeState)
+KIND = replace(compensator.KIND, table=FixedModeTable)
 
 
 def constants(t: FixedModeTable) -> Iterator[Constants]:
@@ -124,7 +116,7 @@ def entered(t: FixedModeTable, j: int, change: Any, by: Factor) -> Any:
 
 
 @jit
-def mode_absorb(t: FixedModeTable, s: FixedModeState, j: int, x: Any) -> Any:
+def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: Any) -> Any:
     """The input is x at this sample. Returns the output."""
     change = x - s.before[j]
     off = s.off[j]
@@ -137,7 +129,7 @@ def mode_absorb(t: FixedModeTable, s: FixedModeState, j: int, x: Any) -> Any:
 
 
 ARITHMETIC = Realized(
-    Verbs(memory_of(FixedModeState), mode_rest, mode_absorb), constants,
+    Verbs(memory_of(ModeState), mode_rest, mode_absorb), constants,
     lambda modes, _: FixedModeTable.of([each.row for each in modes]),
     lambda one, about, given, _: ModeFormats(one, row(one, given * 2.0**about.bits)),
     kinds=(KIND,),

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.basics.structures import Count, Flag, Real, Struct, memory_of
+from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
 from hystgen.effects.kinds import Constants, Kind, Rows
@@ -55,9 +55,9 @@ class GainNumbers(GainTable):
 class GainState(Struct):
     """A gain with an offset behind it."""
 
-    gain: Real
-    inverse: Real
-    offset: Real
+    gain: Narrow
+    inverse: Narrow
+    offset: Signal
 
 
 KIND = Kind("gain", GainTable, GainState, reading=(), own=("solve", "absorb"))
@@ -210,7 +210,7 @@ HEAT_KIND = Kind("heat", HeatTable, HeatState, reading=(), own=("solve", "absorb
 class FrictionPlay(Struct):
     """A play that rubs."""
 
-    threshold: Real
+    threshold: Signal
 
 
 class FrictionTable(Struct):
@@ -222,7 +222,7 @@ class FrictionTable(Struct):
 class FrictionPlayState(Struct):
     """A play that rubs."""
 
-    at: Real
+    at: Narrow
 
 
 class FrictionState(Struct):

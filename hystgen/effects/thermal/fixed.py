@@ -22,10 +22,17 @@ from hystgen.effects.gains import (
     newton_steps,
     reciprocal,
 )
-from hystgen.effects.kinds import Constants, Rows
+from hystgen.effects.kinds import Constants
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
 from hystgen.effects.thermal import compensator as floating
-from hystgen.effects.thermal.compensator import FrictionState, Warm
+from hystgen.effects.thermal.compensator import (
+    FrictionPlay,
+    FrictionPlayState,
+    FrictionState,
+    FrictionTable,
+    GainState,
+    Warm,
+)
 from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Counts, zero
@@ -55,15 +62,7 @@ class FixedGainTable(Struct):
     bits: UInt8  # of a temperature below a code
 
 
-class FixedGainState(Struct):
-    """A gain with an offset behind it."""
-
-    gain: Int32
-    inverse: Int32
-    offset: Int64
-
-
-KIND = replace(floating.KIND, table=FixedGainTable, state=FixedGainState)
+KIND = replace(floating.KIND, table=FixedGainTable)
 
 
 def constants(t: FixedGainTable) -> Iterator[Constants]:
@@ -121,7 +120,7 @@ def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> FixedGainTa
 
 
 @jit
-def gain_reset(t: FixedGainTable, s: FixedGainState, j: int) -> None:  # noqa: ARG001  used in floating point
+def gain_reset(t: FixedGainTable, s: GainState, j: int) -> None:  # noqa: ARG001  used in floating point
     """Return to the state of the parameter file: gain 1, offset 0."""
     s.gain[j] = ONE
     s.inverse[j] = ONE
@@ -129,7 +128,7 @@ def gain_reset(t: FixedGainTable, s: FixedGainState, j: int) -> None:  # noqa: A
 
 
 @jit
-def gain_heat(t: FixedGainTable, s: FixedGainState, j: int, temperature: Any) -> bool:
+def gain_heat(t: FixedGainTable, s: GainState, j: int, temperature: Any) -> bool:
     """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
     given = temperature << t.bits[j]
     inside = given
@@ -151,13 +150,13 @@ def gain_heat(t: FixedGainTable, s: FixedGainState, j: int, temperature: Any) ->
 
 
 @jit
-def gain_solve(t: FixedGainTable, s: FixedGainState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def gain_solve(t: FixedGainTable, s: GainState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return times(y - s.offset[j], s.inverse[j], GAIN_BITS)
 
 
 @jit
-def gain_absorb(t: FixedGainTable, s: FixedGainState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def gain_absorb(t: FixedGainTable, s: GainState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
     return times(x, s.gain[j], GAIN_BITS) + s.offset[j]
 
@@ -198,28 +197,13 @@ class FixedHeatState(Struct):
 HEAT_KIND = replace(floating.HEAT_KIND, table=FixedHeatTable, state=FixedHeatState)
 
 
-class FixedFrictionPlay(Struct):
-    """A play that rubs."""
+class FixedFrictionTable(FrictionTable):
+    """Plays that rub, as in floating point."""
 
-    threshold: Int64
-
-
-class FixedFrictionTable(Struct):
-    """Plays that rub, the narrowest one first."""
-
-    n: Count
     bits: UInt8  # of a play below a drive code
 
 
-class FixedFrictionPlayState(Struct):
-    """A play that rubs."""
-
-    at: Int32
-
-
-FRICTION_KIND = replace(
-    floating.FRICTION_KIND, table=FixedFrictionTable, rows=Rows("play", FixedFrictionPlay, FixedFrictionPlayState)
-)
+FRICTION_KIND = replace(floating.FRICTION_KIND, table=FixedFrictionTable)
 
 
 class FixedHeatTables(NamedTuple):
@@ -228,7 +212,7 @@ class FixedHeatTables(NamedTuple):
     block: FixedHeatTable
     friction: FixedFrictionTable
     first: Counts
-    play: FixedFrictionPlay
+    play: FrictionPlay
 
 
 class FixedHeatMemory(NamedTuple):
@@ -236,7 +220,7 @@ class FixedHeatMemory(NamedTuple):
 
     block: FixedHeatState
     friction: FrictionState
-    play: FixedFrictionPlayState
+    play: FrictionPlayState
 
 
 @dataclass(frozen=True)
@@ -244,7 +228,7 @@ class Heat(Coded):
     """Own heat in fixed point: its table, thresholds of the rubbing plays and their bits below a drive code, and the
     largest error of the temperature against the same recursion without rounding, degrees."""
 
-    table: tuple[Any, ...]
+    table: tuple[object, ...]
     thresholds: tuple[int, ...]
     bits: int
     error: float
@@ -307,7 +291,7 @@ def heat_tables(rows: Sequence[Heat]) -> FixedHeatTables:
         FixedHeatTable.of([one.table for one in rows]),
         FixedFrictionTable.of([(len(one.thresholds), one.bits) for one in rows]),
         floating.firsts([one.thresholds for one in rows]),
-        FixedFrictionPlay.of([(r,) for one in rows for r in one.thresholds]),
+        FrictionPlay.of([(r,) for one in rows for r in one.thresholds]),
     )
 
 
@@ -406,7 +390,7 @@ def friction_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: Any, v
 
 
 ARITHMETIC = Realized(
-    Verbs(memory_of(FixedGainState), absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
+    Verbs(memory_of(GainState), absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
     constants, made, formats, kinds=(KIND,),
 )
 HEAT_ARITHMETIC = Realized(
