@@ -9,8 +9,15 @@ from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct, Two
 from hystgen.plays.slots import Reals, StepState
 
 BOTTOM = 2  # `rose` of the bottom, which is opposite to both directions
-# places in `Curve.constant`
-MOST, ZERO, HALF, ONE = range(4)
+
+
+class Literals(Struct):
+    """Numbers that are literals in C."""
+
+    most: Real  # largest number of the type
+    zero: Real
+    half: Real
+    one: Real
 
 
 class Curve(NamedTuple):
@@ -23,7 +30,7 @@ class Curve(NamedTuple):
     limit: Reals  # (2): of the output
     inside: Reals  # (2): outputs up to here stay within the limit whatever rounding does
     range: Reals  # (2): of the input
-    constant: Reals  # MOST, ZERO, HALF, ONE
+    literal: Literals
 
 
 class Start(NamedTuple):
@@ -105,7 +112,7 @@ def along(m: Memory, x: Any) -> Any:
 @jit(inline=True)
 def forget_line(t: Curve, m: Memory) -> None:
     """Forget the line of the last outputs: the next sample searches."""
-    m.plays.sign[0] = t.constant[ONE] if m.here.rising[0] else -t.constant[ONE]
+    m.plays.sign[0] = t.literal.one[0] if m.here.rising[0] else -t.literal.one[0]
     m.plays.next[0] = m.here.input[0]
     m.plays.cap[0] = m.here.input[0]
     m.plays.behind[0] = m.here.input[0]
@@ -121,7 +128,7 @@ def leave_corner(t: Curve, m: Memory) -> None:
     room = t.limit[1 - rising] + along(m, m.here.output[0])
     m.corner.output[c] = m.here.output[0]
     m.corner.passed[c, rising] = x
-    m.corner.passed[c, 1 - rising] = t.constant[MOST] if t.reach[k] > room else t.way[k] - x
+    m.corner.passed[c, 1 - rising] = t.literal.most[0] if t.reach[k] > room else t.way[k] - x
     m.corner.top[c] = k
     m.corner.rose[c] = rising
     m.here.depth[0] += 1
@@ -179,14 +186,14 @@ def move_to_output(t: Curve, m: Memory, output: Any) -> None:
     kept = 0
     while m.here.depth[0] - kept > 1:
         middle = (kept + m.here.depth[0]) // 2
-        reach = t.constant[ZERO] if m.corner.rose[middle] == rising else t.reach[m.corner.top[middle]]
+        reach = t.literal.zero[0] if m.corner.rose[middle] == rising else t.reach[m.corner.top[middle]]
         if along(m, output - m.corner.output[middle]) >= reach:
             m.here.depth[0] = middle
             m.here.k[0] = m.corner.top[middle]
         else:
             kept = middle
     m.plays.limited[0] = 0
-    stop_in_block(t, m, output, along(m, t.constant[MOST]))
+    stop_in_block(t, m, output, along(m, t.literal.most[0]))
 
 
 @jit
@@ -258,10 +265,10 @@ def move_in_block(t: Curve, m: Memory, to: Any) -> bool:
     m.plays.start[0] = m.plays.from_output[0] + along(m, t.reach[k])
     m.plays.gain[0] = t.gain[k]
     output = m.plays.start[0] + (to - m.plays.begin[0]) * m.plays.gain[0]
-    if k == many or along(m, output - m.here.output[0]) < t.constant[ZERO]:
+    if k == many or along(m, output - m.here.output[0]) < t.literal.zero[0]:
         return False
     after = m.plays.from_input[0] + along(m, t.way[k + 1])
-    m.plays.next[0] = after if along(m, after - m.plays.cap[0]) < t.constant[ZERO] else m.plays.cap[0]
+    m.plays.next[0] = after if along(m, after - m.plays.cap[0]) < t.literal.zero[0] else m.plays.cap[0]
     m.here.k[0] = k
     m.here.input[0] = to
     m.here.output[0] = output
@@ -300,9 +307,9 @@ def start(t: Curve, m: Memory, s: Start) -> None:
         center = s.center[s.step * k]
         m.here.k[0] = k
         m.here.rising[0] = 1 if k <= s.risen else 0
-        m.plays.sign[0] = t.constant[ONE] if m.here.rising[0] else -t.constant[ONE]
-        m.here.input[0] = center[0] + along(m, t.way[k] * t.constant[HALF])
-        m.here.output[0] = center[1] + along(m, t.reach[k] * t.constant[HALF])
+        m.plays.sign[0] = t.literal.one[0] if m.here.rising[0] else -t.literal.one[0]
+        m.here.input[0] = center[0] + along(m, t.way[k] * t.literal.half[0])
+        m.here.output[0] = center[1] + along(m, t.reach[k] * t.literal.half[0])
         leave_corner(t, m)
     m.here.k[0] = 0
     m.here.rising[0] = 1
