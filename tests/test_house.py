@@ -244,7 +244,7 @@ BOUNDS = {
     "`fmt: skip`": (3, 30),
     "files that name an effect outside its folder": (3, 0),
     "files of C": (99, 120),
-    "lines of C": (6_862, 5_000),
+    "lines of C": (6_860, 5_000),
 }
 """Largest number of each today, and the target. A change that gets below the first lowers it; nothing raises it."""
 
