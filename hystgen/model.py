@@ -22,7 +22,8 @@ from hystgen.compensator.reference import Session
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.parameters.files import Parameters, load_parameters
+from hystgen.parameters.files import load_parameters
+from hystgen.parameters.schema import Parameters
 from hystgen.plays import slots
 
 if TYPE_CHECKING:

@@ -79,25 +79,7 @@ _PLACES = {
     "product": "kinds",
 }
 
-__all__ = [
-    "BEND",
-    "CATALOGUE",
-    "FRONTS",
-    "LIMIT",
-    "TOLD_APART",
-    "About",
-    "Candidate",
-    "Effect",
-    "OwnBlock",
-    "Place",
-    "Run",
-    "Unmeasured",
-    "decays",
-    "follow",
-    "load_user_effects",
-    "product",
-    "shapes",
-]
+__all__ = [*_PLACES, "BEND", "CATALOGUE", "FRONTS", "LIMIT", "TOLD_APART", "Unmeasured", "shapes"]
 
 
 @functools.cache

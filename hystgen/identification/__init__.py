@@ -33,7 +33,7 @@ from hystgen.plays import play_sum
 from hystgen.records import SHORTEST, Record, Source, agreed_units, in_units, read_records, several
 
 if TYPE_CHECKING:
-    from hystgen.parameters.files import Parameters
+    from hystgen.parameters.schema import Parameters
 
 MODELS = (*gpi.KINDS, "auto")
 """Names defined by the contract."""

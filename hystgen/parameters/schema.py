@@ -322,7 +322,7 @@ _EXAMPLE = {
 }
 
 
-def schema() -> dict[str, Any]:
+def schema() -> dict[str, object]:
     """JSON Schema (2020-12) of the parameter file in its YAML form, for editors."""
     made = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -352,7 +352,7 @@ def _effects(definitions: dict[str, object]) -> list[dict[str, object]]:
     return [*found, {"type": "object", "required": ["name"], "properties": {"name": own}}]
 
 
-def _tidy(node: Any) -> Any:
+def _tidy(node: object) -> Any:
     """Remove what only Python needs: titles of fields, null as a value, defaults that only mark absence."""
     if isinstance(node, list):
         return [_tidy(entry) for entry in node]

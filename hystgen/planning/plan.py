@@ -27,7 +27,7 @@ from hystgen.planning.waveforms import RECORDS, lead_in, written
 
 if TYPE_CHECKING:
     from hystgen.model import Model
-    from hystgen.parameters.files import Parameters
+    from hystgen.parameters.schema import Parameters
 
 Array = NDArray[np.float64]
 

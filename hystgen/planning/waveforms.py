@@ -12,6 +12,7 @@ import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 
 from hystgen import effects
 from hystgen.planning.grid import MOVE, SLOW_SAMPLES, Grid, Tempo
@@ -131,10 +132,6 @@ def _minor(drive: Waveform, pace: float, size: float = 0.25) -> None:
         drive.go(bias, pace)
 
 
-def _slow_minor(drive: Waveform) -> None:
-    _minor(drive, 60)
-
-
 def _fast_minor(drive: Waveform) -> None:
     _minor(drive, 3 * drive.pace)
     _minor(drive, drive.pace)
@@ -226,12 +223,8 @@ BEND_SHOWN_BY = {"slow": 1, "multisine": 1, "slow_minor": 2, "slow_reversals": 2
 """Records that show a bent front, as `Effect.shown_by`."""
 
 
-def _fast(tempo: Tempo) -> int:
-    return tempo.fast
-
-
-def _middle(tempo: Tempo) -> int:
-    return tempo.middle
+_fast: Callable[[Tempo], int] = attrgetter("fast")
+_middle: Callable[[Tempo], int] = attrgetter("middle")
 
 
 def _lasting(share: float, samples: int = SLOW_SAMPLES) -> Callable[[Tempo], int]:
@@ -265,7 +258,7 @@ RECORDS = (
     ),
     RecordKind(
         "slow_minor", "Equal small loops at three biases, reached from both sides: congruent or not.",
-        _slow_minor, _lasting(1.0),
+        partial(_minor, pace=60), _lasting(1.0),
     ),
     RecordKind(
         "fast_minor", "Small loops at high rate with many reversals: a lag opens the smallest ones, plays do not.",

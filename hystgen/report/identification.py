@@ -28,7 +28,6 @@ from hystgen.report.fit_figures import Shown
 from hystgen.report.html import Details, HtmlTable, Listing, Picture, Section, Text, page
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
     from hystgen.identification import ErrorRow
 
@@ -40,13 +39,9 @@ P = ParamSpec("P")
 def _with_pictures(find: Callable[P, Fit]) -> Callable[P, Fit]:
     @functools.wraps(find)
     def found(*given: P.args, **named: P.kwargs) -> Fit:
-        return replace(find(*given, **named), draw=_picture)
+        return replace(find(*given, **named), draw=lambda fit: plots.fit_figure(fit, fit.records))
 
     return found
-
-
-def _picture(fit: Fit) -> Figure:
-    return plots.fit_figure(fit, fit.records)
 
 
 identify = _with_pictures(identification.identify)

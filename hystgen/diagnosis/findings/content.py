@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,8 +86,7 @@ def result_of(
         withdrawn=_withdrawn(found, unit),
         written=found.written,
     )
-    in_digits: Result = _in_digits(result)
-    return in_digits
+    return cast("Result", _in_digits(result))
 
 
 def _contender(ranked: Ranked, unit: str | None) -> Contender:
@@ -139,7 +138,7 @@ REFUSALS = {
 """Why an effect that was tried has no name, in words."""
 
 
-def _in_digits(value: object) -> Any:
+def _in_digits(value: object) -> object:
     """The value with eight digits in all its numbers, so that the same input gives the same text."""
     if is_dataclass(value) and not isinstance(value, type):
         return type(value)(**{each.name: _in_digits(getattr(value, each.name)) for each in fields(value)})
