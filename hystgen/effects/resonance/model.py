@@ -109,6 +109,16 @@ class _Mode(Effect):
         step = np.where(short, x * (0.5 - zeta * x / 3.0 + curved / 24.0), step)
         return np.stack([c, s, ramp, step])
 
+    def denominator(self, step: float) -> tuple[float, float]:
+        """`a1`, `a2` of the exact poles over a step, `z^2 + a1 z + a2`."""
+        zeta, angle = self.damping, 2.0 * math.pi * self.frequency * step
+        if zeta < 1.0:
+            decay = math.exp(-zeta * angle)
+            return -2.0 * decay * math.cos(math.sqrt(1.0 - zeta * zeta) * angle), decay * decay
+        apart = math.sqrt(zeta * zeta - 1.0)
+        slow, fast = math.exp(-angle / (zeta + apart)), math.exp(-(zeta + apart) * angle)
+        return -(slow + fast), slow * fast
+
     def filtered(self, h: Array, run: Run) -> Array:
         """The response of the mode to the play sum."""
         rows = np.ascontiguousarray(np.atleast_2d(h))

@@ -38,6 +38,14 @@ class _Sensor(Effect):
     pointwise: ClassVar[bool] = True
     compensated: ClassVar[Compensated] = "none needed"
     compensation: ClassVar[str] = "corrected in the data, never inverted in the drive"
+    mistaken: ClassVar[Mapping[str, tuple[str, str]]] = {
+        "asymmetry": (
+            "the memoryless part was diagnosed as asymmetry, and the records could not tell it from a curved sensor; "
+            "if it is the sensor's, the inverse bends the true motion.",
+            "the sensor was diagnosed as curved, and the records could not tell that from an asymmetry of the stage; "
+            "if it is the stage's, the inverse leaves it as it is.",
+        )
+    }
 
 
 class SensorPolynomial(_Sensor):
