@@ -56,8 +56,8 @@ _plain = contextvars.ContextVar("plain", default=False)
 
 SHORT = 10_000
 """[samples] As many of one function and type run as Python in a process before it is compiled or loaded: 0.3 s of a
-plain model, whose functions take 8 s to compile, and 1 s with many effects, where that takes 80 s. Set by: `verify` of
-`mixed` and `everything` of tests/modelfiles.py, inverse, 0.035 and 0.10 ms a sample."""
+plain model, whose functions take 8 s to compile, and 0.8 s with many effects, where that takes 80 s. Set by: `verify`
+of `mixed` and `everything` of tests/modelfiles.py, inverse, 0.028 and 0.083 ms a sample."""
 
 _samples: collections.Counter[tuple[object, np.dtype[np.generic]]] = collections.Counter()
 
