@@ -155,13 +155,13 @@ def test_the_drive_of_a_converter_comes_to_rest() -> None:
     one, lsb = model("lag", 0.05), 8.0 / 4096
     numbers = tables.build(one.chain, "float32", T, one.parameters.emit.compensation, (lsb, None))
     u = np.repeat(np.random.default_rng(5).uniform(-4.0, 4.0, 8), 100)
-    code, state = reference.operations(numbers.tables), reference.new_state(numbers.tables, True)
+    code, state = reference.operations(numbers.tables, True), reference.new_state(numbers.tables, True)
     sent, commit = np.zeros(len(u), np.float32), np.array([slots.OP_COMMIT], np.uint8)
     with jit.plain():
-        code.init(numbers.tables, state, 1)
+        code.init(numbers.tables, state)
         for k, each in enumerate(np.float32(u)):
-            sent[k] = np.rint(code.inverse_step(numbers.tables, state, each) / lsb) * lsb
-            code.run(numbers.tables, state, 1, commit, sent[k : k + 1], np.zeros(1, np.float32), np.zeros(1, np.uint8))
+            sent[k] = np.rint(code.step(numbers.tables, state, each) / lsb) * lsb
+            code.run(numbers.tables, state, commit, sent[k : k + 1], np.zeros(1, np.float32), np.zeros(1, np.uint8))
     error = one.simulate(sent, t=np.arange(len(u)) * T) - u
     ends = np.arange(8)[:, None] * 100 + np.arange(70, 100)
     assert np.max(np.ptp(sent[ends], axis=1)) == 0.0
@@ -179,18 +179,18 @@ def test_answers_are_within_the_bound_of_blocks_that_saw_the_same_drives(name: s
     assert numbers.codes is None or numbers.codes.condition
     u = stops(20, held=30)
     x = np.rint(u / output) if numbers.codes else np.float32(u)
-    code, state = reference.operations(numbers.tables), reference.new_state(numbers.tables, True)
+    code, state = reference.operations(numbers.tables, True), reference.new_state(numbers.tables, True)
     compensator = Compensator(one.chain, as_emitted=True)
     low, high = one.cascade.input_range
     apart, same = [], np.ones(len(x) + 2, dtype=bool)
     with jit.plain():
-        code.init(numbers.tables, state, 1)
+        code.init(numbers.tables, state)
         for k, each in enumerate(x):
             y = float(each) * output - one.cascade.output_offset
             for block in reversed(compensator.blocks):
                 block.advance(T)
                 y = block.solve(y) if k else block.resting(y)
-            sent = float(code.inverse_step(numbers.tables, state, numbers.tables.threshold.dtype.type(each))) * drive
+            sent = float(code.step(numbers.tables, state, numbers.tables.threshold.dtype.type(each))) * drive
             apart.append(abs(min(max(y, low), high) - sent))
             same[k + 2] = k == 0 or bool(state.flags[RISES]) == compensator.actuator.rises
             for block in compensator.blocks:

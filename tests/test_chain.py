@@ -206,16 +206,16 @@ def test_a_quiet_drive_knows_the_step_of_a_converter(lsb: float | None, changes:
     """In floating point, where the firmware commits what a converter of 12 bits makes of each drive."""
     one = model("lag_and_creep", QUIETED["lag_and_creep"] + "emit: {compensation: {quiet: true}}\n")
     t = tables.build(one.chain, "float32", T, one.parameters.emit.compensation, (lsb, None)).tables
-    code, state = reference.operations(t), reference.new_state(t, True)
+    code, state = reference.operations(t, True), reference.new_state(t, True)
     u = np.concatenate([3.0 * np.sin(np.linspace(0.0, 4.0, 80)), np.full(600, -1.234)])
     answer, status, sent = np.zeros(1, np.float32), np.zeros(1, np.uint8), []
     step, commit = (np.array([each], np.uint8) for each in (slots.OP_STEP, slots.OP_COMMIT))
     with jit.plain():
-        code.init(t, state, 1)
+        code.init(t, state)
         for x in np.float32(u):
-            code.run(t, state, 1, step, np.array([x]), answer, status)
+            code.run(t, state, step, np.array([x]), answer, status)
             sent.append(np.rint(float(answer[0]) * 4095.0 / 8.0))
-            code.run(t, state, 1, commit, np.array([sent[-1] * 8.0 / 4095.0], np.float32), answer, status)
+            code.run(t, state, commit, np.array([sent[-1] * 8.0 / 4095.0], np.float32), answer, status)
     assert np.any(np.diff(sent[-200:])) == changes
 
 
@@ -786,7 +786,7 @@ def test_a_notch_is_two_poles_that_come_to_an_end(frequency: float, damping: flo
     mode = Resonance(name="resonance", frequency=frequency, damping=damping)
     found = preview.taps(0.0, [mode], T, by="notch")
     pole = math.exp(-2.0 * math.pi * frequency * T)
-    a1, a2 = resonance.denominator(mode, T)
+    a1, a2 = mode.denominator(T)
     zeros = np.array([1.0, a1, a2]) / (1.0 + a1 + a2)
     both = signal.lfilter(zeros * (1.0 - pole) ** 2, np.convolve([1.0, -pole], [1.0, -pole]), np.eye(1, 4000)[0])
     ages = np.arange(len(found.weights))

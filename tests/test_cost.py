@@ -121,7 +121,7 @@ def _as_written(monkeypatch: pytest.MonkeyPatch) -> None:
 def dearest(one: Model, name: str, engine: str, inverse: bool, samples: int = SAMPLES) -> tuple[int, int]:
     """Most multiplications and comparisons of a step over jumps of all sizes, beyond the limits too, with commits."""
     tables = one.tables(name, engine)
-    code, counted = reference.operations(tables), counting(tables)
+    code, counted = reference.operations(tables, inverse), counting(tables)
     state = counting(reference.new_state(tables, inverse))
     rng = np.random.default_rng(0)
     x: Any = rng.uniform(-10.5, 10.5, samples) * rng.choice([1.0, 0.5, 0.1, 0.02], samples)
@@ -135,10 +135,10 @@ def dearest(one: Model, name: str, engine: str, inverse: bool, samples: int = SA
     arguments, answer, status = counting(x), counting(x[:1]), np.zeros(1, np.uint8)
     found = []
     with jit.plain():
-        code.init(counted, state, int(inverse))
+        code.init(counted, state)
         for k in range(samples):
             Number.products = Number.comparisons = 0
-            code.run(counted, state, int(inverse), call[k : k + 1], arguments[k : k + 1], answer, status)
+            code.run(counted, state, call[k : k + 1], arguments[k : k + 1], answer, status)
             found.append((Number.products, Number.comparisons) if call[k] == slots.OP_STEP else (0, 0))
     return max(a for a, _ in found), max(b for _, b in found)
 

@@ -168,7 +168,6 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
     model = load(name)
     tables, form = built(model, arithmetic)
     assert form.largest_sum < 2**62
-    operations = reference.operations(tables)
     whole = tables._replace(
         **{
             field: getattr(tables, field).astype(object)
@@ -177,16 +176,16 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
                           "below")
         }
     )  # fmt: skip
-    for inverse in (0, 1):
-        state = reference.new_state(whole, bool(inverse))
+    for inverse in (False, True):
+        state, operations = reference.new_state(whole, inverse), reference.operations(tables, inverse)
         with plain():
-            operations.init(whole, state, inverse)
+            operations.init(whole, state)
         first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
         codes = records(*(int(x) for x in tables.limits[first : first + 2]), 3)[::7]
         answers = []
         for code in codes.tolist():
             with plain():
-                answers.append((operations.inverse_step if inverse else operations.forward_step)(whole, state, code))
+                answers.append(operations.step(whole, state, code))
             assert max(map(abs, [state.real[corners_float.OUTPUT], *state.output])) <= form.largest_sum
             assert max(map(abs, [state.real[corners_float.INPUT], *state.input])) < 2**31
         steps = np.full(len(codes), slots.OP_STEP)
@@ -221,16 +220,16 @@ def test_curves_are_the_memoryless_part(name: str, arithmetic: str) -> None:
     tables, form = built(model, arithmetic)
     low, high = (int(x) for x in tables.limits[:2])
     codes = np.arange(low, high + 1) if arithmetic == "q15" else np.linspace(low, high, 20001).astype(np.int64)
-    reference_code = reference.operations(tables)
+    front = reference.front(tables)
     lsb = fixed_tables.lsbs(model, arithmetic)
     builder = fixed_tables.Builder(model, arithmetic, "corners", lsb, (False, False))
     builder.build()
     for up in (1, 0) if tables.branches else (1,):
         exact = np.asarray(model.front(codes * float(form.drive_lsb), bool(up)))
-        w = np.array([reference_code.front_forward(tables, code, up) for code in codes])
+        w = np.array([front.front_forward(tables, code, up) for code in codes])
         gap = np.abs(w * float(builder.step) - exact).max() / float(builder.step)
         assert gap <= builder.front[1 - up].error + 1e-4
-        back = np.array([reference_code.front_inverse(tables, x, up)[0] for x in w])
+        back = np.array([front.front_inverse(tables, x, up)[0] for x in w])
         slopes = np.abs(np.diff(exact)) / float(form.drive_lsb)
         slack = (builder.front[3 - up].error / 2.0 ** int(tables.below[2])) + 0.5
         per_code = builder.front[1 - up].error * float(builder.step) / (slopes.min() * float(form.drive_lsb))

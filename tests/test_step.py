@@ -183,7 +183,7 @@ def calls(draw: st.DrawFn) -> list[tuple[int, float]]:
 
 def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]]) -> tuple[np.ndarray, ...]:
     numbers = tables.build(model, "float64", engine)
-    code, state = reference.operations(numbers), reference.new_state(numbers, inverse)
+    code, state = reference.operations(numbers, inverse), reference.new_state(numbers, inverse)
     first = slots.OUTPUT_MIN if inverse else slots.DRIVE_MIN
     low, high = numbers.limits[first : first + 2]
     drive_low, drive_high = model.input_range
@@ -198,8 +198,8 @@ def run(model: Cascade, engine: str, inverse: bool, made: list[tuple[int, float]
     )
     answers, status = np.zeros(len(x)), np.zeros(len(x), np.int64)
     with plain():
-        code.init(numbers, state, int(inverse))
-        code.run(numbers, state, int(inverse), op, x, answers, status)
+        code.init(numbers, state)
+        code.run(numbers, state, op, x, answers, status)
     return x, answers, status, np.array([low, high])
 
 

@@ -30,14 +30,13 @@ from hystgen.compensator.step import Operations
 from hystgen.front import compensator, curve
 from hystgen.plays import loop
 from hystgen.plays.corners.corners_fixed import new_fixed_memory
-from hystgen.plays.corners.corners_float import STATUS, new_memory
+from hystgen.plays.corners.corners_float import new_memory
 from hystgen.plays.slots import (
     CODE_MAX,
     DRIVE_MAX,
     DRIVE_MIN,
     LOOP,
     OP_STEP,
-    ZERO,
     Bytes,
 )
 
@@ -46,83 +45,50 @@ if TYPE_CHECKING:
     from hystgen.effects.kinds import OwnBlock
 
 
-def operations(t: Tables | FixedTables | ChainTables) -> Operations:
-    """The functions of the bit reference for the arithmetic and the engine of given tables."""
+CORNERS = {
+    (False, False): (forward, inverse),
+    (False, True): (forward_front, inverse_front),
+    (True, False): (forward_fixed, inverse_fixed),
+    (True, True): (forward_fixed, inverse_front_fixed),
+}
+"""Both operators in engine corners, by whether they compute in fixed point and have a memoryless part."""
+
+
+def front(t: Tables | FixedTables | ChainTables) -> ModuleType:
+    """The module with the functions of the memoryless part, for the arithmetic of given tables."""
+    return curve if t.fixed else compensator
+
+
+def operations(t: Tables | FixedTables | ChainTables, inverse: bool) -> Operations:
+    """The functions of one operator in the bit reference, for the arithmetic and the engine of given tables."""
     if isinstance(t, Tables | FixedTables):
-        return _operations(t.engine == LOOP, t.fixed, t.has_front)
+        return _operations(inverse, t.engine == LOOP, t.fixed, t.has_front)
     from hystgen.compensator.chain.layout import OwnChainTables
 
     drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
-    return _chain_operations(t.fixed, t.plays.engine == LOOP, drives, outputs)
+    return _chain_operations(inverse, t.fixed, t.plays.engine == LOOP, drives, outputs)
 
 
 @functools.cache
-def _operations(loops: bool, fixed: bool, front: bool) -> Operations:
-    ends = (curve if fixed else compensator).front_forward, (curve if fixed else compensator).front_inverse
-    if loops:
-        own = step_fixed if fixed else step_float
-        return step.made_of(*ends, own.output, own.inverse_solve, own.finite)
-    if fixed:
-        return _corner_operations(forward_fixed, inverse_front_fixed if front else inverse_fixed, *ends)
-    modules = (forward_front, inverse_front) if front else (forward, inverse)
-    return _corner_operations(*modules, *ends)
+def _operations(inverse: bool, loops: bool, fixed: bool, front: bool) -> Operations:
+    if not loops:
+        found: Operations = CORNERS[fixed, front][inverse].OPERATIONS
+        return found
+    own, ends = (step_fixed, curve) if fixed else (step_float, compensator)
+    return step.made_of(
+        inverse, ends.front_forward, ends.front_inverse, own.output, own.inverse_solve, own.finite
+    )
 
 
 @functools.cache
 def _chain_operations(
-    fixed: bool, loops: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
+    inverse: bool, fixed: bool, loops: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
 ) -> Operations:
     from hystgen.compensator.chain import step as chain_step
     from hystgen.compensator.chain import step_fixed, step_float
 
     own = step_fixed if fixed else step_float
-    return chain_step.made_of(own.BLOCKS if loops else own.CORNERS, own.CODES, drives, outputs)
-
-
-def _corner_operations(
-    forward: ModuleType, inverting: ModuleType, front_forward: Any, front_inverse: Any
-) -> Operations:
-    """The operations of engine corners, from one module for each operator and the two functions of the front."""
-    forward_init, forward_reset, forward_step = forward.forward_init, forward.forward_reset, forward.forward_step
-    inverse_init, inverse_reset, inverse_step = inverting.inverse_init, inverting.inverse_reset, inverting.inverse_step
-    forward_visit, inverse_visit = forward.forward_visit, inverting.inverse_visit
-
-    @jit.jit
-    def init(t: Any, m: Any, inverse: int) -> None:
-        """Set the start memory of the parameter file."""
-        if inverse:
-            inverse_init(t, m)
-        else:
-            forward_init(t, m)
-
-    @jit.jit
-    def reset(t: Any, m: Any, inverse: int) -> None:
-        """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
-        if inverse:
-            inverse_reset(t, m)
-        else:
-            forward_reset(t, m)
-
-    @jit.jit
-    def visit(t: Any, m: Any, inverse: int, v: Any) -> None:
-        """Move the actuator to drive v before the next sample."""
-        if inverse:
-            inverse_visit(t, m, v)
-        else:
-            forward_visit(t, m, v)
-
-    @jit.jit(inline=True)
-    def itself(m: Any) -> Any:
-        """The memory itself, which is only that of the plays."""
-        return m
-
-    @jit.jit(inline=True)
-    def other(t: Any, m: Any, inverse: int, call: int, x: Any) -> Any:  # noqa: ARG001  the same call for every chain
-        """Return 0: there are no other calls."""
-        return t.limits[ZERO]
-
-    run = step.run_of(init, reset, forward_step, inverse_step, inverting.inverse_commit, itself, STATUS, other)
-    return Operations(init, visit, run, forward_step, inverse_step, front_forward, front_inverse)
+    return chain_step.made_of(inverse, own.BLOCKS if loops else own.CORNERS, own.CODES, drives, outputs)
 
 
 def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
@@ -151,12 +117,12 @@ def answers(
     t: Tables | FixedTables | ChainTables, inverse: bool, call: Any, x: Any, compiled: bool = True
 ) -> tuple[NDArray[Any], NDArray[np.uint8]]:
     """Answers and status of the bit reference for operations `call` with arguments `x`, from the start memory on."""
-    code, state = operations(t), new_state(t, inverse)
+    code, state = operations(t, inverse), new_state(t, inverse)
     x = np.asarray(x).astype(t.threshold.dtype)
     found, status = np.zeros_like(x), np.zeros(len(x), dtype=np.uint8)
     with jit.for_samples(code.run, x) if compiled else jit.plain():
-        code.init(t, state, int(inverse))
-        code.run(t, state, int(inverse), np.asarray(call, dtype=np.uint8), x, found, status)
+        code.init(t, state)
+        code.run(t, state, np.asarray(call, dtype=np.uint8), x, found, status)
     return found, status
 
 
@@ -178,8 +144,8 @@ class Session:
         lsb: tuple[float | None, float | None] = (None, None),
     ) -> None:
         arguments.choice("operator", operator, ("forward", "inverse"))
-        self._inverse = int(operator == "inverse")
-        if self._inverse:
+        self.inverse = operator == "inverse"
+        if self.inverse:
             problems = cascade.inverse_problems()
             if problems:
                 raise NotInvertibleError(problems)
@@ -187,24 +153,19 @@ class Session:
         if engine == "corners" and min(cascade.pi.weights) < 0:  # corners need an output that rises with the drive
             engine = "loop"
         self._build = functools.partial(
-            tables.build, cascade, arithmetic or "float64", engine, limited, lsb, bool(self._inverse)
+            tables.build, cascade, arithmetic or "float64", engine, limited, lsb, self.inverse
         )
         self._fixed = ARITHMETICS[arithmetic or "float64"].fixed
         self.tables = self._build()
         self._range, self._cascade = cascade.input_range, cascade
-        self._code = operations(self.tables)
-        self.state = new_state(self.tables, bool(self._inverse))
+        self._code = operations(self.tables, self.inverse)
+        self.state = new_state(self.tables, self.inverse)
         self.init()
 
     def init(self) -> None:
         """Return to the start memory."""
         with jit.plain():  # one pass over the plays is not worth compiling
-            self._code.init(self.tables, self.state, self._inverse)
-
-    @property
-    def inverse(self) -> bool:
-        """Whether the operator is the inverse."""
-        return bool(self._inverse)
+            self._code.init(self.tables, self.state)
 
     @property
     def drive_range(self) -> tuple[float, float]:
@@ -223,7 +184,7 @@ class Session:
             self.init()
         with jit.for_samples(self._code.visit, seen):
             for drive in seen:
-                self._code.visit(self.tables, self.state, self._inverse, drive)
+                self._code.visit(self.tables, self.state, drive)
 
     def run(self, x: ArrayLike) -> tuple[NDArray[Any], Bytes]:
         """Answers (N,) for the input samples (N,), and the status bits of each sample.
@@ -235,7 +196,7 @@ class Session:
         return self.operate(np.full(len(samples), OP_STEP, dtype=np.uint8), samples)
 
     def _samples(self, x: ArrayLike) -> NDArray[Any]:
-        given = arguments.signal("u" if self._inverse else "v", x)
+        given = arguments.signal("u" if self.inverse else "v", x)
         if self._fixed:
             return codes(self.tables, given)
         return np.ascontiguousarray(given, dtype=self.tables.threshold.dtype)
@@ -246,5 +207,5 @@ class Session:
         answers = np.zeros_like(x)
         status = np.zeros(len(x), dtype=np.uint8)
         with jit.for_samples(self._code.run, x):
-            self._code.run(self.tables, self.state, self._inverse, op, x, answers, status)
+            self._code.run(self.tables, self.state, op, x, answers, status)
         return answers, status

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import FixedTables, Tables, clamp_drive, inverse_clamp
+from hystgen.plays.corners.corners_float import STATUS as CORNERS_STATUS
 from hystgen.plays.loop import (
     ANSWER,
     ASCENDING,
@@ -41,24 +42,27 @@ from hystgen.plays.slots import (
     OP_INIT,
     OP_RESET,
     OP_STEP,
+    OP_UNREAD,
     OUTPUT_CLAMPED,
     ZERO,
     Bytes,
     Reals,
-    read,
 )
 
 
 class Operations(NamedTuple):
-    """The operations on an instance: `init`, `visit` and `run` as in `made_of`, both steps, and the front."""
+    """The operations on an instance of one operator: `init` sets the start memory, `visit` moves the actuator before
+    the next sample, `step` answers a sample, `run` makes a sequence of calls."""
 
     init: Callable[..., Any]
     visit: Callable[..., Any]
+    step: Callable[..., Any]
     run: Callable[..., Any]
-    forward_step: Callable[..., Any]
-    inverse_step: Callable[..., Any]
-    front_forward: Callable[..., Any]
-    front_inverse: Callable[..., Any]
+
+
+@jit(inline=True)
+def forward_commit(t: Any, s: Any, applied: Any) -> None:
+    """Do nothing: the forward operator has absorbed every drive."""
 
 
 @jit(inline=True)
@@ -91,9 +95,12 @@ class PlayOperations(NamedTuple):
 
 
 def plays_of(
-    front_forward: Callable[..., Any], front_inverse: Callable[..., Any], output: Callable[..., Any]
+    inverse: bool, front_forward: Callable[..., Any], front_inverse: Callable[..., Any], output: Callable[..., Any]
 ) -> PlayOperations:
-    """The operations of plays, from the two functions of the memoryless part and `output` at the present memory."""
+    """The operations of one operator's plays, from the two functions of the memoryless part and `output` at the present
+    memory."""
+    after_init = 2 * int(inverse)  # as in `Tables.applied`
+    after_reset = after_init + 1
 
     @jit
     def begin(t: Tables | FixedTables, s: State, which: int) -> None:
@@ -112,19 +119,19 @@ def plays_of(
         s.real[ANSWER] = s.real[LEVEL]
 
     @jit
-    def init(t: Tables | FixedTables, s: State, inverse: int) -> None:
+    def init(t: Tables | FixedTables, s: State) -> None:
         """Set the start memory of the parameter file."""
         if len(t.start) == 1:
             loop_rest(s, t.start[0])
         else:
             loop_start(s, t.start)
-        begin(t, s, 2 * inverse)
+        begin(t, s, after_init)
 
     @jit
-    def reset(t: Tables | FixedTables, s: State, inverse: int) -> None:
+    def reset(t: Tables | FixedTables, s: State) -> None:
         """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
         loop_rest(s, t.limits[ZERO])
-        begin(t, s, 2 * inverse + 1)
+        begin(t, s, after_reset)
 
     @jit(inline=True)
     def set_drive(t: Tables | FixedTables, s: State, v: Any) -> None:
@@ -194,9 +201,8 @@ class Hooks(NamedTuple):
 def run_of(
     init: Callable[..., Any],
     reset: Callable[..., Any],
-    forward_step: Callable[..., Any],
-    inverse_step: Callable[..., Any],
-    inverse_commit: Callable[..., Any],
+    step: Callable[..., Any],
+    commit: Callable[..., Any],
     plays: Callable[..., Any],
     place: int,
     other: Callable[..., Any],
@@ -204,38 +210,62 @@ def run_of(
     """`Operations.run` of any engine; `place`: of the status in the counts of the memory."""
 
     @jit
-    def run(t: Any, s: Any, inverse: int, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
+    def run(t: Any, s: Any, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
         """Run op[i] with argument x[i]. answers[i] is the answer of a call that has one, else 0, also for a reset;
-        status[i] is read and cleared, or left for a later call."""
-        m = plays(s)
+        status[i] is read and cleared, or 0 and left for a later call."""
+        counts = plays(s).counts
         for i in range(len(op)):
             call = op[i] & OP_CALL
             answers[i] = t.limits[ZERO]
             if call == OP_INIT:
-                init(t, s, inverse)
+                init(t, s)
             elif call == OP_COMMIT:
-                inverse_commit(t, s, x[i])
-            elif call in (OP_STEP, OP_RESET):
-                if call == OP_RESET:
-                    reset(t, s, inverse)
-                answer = inverse_step(t, s, x[i]) if inverse else forward_step(t, s, x[i])
-                if call == OP_STEP:
-                    answers[i] = answer
+                commit(t, s, x[i])
+            elif call == OP_RESET:
+                reset(t, s)
+                step(t, s, x[i])
+            elif call == OP_STEP:
+                answers[i] = step(t, s, x[i])
             else:
-                answers[i] = other(t, s, inverse, call, x[i])
-            status[i] = read(m.counts, place, op[i])
+                answers[i] = other(t, s, call, x[i])
+            left = counts[place] if op[i] & OP_UNREAD else 0
+            status[i] = counts[place] - left
+            counts[place] = left
 
     return run
 
 
-def operations_of(
+def corners_of(
     init: Callable[..., Any],
     reset: Callable[..., Any],
     visit: Callable[..., Any],
-    front: tuple[Callable[..., Any], Callable[..., Any]],
+    step: Callable[..., Any],
+    commit: Callable[..., Any] = forward_commit,
+) -> Operations:
+    """The operations of one operator in engine corners without effects, whose memory is only that of the plays."""
+
+    @jit(inline=True)
+    def itself(m: Any) -> Any:
+        """The memory itself."""
+        return m
+
+    return Operations(init, visit, step, run_of(init, reset, step, commit, itself, CORNERS_STATUS, no_other))
+
+
+@jit(inline=True)
+def no_other(t: Any, s: Any, call: int, x: Any) -> Any:  # noqa: ARG001  the same call for every chain
+    """Return 0: a model without effects has no other calls."""
+    return t.limits[ZERO]
+
+
+def operations_of(
+    inverse: bool,
+    init: Callable[..., Any],
+    reset: Callable[..., Any],
+    visit: Callable[..., Any],
     hooks: Hooks,
 ) -> Operations:
-    """The operations on a chain: step, commit, hold, clamp and status are the same for every chain."""
+    """The operations of one operator on a chain: step, commit, hold, clamp and status are the same for every chain."""
     plays, finite, forward_absorb, inverse_absorb, shown, unread, held, stands, sought, other = hooks
 
     @jit(inline=True)
@@ -297,27 +327,28 @@ def operations_of(
         m.real[PENDING] = v
         m.counts[HAS_PENDING] = 1
 
-    run = run_of(init, reset, forward_step, inverse_step, inverse_commit, plays, STATUS, other)
-    return Operations(init, visit, run, forward_step, inverse_step, *front)
+    step, commit = (inverse_step, inverse_commit) if inverse else (forward_step, forward_commit)
+    return Operations(init, visit, step, run_of(init, reset, step, commit, plays, STATUS, other))
 
 
 def made_of(
+    inverse: bool,
     front_forward: Callable[..., Any],
     front_inverse: Callable[..., Any],
     output: Callable[..., Any],
     inverse_solve: Callable[..., Any],
     finite: Callable[..., Any],
 ) -> Operations:
-    """The operations of a chain without blocks, from the functions in which arithmetics differ: the memoryless part,
-    the output at the present memory with its status bits, the plays' input for an output, and whether an argument is
-    finite."""
+    """The operations of one operator of a chain without blocks, from the functions in which arithmetics differ: the
+    memoryless part, the output at the present memory with its status bits, the plays' input for an output, and whether
+    an argument is finite."""
 
     @jit(inline=True)
     def level_of(t: Tables | FixedTables, s: State) -> Any:
         """The output at the present memory; its status is not reported, since this is no step."""
         return output(t, s)[0]
 
-    init, reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, level_of)
+    init, reset, arrive, inverse_drive = plays_of(inverse, front_forward, front_inverse, level_of)
 
     @jit(inline=True)
     def itself(s: State) -> State:
@@ -330,7 +361,7 @@ def made_of(
         loop_absorb(t, s, arrive(t, s, v))
 
     @jit
-    def visit(t: Tables | FixedTables, s: State, inverse: int, v: Any) -> None:  # noqa: ARG001  the same call for every engine
+    def visit(t: Tables | FixedTables, s: State, v: Any) -> None:
         """Move the actuator to drive v before the next sample."""
         absorb(t, s, v)
         s.real[LEVEL], bits = output(t, s)
@@ -360,10 +391,5 @@ def made_of(
         s.counts[BITS] = 0
         return inverse_drive(t, s, level, inverse_solve(t, s, level))
 
-    @jit(inline=True)
-    def other(t: Tables | FixedTables, s: State, inverse: int, call: int, x: Any) -> Any:  # noqa: ARG001
-        """Return 0: there are no other calls."""
-        return t.limits[ZERO]
-
-    hooks = Hooks(itself, finite, absorb, absorb, output, unread, held, stands, sought, other)
-    return operations_of(init, reset, visit, (front_forward, front_inverse), hooks)
+    hooks = Hooks(itself, finite, absorb, absorb, output, unread, held, stands, sought, no_other)
+    return operations_of(inverse, init, reset, visit, hooks)

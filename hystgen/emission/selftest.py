@@ -82,7 +82,7 @@ def operators(one: Compensator) -> list[Operator]:
 def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
     """An argument of a setting, in fixed point before it is rounded to a code; every third one exceeds its limits, if
     any."""
-    from hystgen.effects.ageing import compensator as ageing
+    from hystgen.compensator.chain.parts import PARTS
 
     degree, one = form.setting_codes(t)
     drive_low, drive_high, low, high = (float(end) for end in t.limits[: slots.OUTPUT_MAX + 1])
@@ -96,7 +96,7 @@ def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
     if call == "set_gain":
         return one * (1.0 + way)
     if call == "set_travel":
-        return abs(way) * float(t.of("ageing").number[0, ageing.LAST])
+        return abs(way) * next(part.longest(t.of(part.name)) for part in PARTS if part.longest)
     return low + (0.5 + way) * (high - low)
 
 

@@ -32,15 +32,6 @@ PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SATURATED, SHY = range(10,
 
 
 @jit(inline=True)
-def read(counts: Counts, status: int, op: Any) -> Any:
-    """The status bits in counts[status] behind a call, then cleared; 0 if the call leaves them there."""
-    left = counts[status] if op & OP_UNREAD else 0
-    bits = counts[status] - left
-    counts[status] = left
-    return bits
-
-
-@jit(inline=True)
 def zero(x: Any) -> Any:
     """0 of the type of a finite x."""
     return x - x

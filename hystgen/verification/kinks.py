@@ -42,7 +42,7 @@ class _Textbook:
 
     def __init__(self, tables: Tables | FixedTables) -> None:
         self.tables = tables
-        self.code = reference.operations(tables)
+        self.front = reference.front(tables)
         self.kind = tables.threshold.dtype.type
         self.r = tables.threshold[1:].astype(float)
         self.begin(slots.OP_INIT)
@@ -57,7 +57,7 @@ class _Textbook:
     def drive_at(self, w: float, branch: int) -> float:
         """The drive that gives the plays the input w, or one beyond the range."""
         with plain():
-            return float(self.code.front_inverse(self.tables, self.kind(w), branch if self.tables.branches else 1)[0])
+            return float(self.front.front_inverse(self.tables, self.kind(w), branch if self.tables.branches else 1)[0])
 
     def move(self, drive: float) -> None:
         """Move the drive there."""
@@ -65,7 +65,7 @@ class _Textbook:
             self.rising = int(drive > self.drive)
         self.drive = drive
         with plain():
-            self.w = float(self.code.front_forward(self.tables, self.kind(drive), self.rising))
+            self.w = float(self.front.front_forward(self.tables, self.kind(drive), self.rising))
         self.s = np.clip(self.s, self.w - self.r, self.w + self.r)
 
 

@@ -88,12 +88,11 @@ def _bends(tables: Tables | FixedTables) -> NDArray[np.float64]:
     if not isinstance(tables, FixedTables):
         bent = len(tables.stage_kind) > 0 and tables.stage_kind[0] == slots.DEAD_ZONE
         return np.array(tables.stage_data[: tables.stage_size[0] if bent else 0], dtype=float)
-    back = reference.operations(tables).front_inverse
     found: list[float] = []
     for which, (first, count) in enumerate(zip(tables.first, tables.pieces, strict=True)):
         knots = tables.knot[first : first + count]
         branch = curve.INVERSE + 1 - which
-        found += knots.tolist() if which < curve.INVERSE else [back(tables, w, branch)[0] for w in knots]
+        found += knots.tolist() if which < curve.INVERSE else [curve.front_inverse(tables, w, branch)[0] for w in knots]
     return np.array(found, dtype=float)
 
 

@@ -131,10 +131,10 @@ class Codes(NamedTuple):
 
 
 def made_of(
-    blocks: Blocks, codes: Codes, drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] = ()
+    inverse: bool, blocks: Blocks, codes: Codes, drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] = ()
 ) -> Operations:
-    """The operations of models with effects in one arithmetic, with a user's own blocks in front of the plays and
-    behind."""
+    """The operations of one operator of models with effects in one arithmetic, with a user's own blocks in front of
+    the plays and behind."""
     every = [blocks.verbs(part) for part in parts_with(drives, outputs)]
     blocks_reset, blocks_move = resetting(every), moves(every)
     temperature_set, gain_set, travel_set = (told(every, f"set_{what}") for what in ("temperature", "gain", "travel"))
@@ -150,7 +150,7 @@ def made_of(
     assert led
     led_state, led_solve, led_kept, led_absorb, led_missed, *_ = led
     finite, drive_signal, arriving, level_signal, drive_code, output_code, entered_travel, shared = codes
-    plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
+    plays_init, plays_reset, arrive, inverse_drive = plays_of(inverse, front_forward, front_inverse, loop_output)
 
     side = sides_of(every)
     sent_rest, sent_absorb = side.sent_rest, side.sent_absorb
@@ -312,19 +312,19 @@ def made_of(
         s.real[OUTPUT] = output_side_rest(t, s, s.plays.real[LEVEL])
 
     @jit
-    def init(t: ChainTables, s: ChainState, inverse: int) -> None:
+    def init(t: ChainTables, s: ChainState) -> None:
         """Set the start memory of the parameter file, and its settings."""
         settings_reset(t, s)
-        plays_init(t.plays, s.plays, inverse)
+        plays_init(t.plays, s.plays)
         start(t, s, 0)
         begin(t, s)
         if not inverse:
             s.plays.real[ANSWER] = expected(t, s)
 
     @jit
-    def reset(t: ChainTables, s: ChainState, inverse: int) -> None:
+    def reset(t: ChainTables, s: ChainState) -> None:
         """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
-        plays_reset(t.plays, s.plays, inverse)
+        plays_reset(t.plays, s.plays)
         start(t, s, 1)
         begin(t, s)
         if not inverse:
@@ -425,16 +425,15 @@ def made_of(
             s.plays.counts[STATUS] |= SLEW_LIMITED
         absorb(t, s, v, reached)
 
-    @jit
-    def seen(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
-        """Absorb drive v in either operator."""
-        if inverse:
-            absorb(t, s, v, v)
-        else:
-            forward_absorb(t, s, v)
+    @jit(inline=True)
+    def inverse_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
+        """Absorb drive v."""
+        absorb(t, s, v, v)
+
+    seen = inverse_absorb if inverse else forward_absorb
 
     @jit
-    def settle(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
+    def settle(t: ChainTables, s: ChainState, v: Any) -> None:
         """Bring everything to rest at drive v; the plays move there as in any step."""
         if not finite(t, v):
             s.plays.counts[STATUS] |= HELD
@@ -445,17 +444,12 @@ def made_of(
         if s.flags[MOVING]:
             travelled(t, s, inside)
         s.flags[MOVING] = 0
-        seen(t, s, inverse, inside)
+        seen(t, s, inside)
 
     @jit(inline=True)
     def plays_in(s: ChainState) -> State:
         """The memory of the step itself."""
         return s.plays
-
-    @jit(inline=True)
-    def inverse_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
-        """Absorb drive v."""
-        absorb(t, s, v, v)
 
     @jit(inline=True)
     def shown(t: ChainTables, s: ChainState) -> tuple[Any, int]:
@@ -574,7 +568,7 @@ def made_of(
             s.plays.counts[STATUS] |= LIMITED_SETTING
 
     @jit
-    def other(t: ChainTables, s: ChainState, inverse: int, call: int, x: Any) -> Any:
+    def other(t: ChainTables, s: ChainState, call: int, x: Any) -> Any:
         """Run a call that only models with effects have. Returns its answer, or 0."""
         if call == OP_PUSH:
             inverse_push(t, s, x)
@@ -582,7 +576,7 @@ def made_of(
             if s.plays.counts[HAS_PENDING]:
                 absorb(t, s, s.plays.real[PENDING], s.plays.real[PENDING])
                 s.plays.counts[HAS_PENDING] = 0
-            settle(t, s, inverse, x)
+            settle(t, s, x)
         elif call == OP_OFFSET:
             set_offset(t, s, level_signal(t, x))
         elif call == OP_TEMPERATURE:
@@ -599,12 +593,7 @@ def made_of(
             return expected(t, s)
         return t.limits[ZERO]
 
-    @jit
-    def visit(t: ChainTables, s: ChainState, inverse: int, v: Any) -> None:
-        """Move the actuator to drive v before the next sample."""
-        seen(t, s, inverse, v)
-
     hooks = Hooks(
         plays_in, finite, forward_absorb, inverse_absorb, shown, unread, inverse_held, stands, inverse_sought, other
     )
-    return operations_of(init, reset, visit, (front_forward, front_inverse), hooks)
+    return operations_of(inverse, init, reset, seen, hooks)

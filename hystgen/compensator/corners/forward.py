@@ -6,6 +6,7 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import Tables
+from hystgen.compensator.step import corners_of
 from hystgen.plays.corners.corners_float import OUTPUT, STATUS, Memory, Start, plays_step, start
 from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, HELD, INPUT_CLAMPED, OFFSET, REAL_MAX
 
@@ -45,3 +46,6 @@ def forward_reset(t: Tables, m: Memory) -> None:
 def forward_visit(t: Tables, m: Memory, v: Any) -> None:
     """Move the actuator to drive v, in range or not, before the next sample."""
     plays_step(t.forward, m, v)
+
+
+OPERATIONS = corners_of(forward_init, forward_reset, forward_visit, forward_step)

@@ -6,6 +6,7 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import FixedTables, clamp_drive
+from hystgen.compensator.step import corners_of
 from hystgen.front.curve import front_forward
 from hystgen.plays.corners.corners_fixed import FixedMemory, plays_step, start
 from hystgen.plays.corners.corners_float import ASCENDING, DRIVE, INPUT, NEXT, OUTPUT, STATUS
@@ -62,3 +63,6 @@ def forward_reset(t: FixedTables, m: FixedMemory) -> None:
 def forward_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
     """Move the actuator to drive v, in range or not, before the next sample."""
     forward_arrive(t, m, v)
+
+
+OPERATIONS = corners_of(forward_init, forward_reset, forward_visit, forward_step)

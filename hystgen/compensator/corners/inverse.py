@@ -6,6 +6,7 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import Tables, clamp_drive
+from hystgen.compensator.step import corners_of
 from hystgen.plays.corners.corners_float import (
     BEFORE,
     BEGIN,
@@ -150,3 +151,6 @@ def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
     move_to_output(t.inverse, m, v)
     copy_place(m, UNDO, HERE)
     m.real[BEFORE] = m.real[INPUT]
+
+
+OPERATIONS = corners_of(inverse_init, inverse_reset, inverse_visit, inverse_step, inverse_commit)

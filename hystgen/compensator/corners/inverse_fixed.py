@@ -6,6 +6,7 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import FixedTables, clamp_drive, inverse_clamp
+from hystgen.compensator.step import corners_of
 from hystgen.plays.corners.corners_fixed import FAR, FixedMemory, along, move_to_input, move_to_solution, solve, start
 from hystgen.plays.corners.corners_float import (
     BEFORE,
@@ -151,3 +152,6 @@ def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
     move_to_input(t, m, v << t.limits[FINE])
     copy_place(m, UNDO, HERE)
     inverse_stay(m)
+
+
+OPERATIONS = corners_of(inverse_init, inverse_reset, inverse_visit, inverse_step, inverse_commit)

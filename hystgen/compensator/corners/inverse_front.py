@@ -7,6 +7,7 @@ from typing import Any
 
 from hystgen.basics.jit import Jit, jit
 from hystgen.compensator.layout import Tables, clamp_drive
+from hystgen.compensator.step import corners_of
 from hystgen.front.compensator import front_forward, front_inverse
 from hystgen.plays.corners.corners_float import (
     ASCENDING,
@@ -212,3 +213,6 @@ def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
     inverse_replace(t, m, v)
     inverse_keep(m)
     m.real[LEVEL] = m.real[INPUT] + t.limits[OFFSET]
+
+
+OPERATIONS = corners_of(inverse_init, inverse_reset, inverse_visit, inverse_step, inverse_commit)

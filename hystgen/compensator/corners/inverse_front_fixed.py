@@ -7,6 +7,7 @@ from typing import Any
 from hystgen.basics.jit import jit
 from hystgen.compensator.corners.inverse_front import choosing
 from hystgen.compensator.layout import FixedTables, clamp_drive, inverse_clamp
+from hystgen.compensator.step import corners_of
 from hystgen.front.curve import front_forward, front_inverse
 from hystgen.plays.corners.corners_fixed import FAR, FixedMemory, move_to_input, move_to_solution, solve, start
 from hystgen.plays.corners.corners_float import (
@@ -117,3 +118,6 @@ def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
     move_to_input(t, m, inverse_arrive(t, m, v))
     inverse_keep(m)
     m.real[LEVEL] = code(t, m.real[OUTPUT])[0]
+
+
+OPERATIONS = corners_of(inverse_init, inverse_reset, inverse_visit, inverse_step, inverse_commit)

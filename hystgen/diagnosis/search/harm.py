@@ -93,7 +93,6 @@ def _moved(model: Model, v: Array, t: Array, extra: dict[str, Array]) -> Array:
 
 def _drive(model: Model, u: Array, t: Array, extra: dict[str, Array]) -> Array:
     """The drive for a reference, without limits of its range."""
-    model.inverse()
     return model.compensator.drives(model.run(u, t, extra), (-math.inf, math.inf))
 
 

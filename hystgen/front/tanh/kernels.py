@@ -9,7 +9,7 @@ C files; the numbers come from `c_runtime/front/fit_coefficients.py`.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +28,7 @@ __all__ = [
     "tanh",
 ]
 
-Real = np.floating[Any]
+Real = np.floating
 Reals = npt.NDArray[Real]
 
 #: Worst error of `tanh` and `atanh` in ulp of the true value: float32 over all arguments, float64 a bound.

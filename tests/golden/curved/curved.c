@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 8a5b266248fe9f62df0a74bbc4c10986701bd04ca9cae9428afb6ffe405b68d3, without this line
+ * Text: sha256 42b40a19aaae82b6935eddc702902d7ee136aeb71ab7548078acd1092623a8d4, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -460,7 +460,7 @@ CURVED_APART curved_play_t curved_front_forward(curved_real_t v) {
                                        CURVED_DEGREE, v);
 }
 
-/* v = G^-1[w]; sets `limited` if no drive gives w. */
+/* v = G^-1[w], or at an end of G for w beyond it. */
 CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool *limited) {
     const curved_ends_t *ends = &curved_back_ends;
     int64_t v;

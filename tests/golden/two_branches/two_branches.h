@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 0224158a30758f27744b9bdcd04cd2dcb1f7e43607507c1fb62d6ae521abc77e, without this line
+ * Text: sha256 db470961162fcf51f9c04e0fc320b757e1c786d125aa4406dbd732eed080dd43, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -772,7 +772,7 @@ static two_branches_real_t two_branches_front_forward(two_branches_real_t v, boo
     return w;
 }
 
-/* v = G^-1[w]; sets `limited` if no drive gives w, on the branch of the drive's direction. */
+/* v = G^-1[w], on the branch of the drive's direction, or at an end of G for w beyond it. */
 static two_branches_real_t two_branches_front_inverse(two_branches_real_t w, bool ascending,
                                                       bool *limited) {
     two_branches_real_t v = w;
