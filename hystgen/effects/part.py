@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,6 +108,13 @@ class Gained(NamedTuple):
     largest: float
     there: float
     back: float
+
+
+class Arithmetical(Protocol):
+    """A model's tables, which tell their kind of arithmetic."""
+
+    @property
+    def fixed(self) -> bool: ...
 
 
 class One:
@@ -308,7 +315,7 @@ def late(effect: str, name: str = "ARITHMETIC") -> Callable[[], Realized]:
     """A loader for the fixed-point version of an effect, which imports it when called."""
 
     def realized() -> Realized:
-        found: Realized = getattr(importlib.import_module("hystgen.effects." + effect + ".fixed"), name)
+        found: Realized = getattr(importlib.import_module(f"hystgen.effects.{effect}.fixed"), name)
         return found
 
     return realized
@@ -347,6 +354,6 @@ class ChainPart:
         """Its fixed-point version."""
         return self.coded()
 
-    def arithmetic(self, fixed: bool) -> Realized:
-        """Its fixed-point version, or else the floating-point one."""
-        return self.fixed if fixed else self.floating
+    def of(self, t: Arithmetical) -> Realized:
+        """Its version in the arithmetic of a model's tables."""
+        return self.fixed if t.fixed else self.floating

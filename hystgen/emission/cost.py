@@ -228,10 +228,8 @@ def chain_products(t: ChainTables) -> dict[str, int]:
     from hystgen.effects.saturation.fixed import Saturations
 
     counts, behind = _counts(t), t.behind
-    if isinstance(behind, Saturations):
-        kinds, envelope = list(map(int, behind.kind)), behind.bends.coefficient.shape[1]
-    else:
-        kinds, envelope = list(map(int, behind.stage_kind)), 2
+    kinds = list(map(int, behind.stage_kind))
+    envelope = behind.bends.coefficient.shape[1] if isinstance(behind, Saturations) else 2
     envelopes = kinds.count(slots.TANH)
     stages = counts.factor * (len(kinds) - envelopes) + envelopes * envelope
     everything, inverse = blocks.every(t, "forward"), blocks.every(t, "inverse")

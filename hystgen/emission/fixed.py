@@ -6,13 +6,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.layout import FixedTables
 from hystgen.emission.compensator import (
-    AnyTables,
     Effects,
     Errors,
     Field,
@@ -77,10 +74,6 @@ class Fixed(Form):
     def between(self, low: Number, high: Number, part: float) -> Number:
         return int(low) + (int(high) - int(low)) * part
 
-    def arguments(self, t: AnyTables, values: Sequence[Number]) -> Reals:
-        most = int(t.limits[slots.CODE_MAX])
-        return np.array([min(max(round(x), -most - 1), most) for x in values], dtype=t.threshold.dtype)
-
     def numbers(self, parameters: Parameters, cascade: StaticModel, options: Options, writer: Writer) -> Numbers:
         emit = parameters.emit
         t, form = fixed_tables.build(cascade, options.arithmetic, options.engine, emit.drive_lsb, emit.output_lsb)
@@ -134,7 +127,7 @@ class Fixed(Form):
         )
 
     def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[Stage]:
-        return [_saturation(t, j, writer.own) for j in range(len(t.behind.kind))]
+        return [_saturation(t, j, writer.own) for j in range(len(t.behind.stage_kind))]
 
     def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[Table], list[Macro]]:
         from hystgen.compensator.chain import moving
@@ -207,11 +200,6 @@ class Fixed(Form):
         from hystgen.compensator.chain import layout
 
         return int(t.number[layout.DRIVE_BITS])
-
-    def setting_codes(self, t: ChainTables) -> tuple[float, float]:
-        from hystgen.compensator.chain.fixed_tables import setting_codes
-
-        return setting_codes(t)
 
     def reference_temperature(self, t: ChainTables) -> float:
         from hystgen.effects.thermal import fixed as thermal
@@ -384,7 +372,7 @@ def _bumps(t: FixedMovingTables, writer: Writer) -> list[Table]:
 def _saturation(t: ChainTables, j: int, writer: Writer) -> Stage:
     """A stage of saturation behind the plays."""
     behind, own = t.behind, f"behind_{j + 1}"
-    if behind.kind[j] == slots.DEAD_ZONE:
+    if behind.stage_kind[j] == slots.DEAD_ZONE:
         lower, upper, *over = behind.piece[j]
         row = f"    {literal(lower)}, {literal(upper)}, {entries(over, 'ff')},"
         return Stage("stops", (writer.lines("stops_t", own, [row]),), f"&hystgen_{own}")

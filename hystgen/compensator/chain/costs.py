@@ -28,7 +28,7 @@ PER_PLAY = ("relaxing", "dilated", "dashpot", "polynomial", "centre")
 def parts(t: ChainTables, operator: str) -> list[str]:
     """The parts that an operator of a model has; blocks of one kind share their code."""
     exact = t.of("lag").exact.tolist()
-    kinds = [int(kind) for kind in (t.behind.kind if t.fixed else t.behind.stage_kind)]
+    kinds = [int(kind) for kind in t.behind.stage_kind]
     found = Counter(dict(zip(NAMES, t.counts.tolist(), strict=True)) | {
         "delay": t.number_of("wait"), "lag": exact.count(0), "lag_exact": exact.count(1),
         "friction": t.of("heat").plays.any(), "preview": len(t.tap),

@@ -32,8 +32,6 @@ from hystgen.compensator.layout import clamp_drive, inverse_clamp
 from hystgen.compensator.step import Hooks, Operations, operations_of, plays_of
 from hystgen.effects.kinds import OwnBlock
 from hystgen.plays import loop
-from hystgen.plays.corners.corners_fixed import new_fixed_memory
-from hystgen.plays.corners.corners_float import new_memory
 from hystgen.plays.loop import (
     ANSWER,
     ASCENDING,
@@ -99,9 +97,8 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
     """Memory for one instance of an operator; `init` sets it."""
     dtype = t.threshold.dtype
     parts = parts_with(*t.own_blocks) if isinstance(t, OwnChainTables) else PARTS
-    verbs = [part.arithmetic(t.fixed).verbs for part in parts]
+    verbs = [part.of(t).verbs for part in parts]
     corners = int(t.plays.engine == CORNERS)
-    memory = new_fixed_memory if t.fixed else new_memory
     loops = loop.new_state(t.plays)
     return ChainState(
         loops._replace(play=loops.play[:0]) if corners else loops,
@@ -112,7 +109,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
         np.zeros(9, dtype),
         np.array([0, int(inverse), 0, 1], np.int64),
-        memory(len(t.threshold) - 1, dtype) if corners else (),
+        t.plays.new_corners() if corners else (),
         np.zeros(4 * corners, dtype),
     )
 

@@ -13,12 +13,12 @@ from hystgen.plays.slots import TANH, Counts, Reals
 class Saturations(NamedTuple):
     """All saturations, in order from the plays.
 
-    `kind` (k,): TANH, or DEAD_ZONE for straight pieces; `piece` (k, 6): for straight pieces, the ends between which
-    nothing changes, the slope beyond them and 1 over it, as factors. `bends`: two curves for each k, forward and
+    `stage_kind` (k,): TANH, or DEAD_ZONE for straight pieces; `piece` (k, 6): for straight pieces, the ends between
+    which nothing changes, the slope beyond them and 1 over it, as factors. `bends`: two curves for each k, forward and
     inverse.
     """
 
-    kind: Counts
+    stage_kind: Counts
     piece: Reals
     bends: Bends
 
@@ -43,8 +43,8 @@ def stops(t: Saturations, j: int, x: Any, slope: int) -> Any:
 def saturated(t: Saturations, x: Any) -> Any:
     """x behind all saturations."""
     y = x
-    for j in range(len(t.kind)):
-        if t.kind[j] == TANH:
+    for j in range(len(t.stage_kind)):
+        if t.stage_kind[j] == TANH:
             y, _ = bend(t.bends, 2 * j, y)
         else:
             y = stops(t, j, y, GIVE)
@@ -56,8 +56,8 @@ def unsaturated(t: Saturations, y: Any) -> tuple[Any, int]:
     """The input of all saturations for the output y, and whether no input gives it."""
     x = y
     limited = 0
-    for j in range(len(t.kind) - 1, -1, -1):
-        if t.kind[j] == TANH:
+    for j in range(len(t.stage_kind) - 1, -1, -1):
+        if t.stage_kind[j] == TANH:
             x, one = bend(t.bends, 2 * j + 1, x)
             limited = limited | one
         else:

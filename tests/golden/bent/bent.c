@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 d523155a88ae855d1fb24c97b8870aee70340c041e48a1476ff574e05504dc45, without this line
+ * Text: sha256 2d05816aecfbaf233172b8c7ff485b00612cd916325be2ed3341bada295b72ad, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -124,7 +124,7 @@ static bent_real_t bent_loop_output(const bent_tables_t *t, const bent_real_t *p
    rounding error of `output` is divided by the slope before that input, which may be small, and
    must not run on along the steeper slope behind it. */
 static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *play,
-                                   bent_real_t here, bent_real_t output) {
+        bent_real_t here, bent_real_t output) {
     const bool rising = output >= here;
     bent_real_t tail = 0;
     bent_real_t next = 0; /* input at which play k would start to follow */
@@ -357,7 +357,7 @@ bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {
     }
     bent_forward_played(self, inside);
     const bent_real_t answer = bent_forward_displaced(bent_loop_output(&bent_model_tables,
-                                                                       self->play));
+        self->play));
     self->answer = answer;
     return answer;
 }
