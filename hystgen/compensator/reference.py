@@ -80,18 +80,18 @@ def operations(t: Tables | FixedTables | ChainTables, inverse: bool) -> Operatio
     from hystgen.compensator.chain.layout import OwnChainTables
 
     drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
-    return _chain_operations(inverse, fixed, t.plays.engine == LOOP, drives, outputs)
+    return _chain_operations(fixed, t.plays.engine == LOOP, drives, outputs)[inverse]
 
 
 @functools.cache
 def _chain_operations(
-    inverse: bool, fixed: bool, loops: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
-) -> Operations:
+    fixed: bool, loops: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
+) -> tuple[Operations, Operations]:
     from hystgen.compensator.chain import step as chain_step
     from hystgen.compensator.chain import step_fixed, step_float
 
     own = step_fixed if fixed else step_float
-    return chain_step.made_of(inverse, own.BLOCKS if loops else own.CORNERS, own.CODES, drives, outputs)
+    return chain_step.made_of(own.BLOCKS if loops else own.CORNERS, own.CODES, drives, outputs)
 
 
 def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:

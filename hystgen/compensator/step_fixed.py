@@ -31,8 +31,5 @@ def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  as in floating poin
     return True
 
 
-OPERATIONS = (
-    made_of(False, front_forward, front_inverse, output, inverse_solve, finite),
-    made_of(True, front_forward, front_inverse, output, inverse_solve, finite),
-)
+OPERATIONS = made_of(front_forward, front_inverse, output, inverse_solve, finite)
 """Forward and inverse operator."""

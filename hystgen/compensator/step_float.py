@@ -30,8 +30,5 @@ def finite(t: Tables, x: Any) -> bool:
     return bool(-t.limits[REAL_MAX] <= x <= t.limits[REAL_MAX])
 
 
-OPERATIONS = (
-    made_of(False, front_forward, front_inverse, output, inverse_solve, finite),
-    made_of(True, front_forward, front_inverse, output, inverse_solve, finite),
-)
+OPERATIONS = made_of(front_forward, front_inverse, output, inverse_solve, finite)
 """Forward and inverse operator."""
