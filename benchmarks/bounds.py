@@ -25,11 +25,12 @@ from numpy.typing import NDArray
 
 from hystgen.basics.problems import FormatError, NotInvertibleError
 from hystgen.compensator import reference
-from hystgen.compensator.chain import bounds, moving, tables
+from hystgen.compensator.chain import bounds, tables
 from hystgen.compensator.chain.layout import Compiled, output_range
 from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
 from hystgen.effects import Run
+from hystgen.effects.plays import PLAIN
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import slots
@@ -147,7 +148,7 @@ class Measured:
     def inverse(self, v: Array) -> float:
         """Error of the inverse, drive units, asked for where the model is with this drive."""
         extra = self._extra(self.compiled)
-        moves = self.compiled.tables.moving.moves != moving.PLAIN
+        moves = self.compiled.tables.moving.moves != PLAIN
         low, high = output_range(self.compiled.static, self.compiled.parts, T)
         y = self.model.simulate(v, t=self.t, extra=extra)
         y = np.clip(y, low, high) if moves else y + 0.01 * (y - 0.5 * (low + high))  # also beyond what can be reached

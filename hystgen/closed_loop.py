@@ -47,7 +47,7 @@ from hystgen.emission.options import Options
 from hystgen.model import InverseModel, Model, as_model
 
 if TYPE_CHECKING:
-    from hystgen.verification.instance import Instance
+    from hystgen.verification.instance import CompiledInstance
 
 Array = NDArray[np.float64]
 
@@ -335,7 +335,7 @@ class _InUnits:
     Fixed point gets the nearest code, ties away from zero, limited to the type; for a NaN the last code again.
     """
 
-    def __init__(self, operator: _Operator | Instance, model: Model, options: Options) -> None:
+    def __init__(self, operator: _Operator | CompiledInstance, model: Model, options: Options) -> None:
         self._operator = operator
         self._lsb: tuple[float, float] | None = None
         chosen = FIXED.get(options.arithmetic)
@@ -403,8 +403,8 @@ class CompiledC(_InUnits):
         engine: str | None = None,
         compiler: str | None = None,
     ) -> None:
-        from hystgen.verification.instance import Instance
+        from hystgen.verification.instance import CompiledInstance
 
         model = as_model(source)
         options = _one_operator(model, operator, arithmetic, engine)
-        super().__init__(Instance(model, options, compiler), model, options)
+        super().__init__(CompiledInstance(model, options, compiler), model, options)

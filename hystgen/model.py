@@ -22,7 +22,8 @@ from hystgen.compensator.reference import Session
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.stage import Stage
 from hystgen.front.tanh.model import TanhEnvelope
-from hystgen.parameters.files import Parameters, load_parameters
+from hystgen.parameters.files import load_parameters
+from hystgen.parameters.schema import Parameters
 from hystgen.plays import slots
 
 if TYPE_CHECKING:
@@ -340,10 +341,12 @@ class Model:
                 f"the bit reference takes a sample every sample_time = {seconds:g} s; resample the record, or simulate "
                 "in double precision, which takes any sample times"
             )
-        if any(effect.name == "drift" for effect in self.effects) and abs(float(record.t[0])) > EVEN * seconds:
-            raise EffectsError(
-                f"drift is counted from the first sample, but t begins at {float(record.t[0]):g} s; give t from 0 on"
-            )
+        began = float(record.t[0])
+        for effect in self.effects:
+            if effect.from_start and abs(began) > EVEN * seconds:
+                raise EffectsError(
+                    f"{effect.name} is counted from the first sample, but t begins at {began:g} s; give t from 0 on"
+                )
         how = self.parameters.emit.compensation
         chosen = self.engine(engine, arithmetic=arithmetic)
         compiled = tables.build(self.chain, arithmetic, seconds, how, self._lsb, chosen)

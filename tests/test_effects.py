@@ -1191,7 +1191,8 @@ def test_an_own_effect_with_wrong_candidates_is_named(tmp_path: Path, answer: st
         own.candidates(about)
 
 
-def test_an_edit_that_keeps_second_and_size_is_seen(tmp_path: Path) -> None:
+def test_an_edit_that_keeps_second_and_size_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
     path = tmp_path / "own.py"
     seen = []
     for edition in (1, 2):

@@ -19,7 +19,7 @@ from modelfiles import BRAKED, CALM, CHAINS, INVERSE_ALONE, STEADY, TANH, chain
 from hystgen.arithmetic import ARITHMETICS, factors
 from hystgen.basics import jit
 from hystgen.compensator import reference
-from hystgen.compensator.chain import bounds, moving, moving_fixed, tables
+from hystgen.compensator.chain import bounds, moving, tables
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 from hystgen.compensator.chain.layout import Codes, Compiled
 from hystgen.compensator.chain.run import answers
@@ -28,7 +28,9 @@ from hystgen.effects import Run
 from hystgen.effects.base import Array
 from hystgen.effects.drift import fixed as drift
 from hystgen.effects.drift.model import CurvedDrift
+from hystgen.effects.noncongruent import fixed as bent_fixed
 from hystgen.effects.rate_dependence import compensator as dashpot
+from hystgen.effects.rate_dependence import fixed as dashpot_fixed
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.effects.thermal import compensator as thermal
 from hystgen.effects.thermal import fixed as thermal_fixed
@@ -613,7 +615,7 @@ def test_bent_plays_contribute_what_the_model_has(name: str, arithmetic: str) ->
     n = static.pi.n
     exact = effect.bent(np.tile(z * step, (n + 1, 1)), np.array(static.pi.thresholds)) / step
     with jit.plain():
-        found = [[int(moving_fixed.bent(t.moving, t.plays, i, each)) for each in z] for i in range(1, n + 1)]
+        found = [[int(bent_fixed.bent(t.moving, t.plays, i, each)) for each in z] for i in range(1, n + 1)]
     left = np.max(np.abs(np.array(found) - exact[1:]))
     assert 0.05 * error < left <= error
 
@@ -633,8 +635,8 @@ def test_what_a_dashpot_yields_in_fixed_point(exponent: float, ratio: float, ari
     for x in np.unique(np.geomspace(1, t.stretch, 300).astype(np.int64)):
         law, slope = dashpot.yielded(effect, scale, T, float(x) * step)
         with jit.plain():
-            found = int(moving_fixed.yields(t, x)) / 2.0**t.yield_bits * step
-        unit = 3.0 * step * 2.0 ** (int(t.yields[:, moving.YIELD_LIFT].max()) - t.yield_bits)
+            found = int(dashpot_fixed.yields(t, x)) / 2.0**t.yield_bits * step
+        unit = 3.0 * step * 2.0 ** (int(t.yields[:, dashpot_fixed.YIELD_LIFT].max()) - t.yield_bits)
         assert found <= x * step
         stuck = dashpot.LEAST_YIELD * x * step
         assert abs(found - law) <= dashpot.YIELD_ERROR * law + slope * (least + step) + unit + stuck

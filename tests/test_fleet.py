@@ -26,7 +26,7 @@ from hystgen import identification
 from hystgen.basics import extras
 from hystgen.fleet import batch, outliers, workers
 from hystgen.fleet.batch import FIGURES, KEPT_IN
-from hystgen.fleet.workers import Result, Task
+from hystgen.fleet.workers import Task, UnitResult
 
 pytestmark = pytest.mark.thorough
 
@@ -371,11 +371,11 @@ def test_interrupted(sent: signal.Signals, jobs: int, units: Path, fleet: Path, 
 # -- processes that die, and a cluster ---------------------------------------------------------------------------------
 
 
-def deadly(task: Task) -> Result:
+def deadly(task: Task) -> UnitResult:
     """Work that kills the process for one unit."""
     if task.unit == "u2":
         os.kill(os.getpid(), signal.SIGKILL)
-    return Result(task.unit)
+    return UnitResult(task.unit)
 
 
 def test_a_unit_that_kills_its_process_stops_no_other() -> None:
@@ -385,10 +385,10 @@ def test_a_unit_that_kills_its_process_stops_no_other() -> None:
     assert answers == {f"u{k}": "" for k in range(9) if k != 2}
 
 
-def interrupted(task: Task) -> Result:
+def interrupted(task: Task) -> UnitResult:
     """Work that Ctrl-C reaches, as it does every process of a terminal."""
     os.kill(os.getpid(), signal.SIGINT)
-    return Result(task.unit, "done")
+    return UnitResult(task.unit, "done")
 
 
 def test_processes_leave_ctrl_c_to_the_one_that_started_them() -> None:

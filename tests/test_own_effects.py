@@ -544,7 +544,7 @@ def test_the_catalogue_s_blocks_are_what_their_c_says(kind: Kind) -> None:
         assert [name for _, name in members(rows[0][0])] == list(kind.rows.table)
         if kind.rows.state:
             assert [name for _, name in members(f"hystgen_{kind.name}_state_t")] == list(kind.rows.state)
-    functions = {piece.name for piece in runtime._pieces(runtime.CHAIN_BLOCKS, ())}
+    functions = {piece.name for piece in runtime._pieces(runtime.FAMILIES["float32"].chain_blocks, ())}
     assert {f"hystgen_{kind.name}_{verb}" for verb in kind.own} <= functions
 
 

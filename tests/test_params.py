@@ -26,18 +26,14 @@ from hystgen.emission.text import comment_text
 from hystgen.parameters import checks as param_checks
 from hystgen.parameters import yaml as yaml_positions
 from hystgen.parameters.files import (
-    DeadZoneParameters,
-    EmitDefaults,
-    Parameters,
-    TanhParameters,
     canonical_json,
     dump_parameters,
     load_parameters,
     make_parameters,
     parameters_sha256,
     parse_parameters,
-    schema,
 )
+from hystgen.parameters.schema import DeadZoneParameters, EmitDefaults, Parameters, TanhParameters, schema
 
 H = "hystgen: 1\nname: a\ninput_range: [0, 1]\n"
 M = "model: {pi: {thresholds: [0, 1], weights: [1, 1]}}\n"

@@ -64,7 +64,7 @@ class TestApart:
     """The generator knows nothing of the package, and the workflow nothing of the labels."""
 
     def test_names_are_the_catalogue(self) -> None:
-        from hystgen.parameters.files import EFFECT_NAMES
+        from hystgen.parameters.checks import EFFECT_NAMES
 
         assert set(NAMES) == set(EFFECT_NAMES)
         assert set(rivals.RIVALS) == set(NAMES)

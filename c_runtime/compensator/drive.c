@@ -46,7 +46,7 @@ static inline bool hystgen_turns(hystgen_signal_t back, hystgen_signal_t way) {
     return back - HYSTGEN_HOLD > hystgen_inverse_missed(way < 0 ? -way : way);
 }
 #else
-/* Whether a drive that should go back by `back` goes to the other branch, `way` from there. */
+/* Whether a drive that should go back by `back` goes to the other branch. */
 static inline bool hystgen_turns(hystgen_signal_t back, hystgen_signal_t way) {
     (void)way;
     return back > HYSTGEN_HOLD;
@@ -118,7 +118,7 @@ HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hyst
     return v;
 }
 #else
-/* The drive that gives w; sets `limited` if there is none. */
+/* The drive that gives w, or the nearest that there is. */
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
                                                                       hystgen_real_t level,
                                                                       hystgen_reach_t w,
@@ -129,7 +129,7 @@ HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hyst
 }
 #endif
 
-/* The drive that gives w for the limited reference `level`. */
+/* The drive that gives w, for a reference that is already limited. */
 static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_real_t level,
                                              hystgen_reach_t w) {
     bool limited = false;

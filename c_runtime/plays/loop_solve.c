@@ -28,5 +28,5 @@ HYSTGEN_API hystgen_real_t hystgen_loop_solve(const hystgen_tables_t *t, const h
         tail = tail + t->weight[last] * play[last];
         next = first;
     }
-    return play[0]; /* `output` differs from the present one only by rounding */
+    return play[0]; /* the output differs from the present one only by rounding */
 }

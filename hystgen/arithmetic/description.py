@@ -51,7 +51,7 @@ class Arithmetic(ABC):
 
     @cached_property
     @abstractmethod
-    def real(self) -> type[np.floating[Any]]:
+    def real(self) -> type[np.floating]:
         """Type of numbers in physical units."""
 
     @cached_property

@@ -43,7 +43,7 @@ class Fixed(Arithmetic):
         return np.dtype("int64")
 
     @cached_property
-    def real(self) -> type[np.floating[Any]]:
+    def real(self) -> type[np.floating]:
         import numpy as np
 
         return np.float64

@@ -29,8 +29,8 @@ class Floating(Arithmetic):
         return self.number
 
     @cached_property
-    def real(self) -> type[np.floating[Any]]:
-        found: type[np.floating[Any]] = self.number.type
+    def real(self) -> type[np.floating]:
+        found: type[np.floating] = self.number.type
         return found
 
     @cached_property

@@ -50,7 +50,7 @@ def interpreted() -> str:
 
 
 # The functions allocate nothing, so reference counting, which would take most of a sample's time, is disabled
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False, "nogil": True}
+OPTIONS: dict[str, object] = {"error_model": "numpy", "_nrt": False, "nogil": True}
 
 _plain = contextvars.ContextVar("plain", default=False)
 

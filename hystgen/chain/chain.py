@@ -28,16 +28,16 @@ Hz; 25 change it by 2e-4. Set by: benchmarks/chosen_numbers.py visits."""
 SESSION_GAP = 10.0
 """Gap between records of a session, in median steps, above which the drive is held in it; below, it is straight."""
 
-def _rank(effect: Effect) -> int:
-    """Position in the chain: gains lie between linear filters of order 0 and others."""
+def rank(effect: Effect | type[Effect]) -> tuple[int, int]:
+    """Position in the chain: its place, where gains lie between linear filters of order 0 and others, and its order."""
     places = (Place.DRIVE, Place.PLAYS, Place.LINEAR, Place.GAIN, Place.LINEAR, Place.OUTPUT, Place.ADDED)
     late = effect.place is Place.LINEAR and effect.order > 0
-    return 4 if late else places.index(effect.place)
+    return 4 if late else places.index(effect.place), effect.order
 
 
 def in_order(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     """The effects in the order of the chain; effects with the same place and order stay as given."""
-    return tuple(sorted(effects, key=lambda effect: (_rank(effect), effect.order)))
+    return tuple(sorted(effects, key=rank))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, TypedDict, TypeVar
+from typing import IO, TYPE_CHECKING, TypedDict, TypeVar, Unpack
 
 import click
 
@@ -203,6 +203,14 @@ def data_argument(required: bool) -> Callable[[Callable[..., object]], Callable[
     return click.argument("data", nargs=-1, required=required, type=click.Path(), callback=matched)
 
 
+class ReadingArguments(TypedDict):
+    """How the command line says that records are to be read."""
+
+    columns: str | None
+    sample_time: float | None
+    delimiter: str | None
+
+
 class ReadingOptions(TypedDict):
     """The options of `read_records` that the command line gives."""
 
@@ -212,11 +220,12 @@ class ReadingOptions(TypedDict):
     progress: bool
 
 
-def reading_options(columns: str | None, sample_time: float | None, delimiter: str | None) -> ReadingOptions:
+def reading_options(**given: Unpack[ReadingArguments]) -> ReadingOptions:
     from hystgen import records
 
+    columns = given["columns"]
     mapping = guarded("--columns", lambda: records.parse_columns(columns)) if columns else None
-    return {"columns": mapping, "sample_time": sample_time, "delimiter": delimiter, "progress": True}
+    return {**given, "columns": mapping, "progress": True}
 
 
 _RECORD_OPTIONS = [

@@ -5,15 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import click
 
 from hystgen.basics import console
 from hystgen.cli import common
-
-PLAYED = ("rate", "dac_bits", "dac_range", "dac_coding")
-"""Options of a plan that is played at one rate."""
 
 
 def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> None:
@@ -67,8 +64,9 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
 @common.skip_option
 def diagnose(
     params: str, data: tuple[str, ...], output: str | None, holdout: tuple[str, ...], effects: tuple[str, ...],
-    plan: bool, max_rate: float | None, session: str | None, history: str | None, rest: float, skip: float,
-    **reading: Any,
+    plan: bool, max_rate: float | None, rate: float | None, dac_bits: int | None, dac_range: str | None,
+    dac_coding: str | None, session: str | None, history: str | None, rest: float, skip: float,
+    **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Find what a model is missing: where it disagrees with records, which effect is missing, and the model with it.
 
@@ -83,30 +81,31 @@ def diagnose(
     if output is None:
         what = "the drives, as in -o plan/" if plan else "the findings, as in -o diagnosis/"
         raise click.UsageError(f"Missing option '-o': give a folder for {what}")
-    played = {name: reading.pop(name) for name in PLAYED}
+    played: dict[str, Any] = {
+        "max_rate": max_rate, "rate": rate, "dac_bits": dac_bits, "dac_range": dac_range, "dac_coding": dac_coding
+    }
     if plan:
         unused = {
             "DATA": data, "--holdout": holdout, "--history": history, "--rest": rest, "--skip": skip,
-            "--session": session,
+            "--session": session, "--columns": reading["columns"], "--delimiter": reading["delimiter"],
         }
-        unused |= {f"--{option}": reading[option] for option in ("columns", "delimiter")}
         given = [option for option, value in unused.items() if value]
         if given:
             raise click.UsageError(
                 f"--plan comes before anything is measured: leave out {', '.join(given)}, or leave out --plan to "
                 "diagnose records"
             )
-        asked = {"max_rate": max_rate, "sample_time": reading["sample_time"], **played}
-        asked = {name: value for name, value in asked.items() if value is not None}
-        if "dac_coding" in asked and "dac_bits" not in asked:
+        if dac_coding is not None and dac_bits is None:
             raise click.UsageError("--dac-coding is for codes; give --dac-bits and --dac-range with it")
-        if "dac_range" in asked:
-            asked["dac_range"] = common.number_list("--dac-range", asked["dac_range"], "0,150")
+        played["sample_time"] = reading["sample_time"]
+        asked = {name: value for name, value in played.items() if value is not None}
+        if dac_range is not None:
+            asked["dac_range"] = common.number_list("--dac-range", dac_range, "0,150")
         _plan(params, output, effects, **asked)
         return
     if not data:
         raise click.UsageError("Missing argument 'DATA...'; --plan writes drive records to measure")
-    for option, value in {"max_rate": max_rate, **played}.items():
+    for option, value in played.items():
         if value is not None:
             raise click.UsageError(f"--{option.replace('_', '-')} is for drives; give --plan with it")
     if session is not None:

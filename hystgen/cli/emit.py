@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 @common.effects_option
 @click.option("--list-outputs", is_flag=True, help="write nothing; print the paths")
 def emit(
-    params: tuple[str, ...], output: str, check: bool, effects: tuple[str, ...], list_outputs: bool, **options: Any
+    params: tuple[str, ...], output: str, check: bool, effects: tuple[str, ...], list_outputs: bool, **options: object
 ) -> None:
     """Write the C files of models.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import click
 
@@ -52,7 +52,7 @@ def identify(
     data: tuple[str, ...], output: str, model: str, thresholds: int | None, breaks: int | None,
     holdout: tuple[str, ...], skip: float, loading_curve: bool, name: str | None, units: dict[str, str] | None,
     plot: str | None, report: str | None, history: str | None, rest: float, batch: tuple[str, ...], emit: bool | None,
-    jobs: int | None, scheduler: str | None, **reading: Any,
+    jobs: int | None, scheduler: str | None, **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Fit a model to measured records and write its parameter file; with --batch, many units and their C.
 

@@ -17,6 +17,6 @@ def schema() -> None:
     """
     import json
 
-    from hystgen.parameters import files
+    from hystgen.parameters.schema import schema as parameter_schema
 
-    console.say(json.dumps(files.schema(), indent=2))
+    console.say(json.dumps(parameter_schema(), indent=2))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Unpack
 
 import click
 
@@ -38,7 +38,7 @@ def _write_record(target: Path, header: list[str], columns: dict[str, NDArray[np
 @common.record_options
 def simulate(
     params: str, data: tuple[str, ...], output: str | None, operator: str, arithmetic: str | None, engine: str | None,
-    effects: tuple[str, ...], history: str | None, rest: float, **reading: Any,
+    effects: tuple[str, ...], history: str | None, rest: float, **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Run the model (column v) or its inverse (column u) over records; several files form one session.
 

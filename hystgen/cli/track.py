@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import Unpack
 
 import click
 
@@ -21,7 +21,7 @@ from hystgen.cli import common
 @common.skip_option
 def track(
     params: str, data: tuple[str, ...], plot: str | None, json_file: str | None, effects: tuple[str, ...],
-    history: str | None, rest: float, skip: float, **reading: Any,
+    history: str | None, rest: float, skip: float, **reading: Unpack[common.ReadingArguments],
 ) -> None:
     """Print the tracking error on the recorded actuator: with a straight line, with plays alone, with the whole model.
 

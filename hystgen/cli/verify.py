@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 @click.option("--junit", "junit_file", type=click.Path(dir_okay=False), help="write the report as JUnit XML")
 def verify(
     params: tuple[str, ...], compiler: tuple[str, ...], targets: str, target_length: int | None, json_file: str | None,
-    junit_file: str | None, effects: tuple[str, ...], **options: Any,
+    junit_file: str | None, effects: tuple[str, ...], **options: object,
 ) -> None:
     """Compile the emitted C of models, run it and compare it with the Python reference, bit for bit.
 

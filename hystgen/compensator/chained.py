@@ -22,18 +22,11 @@ from hystgen.basics.problems import EffectsError, NotInvertibleError, Unsupporte
 from hystgen.chain.chain import Chain, arriving_slack
 from hystgen.compensator.chain import noise, preview
 from hystgen.compensator.chain.layout import Read, read
-from hystgen.compensator.chain.parts import Parts
+from hystgen.compensator.chain.parts import BEHIND, BESIDE, MOVES, PARTS, Parts
 from hystgen.compensator.chain.step_float import ramp
-from hystgen.effects import CATALOGUE, own
-from hystgen.effects.ageing import compensator as ageing
+from hystgen.effects import CATALOGUE
 from hystgen.effects.base import Array, Block, Effect, Place, Run
-from hystgen.effects.creep import compensator as creep
-from hystgen.effects.lag import compensator as lag
-from hystgen.effects.lag.model import Lag
-from hystgen.effects.rate_dependence.compensator import Movement
-from hystgen.effects.saturation.compensator import unsaturated
-from hystgen.effects.thermal import compensator as thermal
-from hystgen.effects.thermal.model import HysteresisHeating, OwnHeat, lost_on
+from hystgen.effects.part import Following, Leading
 from hystgen.parameters.schema import Compensation
 
 EVEN = 1e-3
@@ -69,9 +62,9 @@ class Actuator(Block):
         self.chain, self.static, self.slack = chain, chain.cascade, arriving_slack(chain.cascade, chain.effects)
         self.r, self.p = np.array(pi.thresholds), np.array(pi.weights)
         self.c, self.q = np.cumsum(self.p), np.cumsum(self.p * self.r)
-        self.movement = None if chain.mover is None else Movement(chain.mover, self.r, self.p)  # type: ignore[arg-type]
+        self.movement = None if chain.mover is None else MOVES.of(chain.mover, self.r, self.p)
         self.start = np.array(pi.start)
-        self.led_by: lag.UnevenLag | None = None
+        self.led_by: Leading | None = None
         self.start_over()
 
     def start_over(self) -> None:
@@ -164,53 +157,13 @@ class Actuator(Block):
         return sign * max(sign * w, sign * float(inputs[k]))
 
 
-class Heating:
-    """A temperature that follows the heat of a drive of n samples, with the turning points that friction remembers."""
-
-    def __init__(self, effect: OwnHeat, n: int) -> None:
-        self.effect, self.rise = effect, 0.0
-        self.first, self.corner, self.depth, self.up = math.nan, np.empty(n), 0, True
-
-    def _heat(self, before: float, drive: float, seconds: float) -> tuple[float, int, bool]:
-        """Final rise at the heat of a move, and the state of friction after it."""
-        effect = self.effect
-        if isinstance(effect, HysteresisHeating):
-            energy, depth, up = lost_on(before, drive, self.first, effect.reach, self.corner, self.depth, self.up)
-            return effect.heating * energy / seconds, depth, up
-        return effect.heating * 0.25 * thermal.heat_way(before, drive) / seconds, 0, True
-
-    def risen(self, before: float, drive: float, seconds: float) -> float:
-        """The rise after the drive has moved from `before`; unchanged at the first sample."""
-        if math.isnan(before) or math.isnan(drive) or seconds == 0.0:
-            return self.rise
-        return thermal.risen(self.effect, self.rise, self._heat(before, drive, seconds)[0], seconds)
-
-    def move(self, before: float, drive: float, seconds: float) -> None:
-        """The drive has moved from `before`."""
-        if math.isnan(before):
-            self.first = drive
-        elif seconds > 0.0:
-            self.rise = self.risen(before, drive, seconds)
-            _, self.depth, self.up = self._heat(before, drive, seconds)
-
-    def solve(self, y: float, rise: float) -> float:
-        """The input that gives the output y at a rise."""
-        return (y - self.effect.offset_per_degree * rise) / (1.0 + self.effect.gain_per_degree * rise)
-
-
-SWITCH = "; to have it all the same, write emit: {compensation: {compensate: [%s]}}"
-"""Advice for effects that are not measured."""
-
-
 def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
     """Why a compensator cannot include an effect; empty if it can. `compensate`: unmeasured effects that are asked for
     nevertheless."""
-    if effect.name == "drift":
-        ask = SWITCH % "drift"
-        return "" if "drift" in compensate else f"drift (a clock that runs alone; nothing says when it began{ask})"
-    if isinstance(effect, OwnHeat):
-        unmeasured = "thermal from the drive's own heat (the temperature is not measured, and drifts with the room's"
-        return "" if "self_heating" in compensate else f"{unmeasured}{SWITCH % 'self_heating'})"
+    for part in PARTS:
+        if (alone := part.unmeasured) and alone.key not in compensate and part.takes(effect):
+            write = f"emit: {{compensation: {{compensate: [{alone.key}]}}}}"
+            return f"{alone.known}; to have it all the same, write {write})"
     if effect.name not in CATALOGUE and effect.block is None:
         return f"{effect.name} (an effect of your own, which has no compensator)"
     return ""
@@ -218,11 +171,7 @@ def refusal(effect: Effect, compensate: Collection[str] = ()) -> str:
 
 def filter_block(effect: Effect) -> Block | None:
     """The block of an effect that is a filter in front of the plays or behind them; None for any other effect."""
-    if isinstance(effect, creep.EFFECTS):
-        return creep.UnevenCreep(effect)
-    if isinstance(effect, Lag):
-        return lag.UnevenLag(effect) if effect.time_constant > 0.0 else None
-    return own.Instance(effect) if effect.block else None
+    return next((block for part in PARTS if part.takes(effect) and (block := part.uneven(effect))), None)
 
 
 class Compensator:
@@ -235,9 +184,10 @@ class Compensator:
 
     def __init__(self, chain: Chain, how: Compensation = STANDARD, as_emitted: bool = False) -> None:
         static, effects = chain.cascade, chain.effects
-        creeping = [effect for effect in effects if isinstance(effect, creep.EFFECTS)]
-        missing = [*(reason for each in creeping for reason in creep.problems(each)), *static.inverse_problems()]
-        if missing:
+        self.parts = Parts.of(effects)
+        listed = [(part, effect) for part in PARTS for effect in self.parts.blocks[part.name]]
+        missing = [reason for part, effect in listed for reason in part.no_inverse(effect)]
+        if missing := [*missing, *static.inverse_problems()]:
             raise NotInvertibleError(missing)
         refused = [reason for effect in effects if (reason := refusal(effect, how.compensate))]
         if refused:
@@ -249,18 +199,14 @@ class Compensator:
         )
         self.actuator = Actuator(chain)
         self.blocks: list[Block] = [*drives, self.actuator, *outputs]
-        self.slew = self._called("slew_limit")
+        self.slew = self.parts.slew
         self.rest = 0.0  # rounding remainder of a slew-limited drive: it would add up over millions of steps
         self.ends: Sequence[tuple[float, float]] = ()
-        lags = [block for block in drives if isinstance(block, lag.UnevenLag)]
+        lags = [block for block in drives if isinstance(block, Leading)]
         self.braked = lags[0] if self.slew and len(lags) == 1 else None
-        self.parts = Parts.of(effects)
         if self.parts.turning(static.branches_differ):
             lags[0].rises, lags[0].always_led = lambda: self.actuator.rises, as_emitted
             self.actuator.led_by = lags[0]
-
-    def _called(self, name: str) -> list[Any]:
-        return [effect for effect in self.effects if effect.name == name]
 
     def drives(self, reference: Run, ends: tuple[float, float], asked: NDArray[np.bool_] | None = None) -> Array:
         """Drives (N,) within `ends` for the reference in `reference.v`; see `answers`."""
@@ -287,10 +233,9 @@ class Compensator:
         t, n = reference.t, len(reference.t)
         gains = self._gains(reference)
         targets = self._targets(reference, asked)
-        ageing_effects = self._called("ageing")
-        heating = [Heating(effect, n) for effect in self.effects if isinstance(effect, OwnHeat)]
+        following = self._following()
         v, beyond = np.empty(n), np.zeros(n)
-        travelled = self.rest = 0.0
+        self.rest = 0.0
         steps = np.diff(t).tolist() or [1.0]
         for k in range(n):
             seconds = steps[k - 1] if k else 0.0
@@ -307,30 +252,32 @@ class Compensator:
                     drive = before if k else min(max(self.actuator.drive, ends[0]), ends[1])
                     break
                 last = drive
-                way = travelled + (abs(drive - before) if k else 0.0)
                 y = float(targets[k])
-                for each in heating:
-                    y = each.solve(y, each.risen(before, drive, seconds))
-                drive = self._solve(y, gains, k, [ageing.gain(e, way) for e in ageing_effects])
+                for gain, offset in reversed(gains):
+                    y = (y - float(offset[k])) / float(gain[k])
+                for each in reversed(following):
+                    y = each.solve(y, before, drive, seconds)
+                drive = self._solve(y, k)
                 wanted = self._slewed(drive, before, seconds) if self.slew and k else drive
                 drive = min(max(wanted, ends[0]), ends[1])
                 beyond[k] = abs(wanted - drive)
-                if drive == last or not (ageing_effects or heating):
+                if drive == last or not following:
                     break
             x = drive
             for block in self.blocks:
                 x = block.absorb(x) if k else block.rest(x)
-            travelled += abs(drive - before) if k else 0.0
-            for each in heating:
+            for each in following:
                 each.move(before, drive, seconds)
             self.rest = next((rest for end, rest in self.ends if drive == end), 0.0)
             v[k] = drive
         return v, beyond
 
-    def _solve(self, y: float, gains: Sequence[tuple[Array, Array]], k: int, aged: Sequence[float]) -> float:
-        for gain, offset in reversed(gains):
-            y = (y - float(offset[k])) / float(gain[k])
-        y = y / math.prod(aged)
+    def _following(self) -> list[Following]:
+        """The gains that follow the drive, from its start on."""
+        listed = [(part, effect) for part in BEHIND for effect in self.parts.blocks[part.name]]
+        return [each for part, effect in listed if (each := part.following(effect))]
+
+    def _solve(self, y: float, k: int) -> float:
         for block in reversed(self.blocks):
             y = block.solve(y) if k else block.resting(y)
         return y
@@ -350,16 +297,16 @@ class Compensator:
         ahead = reference.t + self.parts.delay
         extra = {name: np.interp(ahead, reference.t, column) for name, column in reference.extra.items()}
         later = Run(reference.t, reference.v, extra)
-        logged = [effect for effect in self._called("thermal") if effect.columns]
+        logged = [effect for effect in self.effects if effect.place is Place.GAIN and effect.columns]
         return [(effect.gain(later), effect.offset(later)) for effect in logged]
 
     def _targets(self, reference: Run, asked: NDArray[np.bool_]) -> Array:
         """The output (N,) that creep, or the gain behind it, has to reach at each sample to follow the reference."""
         wanted = reference.v - self.static.output_offset
-        for effect in self._called("drift"):
+        for effect in (each for part in BESIDE for each in self.parts.blocks[part.name]):
             wanted = wanted - np.where(asked, effect.added(reference), 0.0)
-        for effect in reversed(self._called("saturation")):
-            wanted = unsaturated(effect, wanted)
+        for each in reversed(self.parts.maps):
+            wanted = each.undone(wanted)
         t, how = reference.t, self.how
         modes = self.parts.modes if how.resonance != "none" else []
         if not (modes or how.corner or how.noise_gain or how.drive_hold == "held" or how.preview is not None):

@@ -662,7 +662,7 @@ class FixedCurve:
         todo = list(itertools.pairwise(sorted(knots)))[::-1]
         while todo:
             a, b = todo.pop()
-            piece, miss = self._fit(a, b)
+            piece, miss = self._fit(a, b, allowed)
             if b - a > 1 and (miss > allowed or max(map(abs, piece.coefficients)) > TABLE_MAX):
                 if len(self.pieces) + len(todo) > MOST_PIECES:
                     message = "bends too sharply for fixed point over input_range; narrow the range or use float32"
@@ -675,7 +675,8 @@ class FixedCurve:
         # each coefficient and each product is rounded; a quarter more for errors between the samples
         self.error = 1.25 * self.fit_error + degree + 0.5
 
-    def _fit(self, a: int, b: int) -> tuple[_Piece, float]:
+    def _fit(self, a: int, b: int, allowed: float) -> tuple[_Piece, float]:
+        """The piece from a up to b, and its sampled error, or the first that is more than allowed."""
         if b - a == 1:
             first = round(self.function(float(a)))
             kept = _kept(first)
@@ -692,6 +693,8 @@ class FixedCurve:
             for coefficient in reversed(c):
                 value = coefficient + h * value
             miss = max(miss, abs(self.function(a + h * whole) - value))
+            if miss > allowed:
+                break
         first, *others = map(round, c)
         kept = _kept(first)
         return _Piece(a, scale, (kept, *others)), miss + abs(first - kept)

@@ -4,7 +4,7 @@ double precision over sampled signals."""
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from hystgen.effects.kinds import OwnBlock
 
 
-class Kind(NamedTuple):
+class Engines(NamedTuple):
     """One kind of arithmetic: the functions of its memoryless part, and forward and inverse operator in engine loop, in
     engine corners without a memoryless part and with one."""
 
@@ -52,12 +52,12 @@ class Kind(NamedTuple):
     corners: tuple[tuple[Operations, Operations], tuple[Operations, Operations]]
 
 
-KINDS = (
-    Kind(
+ENGINES = (
+    Engines(
         compensator, step_float.OPERATIONS,
         ((forward.OPERATIONS, inverse.OPERATIONS), (forward_front.OPERATIONS, inverse_front.OPERATIONS)),
     ),
-    Kind(
+    Engines(
         curve, step_fixed.OPERATIONS,
         ((forward_fixed.OPERATIONS, inverse_fixed.OPERATIONS),
          (forward_fixed.OPERATIONS, inverse_front_fixed.OPERATIONS)),
@@ -68,15 +68,15 @@ KINDS = (
 
 def front(t: Tables | FixedTables | ChainTables) -> ModuleType:
     """The module with the functions of the memoryless part, for the arithmetic of given tables."""
-    return KINDS[t.fixed].front
+    return ENGINES[t.fixed].front
 
 
 def operations(t: Tables | FixedTables | ChainTables, inverse: bool) -> Operations:
     """The functions of one operator in the bit reference, for the arithmetic and the engine of given tables."""
     fixed = t.fixed
     if isinstance(t, Tables | FixedTables):
-        kind = KINDS[fixed]
-        return (kind.loop if t.engine == LOOP else kind.corners[t.has_front])[inverse]
+        found = ENGINES[fixed]
+        return (found.loop if t.engine == LOOP else found.corners[t.has_front])[inverse]
     from hystgen.compensator.chain.layout import OwnChainTables
 
     drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
@@ -117,7 +117,7 @@ def samples(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[A
     return found
 
 
-def nearest(t: Tables | FixedTables | ChainTables, x: ArrayLike | Sequence[Any]) -> NDArray[Any]:
+def nearest(t: Tables | FixedTables | ChainTables, x: ArrayLike) -> NDArray[Any]:
     """The numbers nearest to the given ones that a call takes as arguments."""
     if t.fixed:
         most = int(t.limits[CODE_MAX])

@@ -34,7 +34,7 @@ from hystgen.records import Record, Source, agreed_units, in_units, read_records
 if TYPE_CHECKING:
     from hystgen.cascade import Cascade
     from hystgen.model import ModelSource
-    from hystgen.parameters.files import Parameters
+    from hystgen.parameters.schema import Parameters
 
 Array = NDArray[np.float64]
 History = tuple[float, ...] | None

@@ -8,7 +8,7 @@ from __future__ import annotations
 import functools
 import importlib
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from hystgen.effects.base import About as About
@@ -39,6 +39,25 @@ _FIRST = (
 """The order in which messages and searches name effects; any others follow by the alphabet."""
 
 
+BEND, LIMIT = "asymmetry", "saturation"
+"""Effects that a memoryless front in `model.memoryless` can have: it bends, or its ends are flatter. The first has no
+folder, the second has one for a limit behind the plays."""
+
+FRONTS = BEND, LIMIT
+
+TOLD_APART = {
+    frozenset(("creep", "drift")): "record holds of a minute after moves both ways: creep follows the last move",
+    frozenset(("lag", "delay")): "record full steps with three samples or more to the edge: a lag has a tail",
+    frozenset(("lag", "resonance")): "record steps or a sweep: a resonance rings and has a peak",
+    frozenset(("lag", "rate_dependence")): "record small loops at high rate with reversals: a lag opens them",
+    frozenset((BEND, "sensor_nonlinearity")): "record wide and nested loops: a sensor's curve is a line over y",
+}
+"""Experiments that separate two effects."""
+
+Unmeasured = Literal["drift", "self_heating"]
+"""What a compensator follows open loop, where it is asked to, since nothing measures it."""
+
+
 def _catalogue() -> tuple[str, ...]:
     found = [path.parent.name for path in Path(__file__).parent.glob("*/model.py")]
     return tuple(sorted(found, key=lambda name: (_FIRST.index(name) if name in _FIRST else len(_FIRST), name)))
@@ -60,20 +79,7 @@ _PLACES = {
     "product": "kinds",
 }
 
-__all__ = [
-    "CATALOGUE",
-    "About",
-    "Candidate",
-    "Effect",
-    "OwnBlock",
-    "Place",
-    "Run",
-    "decays",
-    "follow",
-    "load_user_effects",
-    "product",
-    "shapes",
-]
+__all__ = [*_PLACES, "BEND", "CATALOGUE", "FRONTS", "LIMIT", "TOLD_APART", "Unmeasured", "shapes"]
 
 
 @functools.cache

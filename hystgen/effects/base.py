@@ -233,6 +233,8 @@ class Effect(BaseModel):
     """whether the times of the samples matter"""
     pointwise: ClassVar[bool] = False
     """whether the answer of `bent` or `mapped` depends only on the sample itself, not on the run"""
+    slews: ClassVar[bool] = False
+    """whether it limits the rate of the drive, to its numbers `rate` and `falling_rate`"""
     columns: ClassVar[tuple[str, ...]] = ()
     """further columns that a record needs"""
     fades: ClassVar[bool] = False
@@ -247,6 +249,15 @@ class Effect(BaseModel):
     """how far a compensator can take the effect out"""
     compensation: ClassVar[str] = ""
     """how, one clause"""
+    mistaken: ClassVar[Mapping[str, tuple[str, str]]] = {}
+    """doubts about an inverse where records could not tell the effect from another fault: by the name of that one, if
+    it was taken, and if this effect was"""
+    shown_by: ClassVar[Mapping[str, int]] = {}
+    """records of a plan that show it, and its place among the effects that a record shows, 1 for the plainest"""
+    rank: ClassVar[float] = math.inf
+    """which of several effects that explain the records equally well is named: the one of lowest rank"""
+    from_start: ClassVar[bool] = False
+    """whether it counts the seconds from the first sample"""
     block: ClassVar[OwnBlock | None] = None
     """compensator of a user's own effect; the catalogue's compensators are in their folders"""
 
@@ -269,6 +280,10 @@ class Effect(BaseModel):
     def dead_time(self) -> float:
         """DRIVE: seconds before a change of the drive shows at all."""
         return 0.0
+
+    def corrected(self, resonance: str) -> str:
+        """How a compensator takes the effect out, one clause; `resonance`: what `emit.compensation.resonance` says."""
+        return self.compensation
 
     def time_scale(self, drive_range: float) -> float:
         """Longest time constant in s, or duration of a move over the drive's range; 0 for an effect without either, inf

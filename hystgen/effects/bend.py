@@ -1,4 +1,4 @@
-"""Curves between signals in fixed point, as pieces of polynomials: `bend.c`."""
+"""Curves between signals in fixed point, as pieces of polynomials: `maps.c`."""
 
 from __future__ import annotations
 

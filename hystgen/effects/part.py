@@ -5,15 +5,15 @@ from __future__ import annotations
 import functools
 import importlib
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.effects.base import Array, Place
+from hystgen.effects.base import Array, Block, Effect, Place
 from hystgen.effects.kinds import Constants, Kind
 
 Function = Callable[..., Any]
@@ -22,7 +22,8 @@ Function = Callable[..., Any]
 class Led(NamedTuple):
     """How to lead the only block in front of the plays where the blocks behind it depend on its way: its state, the
     input for an output, the input that is kept, the output of an input, the shortfall of a move in its first sample;
-    and the input that does not overshoot behind a slew limit, found by `halves` halvings."""
+    and the input that does not overshoot behind a slew limit, found by `halves` halvings in floating point, and in
+    fixed point among numbers up to `coarse`."""
 
     state: Function
     solve: Function
@@ -31,6 +32,31 @@ class Led(NamedTuple):
     missed: Function
     braked: Function
     halves: int = 0
+    coarse: int = 0
+
+
+@runtime_checkable
+class Leading(Protocol):
+    """The block that `Led` leads, in double precision. `rises`: the direction of arrival, where two branches follow;
+    with `always_led` it is then led however short a step is; `exact`: whether it is not led in this step; `patience`:
+    share of the way to the other branch that it falls short in the first sample of a turn; `braked`: the drive at which
+    it does not overshoot, from the nearest in reach, `short` of the answer."""
+
+    rises: Callable[[], bool] | None
+    always_led: bool
+    exact: bool
+
+    @property
+    def patience(self) -> float: ...
+    def braked(self, near: float, short: float, falling: float, rising: float) -> float: ...
+
+
+class Following(Protocol):
+    """A gain behind the plays that follows the drive, in double precision at steps of any length: the input that gives
+    the output y if the drive goes from `before` to `drive`, and that it has gone there; NaN before the first sample."""
+
+    def solve(self, y: float, before: float, drive: float, seconds: float) -> float: ...
+    def move(self, before: float, drive: float, seconds: float) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -311,14 +337,31 @@ class Realized:
     beside: Callable[[Any], Iterable[Constants | None]] = lambda _: ()
 
 
-def late(effect: str, name: str = "ARITHMETIC") -> Callable[[], Realized]:
+class Setting(NamedTuple):
+    """What decides whether the C can include an effect: all effects of its part in order, those up to a slew limit, the
+    operator, the length of a step, the `ends` of the drive's range, and whether the arithmetic is fixed point."""
+
+    listed: Sequence[Effect]
+    slewed: Sequence[Effect]
+    operator: str
+    seconds: float
+    ends: tuple[float, float]
+    whole: bool
+
+
+class Unmeasured(NamedTuple):
+    """An effect that nothing measures, which is compensated only if `emit.compensation.compensate` lists its `key`:
+    why the C does not include it otherwise, and why a known reference does not help."""
+
+    key: str
+    emitted: str
+    known: str
+
+
+def late(effect: str, name: str = "ARITHMETIC") -> Callable[[], Any]:
     """A loader for the fixed-point version of an effect, which imports it when called."""
 
-    def realized() -> Realized:
-        found: Realized = getattr(importlib.import_module(f"hystgen.effects.{effect}.fixed"), name)
-        return found
-
-    return realized
+    return lambda: getattr(importlib.import_module("hystgen.effects." + effect + ".fixed"), name)
 
 
 def called(name: str, only: Callable[[Any], bool] | None = None) -> Callable[[Any], bool]:
@@ -333,13 +376,22 @@ def given(place: Place) -> Callable[[Any], bool]:
 
 @dataclass(frozen=True)
 class ChainPart:
-    """One kind of block. `name`: in C; `words`: in messages; `takes`: whether it is the block of an effect; `one`:
-    makes a block from an effect, a step length, and whether it may be `turning`; `calls`: of the interface that it
-    serves; `forward`: only the forward operator has it; `joined`: all of them form one block; `kinds`: in its C, in
-    floating point; `coded`: loads its fixed-point version, for models in fixed point."""
+    """One kind of block. `name`: in C; `words`: in messages; `place`: in the chain; `takes`: whether it is the block of
+    an effect; `one`: makes a block from an effect, a step length, and whether it may be `turning`; `calls`: of the
+    interface that it serves; `forward`: only the forward operator has it; `joined`: all of them form one block;
+    `kinds`: in its C, in floating point; `coded`: loads its fixed-point version, for models in fixed point.
+
+    `longest`: the longest travel that can be set, in its tables. `problems`: why the C cannot include an effect;
+    `unmeasured`: if nothing measures it; `code`: parts of its code in `hystgen.compensator.chain.costs`, and `counted`:
+    how many of each there are in its tables, by default its blocks.
+
+    In double precision at steps of any length: `uneven` makes the block of an effect, `following` that of one behind
+    the plays that follows the drive; `no_inverse`: why there is no inverse.
+    """
 
     name: str
     words: str
+    place: Place
     takes: Callable[[Any], bool]
     one: Callable[[Any, float, bool], Any]
     floating: Realized
@@ -348,6 +400,14 @@ class ChainPart:
     forward: bool = False
     joined: bool = False
     kinds: tuple[Kind, ...] = ()
+    longest: Callable[[Any], float] | None = None
+    problems: Callable[[Any, Setting], Iterator[str]] = lambda *_: iter(())
+    unmeasured: Unmeasured | None = None
+    code: tuple[str, ...] = ()
+    counted: Callable[[Any, int], Iterable[int]] = lambda _, blocks: (blocks,)
+    uneven: Callable[[Any], Block | None] = lambda _: None
+    following: Callable[[Any], Following | None] = lambda _: None
+    no_inverse: Callable[[Any], Iterable[str]] = lambda _: ()
 
     @functools.cached_property
     def fixed(self) -> Realized:

@@ -13,6 +13,7 @@ from hystgen.basics import arguments, writing
 from hystgen.basics.problems import FormatError, NotInvertibleError
 from hystgen.basics.problems import Path as Key
 from hystgen.compensator import engines
+from hystgen.effects import CATALOGUE, shapes
 from hystgen.emission import module
 from hystgen.emission.options import LAYOUTS, OPERATORS, Options
 from hystgen.model import Model, ModelSource, as_model, check_arithmetic
@@ -108,18 +109,13 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
 def doubts(model: Model) -> list[str]:
     """Possible faults of an inverse: the diagnosis could not separate the stage from its sensor, or the drive may not
     come to rest."""
-    named, advice = model.parameters.not_separable, "Record wide and nested loops, or with another sensor"
+    advice = "Record wide and nested loops, or with another sensor, and diagnose again"
+    present = {*(effect.name for effect in model.effects), *["asymmetry"] * bool(model.cascade.stages)}
     found = []
-    if ("asymmetry", "sensor_nonlinearity") in named and model.cascade.stages:
-        found.append(
-            "the memoryless part was diagnosed as asymmetry, and the records could not tell it from a curved sensor; "
-            f"if it is the sensor's, the inverse bends the true motion. {advice}, and diagnose again"
-        )
-    if ("sensor_nonlinearity", "asymmetry") in named and any(e.name == "sensor_nonlinearity" for e in model.effects):
-        found.append(
-            "the sensor was diagnosed as curved, and the records could not tell that from an asymmetry of the stage; "
-            f"if it is the stage's, the inverse leaves it as it is. {advice}, and diagnose again"
-        )
+    for taken, other in model.parameters.not_separable:
+        for name, fault, which in ((other, taken, 0), (taken, other, 1)):
+            mistaken = shapes(name)[0].mistaken if taken in present and name in CATALOGUE else {}
+            found += [f"{mistaken[fault][which]} {advice}"] * (fault in mistaken)
     if model.effects and (reach := _swing(model)):
         found.append(
             "an effect of your own leads the drive in front of two branches of the memoryless part, between which it "

@@ -3,7 +3,7 @@ themselves are in `c_runtime/` and in the folders of effects."""
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -98,7 +98,7 @@ def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
 
 MOVES = ("play", "dilated", "relaxing", "dashpot")
 BENDS = ("none", "polynomial", "centre")
-"""Files of the run time for how plays move and are bent, by the codes of `hystgen.compensator.chain.moving`."""
+"""Files of the run time for how plays move and are bent, by the codes of `hystgen.effects.plays`."""
 
 
 SETTINGS = {
@@ -204,7 +204,7 @@ def effects(
 
 def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[Stage]) -> Glue:
     """The glue of a model with effects."""
-    from hystgen.compensator.chain import moving
+    from hystgen.effects.plays import DASHPOT
 
     t, chain = compiled.tables, Chain.of(compiled.tables, operators)
     shape = Shape.of(t, form)
@@ -217,7 +217,7 @@ def glue(compiled: Compiled, operators: Sequence[str], form: Form, behind: Seque
     calls = {"forward": every, "inverse": [*every, "expected", "correct", *(["push"] * (len(t.tap) > 0))]}
     searched = t.moving.used and not t.moving.scanned
     n = len(t.threshold) - 1
-    kept = n * (t.moving.moves == moving.DASHPOT)
+    kept = n * (t.moving.moves == DASHPOT)
     fields = {op: instance(op, shape, chain.blocks(op), n, kept, searched) for op in operators}
     return Glue(fields, "\n".join(functions), calls)
 
@@ -293,7 +293,12 @@ def _functions(
         absorbed = f"    hystgen_steady_absorb(&self->steady, &{place}, before);\n"
     elif quiet:
         settled, absorbed = "    hystgen_quiet_rest(&self->quiet, v);\n", "    self->quiet.arrived = v;\n"
-    kinds = {name: [block for block in after if block.kind.name == name] for name in ("gain", "ageing", "heat")}
+    from hystgen.compensator.chain.parts import PARTS
+
+    moved = {kind.name for part in PARTS if part.floating.verbs.move for kind in part.kinds}
+    kinds: defaultdict[str, list[Block]] = defaultdict(list)
+    for block in after:
+        kinds[block.kind.name].append(block)
 
     def offset(lead: str) -> str:
         drifts = "".join(f" + hystgen_clock_drift({each.table}, &self->{each.name}, {lead})" for each in clocks)
@@ -301,11 +306,11 @@ def _functions(
 
     return template(
         "chain.c.j2", op=op, inverse=inverse, before=before, after=after, behind=behind, clocks=clocks,
-        rubbing=[each for each in rubbing if each], gains=kinds["gain"], ageing=kinds["ageing"], heat=kinds["heat"],
+        rubbing=[each for each in rubbing if each], kinds=kinds,
         turning=turning, quiet=quiet, settled=settled, absorbed=absorbed, seen=seen, offset=offset,
         solve="braked" if t.braked else "solve", counted="" if quiet else "const ",
         lead=f"self->filled ? self->{clocks[0].name}.lead : 0" if clocks and t.taps else "0",
         displacing=t.form.apart if behind or clocks else "static",
-        travelling=t.form.apart if clocks or kinds["heat"] or kinds["ageing"] else "static",
+        travelling=t.form.apart if clocks or any(block.kind.name in moved for block in after) else "static",
         warming=["hystgen_heat_way(self->applied, v)" if each is None else each.warming() for each in rubbing],
     )

@@ -17,7 +17,7 @@ from hystgen.plays import slots
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables
-    from hystgen.compensator.chain.moving import FixedMovingTables, MovingTables
+    from hystgen.effects.plays import FixedMovingTables, MovingTables
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ def estimate(cascade: StaticModel, options: Options, numbers: AnyTables, data: D
     if not isinstance(numbers, Tables | FixedTables):
         from hystgen.compensator.chain import costs
 
-        parts = {op: costs.parts(numbers, op) for op in options.operators}
+        parts = {op: costs.found(numbers, op) for op in options.operators}
         products = chain_products(numbers)
         worst = [(op, f"{words}; effects: {products[op]} multiplications") for op, words in worst]
         for op in options.operators:
@@ -224,19 +224,17 @@ def _refined(t: ChainTables) -> bool:
 def chain_products(t: ChainTables) -> dict[str, int]:
     """Multiplications in one step of the blocks in front of the plays and behind them, for each operator."""
     from hystgen.compensator.chain import blocks
-    from hystgen.effects.lag import compensator as lag
-    from hystgen.effects.saturation.fixed import Saturations
+    from hystgen.compensator.chain.parts import LED, PARTS
 
-    counts, behind = _counts(t), t.behind
-    kinds = list(map(int, behind.stage_kind))
-    envelope = behind.bends.coefficient.shape[1] if isinstance(behind, Saturations) else 2
+    counts, kinds = _counts(t), t.behind.kinds
     envelopes = kinds.count(slots.TANH)
-    stages = counts.factor * (len(kinds) - envelopes) + envelopes * envelope
+    stages = counts.factor * (len(kinds) - envelopes) + envelopes * t.behind.products
     everything, inverse = blocks.every(t, "forward"), blocks.every(t, "inverse")
     forward = sum(each.products[0] for each in everything) + counts.factor * bool(t.of("wait").samples)
     both = sum(sum(each.products) for each in inverse)
     once, halving = counts.braked
-    led = t.braked * (once + halving * lag.HALVES) + counts.factor * (t.turning + len(t.tap))
+    found = PARTS[LED].floating.verbs.led
+    led = t.braked * (once + halving * (found.halves if found else 0)) + counts.factor * (t.turning + len(t.tap))
     return {"forward": forward + stages, "inverse": both + led + stages}
 
 
@@ -297,7 +295,7 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
     Plain plays follow and are solved for one by one. Plays that an effect moves or bends in its own way are searched
     for: each bisection sums up all of them.
     """
-    from hystgen.compensator.chain import moving
+    from hystgen.effects import plays
 
     m, counts, inverse = t.moving, _counts(t), op == "inverse"
     factor, more = counts.factor, counts.factor - 1  # one more comparison if a product with a factor has two parts
@@ -310,12 +308,12 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
         return products + 2 * refined, per_play + refined, compares + 12 * refined, looked + 3 * refined, 0
     yields = len(m.yields).bit_length() + 3 + 2 * more
     moved, kept = {
-        moving.DILATED: ((factor, 3 + more), (0, 0)),
-        moving.RELAXING: ((factor, 2 + more), (factor, 2 + more)),
-        moving.DASHPOT: ((factor + 3 + more, yields), (0, 0)),
+        plays.DILATED: ((factor, 3 + more), (0, 0)),
+        plays.RELAXING: ((factor, 2 + more), (factor, 2 + more)),
+        plays.DASHPOT: ((factor + 3 + more, yields), (0, 0)),
     }.get(m.moves, ((0, 2), (0, 0)))
     bent, looked, tanh, sums, halved = _bent(m)
-    twice = 1 + (m.moves == moving.RELAXING)  # a play's contribution, and where it will rest
+    twice = 1 + (m.moves == plays.RELAXING)  # a play's contribution, and where it will rest
     sums, halved = sums * inverse, halved * inverse
     return (
         sums + 1 + halved,
@@ -329,14 +327,13 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
 def _bent(m: MovingTables | FixedMovingTables) -> tuple[int, int, int, int, int]:
     """Multiplications, comparisons and tanh of a bend per play; sums over the plays in a search, and multiplications of
     its halvings."""
-    from hystgen.compensator.chain import moving
-    from hystgen.compensator.chain.moving import FixedMovingTables
+    from hystgen.effects import plays
 
-    straight = m.bends == moving.STRAIGHT
-    if isinstance(m, FixedMovingTables):
+    straight = m.bends == plays.STRAIGHT
+    if isinstance(m, plays.FixedMovingTables):
         sums = 3 + (2 * m.farthest).bit_length()
         if straight:
             return 0, 0, 0, sums, 0
         return m.bump.coefficient.shape[1], int(max(m.bump.pieces)).bit_length() + 5, 0, sums, 0
-    bent = 0 if straight else m.curve.shape[1] + 3 if m.bends == moving.POLYNOMIAL else 2
-    return bent, 0, int(m.bends == moving.CENTRE), 1 + m.halves, m.halves
+    bent = 0 if straight else m.curve.shape[1] + 3 if m.bends == plays.POLYNOMIAL else 2
+    return bent, 0, int(m.bends == plays.CENTRE), 1 + m.halves, m.halves

@@ -127,7 +127,7 @@ class Fixed(Form):
         )
 
     def behind(self, t: ChainTables, options: Options, writer: Writer) -> list[Stage]:
-        return [_saturation(t, j, writer.own) for j in range(len(t.behind.stage_kind))]
+        return [_saturation(t, j, writer.own) for j in range(len(t.behind.kind))]
 
     def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[Table], list[Macro]]:
         from hystgen.compensator.chain import moving
@@ -372,7 +372,7 @@ def _bumps(t: FixedMovingTables, writer: Writer) -> list[Table]:
 def _saturation(t: ChainTables, j: int, writer: Writer) -> Stage:
     """A stage of saturation behind the plays."""
     behind, own = t.behind, f"behind_{j + 1}"
-    if behind.stage_kind[j] == slots.DEAD_ZONE:
+    if behind.kind[j] == slots.DEAD_ZONE:
         lower, upper, *over = behind.piece[j]
         row = f"    {literal(lower)}, {literal(upper)}, {entries(over, 'ff')},"
         return Stage("stops", (writer.lines("stops_t", own, [row]),), f"&hystgen_{own}")

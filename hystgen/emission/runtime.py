@@ -21,6 +21,7 @@ from typing import ClassVar
 import jinja2
 
 from hystgen.arithmetic import FIXED, FLOATING, Arithmetic
+from hystgen.effects import sources
 from hystgen.emission import folding
 
 FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")
@@ -39,48 +40,7 @@ FLOAT_KERNELS = (
     "plays/loop_solve.c",
 )
 CHAIN_TYPES = ("compensator/chain/tables.h", "compensator/chain/state.h")
-CHAIN_BLOCKS = (
-    "effects/creep/creep.c",
-    "effects/lag/lag.c",
-    "effects/lag/exact.c",
-    "effects/lag/braked.c",
-    "effects/ageing/ageing.c",
-    "effects/thermal/heat.c",
-    "effects/thermal/gain.c",
-    "effects/resonance/mode.c",
-    "effects/drift/clock.c",
-    "effects/thermal/friction.c",
-    "effects/delay/delay.c",
-    "effects/delay/preview.c",
-    "compensator/chain/drive_signal.c",
-    "effects/lag/quiet.c",
-    "arithmetic/product.c",
-    "effects/lag/steady.c",
-)
 FIXED_CHAIN_TYPES = ("compensator/chain/tables_fixed.h", "compensator/chain/state_fixed.h")
-FIXED_CHAIN_BLOCKS = (
-    "arithmetic/factors.c",
-    "effects/creep/creep_fixed.c",
-    "effects/lag/lag_fixed.c",
-    "effects/lag/exact.c",
-    "effects/lag/braked_fixed.c",
-    "effects/thermal/gain_fixed.c",
-    "effects/ageing/ageing_fixed.c",
-    "effects/thermal/friction.c",
-    "effects/thermal/heat.c",
-    "effects/resonance/mode.c",
-    "effects/drift/clock.c",
-    "effects/delay/delay.c",
-    "effects/delay/preview.c",
-    "compensator/chain/drive_signal.c",
-    "effects/lag/quiet.c",
-    "effects/bend.c",
-    "effects/saturation/stops.c",
-    "arithmetic/product.c",
-    "effects/lag/steady_fixed.c",
-)
-"""Files that models with effects carry themselves, even with a shared run time, callees before callers."""
-
 SIGNALS = {
     "hystgen_signal_t": "hystgen_sum_t", "hystgen_fine_t": "hystgen_play_t", "hystgen_travel_t": "hystgen_sum_t",
 }
@@ -117,10 +77,10 @@ class Family(ABC):
     without effects in engine loop.
 
     `kind`: the kind of arithmetic, in names of files; `ending`: of files whose floating-point names have none;
-    `chain_types`, `chain_blocks`: files of effects; `curves`: of a memoryless part whose stages are not called one by
-    one; `codes`: of codes; `moves_apart`: whether moving and bending plays takes less stack in separate functions;
-    `opening`: headers before all code of a file, which in a single header stand between `opening_apart` and `closing`,
-    so that its user's code is compiled as before.
+    `chain_types`: types of effects; `helpers`: files that several effects call; `curves`: of a memoryless part whose
+    stages are not called one by one; `codes`: of codes; `moves_apart`: whether moving and bending plays takes less
+    stack in separate functions; `opening`: headers before all code of a file, which in a single header stand between
+    `opening_apart` and `closing`, so that its user's code is compiled as before.
     """
 
     arithmetic: Arithmetic
@@ -131,9 +91,9 @@ class Family(ABC):
     ending: ClassVar[str]
     moves_apart: ClassVar[bool]
     chain_types: ClassVar[tuple[str, ...]]
-    chain_blocks: ClassVar[tuple[str, ...]]
     curves: ClassVar[tuple[str, ...]]
     codes: ClassVar[tuple[str, ...]]
+    helpers: ClassVar[tuple[str, ...]] = ()
     opening: ClassVar[tuple[str, ...]] = ()
     opening_apart: ClassVar[tuple[str, ...]] = ()
     closing: ClassVar[tuple[str, ...]] = ()
@@ -206,6 +166,13 @@ class Family(ABC):
         return (f"plays/state_{self.kind}.h",)
 
     @property
+    def chain_blocks(self) -> tuple[str, ...]:
+        """The files of blocks, which models with effects carry themselves, even with a shared run time; callees before
+        callers."""
+        blocks, drives = (sources.files(use, self.ending) for use in ("blocks", "drives"))
+        return (*self.helpers, *blocks, "compensator/chain/drive_signal.c", *drives, "arithmetic/product.c")
+
+    @property
     @abstractmethod
     def kernel_files(self) -> tuple[str, ...]:
         """The files of its kernels, callees before callers."""
@@ -223,7 +190,7 @@ class FloatFamily(Family):
     """Floating point: one type for every number."""
 
     kind, ending, moves_apart = "float", "", False
-    chain_types, chain_blocks, curves, codes = CHAIN_TYPES, CHAIN_BLOCKS, (), ()
+    chain_types, curves, codes = CHAIN_TYPES, (), ()
     opening = ("arithmetic/rounding_begin.h",)
     opening_apart = ("arithmetic/rounding_push.h",)
     closing = ("arithmetic/rounding_end.h",)
@@ -254,7 +221,7 @@ class FixedFamily(Family):
     """Fixed point."""
 
     kind, ending, moves_apart = "fixed", "_fixed", True
-    chain_types, chain_blocks = FIXED_CHAIN_TYPES, FIXED_CHAIN_BLOCKS
+    chain_types, helpers = FIXED_CHAIN_TYPES, ("arithmetic/factors.c", "effects/gains.c", "effects/maps.c")
     curves, codes, kernel_files = ("front/front.c",), ("compensator/code.c",), FIXED_KERNELS
 
     @property
@@ -353,27 +320,24 @@ class Variant:
 
     def _chain(self) -> tuple[str, ...]:
         """The files of a chain except its blocks: for a model with effects, or for engine loop."""
-        chain, moving = "compensator/chain/", "effects/rate_dependence/"
+        chain, files = "compensator/chain/", sources.files
         loops, solve, refined = self.engine == "loop", f"{chain}plays_solve.c", f"{chain}refined_input.c"
         if not loops:
             plays: tuple[str, ...] = (refined, f"{chain}corners_{self.family.kind}.c")
         elif not self.moves:
             plays = (solve, f"{chain}plays.c", refined)
         elif not self.bends:
-            plays = (f"{moving}stretch.c", f"{moving}relaxing.c", solve, f"{moving}relaxing_plays.c", refined)
+            plays = (solve, *files(f"{self.moves} alone"), refined)
         else:
-            before = {"relaxing": (f"{moving}stretch.c",), "dashpot": (f"{moving}yield.c",)}.get(self.moves, ())
-            moved = f"{moving}{'dashpot' if self.moves == 'dashpot' else 'moved'}.c"
-            plays = (*before, "effects/noncongruent/bent.c", moved, f"{chain}moving_plays.c", f"{chain}moving_search.c",
-                     refined)
-        brake = ("effects/slew_limit/brake.c",) if self.braked else ()
+            moved = (*files("bends"), *files(self.moves))
+            plays = (*moved, f"{chain}moving_plays.c", f"{chain}moving_search.c", refined)
+        brake = files("brake") if self.braked else ()
         entered = () if self.chain else (f"{chain}drive_signal.c",)
-        limits = ("effects/delay/forward.c", "effects/slew_limit/slewed.c")
-        signals = (*limits, *entered, f"{chain}signals.c", *brake)
+        signals = (*files("limits"), *entered, f"{chain}signals.c", *brake)
         start = (*("compensator/loop_start.c",) * loops, f"{chain}chain_start.c")
-        ageing = ("effects/ageing/calls.c",) if self.ages else ()
         settings = (f"{chain}settings.c",) if self.chain else ()
-        calls = (f"{chain}chain.c", *start, f"{chain}chain_calls.c", *settings, *ageing)
+        travel = files("calls") if self.ages else ()
+        calls = (f"{chain}chain.c", *start, f"{chain}chain_calls.c", *settings, *travel)
         return (*signals, *plays, *calls)
 
     def _corners(self) -> tuple[str, ...]:

@@ -83,7 +83,7 @@ def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
     """An argument of a setting, in fixed point before it is rounded to a code; every third one exceeds its limits, if
     any."""
     from hystgen.compensator.chain.fixed_tables import setting_codes
-    from hystgen.effects.ageing import compensator as ageing
+    from hystgen.compensator.chain.parts import PARTS
 
     degree, one = setting_codes(t)
     drive_low, drive_high, low, high = (float(end) for end in t.limits[: slots.OUTPUT_MAX + 1])
@@ -97,7 +97,7 @@ def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
     if call == "set_gain":
         return one * (1.0 + way)
     if call == "set_travel":
-        return abs(way) * float(t.of("ageing").number[0, ageing.LAST])
+        return abs(way) * next(part.longest(t.of(part.name)) for part in PARTS if part.longest)
     return low + (0.5 + way) * (high - low)
 
 
@@ -121,7 +121,7 @@ def _samples(one: Compensator, inverse: bool, settings: Sequence[str]) -> list[S
             calls.append(SETTINGS[call])
             argument = _setting(numbers, one.form, call, i // 11 // len(settings))
             arguments.append(argument)
-    x = reference.nearest(numbers, arguments)
+    x = reference.nearest(numbers, np.array(arguments))
     op = np.array(calls, dtype=np.uint8)
     op[:-1:2] |= slots.OP_UNREAD  # so that bits have to persist until they are read
     answers, status = reference.answers(numbers, inverse, op, x, compiled=False)

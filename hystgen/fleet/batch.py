@@ -31,7 +31,7 @@ from hystgen.basics.progress import Progress
 from hystgen.basics.version import __version__
 from hystgen.emission.calls import emit_options
 from hystgen.fleet import outliers, workers
-from hystgen.fleet.workers import Result, Task
+from hystgen.fleet.workers import Task, UnitResult
 from hystgen.identification import settings
 from hystgen.identification.settings import Settings
 from hystgen.records import FORMATS, Record, several, write_atomically
@@ -327,7 +327,7 @@ def _kept(folder: Path, job: _Job) -> Unit | None:
     return Unit(job.unit, job.file, True, "", figures, job.key, kept=True)
 
 
-def _keep(folder: Path, job: _Job, result: Result) -> Unit:
+def _keep(folder: Path, job: _Job, result: UnitResult) -> Unit:
     """Write the files of a unit and, last, the note that it is done."""
     message = result.message
     try:
@@ -366,7 +366,7 @@ def _bytes(path: str) -> bytes | None:
 
 def _here(
     tasks: Iterator[Task], number: int, jobs: int | None, options: Mapping[str, object]
-) -> Generator[Result, None, None]:
+) -> Generator[UnitResult, None, None]:
     """Results from this machine, once its cache of compiled functions is filled."""
     import joblib
 

@@ -65,7 +65,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Result:
+class UnitResult:
     """The result of a task: text of the parameter file, C files by name, figures; `message` says what failed."""
 
     unit: str
@@ -75,13 +75,14 @@ class Result:
     figures: Mapping[str, object] = field(default_factory=dict)
 
 
-Work = Callable[[Task], Result]
+Work = Callable[[Task], UnitResult]
 
 
-def fit_unit(task: Task) -> Result:
+def fit_unit(task: Task) -> UnitResult:
     """Fit and emit one unit. Never raises an Exception: a failure becomes the result's message."""
     if task.version != __version__:
-        return Result(task.unit, f"the worker has hystgen {__version__}, not {task.version}; install the same version")
+        what = f"the worker has hystgen {__version__}, not {task.version}; install the same version"
+        return UnitResult(task.unit, what)
     with writing.temporary() as folder:
         paths = {}
         for k, (path, data) in enumerate((*task.records, *task.holdout)):
@@ -97,10 +98,10 @@ def fit_unit(task: Task) -> Result:
             message = _line(failure)
         for copy_path, path in paths.items():
             message = message.replace(copy_path, path)
-        return Result(task.unit, message)
+        return UnitResult(task.unit, message)
 
 
-def _fitted(task: Task, records: list[str], holdout: list[str]) -> Result:
+def _fitted(task: Task, records: list[str], holdout: list[str]) -> UnitResult:
     from hystgen import identification
     from hystgen.emission import calls
     from hystgen.model import Model
@@ -119,11 +120,11 @@ def _fitted(task: Task, records: list[str], holdout: list[str]) -> Result:
     model = Model(fit.parameters)
     text, figures = fit.text(), _figures(fit, model)
     if task.emission is None:
-        return Result(task.unit, "", text, {}, figures)
+        return UnitResult(task.unit, "", text, {}, figures)
     try:
-        return Result(task.unit, "", text, calls.emitted_files(model, **task.emission), figures)
+        return UnitResult(task.unit, "", text, calls.emitted_files(model, **task.emission), figures)
     except Exception as failure:
-        return Result(task.unit, f"fitted, but not emitted: {_line(failure)}", text, {}, figures)
+        return UnitResult(task.unit, f"fitted, but not emitted: {_line(failure)}", text, {}, figures)
 
 
 def _line(failure: Exception) -> str:
@@ -180,7 +181,7 @@ def _end_with(parent: int) -> None:
     os._exit(1)
 
 
-def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> Generator[Result, None, None]:
+def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> Generator[UnitResult, None, None]:
     """Results in order of completion, from `jobs` processes (1: from this one); tasks are taken as needed.
 
     A process that dies takes the whole pool down with it. The units in progress are then repeated one by one: only a
@@ -190,7 +191,7 @@ def on_this_machine(tasks: Iterable[Task], jobs: int, work: Work = fit_unit) -> 
         yield from _pooled(tasks, jobs, work, str(folder))
 
 
-def _pooled(tasks: Iterable[Task], jobs: int, work: Work, folder: str) -> Generator[Result, None, None]:
+def _pooled(tasks: Iterable[Task], jobs: int, work: Work, folder: str) -> Generator[UnitResult, None, None]:
     from joblib import Parallel, delayed, parallel_config
 
     waiting = iter(tasks)
@@ -219,7 +220,7 @@ def _pooled(tasks: Iterable[Task], jobs: int, work: Work, folder: str) -> Genera
                 try:
                     yield from pool()([delayed(work)(task)])
                 except BrokenProcessPool:
-                    yield Result(task.unit, DIED)
+                    yield UnitResult(task.unit, DIED)
             sent.clear()
         finally:
             with warnings.catch_warnings():
@@ -272,7 +273,7 @@ async def _answer(address: str) -> None:
     comm.abort()
 
 
-def on_cluster(tasks: Iterable[Task], client: Client, work: Work = fit_unit) -> Generator[Result, None, None]:
+def on_cluster(tasks: Iterable[Task], client: Client, work: Work = fit_unit) -> Generator[UnitResult, None, None]:
     """Results in order of completion, from the workers of a Dask scheduler.
 
     Only as many tasks as the workers soon need are in flight, so that few records are in memory. Dask repeats the tasks
@@ -304,9 +305,9 @@ def on_cluster(tasks: Iterable[Task], client: Client, work: Work = fit_unit) -> 
             try:
                 result = future.result()
             except KilledWorker:
-                result = Result(unit, DIED)
+                result = UnitResult(unit, DIED)
             except Exception as failure:
-                result = Result(unit, _line(failure))
+                result = UnitResult(unit, _line(failure))
             yield result
             refill()
     finally:

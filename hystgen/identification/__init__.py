@@ -27,13 +27,13 @@ from hystgen.identification import gpi, pi, prepared, quality, reduction
 from hystgen.identification.fit import HELD_OUT, Fit, Used, used_of, visited
 from hystgen.identification.gpi import FittedModel
 from hystgen.identification.pi import IdentificationError, rounded
-from hystgen.identification.quality import Row
+from hystgen.identification.quality import ErrorRow
 from hystgen.identification.reduction import Course
 from hystgen.plays import play_sum
 from hystgen.records import SHORTEST, Record, Source, agreed_units, in_units, read_records, several
 
 if TYPE_CHECKING:
-    from hystgen.parameters.files import Parameters
+    from hystgen.parameters.schema import Parameters
 
 MODELS = (*gpi.KINDS, "auto")
 """Names defined by the contract."""
@@ -162,7 +162,7 @@ def identify(
         masks += used_of(held_records, done.held, True)
     reported += [text for each in masks for text in each.sentences()]
     errors = [_compare(item, fitted) for item in compared]
-    own = Row.of("fit" if held or not rows else "all", "written", errors)
+    own = ErrorRow.of("fit" if held or not rows else "all", "written", errors)
     rows.append(own)
     drive = _drive(compared)
     if held:
@@ -222,10 +222,10 @@ class _Tried:
     fitted: FittedModel
     compared: list[Course]
     held: list[Course]
-    errors: list[pi.Errors]
-    held_out: Row
+    errors: list[pi.FreeRunErrors]
+    held_out: ErrorRow
 
-    def as_candidate(self) -> Row:
+    def as_candidate(self) -> ErrorRow:
         """The held-out row labelled with the kind, for the table of `auto`."""
         return replace(self.held_out, part="candidate", model=self.fitted.front.name)
 
@@ -262,7 +262,7 @@ def _compared(fitted: FittedModel, compared: list[Course], begun: Sequence[Cours
                 "are needed; hold out a longer record"
             )
     errors = [_compare(item, fitted) for item in settled]
-    return _Tried(fitted, compared, settled, errors, Row.of("held out", "written", errors))
+    return _Tried(fitted, compared, settled, errors, ErrorRow.of("held out", "written", errors))
 
 
 def _choose(tried: Sequence[_Tried]) -> int:
@@ -298,7 +298,7 @@ def _drive(courses: Sequence[Course]) -> tuple[float, float]:
     return min(low for low, _ in ranges), max(high for _, high in ranges)
 
 
-def _compare(item: Course, fitted: FittedModel) -> pi.Errors:
+def _compare(item: Course, fitted: FittedModel) -> pi.FreeRunErrors:
     return pi.compare(fitted.inner(item), fitted.solution.thresholds, fitted.solution.weights)
 
 
@@ -353,7 +353,7 @@ def _checked_breaks(breaks: int | Sequence[float] | None, model: str) -> int | t
 
 def _trial(
     courses: Sequence[Course], kinds: Sequence[str], how: gpi.How
-) -> tuple[list[Row], str, list[pi.Errors], str]:
+) -> tuple[list[ErrorRow], str, list[pi.FreeRunErrors], str]:
     """Rows of models fitted to the first part of each record and compared with the remainder, the kind they select, its
     errors, and the reason if there are no rows."""
     if not courses:
@@ -375,7 +375,7 @@ def _trial(
         return [], kinds[0], [], f"nothing was held out: {failure}{instead}"
     chosen = _choose(tried)
     best = tried[chosen]
-    own = Row.of("fit", "trial", [_compare(item, best.fitted) for item in best.compared])
+    own = ErrorRow.of("fit", "trial", [_compare(item, best.fitted) for item in best.compared])
     rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
     rows += [own, replace(best.held_out, model="trial")]
     # if the amplitude fades, the end alone has a smaller range, which is no measure for the errors of both
@@ -471,9 +471,9 @@ def identifier_from(text: str) -> str:
 __all__ = [
     "MODELS",
     "MODEL_PARSIMONY",
+    "ErrorRow",
     "Fit",
     "IdentificationError",
-    "Row",
     "Used",
     "check_options",
     "identifier_from",

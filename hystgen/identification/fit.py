@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hystgen.basics import arguments, display, drawing
 from hystgen.basics.problems import counted
 from hystgen.identification import faults, joint, quality, reduction
-from hystgen.identification.quality import Intervals, Row, table
+from hystgen.identification.quality import ErrorRow, Intervals, table
 from hystgen.identification.reduction import Course, StartMemory
 from hystgen.records import Record, Source, in_units, read_record, write_atomically
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hystgen.model import Model
-    from hystgen.parameters.files import Parameters
+    from hystgen.parameters.schema import Parameters
 
 
 HELD_OUT = 0.25
@@ -42,7 +42,7 @@ class Fit:
     """
 
     parameters: Parameters
-    rows: tuple[Row, ...]
+    rows: tuple[ErrorRow, ...]
     warnings: tuple[str, ...]
     intervals: Intervals
     used: tuple[Used, ...]

@@ -175,7 +175,7 @@ def fronts_of(kind: str, courses: Sequence[Course], breaks: int | tuple[float, .
 
 def _shaped(
     courses: Sequence[Course], front: Front, thresholds: Array, before: Array | None, tick: Tick
-) -> joint.Shaped:
+) -> joint.LocalFit:
     """The best result of several starts; `before`: the shape of the front tried before this one."""
     starts = [front.straight]
     if isinstance(front, Tanh) and front.branches == 2 and before is not None:
@@ -188,7 +188,7 @@ def _shaped(
     return min(found, key=lambda shaped: shaped.rms)
 
 
-def validation(shaped: joint.Shaped, front: Front) -> float:
+def validation(shaped: joint.LocalFit, front: Front) -> float:
     """rms error on blocks of the records that took no part in the weights and in the last step of the shape."""
     squares = 0.0
     for fold, left_out in enumerate(shaped.system.folds):

@@ -367,7 +367,7 @@ Tick = Callable[[int], None] | None
 
 
 @dataclass(frozen=True)
-class Shaped:
+class LocalFit:
     """A shape, weights over a list of thresholds, and the system linearised about both.
 
     `rms`: error of the `best` weights for the shape, to which `weights` are close. `derived` computes the system, which
@@ -409,13 +409,13 @@ def _session(item: Course, stages: Sequence[Stage]) -> tuple[NDArray[np.bool_] |
     return (None if whole is None else whole[len(before) :]), tuple(visited.tolist())
 
 
-def refine(courses: Sequence[Course], front: Front, shape: Array, thresholds: Array, tick: Tick = None) -> Shaped:
+def refine(courses: Sequence[Course], front: Front, shape: Array, thresholds: Array, tick: Tick = None) -> LocalFit:
     """The best shape near `shape`, with non-negative weights for the plays of `thresholds`."""
     stages = front.stages(shape)
     plain = reduction.reduce([through_front(item, stages) for item in courses], thresholds, tick)
     p = pi.non_negative(plain.whole, np.arange(len(thresholds)))
 
-    def linear(s: Array, q: Array) -> Shaped:
+    def linear(s: Array, q: Array) -> LocalFit:
         return _linear(courses, front, s, q, thresholds, tick)
 
     return search(linear, front, linear(shape, p))[0]
@@ -433,13 +433,13 @@ class Limits(Protocol):
 
 
 def search(
-    linear: Callable[[Array, Array], Shaped],
+    linear: Callable[[Array, Array], LocalFit],
     limits: Limits,
-    now: Shaped,
+    now: LocalFit,
     most: int = MOST_STEPS,
     little: float = 0.0,
     damping: float = DAMPING,
-) -> tuple[Shaped, float]:
+) -> tuple[LocalFit, float]:
     """The best shape near that of `now`, and the damping with which the search would continue.
 
     `linear` linearises the system about a shape and weights. `little`: the search also ends after a step that lowers
@@ -498,7 +498,7 @@ def _allowed(limits: Limits, shape: Array) -> bool:
     return not len(slack) or float(np.min(slack)) > -1e-6
 
 
-def _linear(courses: Sequence[Course], front: Front, shape: Array, p: Array, thresholds: Array, tick: Tick) -> Shaped:
+def _linear(courses: Sequence[Course], front: Front, shape: Array, p: Array, thresholds: Array, tick: Tick) -> LocalFit:
     """The best weights for a shape, and the system linearised about the shape and weights `p` close to them."""
     every = max(1, sum(item.used for item in courses) // COMPARED)
     source = linear_source(front, shape, p, every)
@@ -507,7 +507,7 @@ def _linear(courses: Sequence[Course], front: Front, shape: Array, p: Array, thr
     best = pi.non_negative(system.whole, columns)
     rms = root_mean_square(pi.residual(system.whole, columns, best), system.samples)
     # `p`, with which the derivatives were taken: the next step of the shape refers to it
-    return Shaped(shape, p, rms, best, system.samples, lambda: system)
+    return LocalFit(shape, p, rms, best, system.samples, lambda: system)
 
 
 def linear_source(front: Front, shape: Array, p: Array, every: int) -> Callable[[Course, Array], Source]:

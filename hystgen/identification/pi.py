@@ -97,14 +97,14 @@ def solve(
             "--history"
         )
     if isinstance(wanted, tuple):
-        lists = [Candidate(wanted)]
+        lists = [ThresholdList(wanted)]
     else:
         wide = once(courses, reach)
         if wanted is not None and len(wide) > wanted // 2:  # too few samples would be left
             wide = ()
         count = None if wanted is None else wanted - len(wide)
         lists = candidates(reach, sum(item.used for item in courses), count)
-        lists = [Candidate((*each.thresholds, *wide)) for each in lists]
+        lists = [ThresholdList((*each.thresholds, *wide)) for each in lists]
     top = max(candidate.thresholds[-1] for candidate in lists)
     compared = [item.resettled(top) for item in courses]
     samples = sum(item.used for item in compared)
@@ -127,7 +127,7 @@ def solve(
 
 
 @dataclass(frozen=True)
-class Errors:
+class FreeRunErrors:
     """Errors of one course from `first` to `last` without its free offset; NaN where samples are not compared."""
 
     course: Course
@@ -135,11 +135,11 @@ class Errors:
     error: Array
 
 
-def compare(item: Course, r: Array, p: Array) -> Errors:
+def compare(item: Course, r: Array, p: Array) -> FreeRunErrors:
     """Free run of the model along the drive, compared from `first` to `last`, with one free offset."""
     error = (item.y - reduction.prediction(item.v, item.visited, r, p))[item.first : item.last]
     offset = float(np.nanmean(error))
-    return Errors(item, offset, error - offset)
+    return FreeRunErrors(item, offset, error - offset)
 
 
 # Direction of the output, and direction of its loops. A play sum with positive weights rises with its drive, and its
@@ -360,7 +360,7 @@ SAMPLES_A_PLAY = 8
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ThresholdList:
     """A list of thresholds to try, r_0 = 0 included."""
 
     thresholds: tuple[float, ...]
@@ -404,7 +404,7 @@ def once(courses: Sequence[Course], reach: float) -> tuple[float, ...]:
     return tuple(sorted({each.once for each in starts if each.once is not None and each.once > reach}))
 
 
-def candidates(reach: float, samples: int, count: int | None = None) -> list[Candidate]:
+def candidates(reach: float, samples: int, count: int | None = None) -> list[ThresholdList]:
     """The lists of thresholds to choose from: every spacing with every number of plays, or with `count` of them."""
     if count is not None:
         counts: Sequence[int] = (count,)
@@ -415,11 +415,11 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Can
         # a single play has only one position; with very many the spacing does not matter
         for power in POWERS[: 1 if n < 2 or n > MANY_PLAYS else None]:
             places = (rounded(reach * (i / n) ** power, 6) for i in range(1, n + 1))
-            lists.append(Candidate((0.0, *places)))
+            lists.append(ThresholdList((0.0, *places)))
     return lists
 
 
-def dense(reach: float, samples: int, most: int = DENSE) -> Candidate:
+def dense(reach: float, samples: int, most: int = DENSE) -> ThresholdList:
     """A single list of `most` plays, fine enough to reveal the other effects in a record."""
     return candidates(reach, samples, min(most, max(1, samples // SAMPLES_A_PLAY)))[:2][-1]
 
@@ -436,17 +436,17 @@ def rounded(x: float, digits: int) -> float:
     return float(f"{x:.{digits}g}") if math.isfinite(x) else x
 
 
-def union(lists: Sequence[Candidate]) -> Array:
+def union(lists: Sequence[ThresholdList]) -> Array:
     """All thresholds in the lists, each once."""
     return np.array(sorted({r for candidate in lists for r in candidate.thresholds}))
 
 
-def columns(reduced: Reduced, candidate: Candidate) -> Columns:
+def columns(reduced: Reduced, candidate: ThresholdList) -> Columns:
     """Columns of the candidate's plays in the reduced systems."""
     return np.asarray(np.searchsorted(reduced.thresholds, candidate.thresholds))
 
 
-def choose(reduced: Reduced, lists: Sequence[Candidate]) -> Candidate:
+def choose(reduced: Reduced, lists: Sequence[ThresholdList]) -> ThresholdList:
     """The fewest plays whose prediction of blocks left out of the fit is close to that of the best candidate.
 
     Weights fitted to three of four consecutive blocks predict the fourth. Ties go to the smaller error.

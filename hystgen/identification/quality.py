@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hystgen.basics.problems import counted
 from hystgen.identification import joint, pi, reduction
 from hystgen.identification.gpi import FittedModel
-from hystgen.identification.pi import Errors, Solution, Weights
+from hystgen.identification.pi import FreeRunErrors, Solution, Weights
 from hystgen.identification.reduction import Course
 from hystgen.identification.start import STARTS, UNLIKE
 from hystgen.records import Record
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Row:
+class ErrorRow:
     """One line of the fit table.
 
     `part`: 'fit', 'held out' or 'all'; `model`: 'written' or 'trial'; `samples`: number compared; `ignored`: number not
@@ -42,7 +42,7 @@ class Row:
     output_range: float
 
     @classmethod
-    def of(cls, part: str, model: str, errors: Sequence[Errors]) -> Row:
+    def of(cls, part: str, model: str, errors: Sequence[FreeRunErrors]) -> ErrorRow:
         """The row that summarises the errors of some courses."""
         joined = np.concatenate([e.error for e in errors])
         joined = joined[np.isfinite(joined)]
@@ -80,7 +80,7 @@ WORD_COLUMNS = (0, 1, 8)
 """Text columns of the table."""
 
 
-def cells(rows: Sequence[Row], unit: str) -> list[tuple[str, ...]]:
+def cells(rows: Sequence[ErrorRow], unit: str) -> list[tuple[str, ...]]:
     """The table's head and rows."""
     suffix = f" [{unit}]" if unit else ""
     head = ("part", "model", "samples", "ignored", f"rms{suffix}", "rms %", f"max{suffix}", "max %", "records")
@@ -101,7 +101,7 @@ def cells(rows: Sequence[Row], unit: str) -> list[tuple[str, ...]]:
     return [head, *body]
 
 
-def table(rows: Sequence[Row], unit: str, remarks: Sequence[str]) -> str:
+def table(rows: Sequence[ErrorRow], unit: str, remarks: Sequence[str]) -> str:
     """The rows in aligned columns, remarks below."""
     content = cells(rows, unit)
     widths = [max(len(line[k]) for line in content) for k in range(len(content[0]))]
@@ -161,7 +161,7 @@ class Intervals:
 
 
 def intervals(
-    fitted: FittedModel, courses: Sequence[Course], errors: Sequence[Errors], held: Sequence[Errors]
+    fitted: FittedModel, courses: Sequence[Course], errors: Sequence[FreeRunErrors], held: Sequence[FreeRunErrors]
 ) -> Intervals:
     """Intervals of a fit to `courses` (drive as measured) with those `errors`; `held`: errors of held-out records.
 
@@ -220,7 +220,7 @@ def _weights(fitted: FittedModel, triangle: Array, target: Array) -> Array:
     return np.maximum(p, 0.0)
 
 
-def _scores(rows: reduction.Source, item: Course, errors: Errors, block: int) -> Array:
+def _scores(rows: reduction.Source, item: Course, errors: FreeRunErrors, block: int) -> Array:
     """`X_b^T e_b` of every block (blocks, unknowns), without each record's mean in its columns."""
     size = block * max(1, reduction.CHUNK // block)
     for start in range(0, item.first, size):
@@ -291,7 +291,7 @@ SMALL_REACH = 0.1
 
 
 def about_model(
-    solution: Solution, wanted: int | tuple[float, ...] | None, compared: Sequence[Course], own: Row
+    solution: Solution, wanted: int | tuple[float, ...] | None, compared: Sequence[Course], own: ErrorRow
 ) -> list[str]:
     """Warnings about the model itself, one sentence each."""
     reported = solution.sense.sentences(int(np.count_nonzero(solution.weights[1:])))
@@ -343,7 +343,7 @@ def about_inverse(p: NDArray[np.float64], made: Weights) -> list[str]:
     return []
 
 
-def about_start(errors: Errors, largest: float) -> str:
+def about_start(errors: FreeRunErrors, largest: float) -> str:
     """A warning if a record's start disagrees with the given history; else empty."""
     item = errors.course
     end = reduction.settled(item.v, largest) - item.first

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from hystgen.front.stage import Stage
 from hystgen.identification import joint, pi, reduction
-from hystgen.identification.joint import Shaped
+from hystgen.identification.joint import LocalFit
 from hystgen.identification.reduction import Course, Reduced, StartMemory
 from hystgen.plays import operators
 
@@ -367,7 +367,7 @@ class _Search:
     def _slopes(self) -> int:
         return sum(each.slopes for each in self.systems)
 
-    def result(self) -> Shaped:
+    def result(self) -> LocalFit:
         """The best slopes, with their weights in `best`."""
         shape, rms = self._first_slopes(), 0.0
         for _ in range(ROUNDS):
@@ -377,7 +377,7 @@ class _Search:
             shape, rms = found.shape, found.rms
         return found
 
-    def parted(self, found: Shaped) -> list[tuple[Array, float]]:
+    def parted(self, found: LocalFit) -> list[tuple[Array, float]]:
         """Slopes of each course, and half the width of the 95 % interval of their contribution at its start."""
         k = 0 if self.known is not None else len(self.r)
         system, p = found.system.whole[:, :-1], found.best
@@ -417,7 +417,7 @@ class _Search:
         system = self._whole(shape, np.zeros(len(self.r)), 0.0)
         return pi.non_negative(system, np.arange(len(self.r)))
 
-    def _linear(self, rms: float, shape: Array, p: Array) -> Shaped:
+    def _linear(self, rms: float, shape: Array, p: Array) -> LocalFit:
         """The system linearised about slopes and weights; `rms`: the errors that set the weight of the prior."""
         samples = sum(each.item.used for each in self.systems)
         if self.known is None:
@@ -430,7 +430,7 @@ class _Search:
             left = system[:, -1] - system[:, : len(best)] @ best
             system, squares = np.column_stack([system[:, len(best) : -1], left]), float(left @ left)
         size = pi.root_mean_square(squares, samples)
-        return Shaped(shape, p, size, best, samples, lambda: Reduced(self.r, system, (), (samples,)))
+        return LocalFit(shape, p, size, best, samples, lambda: Reduced(self.r, system, (), (samples,)))
 
     def _whole(self, shape: Array, p: Array, rms: float) -> Array:
         """Rows `[plays, slopes of all courses, y]` of all courses and of the prior."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import difflib
 import itertools
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ValidationError
@@ -23,13 +23,14 @@ from hystgen.parameters.yaml import Document
 
 if TYPE_CHECKING:
     from hystgen.effects import Effect
+    from hystgen.plays.density import Discretisation, Formula
 
 Shapes = tuple["type[Effect]", ...]
 """Classes that share a name."""
 
-_FRONT = effects.CATALOGUE.index("saturation")
+_FRONT = effects.CATALOGUE.index(effects.LIMIT)
 
-EFFECT_NAMES = (*effects.CATALOGUE[:_FRONT], "asymmetry", *effects.CATALOGUE[_FRONT:])
+EFFECT_NAMES = (*effects.CATALOGUE[:_FRONT], effects.BEND, *effects.CATALOGUE[_FRONT:])
 """Names of effects: the folders of the catalogue and asymmetry, which is a memoryless stage of the model."""
 
 _PARTS: dict[str, type[BaseModel]] = {
@@ -101,7 +102,7 @@ class _Checker:
         self.document = document
         self.user = user
         self.problems: list[Problem] = []
-        self.discretisation: Any = None
+        self.discretisation: Discretisation | None = None
         self.effects: list[Effect] = []
         self._mover: tuple[str, str] | None = None
         self._classes: dict[Path, type[Effect]] = {}
@@ -153,12 +154,15 @@ class _Checker:
         try:
             parameters = schema.Parameters.model_validate(self.data)
         except ValidationError as error:
-            for found in error.errors(include_url=False):
-                path = self._path(found["loc"])
-                if not self.judged(path):
-                    self._structural(path, found["type"], found.get("ctx", {}), found["msg"])
+            self._found(error, self._path)
         self._empty_values()
         return parameters
+
+    def _found(self, error: ValidationError, path_of: Callable[[Sequence[str | int]], Path]) -> None:
+        for found in error.errors(include_url=False):
+            path = path_of(found["loc"])
+            if not self.judged(path):
+                self._structural(path, found["type"], found.get("ctx", {}), found["msg"])
 
     def _path(self, location: Sequence[str | int]) -> Path:
         """Pydantic's location as a path in the data: without union members, and without 0 for a single stage."""
@@ -364,7 +368,7 @@ class _Checker:
         self._state(path[:-1], len(found.thresholds))
         self.discretisation = found
 
-    def _formula(self, path: Path) -> Any:
+    def _formula(self, path: Path) -> Formula | None:
         text = self.get(*path)
         if text is None:
             return None
@@ -401,7 +405,7 @@ class _Checker:
         elif a0 and a1 and not 1e-150 < abs(a0 * a1) < 1e150:
             self.add(path, f"a0 a1, the branch's steepest slope, is {shown(a0 * a1)}; keep to 1e-150 .. 1e150")
 
-    def _effect(self, path: Path, effect: Any) -> None:
+    def _effect(self, path: Path, effect: object) -> None:
         name = (*path, "name")
         given = self.at(name)
         if self.judged(path) or self.judged(name):
@@ -412,8 +416,8 @@ class _Checker:
             self.add(name, "is missing; add the name of an effect")
         elif not isinstance(given, str):
             self.add(name, f"must be the name of an effect, not {shown(given)}; known are {', '.join(EFFECT_NAMES)}")
-        elif given == "asymmetry":
-            self.add(name, "asymmetry is not written here; make it a stage of model.memoryless")
+        elif given == effects.BEND:
+            self.add(name, f"{effects.BEND} is not written here; make it a stage of model.memoryless")
         elif given in EFFECT_NAMES or given in self.user:
             shapes = self.user[given] if given in self.user else effects.shapes(given)
             first = self._seen.setdefault(given, path_text(path))
@@ -446,10 +450,7 @@ class _Checker:
         try:
             made = chosen.model_validate(effect)
         except ValidationError as error:
-            for found in error.errors(include_url=False):
-                place = (*path, *found["loc"])
-                if not self.judged(place):
-                    self._structural(place, found["type"], found.get("ctx", {}), found["msg"])
+            self._found(error, lambda location: (*path, *location))
         if made is None or len(self.problems) > before or not self.sound(path):
             return
         if chosen.moves_plays():
@@ -508,30 +509,28 @@ def _choice(value: object, known: Sequence[object]) -> str:
     return f"must be {listed}, not {shown(value)}; {near or 'choose one of them'}"
 
 
+_TYPES = (
+    ("float_", "must be a number", "write it like 0.45"),
+    ("int_", "must be a whole number", "write it like 12"),
+    ("bool_", "must be true or false", "write one of them, without quotes"),
+    ("string_type", "must be text", "put it in quotes"),
+    ("tuple_type", "must be a list", "write [ ] around the values"),
+    (("model_", "dict_type"), "must be a mapping", "write `key: value` pairs in it"),
+)
+"""How findings of pydantic about a wrong type begin, and what to say and to advise instead."""
+
+_BOUNDS = {
+    "greater_than": ("gt", "must be above"),
+    "greater_than_equal": ("ge", "must be at least"),
+    "less_than": ("lt", "must be below"),
+    "less_than_equal": ("le", "must be at most"),
+}
+"""Findings of pydantic about a number out of bounds: the key of the bound in its context, and what to say."""
+
+
 def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said: str) -> str:
     """A finding of pydantic in our own words."""
-    wrong = {
-        "float_type": "must be a number",
-        "float_parsing": "must be a number",
-        "int_type": "must be a whole number",
-        "int_from_float": "must be a whole number",
-        "int_parsing": "must be a whole number",
-        "bool_type": "must be true or false",
-        "bool_parsing": "must be true or false",
-        "string_type": "must be text",
-        "tuple_type": "must be a list",
-        "model_type": "must be a mapping",
-        "model_attributes_type": "must be a mapping",
-        "dict_type": "must be a mapping",
-    }.get(kind)
-    advice = {
-        "must be a number": "write it like 0.45",
-        "must be a whole number": "write it like 12",
-        "must be true or false": "write one of them, without quotes",
-        "must be text": "put it in quotes",
-        "must be a list": "write [ ] around the values",
-        "must be a mapping": "write `key: value` pairs in it",
-    }.get(wrong or "", "")
+    wrong, advice = next((said for start, *said in _TYPES if kind.startswith(start)), ("", ""))
     if key == "initial_state" and isinstance(value, Mapping | str):
         wrong, advice = "must be a number or a list of numbers", "write it like 0.0"
     if kind.startswith("union_tag"):
@@ -552,15 +551,9 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
         fields = {**schema.EmitDefaults.model_fields, **schema.Compensation.model_fields}
         known: Any = fields[key].annotation if key != "kind" else None
         return _choice(value, known.__args__ if known else schema.STAGE_KINDS)
-    bounds = (
-        ("greater_than", "gt", "must be above"),
-        ("greater_than_equal", "ge", "must be at least"),
-        ("less_than", "lt", "must be below"),
-        ("less_than_equal", "le", "must be at most"),
-    )
-    for name, limit, what in bounds:
-        if kind == name and limit in context:
-            return f"{what} {context[limit]:g}, not {shown(value)}; correct the number"
+    if kind in _BOUNDS:
+        limit, what = _BOUNDS[kind]
+        return f"{what} {context[limit]:g}, not {shown(value)}; correct the number"
     if kind == "too_short":
         return f"has {_entries(len(value))}, at least {context.get('min_length')} needed; add to the list"
     if kind == "too_long":

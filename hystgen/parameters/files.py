@@ -14,54 +14,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from hystgen.basics.names import name_problem
 from hystgen.basics.problems import ParameterError, Path, Problem, path_text
-from hystgen.parameters.checks import EFFECT_NAMES, check
-from hystgen.parameters.schema import (
-    Compensation,
-    DeadZoneParameters,
-    DensityParameters,
-    DensityTable,
-    EmitDefaults,
-    ModelParameters,
-    Parameters,
-    PIParameters,
-    TanhBranch,
-    TanhParameters,
-    Units,
-    schema,
-)
+from hystgen.parameters.checks import check
+from hystgen.parameters.schema import Compensation, ModelParameters, PIParameters
+from hystgen.parameters.schema import Parameters as Parameters
 from hystgen.parameters.yaml import MAX_BYTES, read, resolve
 
 if TYPE_CHECKING:
     from hystgen.effects import Effect
-
-__all__ = [
-    "EFFECT_NAMES",
-    "MAX_BYTES",
-    "DeadZoneParameters",
-    "DensityParameters",
-    "DensityTable",
-    "EmitDefaults",
-    "ModelParameters",
-    "PIParameters",
-    "ParameterError",
-    "Parameters",
-    "Problem",
-    "TanhBranch",
-    "TanhParameters",
-    "Units",
-    "canonical_json",
-    "dump_parameters",
-    "load_parameters",
-    "located",
-    "make_parameters",
-    "name_problem",
-    "parameter_data",
-    "parameters_sha256",
-    "parse_parameters",
-    "schema",
-]
 
 _WIDTH = 100
 
@@ -250,18 +210,12 @@ def _block(
         if value is None or (not wanted and key in defaults and value == defaults[key]):
             continue
         yield from _comment(note, indent)
-        if key == "memoryless" and value:
+        if key in ("memoryless", "effects") and value:
             yield f"{indent}{key}:"
-            for stage in value:
-                if stage.get("descending") == stage.get("ascending", ()):
-                    stage = {name: entry for name, entry in stage.items() if name != "descending"}
-                lines = [line for name, entry in stage.items() for line in _entry(name, entry, indent + "    ")]
-                yield f"{indent}  - {lines[0].lstrip()}"
-                yield from lines[1:]
-        elif key == "effects" and value:
-            yield f"{indent}{key}:"
-            for effect in value:
-                lines = [line for name, entry in effect.items() for line in _entry(name, entry, indent + "    ")]
+            for part in value:
+                if part.get("descending") == part.get("ascending", ()):
+                    part = {name: entry for name, entry in part.items() if name != "descending"}
+                lines = [line for name, entry in part.items() for line in _entry(name, entry, indent + "    ")]
                 yield f"{indent}  - {lines[0].lstrip()}"
                 yield from lines[1:]
         elif isinstance(value, dict) and key not in _FLOW:

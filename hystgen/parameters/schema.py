@@ -23,6 +23,7 @@ from pydantic_core import PydanticCustomError
 
 from hystgen.basics.names import MAX_NAME, MAX_UNIT, NAME_PATTERN
 from hystgen.basics.quantities import MAX_PLAYS, NotNegative, Number, Positive
+from hystgen.effects import Unmeasured
 
 MAX_STAGES = 16
 MAX_EFFECTS = 64
@@ -255,7 +256,7 @@ class Compensation(_Part):
         "move by a code now and then get larger leads",
     )
 
-    compensate: tuple[Literal["drift", "self_heating"], ...] = Field(
+    compensate: tuple[Unmeasured, ...] = Field(
         default=(),
         description="effects that are compensated although nothing measures them: a drift, counted from set_offset on, "
         "and the drive's own heat, or that of its loops",
@@ -321,7 +322,7 @@ _EXAMPLE = {
 }
 
 
-def schema() -> dict[str, Any]:
+def schema() -> dict[str, object]:
     """JSON Schema (2020-12) of the parameter file in its YAML form, for editors."""
     made = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -351,7 +352,7 @@ def _effects(definitions: dict[str, object]) -> list[dict[str, object]]:
     return [*found, {"type": "object", "required": ["name"], "properties": {"name": own}}]
 
 
-def _tidy(node: Any) -> Any:
+def _tidy(node: object) -> Any:
     """Remove what only Python needs: titles of fields, null as a value, defaults that only mark absence."""
     if isinstance(node, list):
         return [_tidy(entry) for entry in node]

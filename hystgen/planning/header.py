@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from hystgen.emission import interface, runtime, text
-from hystgen.parameters.files import Parameters, parameters_sha256
+from hystgen.parameters.files import parameters_sha256
+from hystgen.parameters.schema import Parameters
 from hystgen.planning.converter import Codes, Dac
 from hystgen.planning.session import Session
 

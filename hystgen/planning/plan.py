@@ -22,12 +22,12 @@ from hystgen.basics.problems import PlanError
 from hystgen.planning import converter, header, session
 from hystgen.planning.converter import Codes, Dac
 from hystgen.planning.grid import FULL_SCALE, SLOW_SAMPLES, Grid, Tempo
-from hystgen.planning.session import Part, Session
+from hystgen.planning.session import PlayedRecord, Session
 from hystgen.planning.waveforms import RECORDS, lead_in, written
 
 if TYPE_CHECKING:
     from hystgen.model import Model
-    from hystgen.parameters.files import Parameters
+    from hystgen.parameters.schema import Parameters
 
 Array = NDArray[np.float64]
 
@@ -338,7 +338,7 @@ class _Player:
             before, code = pieces[-1]
             pieces.append((np.repeat(before[-1:], hold), None if code is None else np.repeat(code[-1:], hold)))
             pieces.append((drive.v, drive.codes))
-            parts.append(Part(drive.name, at, len(drive.v), drive.held_out))
+            parts.append(PlayedRecord(drive.name, at, len(drive.v), drive.held_out))
             every = round(drive.corner_time / drive.sample_time)
             stretches += [(1, self.tempo.rest), ((len(drive.v) - 1) // every, every)]
             at += len(drive.v) - 1 + self.tempo.rest

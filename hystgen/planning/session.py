@@ -25,7 +25,7 @@ noise of a monitor. A recording that is out of step with its session starts and 
 
 
 @dataclass(frozen=True)
-class Part:
+class PlayedRecord:
     """A record of the session: the samples played from `first` on."""
 
     name: str
@@ -48,7 +48,7 @@ class Session:
     history: tuple[float, float]
     rest: float
     rise: float
-    records: tuple[Part, ...]
+    records: tuple[PlayedRecord, ...]
     dac: Mapping[str, object] | None = None
 
     def to_json(self) -> str:
@@ -77,7 +77,7 @@ class Session:
             ]
         if problems:
             raise ParameterError(file, problems)
-        parts = tuple(Part(**part) for part in document.data["records"])
+        parts = tuple(PlayedRecord(**part) for part in document.data["records"])
         given = {key: value for key, value in document.data.items() if key != "hystgen"}
         return cls(**{**given, "records": parts})
 

@@ -12,7 +12,9 @@ import random
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from operator import attrgetter
 
+from hystgen import effects
 from hystgen.planning.grid import MOVE, SLOW_SAMPLES, Grid, Tempo
 
 EDGE = 4
@@ -22,7 +24,7 @@ ROUND = 3
 """Samples over which every drive is averaged: a sharper corner would lie between samples, where no record sees it."""
 
 
-class Course:
+class Waveform:
     """A drive being built up: codes sample by sample, counted from the lowest; positions are shares of the range.
 
     `pace`: samples of a quick full-scale move.
@@ -88,138 +90,141 @@ def sine(turns: float) -> float:
     return total
 
 
-def _ends(course: Course, pace: float) -> None:
+def _ends(drive: Waveform, pace: float) -> None:
     """Moves to the top and the bottom: the history of the next record."""
-    course.go(1.0, pace)
-    course.go(0.0, pace)
-    course.hold(EDGE)
+    drive.go(1.0, pace)
+    drive.go(0.0, pace)
+    drive.hold(EDGE)
 
 
-def _triangles(course: Course) -> None:
+def _triangles(drive: Waveform) -> None:
     for slower, cycles in ((1, 4), (2, 2), (4, 1)):
         for _ in range(cycles):
-            course.go(1.0, slower * course.pace)
-            course.go(0.0, slower * course.pace)
-    _nested(course, 2 * course.pace)
+            drive.go(1.0, slower * drive.pace)
+            drive.go(0.0, slower * drive.pace)
+    _nested(drive, 2 * drive.pace)
 
 
-def _nested(course: Course, pace: float) -> None:
+def _nested(drive: Waveform, pace: float) -> None:
     for k in range(6):
-        course.go(1.0 - 0.08 * k, pace)
-        course.go(0.08 * (k + 1), pace)
+        drive.go(1.0 - 0.08 * k, pace)
+        drive.go(0.08 * (k + 1), pace)
 
 
-def _slow(course: Course) -> None:
+def _slow(drive: Waveform) -> None:
     for k in range(5):
-        course.go(1.0 - 0.1 * k, 75)
-        course.go(0.1 * k, 75)
+        drive.go(1.0 - 0.1 * k, 75)
+        drive.go(0.1 * k, 75)
 
 
-def _minor(course: Course, pace: float, size: float = 0.25) -> None:
-    course.go(1.0, pace)
-    course.go(0.0, pace)
+def _minor(drive: Waveform, pace: float, size: float = 0.25) -> None:
+    drive.go(1.0, pace)
+    drive.go(0.0, pace)
     for bias in (0.02, 0.5 - 0.5 * size, 0.98 - size):
-        course.go(bias + size, pace)
+        drive.go(bias + size, pace)
         for _ in range(2):
-            course.go(bias, pace)
-            course.go(bias + size, pace)
-    course.go(1.0, pace)
+            drive.go(bias, pace)
+            drive.go(bias + size, pace)
+    drive.go(1.0, pace)
     for bias in (0.98 - size, 0.5 - 0.5 * size, 0.02):
-        course.go(bias, pace)
-        course.go(bias + size, pace)
-        course.go(bias, pace)
+        drive.go(bias, pace)
+        drive.go(bias + size, pace)
+        drive.go(bias, pace)
 
 
-def _slow_minor(course: Course) -> None:
-    _minor(course, 60)
-
-
-def _fast_minor(course: Course) -> None:
-    _minor(course, 3 * course.pace)
-    _minor(course, course.pace)
+def _fast_minor(drive: Waveform) -> None:
+    _minor(drive, 3 * drive.pace)
+    _minor(drive, drive.pace)
     for bias in (0.15, 0.5, 0.85):
-        course.go(bias, course.pace)
+        drive.go(bias, drive.pace)
         for _ in range(4):
-            course.go(bias + 0.1, course.pace)
-            course.go(bias - 0.1, course.pace)
+            drive.go(bias + 0.1, drive.pace)
+            drive.go(bias - 0.1, drive.pace)
 
 
-def _steps(course: Course, hold: int, levels: Sequence[float]) -> None:
-    course.hold(hold // 3)
+def _steps(drive: Waveform, hold: int, levels: Sequence[float]) -> None:
+    drive.hold(hold // 3)
     for level in levels:
-        course.go(level)
-        course.hold(hold)
+        drive.go(level)
+        drive.hold(hold)
 
 
-def _sweep(course: Course, samples: int = 1100) -> None:
+def _sweep(drive: Waveform, samples: int = 1100) -> None:
     """Frequency rises with time squared to an eighth of the sampling rate; amplitude falls as the limit requires."""
-    first, last = 1.0 / (16.0 * course.pace), 1.0 / 8.0
+    first, last = 1.0 / (16.0 * drive.pace), 1.0 / 8.0
     turns, values = 0.0, []
     for k in range(samples):
         x = k / samples
         frequency = first + (last - first) * x * x
-        values.append(min(1.0, 1.0 / (6.0 * course.pace * frequency)) * -sine(turns + 0.25))
+        values.append(min(1.0, 1.0 / (6.0 * drive.pace * frequency)) * -sine(turns + 0.25))
         turns += frequency
-    course.wave(values)
+    drive.wave(values)
 
 
-def _multisine(course: Course, period: int = 240, periods: int = 4) -> None:
+def _multisine(drive: Waveform, period: int = 240, periods: int = 4) -> None:
     """Odd harmonics with random phases, in whole periods."""
     phases = random.Random(1)
     lines = [(line, phases.random()) for line in range(1, 24, 2)]
     one = [sum(sine(line * k / period + phase) / line for line, phase in lines) for k in range(period)]
-    course.wave([*(one * periods), one[0]])
+    drive.wave([*(one * periods), one[0]])
 
 
-def _cycles(course: Course) -> None:
+def _cycles(drive: Waveform) -> None:
     for _ in range(28):
-        course.go(1.0, MOVE)
-        course.go(0.0, MOVE)
+        drive.go(1.0, MOVE)
+        drive.go(0.0, MOVE)
 
 
-def _settling(course: Course) -> None:
-    _nested(course, course.pace)
-    _steps(course, 50, (1.0, 0.3, 0.7, 0.0))
+def _settling(drive: Waveform) -> None:
+    _nested(drive, drive.pace)
+    _steps(drive, 50, (1.0, 0.3, 0.7, 0.0))
 
 
-def _staircase(course: Course) -> None:
-    course.hold(2 * course.pace)
+def _staircase(drive: Waveform) -> None:
+    drive.hold(2 * drive.pace)
     for level, slower in (
         (0.35, 0), (0.8, 2), (0.55, 0), (1.0, 0), (0.0, 0), (0.9, 0), (0.45, 4), (0.65, 0), (0.2, 0)
     ):
-        course.go(level, slower * course.pace)
-        course.hold(70)
+        drive.go(level, slower * drive.pace)
+        drive.hold(70)
 
 
-def _reversals(course: Course, seed: int, turns: int, slowest: float) -> None:
+def _reversals(drive: Waveform, seed: int, turns: int, slowest: float) -> None:
     """Random turning points at random speeds, with an occasional hold; both ends come first."""
     chance = random.Random(seed)
-    course.go(1.0, slowest * course.pace)
-    course.go(0.0, slowest * course.pace)
+    drive.go(1.0, slowest * drive.pace)
+    drive.go(0.0, slowest * drive.pace)
     for _ in range(turns):
-        course.go(0.02 + 0.96 * chance.random(), (1.0 + (slowest - 1.0) * chance.random()) * course.pace)
+        drive.go(0.02 + 0.96 * chance.random(), (1.0 + (slowest - 1.0) * chance.random()) * drive.pace)
         if chance.random() < 0.2:
-            course.hold(2 * course.pace)
+            drive.hold(2 * drive.pace)
 
 
 @dataclass(frozen=True)
 class RecordKind:
-    """A record: file name, purpose, the effects it shows, waveform and time between samples."""
+    """A record: file name, purpose, waveform and time between samples."""
 
     name: str
     purpose: str
-    shows: tuple[str, ...]
-    draw: Callable[[Course], None]
+    draw: Callable[[Waveform], None]
     every: Callable[[Tempo], int]
     held_out: bool = False
 
+    @property
+    def shows(self) -> tuple[str, ...]:
+        """Names of the effects that it shows, the plainest first."""
+        shown_by = {name: effects.shapes(name)[0].shown_by for name in effects.CATALOGUE}
+        shown_by[effects.BEND] = BEND_SHOWN_BY
+        places = {name: records[self.name] for name, records in shown_by.items() if self.name in records}
+        return tuple(sorted(places, key=places.__getitem__))
 
-def _fast(tempo: Tempo) -> int:
-    return tempo.fast
+
+BEND_SHOWN_BY = {"slow": 1, "multisine": 1, "slow_minor": 2, "slow_reversals": 2}
+"""Records that show a bent front, as `Effect.shown_by`."""
 
 
-def _middle(tempo: Tempo) -> int:
-    return tempo.middle
+_fast: Callable[[Tempo], int] = attrgetter("fast")
+_middle: Callable[[Tempo], int] = attrgetter("middle")
 
 
 def _lasting(share: float, samples: int = SLOW_SAMPLES) -> Callable[[Tempo], int]:
@@ -232,66 +237,64 @@ LONG_HOLDS = (1.0, 0.0, 0.5, 1.0, 0.5, 0.0)
 RECORDS = (
     RecordKind(
         "slow", "One slow full loop, then nested ones: the hysteresis itself, and its bends at every amplitude.",
-        ("asymmetry", "saturation", "sensor_nonlinearity"), _slow, _lasting(1.0),
+        _slow, _lasting(1.0),
     ),
     RecordKind(
         "fast_triangles", "The same loops at the rate limit and two and four times slower: how they widen with rate.",
-        ("rate_dependence", "lag", "delay", "slew_limit"), _triangles, _fast,
+        _triangles, _fast,
     ),
     RecordKind(
         "fast_steps", "Full-scale and smaller steps with resolved edges: a tail is a lag, a shift a delay, a straight "
         "slope a slew limit, ringing a resonance.",
-        ("lag", "delay", "slew_limit", "resonance"), partial(_steps, hold=130, levels=FULL_STEPS), _fast,
+        partial(_steps, hold=130, levels=FULL_STEPS), _fast,
     ),
     RecordKind(
         "holds", "Long holds after moves both ways: creep follows the last move, drift does not.",
-        ("creep", "drift", "thermal"), partial(_steps, hold=100, levels=LONG_HOLDS), _lasting(4.0, 700),
+        partial(_steps, hold=100, levels=LONG_HOLDS), _lasting(4.0, 700),
     ),
     RecordKind(
         "staircase", "Steps of other sizes and speeds, to judge the findings of the fast records.",
-        ("lag", "delay", "slew_limit", "resonance"), _staircase, _fast, True,
+        _staircase, _fast, True,
     ),
     RecordKind(
         "slow_minor", "Equal small loops at three biases, reached from both sides: congruent or not.",
-        ("noncongruent", "asymmetry", "sensor_nonlinearity"), _slow_minor, _lasting(1.0),
+        partial(_minor, pace=60), _lasting(1.0),
     ),
     RecordKind(
         "fast_minor", "Small loops at high rate with many reversals: a lag opens the smallest ones, plays do not.",
-        ("rate_dependence", "lag", "noncongruent"), _fast_minor, _fast,
+        _fast_minor, _fast,
     ),
     RecordKind(
         "slow_reversals", "Random turning points with pauses, to judge the findings of the slow records.",
-        ("creep", "asymmetry", "saturation", "sensor_nonlinearity", "noncongruent"),
         partial(_reversals, seed=2, turns=14, slowest=3.0), _lasting(1.25, 600), True,
     ),
     RecordKind(
         "sweep", "A sine from slow to an eighth of the sampling rate: the peak of a resonance, the phase of a lag.",
-        ("resonance", "lag", "delay"), _sweep, _fast,
+        _sweep, _fast,
     ),
     RecordKind(
         "cycles", "Many equal full loops: they accumulate travel and heat; later ones differ from earlier ones.",
-        ("ageing", "thermal"), _cycles, _lasting(1.0, 720),
+        _cycles, _lasting(1.0, 720),
     ),
     RecordKind(
         "settling", "Nested loops and short holds at a medium pace, while it cools: creep and rate in between.",
-        ("creep", "rate_dependence", "thermal"), _settling, _middle,
+        _settling, _middle,
     ),
     RecordKind(
         "fast_reversals", "Random turning points at random speeds near the limit, to judge.",
-        ("rate_dependence", "lag", "delay", "slew_limit"), partial(_reversals, seed=3, turns=40, slowest=4.0), _fast,
-        True,
+        partial(_reversals, seed=3, turns=40, slowest=4.0), _fast, True,
     ),
     RecordKind(
         "multisine", "Equal periods of an odd multisine with random phases: noise without a model, even nonlinearity.",
-        ("asymmetry", "sensor_nonlinearity", "resonance"), _multisine, _fast,
+        _multisine, _fast,
     ),
     RecordKind(
         "reversals", "Random turning points at a medium pace, to judge what lies between slow and fast.",
-        ("creep", "rate_dependence", "noncongruent"), partial(_reversals, seed=5, turns=25, slowest=3.0), _middle, True,
+        partial(_reversals, seed=5, turns=25, slowest=3.0), _middle, True,
     ),
     RecordKind(
         "slow_again", "The first record once more: changes in the session due to neither rate nor amplitude.",
-        ("drift", "ageing", "thermal"), _slow, _lasting(1.0),
+        _slow, _lasting(1.0),
     ),
 )
 """The records of a session, in order."""
@@ -300,16 +303,16 @@ RECORDS = (
 def written(record: RecordKind, grid: Grid, tempo: Tempo, every: int) -> list[int]:
     """The codes of a record, which ends with moves to the top and the bottom: the history of the next."""
     pace = tempo.move if every == tempo.fast else 2 * MOVE
-    course = Course(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), pace)
-    course.hold(EDGE)
-    record.draw(course)
-    _ends(course, pace)
-    return course.rounded()
+    drive = Waveform(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), pace)
+    drive.hold(EDGE)
+    record.draw(drive)
+    _ends(drive, pace)
+    return drive.rounded()
 
 
 def lead_in(grid: Grid, tempo: Tempo, every: int) -> list[int]:
     """Moves to the top and the bottom, the history of the first record, slow enough for any stage."""
-    course = Course(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), 2 * MOVE)
-    course.hold(EDGE)
-    _ends(course, 2 * MOVE)
-    return course.rounded()
+    drive = Waveform(grid, grid.rate(tempo.max_rate, tempo.seconds(every)), 2 * MOVE)
+    drive.hold(EDGE)
+    _ends(drive, 2 * MOVE)
+    return drive.rounded()

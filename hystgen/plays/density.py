@@ -30,10 +30,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from hystgen.basics.arguments import finite, positive, whole_from
 from hystgen.basics.quantities import MAX_PLAYS
+
+if TYPE_CHECKING:
+    from mpmath.ctx_mp import MPContext
+    from mpmath.ctx_mp_python import mpf
 
 MAX_FORMULA = 1000
 """[characters] A longer formula is refused before it is parsed."""
@@ -85,7 +89,7 @@ class Discretisation:
 
 
 @cache
-def _context() -> Any:
+def _context() -> MPContext:
     """A multiple-precision context of our own; the global one belongs to the user."""
     from mpmath.ctx_mp import MPContext
 
@@ -113,7 +117,7 @@ class Formula:
     @cached_property
     def _compiled(self) -> tuple[tuple[int, Any], ...]:
         mp = _context()
-        operators: dict[str, tuple[int, Callable[..., Any]]] = {
+        operators: dict[str, tuple[int, Callable[..., mpf]]] = {
             "+": (2, lambda a, b: a + b),
             "-": (2, lambda a, b: a - b),
             "*": (2, lambda a, b: a * b),
@@ -124,11 +128,11 @@ class Formula:
         operators.update((name, (1, getattr(mp, name))) for name in FUNCTIONS)
         return tuple(operators.get(step) or (0, None if step == "r" else mp.mpf(step)) for step in self.steps)
 
-    def __call__(self, r: Any) -> Any:
+    def __call__(self, r: mpf) -> mpf:
         """Value at `r` with 40 digits. Raises DensityError where it has no value."""
         real = _context().mpf
         r = real(r)
-        stack: list[Any] = []
+        stack: list[mpf] = []
         for count, step in self._compiled:
             if count == 0:
                 stack.append(r if step is None else step)
@@ -147,7 +151,7 @@ class Formula:
         return stack[0]
 
 
-def _power(base: Any, exponent: Any) -> Any:
+def _power(base: mpf, exponent: mpf) -> mpf:
     """`base**exponent`. Raises ValueError where it is not real.
 
     A large exponent goes through the logarithm, with the extra bits that this costs: an integer power would go bit by
@@ -246,14 +250,14 @@ def _number(token: str, at: int) -> str:
     return token
 
 
-def _short(r: Any) -> str:
+def _short(r: mpf) -> str:
     return f"{float(r):.6g}"
 
 
 # Densities as polynomials on panels -----------------------------------------------------------------------
 
 
-def _polynomial(coefficients: Sequence[Any], t: Any) -> Any:
+def _polynomial(coefficients: Sequence[mpf], t: mpf) -> mpf:
     """Value at t, coefficients from the highest power down."""
     value = 0
     for c in coefficients:
@@ -264,7 +268,7 @@ def _polynomial(coefficients: Sequence[Any], t: Any) -> Any:
 class _Panel:
     """Density on `[start, end]` as a polynomial `sum c_k t**k` of `t = (r - middle)/half` in [-1, 1]."""
 
-    def __init__(self, start: Any, end: Any, coefficients: Sequence[Any], error: float = 0.0) -> None:
+    def __init__(self, start: mpf, end: mpf, coefficients: Sequence[mpf], error: float = 0.0) -> None:
         self.start, self.end, self.error = start, end, error
         self.middle, self.half = (start + end) / 2, (end - start) / 2
         integral = [c * self.half / (k + 1) for k, c in enumerate(coefficients)]
@@ -272,7 +276,7 @@ class _Panel:
         self._mass = [*reversed(integral), -sum(a if k % 2 else -a for k, a in enumerate(integral))]
         self._lever = [*reversed(lever), 0, -sum(-a if k % 2 else a for k, a in enumerate(lever))]
 
-    def moments(self, r: Any) -> tuple[Any, Any]:
+    def moments(self, r: mpf) -> tuple[mpf, mpf]:
         """Integrals of p and of r p over `[start, r]`."""
         t = (r - self.middle) / self.half
         mass = _polynomial(self._mass, t)
@@ -288,7 +292,7 @@ class Density:
         self._starts = [panel.start for panel in panels]
         self.r_max = panels[-1].end
         mass = moment = _context().mpf(0)
-        self._before: list[tuple[Any, Any]] = []
+        self._before: list[tuple[mpf, mpf]] = []
         for panel in panels:
             self._before.append((mass, moment))
             m, s = panel.moments(panel.end)
@@ -296,7 +300,7 @@ class Density:
         self._total = mass
         self._noise = sum(panel.error for panel in panels)
 
-    def _moments(self, r: Any) -> tuple[Any, Any]:
+    def _moments(self, r: mpf) -> tuple[mpf, mpf]:
         """Integrals of p and of r p over `[0, r]`."""
         i = max(bisect_right(self._starts, r) - 1, 0)
         mass, moment = self._panels[i].moments(r)
@@ -377,7 +381,7 @@ def from_table(r: Sequence[float], p: Sequence[float]) -> Density:
 
 
 @cache
-def _fit() -> tuple[list[Any], list[Any], list[list[Any]]]:
+def _fit() -> tuple[list[mpf], list[mpf], list[list[mpf]]]:
     """Chebyshev points, the points between them, and the matrix from samples to powers of t."""
     mp = _context()
     n = _DEGREE
@@ -408,7 +412,7 @@ def from_formula(formula: Formula, r_max: float) -> Density:
     lowest, highest = (mp.inf, mp.mpf(0)), mp.mpf(0)
     panels_within = _MAX_OPERATIONS // (len(formula.steps) * (len(nodes) + len(between)))
 
-    def fit(a: Any, b: Any) -> _Panel:
+    def fit(a: mpf, b: mpf) -> _Panel:
         nonlocal lowest, highest, panels_within
         panels_within -= 1
         if panels_within < 0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 from numpy.lib import format as npy
@@ -14,6 +14,9 @@ from hystgen.basics import extras
 from hystgen.records import mat_nesting
 from hystgen.records.columns import Column, Step, column, from_number, is_named
 from hystgen.records.reading import Matrix, Reading, Table, in_matrix, one_dimension
+
+if TYPE_CHECKING:
+    from numpy.lib.npyio import NpzFile
 
 MATLAB_NUMBERS = frozenset(
     ("double", "single", "logical", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
@@ -53,15 +56,16 @@ def _scalar(
     """Whether the number is the sample rate of the vectors; it is then added to `steps`."""
     if int(np.prod(shape)) != 1 or not is_named(name):
         return False
-    step = from_number(name, float(read()[0]), of)
+    step = from_number(name, float(np.ravel(read())[0]), of)
     steps += [step] if step else []
     return step is not None
 
 
-def _npy_shape(archive: Any, file: str) -> tuple[int, ...]:
+def _npy_shape(archive: NpzFile, file: str) -> tuple[int, ...]:
     """Shape of an archived array of numbers, from its header alone; (0,) for anything else."""
+    assert archive.zip is not None, "open"
     with archive.zip.open(file) as member:
-        header: Mapping[tuple[int, int], Callable[..., Any]] = {
+        header: Mapping[tuple[int, int], Callable[[IO[bytes]], tuple[tuple[int, ...], bool, np.dtype]]] = {
             (1, 0): npy.read_array_header_1_0,
             (2, 0): npy.read_array_header_2_0,
         }
@@ -75,7 +79,7 @@ def _npy_shape(archive: Any, file: str) -> tuple[int, ...]:
     return tuple(shape) if dtype.kind in "fiub" else (0,)
 
 
-def _npy_vector(archive: Any, name: str) -> NDArray[np.generic]:
+def _npy_vector(archive: NpzFile, name: str) -> NDArray[np.generic]:
     return np.asarray(archive[name]).ravel()
 
 
@@ -102,9 +106,7 @@ def read_mat(reading: Reading, stream: IO[bytes]) -> Table:
             elif kind in MATLAB_NUMBERS and one_dimension(shape):
                 vectors.add(name, one_dimension(shape))
                 columns.append(column(name, length=one_dimension(shape), read=partial(vectors.read, name)))
-            elif kind not in MATLAB_NUMBERS or not _scalar(
-                name, "", partial(_mat_variable, stream, name), shape, steps
-            ):
+            elif kind not in MATLAB_NUMBERS or not _scalar(name, "", partial(_mat_matrix, stream, name), shape, steps):
                 ignored.append(name)
                 if kind in MATLAB_NUMBERS and in_matrix(shape):
                     matrices[name] = shape, partial(_mat_matrix, stream, name)
@@ -121,10 +123,6 @@ def _mat_variables(stream: IO[bytes], names: Sequence[str]) -> dict[str, NDArray
 
 def _mat_matrix(stream: IO[bytes], name: str) -> NDArray[np.generic]:
     return _mat_variables(stream, [name])[name]
-
-
-def _mat_variable(stream: IO[bytes], name: str) -> NDArray[np.generic]:
-    return np.asarray(_mat_matrix(stream, name)).ravel()
 
 
 class _MatVectors:

@@ -6,7 +6,7 @@ import difflib
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -355,6 +355,7 @@ def parse_columns(text: str) -> dict[str, str]:
     return mapping
 
 
+@dataclass
 class Finder:
     """Finds the requested columns; `problems` says what is wrong with the others.
 
@@ -362,23 +363,16 @@ class Finder:
     columns found, if it has no time.
     """
 
-    def __init__(
-        self,
-        columns: Sequence[Column],
-        mapping: Mapping[str, str],
-        ignored: Sequence[str] = (),
-        outside: Sequence[str] = (),
-    ) -> None:
-        self.columns = columns
-        self.mapping = mapping
-        self.ignored = ignored
-        self.outside = outside
-        self.problems: list[str] = []
-        self.understood: dict[str, Column] = {}
-        self.steps: list[Step] = []
-        self._unnamed: list[str] = []
-        self._several: dict[str, list[Column]] = {}
-        self._asked: set[str] = set()
+    columns: Sequence[Column]
+    mapping: Mapping[str, str]
+    ignored: Sequence[str] = ()
+    outside: Sequence[str] = ()
+    problems: list[str] = field(default_factory=list)
+    understood: dict[str, Column] = field(default_factory=dict)
+    steps: list[Step] = field(default_factory=list)
+    _unnamed: list[str] = field(default_factory=list)
+    _several: dict[str, list[Column]] = field(default_factory=dict)
+    _asked: set[str] = field(default_factory=set)
 
     def find(
         self, need: Sequence[str], timed: bool, steps: Sequence[Step] = (), points: bool = False

@@ -29,7 +29,7 @@ class Frame(Protocol):
     def columns(self) -> Any:
         """Names of the columns."""
 
-    def __getitem__(self, name: Any, /) -> Any:
+    def __getitem__(self, name: object, /) -> Any:
         """A column by its name."""
 
 

@@ -78,6 +78,7 @@ class Table:
         return None if self.lines is None else self.lines.line(row)
 
 
+@dataclass
 class Reading:
     """A file being read: the request, and the problems and notes so far.
 
@@ -86,27 +87,21 @@ class Reading:
     does not state plainly.
     """
 
-    def __init__(
-        self,
-        file: str,
-        columns: Mapping[str, str],
-        sample_time: float | None,
-        delimiter: str | None,
-        need: tuple[str, ...],
-        tick: Callable[[float], None],
-        points: bool = False,
-    ) -> None:
-        self.file = file
-        self.columns = columns
-        self.sample_time = sample_time
-        self.delimiter = "\t" if delimiter in ("\\t", "tab") else delimiter
-        self.need = need
-        self.points = points
-        self.tick = tick
-        self.problems: list[str] = []
-        self.notes: list[str] = []
-        self.fills: dict[str, str] = {}
-        self.read_as: list[str] = []
+    file: str
+    columns: Mapping[str, str]
+    sample_time: float | None
+    delimiter: str | None
+    need: tuple[str, ...]
+    tick: Callable[[float], None]
+    points: bool = False
+    problems: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    fills: dict[str, str] = field(default_factory=dict)
+    read_as: list[str] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        if self.delimiter in ("\\t", "tab"):
+            self.delimiter = "\t"
 
     def understood(self, text: str) -> None:
         """Add to the line that says how the file was interpreted."""
@@ -168,7 +163,7 @@ class Reading:
             self.understood(
                 ", ".join(
                     f"{ours} = {printable(c.own)}{' in seconds, as it has no unit' if ours == 't' and no_unit else ''}"
-                    for ours, c in sorted(found.items(), key=_standard_first)
+                    for ours, c in sorted(found.items(), key=lambda entry: (*STANDARD, entry[0]).index(entry[0]))
                 )
             )
         if steps:
@@ -264,10 +259,6 @@ class Reading:
                 self.notes.append(note)
             units["t"] = "s"
         return Table(numbers, units, lines)
-
-
-def _standard_first(entry: tuple[str, Column]) -> int:
-    return STANDARD.index(entry[0]) if entry[0] in STANDARD else len(STANDARD)
 
 
 MOST_TOGETHER = 64

@@ -275,14 +275,10 @@ def frequency(found: Diagnosis, width: float) -> Figure:
     return drawn
 
 
-def _last(found: Diagnosis) -> str:
-    return "with the effects" if found.result.effects else "refitted model"
-
-
 def _sides(found: Diagnosis) -> list[tuple[str, str, str]]:
     """The errors to draw: key, colour and name; those before only if there are effects."""
     before = [("before", BEFORE, "refitted")] if found.result.effects else []
-    return [*before, ("after", AFTER, _last(found))]
+    return [*before, ("after", AFTER, "with the effects" if found.result.effects else "refitted model")]
 
 
 def _range(axes: Axes, values: Sequence[float], which: str) -> None:

@@ -19,7 +19,7 @@ from hystgen.basics.version import __version__
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.identification import MODEL_PARSIMONY
 from hystgen.identification.fit import HELD_OUT, Fit
-from hystgen.identification.quality import WORD_COLUMNS, Row, cells
+from hystgen.identification.quality import WORD_COLUMNS, ErrorRow, cells
 from hystgen.model import Model, cascade_of
 from hystgen.parameters.files import parameters_sha256
 from hystgen.records import Record, Source, in_units, read_records, several
@@ -28,9 +28,8 @@ from hystgen.report.fit_figures import Shown
 from hystgen.report.html import Details, HtmlTable, Listing, Picture, Section, Text, page
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
-    from hystgen.identification import Row
+    from hystgen.identification import ErrorRow
 
 PAGE = "report.html"
 
@@ -40,13 +39,9 @@ P = ParamSpec("P")
 def _with_pictures(find: Callable[P, Fit]) -> Callable[P, Fit]:
     @functools.wraps(find)
     def found(*given: P.args, **named: P.kwargs) -> Fit:
-        return replace(find(*given, **named), draw=_picture)
+        return replace(find(*given, **named), draw=lambda fit: plots.fit_figure(fit, fit.records))
 
     return found
-
-
-def _picture(fit: Fit) -> Figure:
-    return plots.fit_figure(fit, fit.records)
 
 
 identify = _with_pictures(identification.identify)
@@ -134,12 +129,12 @@ def _kind(fit: Fit) -> str:
     return f"A generalized Prandtl-Ishlinskii model with {count} behind a tanh front with {branches}"
 
 
-def held_out_row(fit: Fit) -> Row | None:
+def held_out_row(fit: Fit) -> ErrorRow | None:
     """The row that judges the model; None if nothing was held out."""
     return next((row for row in fit.rows if row.part == "held out"), None)
 
 
-def _of_range(row: Row) -> str:
+def _of_range(row: ErrorRow) -> str:
     return percent(row.rms_percent / 100.0, of="the output range")
 
 

@@ -15,7 +15,7 @@ from hystgen.basics.problems import counted
 from hystgen.basics.version import __version__
 from hystgen.planning import header
 from hystgen.planning import plan as planning
-from hystgen.planning.plan import CODES, MEASURED, RECORDING, WHOLE, Drive, lasting
+from hystgen.planning.plan import CODES, MEASURED, RECORDING, WHOLE, lasting
 from hystgen.planning.session import FILE as SESSION
 from hystgen.planning.waveforms import EDGE
 from hystgen.report.html import HtmlTable, Listing, Picture, Section, Text, page
@@ -67,10 +67,11 @@ def html(plan: Plan, folder: str | os.PathLike[str]) -> str:
         Text(f"Drives that separate all effects. {plan.sentence()}"),
         Text(f"When {_measured(plan, home)}, run:", plan.command(folder)),
     ]
+    purposes = [f"{drive.name}: {drive.purpose} Distinguishes: {', '.join(drive.shows)}." for drive in plan.drives]
     sections = [
         Section("What to do", [Listing(_steps(plan, home))]),
         Section("The drives", [figure, _times(plan)]),
-        Section("Purpose of each drive", [Listing([_purpose(drive) for drive in plan.drives])]),
+        Section("Purpose of each drive", [Listing(purposes)]),
         Section("Limits", [Listing([*_kept(plan), *_limits(plan)])]),
         Section("Provenance", [Text(f"hystgen {__version__}; the same parameter file gives the same drives.")]),
     ]
@@ -150,10 +151,6 @@ def _times(plan: Plan) -> HtmlTable:
             ]
         )
     return HtmlTable(rows, (0, 1))
-
-
-def _purpose(drive: Drive) -> str:
-    return f"{drive.name}: {drive.purpose} Distinguishes: {', '.join(drive.shows)}."
 
 
 def _kept(plan: Plan) -> list[str]:

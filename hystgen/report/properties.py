@@ -9,14 +9,10 @@ from hystgen.arithmetic import ARITHMETICS, FIXED, FLOATING
 from hystgen.basics.problems import EffectsError, FormatError, NotInvertibleError, counted, percent
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.bounds import error_bounds
-from hystgen.compensator.chain.preview import rings
-from hystgen.effects import Effect
-from hystgen.effects.resonance.model import Resonance
 from hystgen.emission import interface, module
 from hystgen.emission.calls import emit_options
 from hystgen.front.dead_zone.model import DeadZone
 from hystgen.model import SETTLED, Model
-from hystgen.parameters.schema import Compensation
 
 HARD_RATIO = 1e6
 """Slope ratio from which a warning is given: a rounding of float32, 6e-8, is then 6 % of the drive."""
@@ -147,18 +143,9 @@ def _effects(model: Model) -> list[str]:
                 value = getattr(effect, key)
                 lines.append(f"        {key} = {_shown(value)}: {field.description}")
         lines += [f"        {remark}" for remark in effect.remarks(tuple(model.cascade.pi.thresholds))]
-        if words := _compensation(effect, model.parameters.emit.compensation):
+        if words := effect.corrected(model.parameters.emit.compensation.resonance):
             lines.append(f"        compensation: {words}")
     return [*lines, *(f"    {words}" for words in _reading(model))]
-
-
-def _compensation(effect: Effect, how: Compensation) -> str:
-    """How well the inverse can correct an effect; for a mode, how `emit.compensation.resonance` changes that."""
-    if not isinstance(effect, Resonance) or how.resonance == "inverse":
-        return effect.compensation
-    if how.resonance == "none":
-        return "none, as emit.compensation.resonance says"
-    return f"a {how.resonance}, see below" if rings(effect, how.resonance) else effect.compensation
 
 
 def _reading(model: Model) -> list[str]:

@@ -12,7 +12,7 @@ from hystgen.verification import compilers, sources
 from hystgen.verification.loading import load
 
 
-class Instance:
+class CompiledInstance:
     """An instance driven by NAME_OP_init and NAME_OP_step in the C that a model emits, with numbers as the C takes
     them.
 

@@ -23,8 +23,8 @@
 #define HYSTGEN_CHAIN_CHAIN_C
 #include "compensator/chain/model.h"
 #include "compensator/chain/drive_signal.c"
-#include "effects/delay/forward.c"
-#include "effects/slew_limit/slewed.c"
+#define HYSTGEN_ASKS_LIMITS
+#include "effects/catalogue.h"
 #include "compensator/chain/signals.c"
 #ifndef HYSTGEN_CONFIGURED
 #include "compensator/drive.c"

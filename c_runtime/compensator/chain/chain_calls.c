@@ -49,8 +49,8 @@ HYSTGEN_APART_IN_FIXED_CHAIN hystgen_signal_t hystgen_inverse_wanted(hystgen_inv
                         : hystgen_inverse_output_side_resting(self, y);
 }
 
-/* The drive that leads to an input w of the plays, at which their sum is h, for the limited
-   reference `level`. */
+/* The drive that leads to an input w of the plays, at which their sum is h, for a reference that is
+   already limited. */
 HYSTGEN_APART_IN_FIXED_CHAIN hystgen_reach_t hystgen_inverse_sought(hystgen_inverse_t *self,
                                                                     hystgen_real_t level,
                                                                     hystgen_signal_t h,

@@ -5,12 +5,8 @@
 #define HYSTGEN_CHAIN_MOVING_PLAYS_C
 #include "compensator/chain/model.h"
 #include "compensator/chain/signals.c"
-#include "effects/noncongruent/bent.c"
-#ifdef HYSTGEN_HAS_DASHPOT_PLAYS
-#include "effects/rate_dependence/dashpot.c"
-#else
-#include "effects/rate_dependence/moved.c"
-#endif
+#define HYSTGEN_ASKS_MOVES
+#include "effects/catalogue.h"
 
 #ifdef HYSTGEN_HAS_MOVES_APART
 /* Play i after the input of the plays has gone to w, apart from what it contributes there, to need

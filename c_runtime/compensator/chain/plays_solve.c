@@ -1,13 +1,11 @@
-/* Operators of engine loop: plays solved for their input. Called by plays.c and by
-   relaxing_plays.c. */
+/* Operators of engine loop: plays solved for their input. Called by plays.c and relaxing.c. */
 #ifndef HYSTGEN_CHAIN_PLAYS_SOLVE_C
 #define HYSTGEN_CHAIN_PLAYS_SOLVE_C
 #include "compensator/chain/model.h"
 #include "compensator/chain/signals.c"
 
-/* Input of the plays at which their sum is h; now it is `level`. The plays are summed up again
-   where that is not kept, as without effects, or lacks bits, as in fixed point, whose kernel does
-   that. */
+/* Input of the plays at which their sum is h. The plays are summed up again where their present
+   sum is not kept, as without effects, or lacks bits, as in fixed point, whose kernel does that. */
 static inline hystgen_reach_t hystgen_input_of(const hystgen_play_t *play, hystgen_signal_t level,
                                                hystgen_signal_t h) {
 #if defined(HYSTGEN_CHAIN) && !defined(HYSTGEN_FIXED)

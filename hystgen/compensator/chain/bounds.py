@@ -31,10 +31,9 @@ from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, ErrorBounds, Loop
 from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, ahead_of, crossing, lead
 from hystgen.compensator.chain.parts import SENT, Parts
+from hystgen.effects.maps import MapErrors
 from hystgen.effects.part import Gained, Speed
-from hystgen.effects.rate_dependence import compensator as dashpot
-from hystgen.effects.saturation.model import TanhSaturation
-from hystgen.front.tanh import kernels
+from hystgen.effects.plays import DASHPOT, DILATED, RELAXING, SEEN
 from hystgen.plays import slots
 
 SAME = "both have seen the same drives"
@@ -64,31 +63,15 @@ def _sizes(compiled: Compiled) -> _Sizes:
     return _Sizes(drive, plays, output, max(ends) + abs(static.output_offset) + settings)
 
 
-def _saturation(compiled: Compiled, u: float, kind: str) -> tuple[float, float, float]:
-    """Saturation: the slope of its inverse at the ends of the output, the roundings of the inverse as errors of its
-    input, and the roundings of the map."""
-    slope, back, there = 1.0, 0.0, 0.0
+def _mapped(compiled: Compiled, u: float, kind: str) -> tuple[float, float, float]:
+    """Maps of the output: the slope of their inverse at its ends, the roundings of the inverse as errors of its result,
+    and the roundings of the maps."""
     limits = compiled.tables.limits
     ends = np.array([float(limits[slots.OUTPUT_MIN]), float(limits[slots.OUTPUT_MAX])]) - compiled.static.output_offset
-    for effect in reversed(compiled.parts.saturations):
-        if isinstance(effect, TanhSaturation):
-            level, centre = effect.level, abs(effect.centre)
-            shares = np.clip((ends - effect.centre) / level, 4.0 * u - 1.0, 1.0 - 4.0 * u)
-            share = float(np.max(np.abs(shares)))
-            slope = slope / (1.0 - share * share)
-            size, off = level * share, 1.0 if centre else 0.0
-            back += u * (4.0 * size + level * (0.9 * kernels.ATANH_MAX_ULP[kind] + 2.0)) * slope
-            back += u * (2.0 * off * size + 5.0 * centre) * slope  # two more sums; a2, a3 and what they are added to
-            there += u * level * (4.0 + 2.0 * kernels.TANH_MAX_ULP[kind])
-            there += u * (off * level + 6.0 * centre)
-            ends = effect.centre + level * np.arctanh(shares)
-        else:
-            size = float(np.max(np.abs(ends)))
-            give = getattr(effect, "give", 0.0)
-            slope = slope / (give if 0.0 < give < 1.0 else 1.0)
-            back += 8.0 * u * size * slope
-            there += 8.0 * u * size
-    return slope, back, there
+    found = MapErrors(ends, 1.0, 0.0, 0.0)
+    for each in reversed(compiled.parts.maps):
+        found = each.errors(found, u, kind)
+    return found.slope, found.back, found.there
 
 
 def _gains(compiled: Compiled, u: float, emitted: bool) -> Gained:
@@ -114,18 +97,18 @@ def _moving(compiled: Compiled, kind: str, emitted: bool) -> tuple[float, float,
     size = 3.0 * max(abs(low), abs(high)) + float(r[-1])
     steep = 1.0 + abs(moving.steepest_bend(static, compiled.parts.plays))
     play = 4.0 * u * size
-    if t.moves == moving.RELAXING:
+    if t.moves == RELAXING:
         slow = t.first[1:].astype(float)
         play = 8.0 * u * size / float(np.min(slow))
         if emitted:
             play += compiled.largest_way / 4.0  # contact within a step counts from the first touch
-    if t.moves == moving.DASHPOT:
-        effect, way = next(filter(dashpot.nonlinear, compiled.parts.plays)), compiled.largest_way
+    if t.moves == DASHPOT:
+        (mover,), way = moving.movers(static, compiled.parts.plays), compiled.largest_way
         rows, ways = t.yields.astype(float), (way, moving.largest_stretch(static))
-        stretched = dashpot.stretch_error(effect, float(r[-1]), compiled.seconds, rows, ways, np.zeros(len(rows)))
+        stretched = mover.stretch_error(compiled.seconds, rows, ways, np.zeros(len(rows)))
         play = 8.0 * u * size + stretched
         if emitted:
-            play += float(t.number[moving.SEEN]) * way  # where the input counts as standing still
+            play += float(t.number[SEEN]) * way  # where the input counts as standing still
     summed = (12.0 + len(static.pi.weights)) * u * size * steep
     width = 3.0 * (high - low) * 2.0 ** -t.halves + u * size
     return play, float(np.sum(p)) * summed, float(np.sum(p)) * steep * width
@@ -139,7 +122,7 @@ def _one(compiled: Compiled, kind: str, emitted: bool, same: bool) -> tuple[floa
     """
     u = float(np.finfo(kind).eps) / 2
     sizes = _sizes(compiled)
-    slope, back, there = _saturation(compiled, u, kind)
+    slope, back, there = _mapped(compiled, u, kind)
     gains, least, gain, misjudged, late = _gains(compiled, u, emitted)
     taps = float(np.sum(np.abs(compiled.taps.weights))) if compiled.taps else 1.0
     inverse = 4.0 * u * sizes.displacement * slope + back
@@ -255,7 +238,7 @@ def condition(compiled: Compiled) -> str:
         return together(SAME, UNSLEWED, still)
     missed = any(one.misses for one in ahead_of(compiled.ones))
     remembered = compiled.static.pi.n > 0 or any(one.remembers for one in compiled.behind)
-    dilated = compiled.tables.moving.moves == moving.DILATED
+    dilated = compiled.tables.moving.moves == DILATED
     return together(SAME, still) if dilated or compiled.tables.turning or (missed and remembered) else ""
 
 
@@ -274,7 +257,7 @@ def chain_bounds(compiled: Compiled, arithmetic: str) -> ErrorBounds:
     only_seen = 0.0  # error of the sum that the inverse undoes; only creep behind plays with a limited drive sees it
     if compiled.tables.moving.used:
         least = moving.least_slope(static, compiled.parts.plays) * (1.0 if same else 0.5)
-        if compiled.tables.moving.moves == moving.DILATED:
+        if compiled.tables.moving.moves == DILATED:
             least = min(least, moving.least_dilated(static, compiled.parts.plays, compiled.seconds))
         gain = 1.0 / least / static.front_slopes[0]
         pairs = zip(_moving(compiled, arithmetic, True), _moving(compiled, "float64", False), strict=True)

@@ -29,9 +29,6 @@ from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, together
 from hystgen.compensator.chain.bounds import SAME, STILL
 from hystgen.compensator.chain.layout import DITHER, ChainTables, ahead_of, largest_way
 from hystgen.compensator.chain.moving import (
-    DASHPOT,
-    DILATED,
-    PLAIN,
     Bumps,
     least_dilated,
     least_slope,
@@ -41,9 +38,9 @@ from hystgen.compensator.chain.moving import (
 )
 from hystgen.compensator.chain.parts import BEHIND, LED, NAMES, Parts
 from hystgen.compensator.fixed_tables import Builder, FixedCurve, upward
+from hystgen.effects.maps import MapErrors, Whole
 from hystgen.effects.part import Coded, CodedGain, Coding, Sought, Speed
-from hystgen.effects.rate_dependence import compensator as dashpot
-from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
+from hystgen.effects.plays import DASHPOT, DILATED, PLAIN
 
 DOUBLE = 2.0**-40
 """Relative error allowed for double precision itself: a thousand roundings."""
@@ -53,19 +50,19 @@ DOUBLE = 2.0**-40
 class Sizes:
     """Largest sizes of the signals behind the plays, in output codes.
 
-    Forwards: the sum of the plays, the input of each block (`given`, by part) and of each saturation, and the output.
-    Backwards: the reference after the inverse of each saturation, the least and largest input to which each tanh is
-    inverted (`inverted`), the target of the output side, the output wanted from each block (`wanted`), and the sum
+    Forwards: the sum of the plays, the input of each block (`given`, by part) and of each map of the output (`mapped`),
+    and the output. Backwards: the reference after the inverse of each map, the least and largest input to which a curve
+    inverts it (`inverted`), the target of the output side, the output wanted from each block (`wanted`), and the sum
     asked of the plays.
     """
 
     plays: float
     given: dict[str, list[float]]
     wanted: dict[str, list[float]]
-    saturations: list[float]
+    mapped: list[float]
     output: float
     undone: list[float]
-    inverted: list[tuple[float, float]]
+    inverted: list[tuple[float, float] | None]
     target: float
     asked: float
 
@@ -73,13 +70,13 @@ class Sizes:
     def largest(self) -> float:
         """The largest of them."""
         blocks = (size for sizes in (*self.given.values(), self.wanted["own_behind"]) for size in sizes)
-        forwards = (self.plays, *blocks, *self.saturations, self.output)
+        forwards = (self.plays, *blocks, *self.mapped, self.output)
         return max(*forwards, *self.undone, self.target, self.asked)
 
 
 @dataclass(frozen=True)
 class Bend:
-    """The curve of a saturation; its arguments leave out `drop` bits of a signal, its values `lift` bits."""
+    """A curve of a map; its arguments leave out `drop` bits of a signal, its values `lift` bits."""
 
     curve: FixedCurve
     drop: int
@@ -95,10 +92,10 @@ class Bend:
 class Bounds:
     """The bounds of one model; fields as in `hystgen.compensator.chain.fixed_tables`.
 
-    `formats`: the blocks of each part; `bends`: the curve and inverse curve of each tanh; `ends`: range of the output;
-    `slewed`: error of a slew-limited drive by rounding, in drive codes; `reached`: whether the block in front can be
-    led to every input asked of the plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in front of the
-    plays below their input; `bumps`: curves of bent plays.
+    `formats`: the blocks of each part; `bends`: the curve and inverse curve of each map that has them; `ends`: range of
+    the output; `slewed`: error of a slew-limited drive by rounding, in drive codes; `reached`: whether the block in
+    front can be led to every input asked of the plays; `largest_step`: as in `Compiled`; `finer`: bits of a signal in
+    front of the plays below their input; `bumps`: curves of bent plays.
     """
 
     static: StaticModel
@@ -110,7 +107,7 @@ class Bounds:
     drop: int
     formats: dict[str, list[Any]]
     taps: list[float]
-    bends: list[Bend]
+    bends: list[list[Bend]]
     ends: tuple[float, float]
     slewed: float
     reached: bool
@@ -168,31 +165,14 @@ class Bounds:
                     reached = (reached or size) * gain.largest + gain.offset
         return found
 
-    def _saturation(self) -> tuple[float, float, float]:
-        """Saturation: the slope of its inverse at the ends of the output, and the errors of inverse and map, in output
+    def _mapped(self) -> MapErrors:
+        """Maps of the output: the slope of their inverse at its ends, and the errors of inverse and maps, in output
         codes."""
-        ends = [end - self.static.output_offset for end in self.ends]
-        slope, back, there = 1.0, 0.0, 0.0
-        bends = [self.bends[i : i + 2] for i in range(0, len(self.bends), 2)]
-        for effect in reversed(self.parts.saturations):
-            if isinstance(effect, TanhSaturation):
-                onward, backward = bends.pop()
-                most = 1.0 - 2.0**-50
-                shares = [min(max((end - effect.centre) / effect.level, -most), most) for end in ends]
-                share = max(map(abs, shares))
-                slope = slope / (1.0 - share * share)
-                back = back / (1.0 - share * share) + backward.error(1.0 / (1.0 - share * share)) * self._signal
-                there += onward.error(1.0) * self._signal
-                ends = [effect.centre + effect.level * math.atanh(each) for each in shares]
-            elif isinstance(effect, HardSaturation | Stops):
-                give = getattr(effect, "give", 0.0)
-                over = 1.0 / give if 0.0 < give < 1.0 else 1.0
-                slope, back = slope * over, back * over
-                if give:
-                    size = max(map(abs, ends)) / float(self.inner.output_lsb)
-                    back += (0.5 + over) * self._signal + missed(1.0 / give) * size
-                    there += 1.0 * self._signal + missed(give) * self.sizes.output
-        return slope, back, there
+        found = MapErrors(np.array(self.ends) - self.static.output_offset, 1.0, 0.0, 0.0)
+        unit = Whole(self._signal, float(self.inner.output_lsb), self.sizes.output)
+        for each, curves in zip(reversed(self.parts.maps), reversed(self.bends), strict=True):
+            found = each.whole_errors(found, curves, unit)
+        return found
 
     # ------------------------------------------------------------ operators
 
@@ -259,9 +239,8 @@ class Bounds:
         """How far plays with a nonlinear dashpot can be from the model's: by the table, and by treating the input as
         standing still within a step."""
         t = self.tables.moving
-        effect = next(filter(dashpot.nonlinear, self.parts.plays))
         seen = float(t.seen[0]) / 2.0 ** int(t.seen[1])
-        return yield_error(t, effect, self.static, self.seconds, step, way) + seen * way
+        return yield_error(t, self.static, self.parts.plays, self.seconds, step, way) + seen * way
 
     @cached_property
     def _steepest(self) -> float:
@@ -292,12 +271,12 @@ class Bounds:
             error = error * each.one.growth + each.there(size, self._signal)
             if gain:
                 error = gain.largest * error + gain.there + self._signal
-        beside = self._saturation()[2] + 0.5 + (1.0 + self.drifted) * self._signal
+        beside = self._mapped().there + 0.5 + (1.0 + self.drifted) * self._signal
         return upward(Fraction(SECOND_ORDER * (error + beside) + DOUBLE * self.sizes.output))
 
     def _asked(self) -> float:
         """Error of the sum that the inverse asks of the plays, in output codes."""
-        slope, back, _ = self._saturation()
+        _, slope, back, _ = self._mapped()
         low, high = (end / float(self.inner.output_lsb) for end in self.ends)
         limits = self.tables.limits
         short = max(high - float(limits[3]), float(limits[2]) - low, 0.0)

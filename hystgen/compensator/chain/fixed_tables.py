@@ -64,11 +64,8 @@ from hystgen.compensator.chain.moving import Bumps
 from hystgen.compensator.chain.parts import AHEAD, BEHIND, LED, NAMES, PARTS, Parts
 from hystgen.compensator.fixed_tables import TABLE_MAX, Builder, FixedCurve, lsbs, nearest
 from hystgen.effects import bend
-from hystgen.effects.lag.fixed import COARSE
+from hystgen.effects.maps import MapTables, Wanted
 from hystgen.effects.part import ChainPart, FixedSurroundings, Margin
-from hystgen.effects.saturation.fixed import Saturations
-from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
-from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
 
@@ -84,9 +81,6 @@ MOST_FINER = 16
 
 BEND_BITS = 30
 """Bits of the arguments and values of a curve, without their sign."""
-
-STEEP = 4.0
-"""Largest argument of a tanh to which a displacement is inverted, in its levels: the inverse has slope 750 there."""
 
 
 def build(
@@ -145,7 +139,7 @@ class _Builder:
         self.bits = min(self.inner.bits, room)
         self.drop = self.inner.bits - self.bits
         limits = self._limits(plays.limits)
-        saturations = self._saturations()
+        maps = self._maps()
         drive = [end << self.inner.fine for end in self.inner.drive]
         plays.limits[slots.DRIVE_MIN], plays.limits[slots.DRIVE_MAX] = drive
         tables = ChainTables(
@@ -154,7 +148,7 @@ class _Builder:
             self._need(lambda: self._moving(plays), "effects on plays"),
             self._tables(),
             self.parts.counts,
-            saturations,
+            maps,
             self._need(self._tap, "the preview"),
             np.array(self._numbers(), dtype=np.int64),
             int(bool(self.parts.slew)),
@@ -222,30 +216,22 @@ class _Builder:
             if part.forward:
                 given[part.name].append(size)
                 size = one.grown(size, margin)
-        saturations, at_rest = [], []
+        lsb = float(self.output_lsb)
+        mapped, at_rest = [], []
         low, high = (self._code(end - static.output_offset) for end in self._unlimited)
-        for effect in self.parts.saturations:
-            saturations.append(size)
+        for each in self.parts.maps:
+            mapped.append(size)
             more = (slack - 1.0) * max(abs(low), abs(high)) + 1.0
             at_rest.append((low - more, high + more))
-            if isinstance(effect, TanhSaturation):
-                size = max(size, abs(self._code(effect.centre)) + 1.0)
-            low, high = (
-                self._code(float(end))
-                for end in effect.mapped(np.array([low, high]) * float(self.output_lsb), None)
-            )
+            size = each.grown(size, lsb)
+            low, high = (self._code(float(end)) for end in each.mapped(np.array([low, high]) * lsb))
         away = abs(self._code(static.output_offset)) + span * (1 + len(self.ones["clock"]))
         back = float(self.about.code_max) + away + 1.0
-        undone, inverted = [back], []
-        for effect, ends in zip(reversed(self.parts.saturations), reversed(at_rest), strict=True):
-            if isinstance(effect, TanhSaturation):
-                inverted.append(self._inverted(effect, ends, still))
-                back = max(map(abs, inverted[-1]))
-            elif isinstance(effect, HardSaturation):
-                back = min(back, self._code(effect.level) + 1.0)
-            elif isinstance(effect, Stops):
-                stop = max(abs(effect.lower), abs(effect.upper))
-                back = back / effect.give if effect.give else self._code(stop)
+        undone: list[float] = [back]
+        inverted: list[tuple[float, float] | None] = []
+        for each, ends in zip(reversed(self.parts.maps), reversed(at_rest), strict=True):
+            back, reached = each.asked(back, ends, still, lsb)
+            inverted.append(reached)
             undone.append(back)
         target = back * (math.fsum(map(abs, self.taps.weights.tolist())) if self.taps else 1.0) + 1.0
         asked, wanted = target, {part.name: [0.0] * len(given[part.name]) for part in BEHIND}
@@ -253,18 +239,12 @@ class _Builder:
             for j in range(len(given[part.name]) * (not part.forward) - 1, -1, -1):
                 wanted[part.name][j] = asked
                 asked = self.ones[part.name][j].asked(given[part.name][j], asked, margin)
-        return Sizes(plays, given, wanted, saturations, size + away, undone, inverted[::-1], target, asked)
+        return Sizes(plays, given, wanted, mapped, size + away, undone, inverted[::-1], target, asked)
 
     @cached_property
     def _unlimited(self) -> tuple[float, float]:
-        """Extremes of the settled output in front of the saturations, including the offset."""
-        return output_range(self.static, dataclasses.replace(self.parts, saturations=[]), self.seconds)
-
-    def _inverted(self, effect: TanhSaturation, at_rest: tuple[float, float], size: float) -> tuple[float, float]:
-        """Least and largest input to which a displacement is inverted; at least what the model reaches `at_rest`."""
-        centre = self._code(effect.centre)
-        way = max(*(abs(end - centre) for end in at_rest), min(size + abs(centre), STEEP * self._code(effect.level)))
-        return centre - way, centre + way
+        """Extremes of the settled output in front of its maps, including the offset."""
+        return output_range(self.static, dataclasses.replace(self.parts, maps=[]), self.seconds)
 
     def _beyond(self) -> tuple[int, bool]:
         """Spans beyond its range that the input of the plays has to be asked for, and whether they all can be.
@@ -338,7 +318,9 @@ class _Builder:
         found[SHARE_BITS] = 31 - self.about.code_bits
         found[DRIVE_BITS], found[ARRIVING_BITS] = self.inner.fine + self.finer, self.finer
         found[DITHER] = (1 << found[DRIVE_BITS]) + math.ceil(lead(self.leading))
-        found[BRAKED_DROP] = max((span << found[DRIVE_BITS]).bit_length() + 2 - COARSE.bit_length(), 0)
+        led = PARTS[LED].coded().verbs.led
+        coarse = led.coarse.bit_length() if led else 0
+        found[BRAKED_DROP] = max((span << found[DRIVE_BITS]).bit_length() + 2 - coarse, 0)
         return found
 
     def _largest_step(self) -> float:
@@ -432,66 +414,39 @@ class _Builder:
         rows = [factor(weight) for weight in self.taps.weights.tolist()] if self.taps else []
         return np.array(rows, dtype=np.int64).reshape(-1, 2)
 
-    # ------------------------------------------------------------ what saturates
+    # ------------------------------------------------------------ maps of the output
 
-    def _saturations(self) -> Saturations:
-        self.bends: list[Bend] = []
+    def _maps(self) -> MapTables:
+        self.bends: list[list[Bend]] = []
         kinds, pieces = [], []
-        domain: list[tuple[int, int]] = []
-        scaled: list[tuple[int, int]] = []
-        curves: list[FixedCurve | None] = []
-        inverted = iter(self.sizes.inverted)
-        for effect, size in zip(self.parts.saturations, self.sizes.saturations, strict=True):
-            row = [0, 0, *factor(0), *factor(0)]
-            if isinstance(effect, TanhSaturation):
-                kinds.append(slots.TANH)
-                pair = self._bends(effect, size, next(inverted))
-                self.bends += pair
-                curves += [one.curve for one in pair]
-                domain += [one.curve.domain for one in pair]
-                scaled += [(one.drop, one.lift) for one in pair]
-            else:
-                kinds.append(slots.DEAD_ZONE)
-                lower, upper, give = (
-                    (-effect.level, effect.level, 0.0) if isinstance(effect, HardSaturation)
-                    else (effect.lower, effect.upper, effect.give)
-                )
-                most = LARGEST // 2
-                ends = [min(max(self.signal(end), -most), most) for end in (lower, upper)]
-                over = self._need(lambda give=give: factor(1.0 / give if give else 0.0), "stops")  # type: ignore[misc]
-                row = [*ends, *factor(give), *over]
-                curves += [None, None]
-                domain += [(0, 0), (0, 0)]
-                scaled += [(0, 0), (0, 0)]
-            pieces.append(row)
-        each = [[] if one is None else one.pieces for one in curves]
-        found = bend.bends(each, domain, scaled, self.about.degree)
-        return Saturations(
-            np.array(kinds, dtype=np.int64), np.array(pieces, dtype=np.int64).reshape(-1, 6), found
+        most, degree = LARGEST // 2, self.about.degree
+        for each, size, ends in zip(self.parts.maps, self.sizes.mapped, self.sizes.inverted, strict=True):
+            self.bends.append([self._bend(curve) for curve in each.curves(size, ends, float(self.output_lsb))])
+            kinds.append(slots.TANH if self.bends[-1] else slots.DEAD_ZONE)
+            over = self._need(functools.partial(factor, 1.0 / each.give if each.give else 0.0), "stops")
+            limits = [min(max(self.signal(end), -most), most) for end in (each.lower, each.upper)]
+            pieces.append([*limits, *factor(each.give), *over])
+        curves = [one for pair in self.bends for one in pair or (None, None)]
+        found = bend.bends(
+            [one.curve.pieces if one else [] for one in curves],
+            [one.curve.domain if one else (0, 0) for one in curves],
+            [(one.drop, one.lift) if one else (0, 0) for one in curves], degree,
         )
+        return MapTables(np.array(kinds, dtype=np.int64), np.array(pieces, dtype=np.int64).reshape(-1, 6), found)
 
-    def _bends(self, effect: TanhSaturation, size: float, inverted: tuple[float, float]) -> tuple[Bend, Bend]:
-        """The curve of a tanh for inputs up to `size` codes, and its inverse for results within `inverted`."""
+    def _bend(self, wanted: Wanted) -> Bend:
+        """A curve of a map, fitted."""
+        function, low, high, largest = wanted
         scale = 2.0**self.bits
-
-        def curve(function: Callable[[float], float], low: float, high: float, value: float) -> Bend:
-            drop = max(0, math.ceil(math.log2(max(-low, high) * scale)) - BEND_BITS)
-            lift = max(0, math.ceil(math.log2(value * scale)) - BEND_BITS)
-            into, out = 2.0**drop / scale, scale / 2.0**lift
-            ends, allowed = (math.ceil(low / into), math.floor(high / into)), max(0.5, out / 64.0)
-            try:
-                found = FixedCurve(lambda x: function(x * into) * out, ends, [], self.about.degree, allowed)
-            except FormatError:
-                self._refuse("saturation bends too sharply within the output's range")
-            return Bend(found, drop, lift)
-
-        level, centre = self._code(effect.level), self._code(effect.centre)
-        envelope = TanhEnvelope((level, 1.0 / level, 0.0 - centre / level, centre))
-        least, most = (float(envelope.forward(end)) for end in inverted)
-        return (
-            curve(lambda x: float(envelope.forward(x)), -size, size, min(level + abs(centre), max(size, abs(centre)))),
-            curve(lambda y: float(envelope.inverse(y)), least, most, max(map(abs, inverted))),
-        )
+        drop = max(0, math.ceil(math.log2(max(-low, high) * scale)) - BEND_BITS)
+        lift = max(0, math.ceil(math.log2(largest * scale)) - BEND_BITS)
+        into, out = 2.0**drop / scale, scale / 2.0**lift
+        ends, allowed = (math.ceil(low / into), math.floor(high / into)), max(0.5, out / 64.0)
+        try:
+            found = FixedCurve(lambda x: function(x * into) * out, ends, [], self.about.degree, allowed)
+        except FormatError:
+            self._refuse("saturation bends too sharply within the output's range")
+        return Bend(found, drop, lift)
 
 
 def setting_codes(tables: ChainTables) -> tuple[float, float]:

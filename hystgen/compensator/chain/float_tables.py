@@ -36,7 +36,6 @@ from hystgen.compensator.chain.layout import (
 from hystgen.compensator.chain.parts import BEHIND, LED, NAMES, PARTS, Parts
 from hystgen.compensator.float_tables import build_float, inward
 from hystgen.effects.part import FloatSurroundings
-from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.front.tanh import kernels
 from hystgen.parameters.schema import Compensation
 from hystgen.plays import slots
@@ -47,33 +46,12 @@ arrives: from a lag's goal and its state. Set by: tests/test_chain.py -k stands_
 
 
 def _behind(parts: Parts, arithmetic: str) -> Stages:
-    """The stages of saturation, each an envelope or three straight pieces."""
+    """The stages of maps of the output, each an envelope or three straight pieces."""
     dtype = ARITHMETICS[arithmetic].computed.type
-    kinds: list[int] = []
-    firsts: list[int] = []
-    sizes: list[int] = []
-    data: list[float] = []
-    for effect in parts.saturations:
-        firsts.append(len(data))
-        if isinstance(effect, TanhSaturation):
-            kinds.append(slots.TANH)
-            sizes.append(0)
-            one = [*effect.envelope, 1.0 / effect.level, effect.level]
-            one.append(float(np.nextafter(dtype(1), dtype(0))))
-            data += 2 * one  # both branches
-            continue
-        lower, upper, give = -math.inf, math.inf, 1.0
-        if isinstance(effect, HardSaturation):
-            lower, upper, give = -effect.level, effect.level, 0.0
-        elif isinstance(effect, Stops):
-            lower, upper, give = effect.lower, effect.upper, effect.give
-        kinds.append(slots.DEAD_ZONE)
-        sizes.append(2)
-        ends, anchors = [lower, upper], [lower, lower, upper]
-        data += [*ends, *ends, *anchors, *anchors, give, 1.0, give]
-        data += [1.0 / give if give else 0.0, 1.0, 1.0 / give if give else 0.0]
-    kind, first, size = (np.array(each, dtype=np.int64) for each in (kinds, firsts, sizes))
-    numbers = np.array(data, dtype=dtype)
+    rows = [each.stage(float(np.nextafter(dtype(1), dtype(0)))) for each in parts.maps]
+    kind, size = (np.array(each, dtype=np.int64) for each in ([row[0] for row in rows], [row[1] for row in rows]))
+    first = np.cumsum([0, *(len(data) for *_, data in rows)], dtype=np.int64)[: len(rows)]
+    numbers = np.array([x for *_, data in rows for x in data], dtype=dtype)
     return Stages(kind, first, size, numbers, kernels.TANH_TABLES[arithmetic], kernels.ATANH_TABLES[arithmetic])
 
 

@@ -67,12 +67,22 @@ class Stages(NamedTuple):
     tanh: TanhTables
     atanh: AtanhTables
 
+    @property
+    def kinds(self) -> list[int]:
+        """The kind of each stage."""
+        return list(map(int, self.stage_kind))
+
+    @property
+    def products(self) -> int:
+        """Multiplications of an envelope."""
+        return 2
+
 
 class ChainTables(NamedTuple):
     """The constants of one model with effects in one arithmetic.
 
     `limits`: as in `Tables`, for the whole chain; `plays`: front and plays without an offset, whose limits are the same
-    in floating point; in fixed point their drive may have bits below a code; `behind`: saturation.
+    in floating point; in fixed point their drive may have bits below a code; `behind`: maps of the output.
     """
 
     plays: Any  # `Tables` or `FixedTables`
@@ -80,7 +90,7 @@ class ChainTables(NamedTuple):
     moving: Any  # `MovingTables` or `FixedMovingTables`
     blocks: tuple[Any, ...]  # tables of each of `parts.PARTS`
     counts: Counts  # of their blocks
-    behind: Any  # `Stages`, or in fixed point `hystgen.effects.saturation.fixed.Saturations`
+    behind: Any  # `Stages`, or in fixed point `hystgen.effects.maps.MapTables`
     tap: Reals  # (L,), as factors (L, 2) in fixed point; empty without a preview
     number: Reals
     slew: int  # 1 if the rate of the drive is limited
@@ -359,6 +369,6 @@ def output_range(static: StaticModel, parts: Parts, seconds: float) -> tuple[flo
     low, high = (settled(static, parts.plays, end) for end in static.play_range)
     for one in parts.behind(seconds):
         low, high = one.at_rest(low), one.at_rest(high)
-    for effect in parts.saturations:
-        low, high = (float(end) for end in effect.mapped(np.array([low, high]), None))
+    for each in parts.maps:
+        low, high = (float(end) for end in each.mapped(np.array([low, high])))
     return low + static.output_offset, high + static.output_offset

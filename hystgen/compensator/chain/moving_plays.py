@@ -1,98 +1,34 @@
-"""Operators of plays in any arithmetic: `chain_plays.c`, `chain_relaxing.c`, `chain_moving.c` and `moved_*.c`."""
+"""Operators of plays in any arithmetic, from the functions of the effects that move and bend them: `moving_plays.c`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import ChainTables
-from hystgen.compensator.chain.moving import DASHPOT, DILATED, PLAIN, RELAXING, STRAIGHT, stretch
 from hystgen.compensator.chain.step import MOVING, ChainState
+from hystgen.effects.part import Function
+from hystgen.effects.plays import PLAIN, RELAXING, STRAIGHT, Moves
 from hystgen.plays.loop import State, loop_absorb, loop_output
-from hystgen.plays.slots import Reals, zero
-
-Function = Callable[..., Any]
+from hystgen.plays.slots import Reals
 
 
 class Kind(NamedTuple):
-    """The functions in which arithmetics differ; `m` are the `moving` tables, `plays` those of plain plays."""
+    """The functions in which arithmetics differ."""
 
     level: Function  # of chain tables and a sum: the signal
     asked: Function  # of chain tables and a signal: the sum of the plays asked for
     solve: Function  # of plays, state and a sum: as engine loop
-    relaxing_follow: Function  # of m, plays, state and w
-    relaxing_input: Function  # of m, plays, state and a sum
-    share_of: Function  # of factors, i and x: x times factor i
-    yields: Function  # of m and a stretch, not negative: its yield in a step
-    seen: Function  # of m and a way: the part of it at which the input counts as standing still
-    moved_by: Function  # of m and a yield: the move of a play
-    yield_of: Function  # of m and the move of a play: the yield
-    bent: Function  # of m, plays, i and z
-    search: Callable[[Function], Function]  # of a function from input to sum: the function that finds the input
-
-
-def movement(kind: Kind) -> tuple[Function, Function, Function]:
-    """`moved`, `move` and `put` of single plays, as in `moved.c` and `dashpot.c` of `effects/rate_dependence/`."""
-    share_of, yields, seen, moved_by, yield_of = kind.share_of, kind.yields, kind.seen, kind.moved_by, kind.yield_of
-
-    @jit
-    def change(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
-        """Move, as a yield, of play i with a nonlinear dashpot while the input of the plays goes to w."""
-        x = s.play[0] + seen(m, w - s.play[0]) - s.play[i]
-        gained = zero(x)
-        if x > r[i]:
-            gained = yields(m, x - r[i])
-        elif x < -r[i]:
-            gained = -yields(m, -x - r[i])
-        return gained + lost[i]
-
-    @jit
-    def moved(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
-        """Play i after the input of the plays has gone to w."""
-        q = s.play[i]
-        if m.moves == DASHPOT:
-            return q + moved_by(m, change(m, r, i, s, lost, w))
-        if m.moves == RELAXING:
-            return q + share_of(m.first, i, stretch(w - q, r[i]))
-        threshold = r[i]
-        if m.moves == DILATED:
-            before = s.play[0]
-            way = w - before if w > before else before - w
-            threshold = r[i] + share_of(m.first, i, way)
-        low = w - threshold
-        high = w + threshold
-        upper = high if q > high else q
-        return low if upper < low else upper
-
-    @jit
-    def move(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> None:
-        """Move play i while the input of the plays goes to w."""
-        if m.moves == DASHPOT:
-            gained = change(m, r, i, s, lost, w)
-            z = s.play[i] + moved_by(m, gained)
-            lost[i] = gained - yield_of(m, z - s.play[i])
-            s.play[i] = z
-        else:
-            s.play[i] = moved(m, r, i, s, lost, w)
-
-    @jit
-    def put(m: Any, i: int, s: State, lost: Reals, z: Any) -> None:
-        """Put play i to rest at z."""
-        if m.moves == DASHPOT:
-            lost[i] = zero(lost[i])
-        s.play[i] = z
-
-    return moved, move, put
+    moves: Moves  # plays that an effect moves
+    bent: Function  # of the `moving` tables, those of plays, i and z: the contribution of play i at z
+    search: Function  # of a function from input to sum: the function that finds the input
 
 
 def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     """`start`, `follow`, `started` and `inverse_input` of models with effects, as functions of tables, state and a
     number."""
-    level, asked, solve, bent = kind.level, kind.asked, kind.solve, kind.bent
-    relaxing_follow, relaxing_input = kind.relaxing_follow, kind.relaxing_input
-    share_of = kind.share_of
-    moved, move, put = movement(kind)
+    level, asked, solve, moves, bent, search = kind
+    moved, move, put, rests, relaxing_follow, relaxing_input = moves
 
     @jit
     def moved_sum(m: Any, plays: Any, s: State, lost: Reals, values: Reals, w: Any) -> Any:
@@ -124,7 +60,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         if m.moves != RELAXING:
             return
         for i in range(1, len(plays.threshold)):
-            rest = s.play[i] + share_of(m.second, i, stretch(s.play[0] - s.play[i], plays.threshold[i]))
+            rest = rests(m, plays.threshold, i, s)
             if rest != s.play[i]:
                 s.play[i] = rest
                 values[i] = bent(m, plays, i, rest)
@@ -166,7 +102,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
             return moved_sum(t.moving, t.plays, s.plays, s.lost, s.bent, w)
         return resting_sum(t.moving, t.plays, s.plays, s.bent, w)
 
-    searched = kind.search(sum_at)
+    searched = search(sum_at)
 
     @jit(inline=True)
     def start(t: ChainTables, s: ChainState, zero: int) -> None:

@@ -24,11 +24,7 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.parts import AHEAD, BEHIND, Parts
 from hystgen.compensator.chain.preview import Taps, averages, whole
-from hystgen.effects.base import decays
 from hystgen.effects.part import One, Responses
-from hystgen.effects.rate_dependence import compensator as dashpot
-from hystgen.effects.rate_dependence.compensator import Movement
-from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate
 from hystgen.parameters.schema import MOST_REFERENCES
 
 Array = NDArray[np.float64]
@@ -88,7 +84,7 @@ class Gain:
         led, _, answers = self._answers(at)
         least = self.static.front_slopes[0]
         if not self._moving_plays:
-            least *= moving.least_slope(self.static, self.parts.plays)
+            least *= self._flattest
         return np.asarray(np.abs(led) * np.max([1.0 / np.abs(answer) for _, answer in answers], axis=0) / least)
 
     def _answers(self, at: Array) -> tuple[NDArray[np.complex128], float, list[tuple[float, NDArray[np.complex128]]]]:
@@ -109,26 +105,18 @@ class Gain:
         """For each number of plays that follow: slope at rest, response, and the part of it that comes at once."""
         if not self._moving_plays:
             yield 1.0, np.ones_like(z), 1.0
-        for effect in self._moving_plays:
-            p = self._steepest
-            if dashpot.nonlinear(effect):  # some stretch is too slow for its play to follow
-                yield float(np.sum(p)), np.full_like(z, p[0]), float(p[0])
-                continue
-            movement = Movement(effect, np.array(self.static.pi.thresholds), p)
-            slope, response, at_once = float(p[0]), np.full_like(z, p[0]), float(p[0])
-            for weight, tau in zip(p[1:].tolist(), movement.taus.tolist(), strict=True):
-                if movement.by_threshold(self.seconds):
-                    followed, first = 1.0 - tau / self.seconds * (1.0 - z), 1.0 - tau / self.seconds
-                else:
-                    decay, early, first = (float(x[0]) for x in decays(np.array([self.seconds]), tau))
-                    followed = (first + early * z) / (1.0 - decay * z)
-                slope, response, at_once = slope + weight, response + weight * followed, at_once + weight * first
-                yield slope, response, at_once
+        for mover in moving.movers(self.static, self.parts.plays, self._steepest):
+            yield from mover.responses(z, self.seconds)
 
     @property
-    def _moving_plays(self) -> list[RelaxingPlays | ThresholdRate]:
-        """The effect that makes plays depend on the rate, if there is one."""
-        return [each for each in self.parts.plays if isinstance(each, RelaxingPlays | ThresholdRate)]
+    def _moving_plays(self) -> bool:
+        """Whether an effect makes plays depend on the rate."""
+        return any(effect.moves_plays() for effect in self.parts.plays)
+
+    @cached_property
+    def _flattest(self) -> float:
+        """Least slope of the plays, bent or not."""
+        return moving.least_slope(self.static, self.parts.plays)
 
     @cached_property
     def _steepest(self) -> Array:

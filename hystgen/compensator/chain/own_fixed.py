@@ -8,7 +8,7 @@ argument has more bits than a product takes, the product leaves out its last bit
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,7 +20,8 @@ from hystgen.compensator.chain import own
 from hystgen.compensator.chain.own import Linear, OwnTables
 from hystgen.effects.base import Effect, Place
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Sought, given
+from hystgen.effects.own import Instance
+from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Setting, Sought, given
 from hystgen.plays.fixed import nearest
 
 MANTISSA, SHIFT, DROP, LIFT = range(4)
@@ -210,10 +211,17 @@ def part(name: str, place: Place, blocks: Sequence[OwnBlock] = (), effects: Sequ
         bits = 0 if ahead else about.bits  # of the sizes in front of the plays below the given ones
         return formats(one, size * 2.0**bits, asked * 2.0**bits, bits)
 
+    def problems(effect: Effect, at: Setting) -> Iterator[str]:
+        yield from own.problems(effect, at.seconds, at.whole)
+        if ahead and effect in at.slewed:
+            limit = at.slewed[-1]
+            order = f"give it an order: ClassVar[int] above that of {limit.name}, {limit.order}"
+            yield f"in front of the slew limit; {order}"
+
     return ChainPart(
-        name, "effects in front of the plays" if ahead else "", given(place),
+        name, "effects in front of the plays" if ahead else "", place, given(place),
         lambda effect, seconds, _: own.linear(effect, seconds),
         own.arithmetic(blocks, effects, own.GLUE, lambda every, about: own.build(every, about.reals)),
         lambda: own.arithmetic(blocks, effects, (product, entered, left), lambda rows, _: build(rows), format_of),
-        joined=True,
+        joined=True, problems=problems, uneven=Instance, counted=lambda *_: (),
     )

@@ -2,38 +2,66 @@
 
 from __future__ import annotations
 
+import importlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from hystgen import effects
+from hystgen.chain.chain import rank
 from hystgen.compensator.chain import own_fixed
-from hystgen.effects.ageing.compensator import AGEING
+from hystgen.effects import CATALOGUE, shapes
 from hystgen.effects.base import Effect, Place
-from hystgen.effects.creep.compensator import CREEP
-from hystgen.effects.delay.compensator import DELAY
-from hystgen.effects.drift.compensator import CLOCK
 from hystgen.effects.kinds import OwnBlock
-from hystgen.effects.lag.compensator import LAG
-from hystgen.effects.part import ChainPart
-from hystgen.effects.resonance.compensator import MODE
-from hystgen.effects.thermal.compensator import GAIN_PART, HEAT_PART
+from hystgen.effects.maps import Map, MapPart
+from hystgen.effects.part import ChainPart, Function
+from hystgen.effects.plays import Bent, Mover, Moves, PlaysPart
 from hystgen.plays.slots import Counts
+
+
+def _catalogue() -> list[ModuleType]:
+    """The module `compensator` of each effect in the catalogue, in the order of the chain."""
+    folder = Path(effects.__file__).parent
+    names = [name for name in CATALOGUE if (folder / name / "compensator.py").exists()]
+    names.sort(key=lambda name: rank(shapes(name)[0]))
+    return [importlib.import_module(f"hystgen.effects.{name}.compensator") for name in names]
+
+
+_MODULES = _catalogue()
+_CATALOGUE: list[ChainPart] = [part for module in _MODULES for part in getattr(module, "PARTS", ())]
+
+MOVES: PlaysPart[Mover, Moves]
+(MOVES,) = (module.MOVES for module in _MODULES if hasattr(module, "MOVES"))
+BENDS: PlaysPart[Bent, Function]
+(BENDS,) = (module.BENDS for module in _MODULES if hasattr(module, "BENDS"))
+"""The effects that move plays, and that bend them."""
+
+MAPS: list[MapPart] = [module.MAPS for module in _MODULES if hasattr(module, "MAPS")]
+"""Maps of the output at the very end of the chain."""
 
 OWN_AHEAD, OWN_BEHIND = own_fixed.part("own_ahead", Place.DRIVE), own_fixed.part("own_behind", Place.LINEAR)
 
-SENT = (DELAY,)
+
+def _at(*places: Place, forward: bool = False) -> list[ChainPart]:
+    return [part for part in _CATALOGUE if part.place in places and part.forward in (False, forward)]
+
+
+SENT = tuple(part for part in _CATALOGUE if part.place is Place.DRIVE and part.forward)
 """Between the drive and the amplifier."""
 
-AHEAD = (LAG, OWN_AHEAD)
+AHEAD = (*_at(Place.DRIVE), OWN_AHEAD)
 """In front of the plays, from the amplifier on. In front of two branches only the first is led."""
 
-BEHIND = (CREEP, OWN_BEHIND, AGEING, HEAT_PART, GAIN_PART, MODE)
+_first, *_others = _at(Place.LINEAR, Place.GAIN, forward=True)
+BEHIND = (_first, OWN_BEHIND, *_others)
 """Behind the plays, from their sum on."""
 
-BESIDE = (CLOCK,)
+BESIDE = tuple(_at(Place.ADDED))
 """Added to the displacement."""
 
 PARTS = (*SENT, *AHEAD, *BEHIND, *BESIDE)
@@ -60,7 +88,7 @@ class Parts:
     name."""
 
     blocks: dict[str, list[Any]]
-    saturations: list[Any]
+    maps: list[Map]
     slew: list[Any]
     plays: list[Effect]
 
@@ -68,32 +96,30 @@ class Parts:
     def of(cls, effects: Sequence[Effect]) -> Parts:
         """Sort the effects of a chain."""
 
-        def called(name: str) -> list[Any]:
-            return [effect for effect in effects if effect.name == name]
-
         blocks = {part.name: [effect for effect in effects if part.takes(effect)] for part in PARTS}
         plays = [effect for effect in effects if effect.place is Place.PLAYS]
-        return cls(blocks, called("saturation"), called("slew_limit"), plays)
+        maps = [part.of(effect) for effect in effects for part in MAPS if part.takes(effect)]
+        return cls(blocks, maps, [effect for effect in effects if effect.slews], plays)
 
     @property
     def delay(self) -> float:
         """Total delay of the drive, in s."""
-        return math.fsum(each.dead_time for each in self.blocks[DELAY.name])
+        return math.fsum(each.dead_time for part in SENT for each in self.blocks[part.name])
 
     @property
     def modes(self) -> list[Any]:
         """Modes that the preview inverts."""
-        return self.blocks["mode"]
+        return [effect for part in BEHIND if part.forward for effect in self.blocks[part.name]]
 
     @property
     def own_drives(self) -> list[Effect]:
         """The user's own effects in front of the plays."""
-        return self.blocks["own_ahead"]
+        return self.blocks[OWN_AHEAD.name]
 
     @property
     def own_outputs(self) -> list[Effect]:
         """The user's own effects behind the plays."""
-        return self.blocks["own_behind"]
+        return self.blocks[OWN_BEHIND.name]
 
     @property
     def counts(self) -> Counts:

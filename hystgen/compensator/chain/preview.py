@@ -1,30 +1,37 @@
 """The preview: a weighted sum of the reference's samples around the present one.
 
-A delay takes linear interpolation between two samples; a mode takes three samples
-(`hystgen.effects.resonance.compensator`), or a shaper or a notch for steps from point to point. In series they are one
-row of weights, which sum to 1: without recursion they are stable for any numbers.
+A delay takes linear interpolation between two samples; a mode takes three samples, or a shaper or a notch for steps
+from point to point. In series they are one row of weights, which sum to 1: without recursion they are stable for any
+numbers.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
 from hystgen.basics.problems import FormatError
-from hystgen.effects.resonance.compensator import denominator
-from hystgen.effects.resonance.model import Resonance
 from hystgen.parameters.schema import MOST_REFERENCES
 from hystgen.plays.slots import Counts, Reals
 
-WELL_DAMPED = 0.7
-"""[damping ratio] From here on a mode is inverted rather than shaped or notched. It overshoots a step by
-`exp(-pi z/sqrt(1 - z^2))`, at most 4.6 %, while the half period that a shaper waits for is 1.4 times the undamped one
-and grows without bound towards 1. Both are closed forms; no run set it."""
+
+class Mode(Protocol):
+    """An effect with a pair of poles; a setting of `emit.compensation` under its name tells how it is compensated."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def frequency(self) -> float: ...
+    @property
+    def damping(self) -> float: ...
+    def rings(self, by: By, /) -> bool: ...
+    def denominator(self, step: float, /) -> tuple[float, float]:
+        """`a1`, `a2` of its poles over a step, `z^2 + a1 z + a2`."""
 
 
 class Taps(NamedTuple):
@@ -47,13 +54,8 @@ By = Literal["inverse", "shaper", "notch"]
 """How modes are compensated."""
 
 
-def rings(mode: Resonance, by: By) -> bool:
-    """Whether a mode is compensated by a shaper or a notch."""
-    return by != "inverse" and mode.damping < WELL_DAMPED
-
-
 def taps(
-    delay: float, modes: Sequence[Resonance], seconds: float, number: int = 3, corner: int = 0, by: By = "inverse"
+    delay: float, modes: Sequence[Mode], seconds: float, number: int = 3, corner: int = 0, by: By = "inverse"
 ) -> Taps:
     """The weights for a delay in s and modes in series at samples `seconds` apart; else the reference itself.
 
@@ -69,14 +71,14 @@ def taps(
     weights = np.array([1.0 - share, share] if share > 0.0 else [1.0])
     first = whole
     for mode in modes:
-        if rings(mode, by):
+        if mode.rings(by):
             row = shaper(mode, seconds) if by == "shaper" else notch(mode, seconds)
             weights = np.convolve(weights, row)
             first -= len(row) - 1
             if len(weights) > MOST_REFERENCES:
-                raise _too_long(f"the modes take {len(weights)} samples one behind the other")
+                raise _too_long(mode, f"the modes take {len(weights)} samples one behind the other")
             continue
-        a1, a2 = denominator(mode, seconds)
+        a1, a2 = mode.denominator(seconds)
         weights = np.convolve(weights, np.array([a2, a1, 1.0]) / (1.0 + a1 + a2))
         first -= 1
         if number == 5:
@@ -92,19 +94,19 @@ def taps(
     return Taps(first, weights)
 
 
-def shaper(mode: Resonance, seconds: float) -> NDArray[np.float64]:
+def shaper(mode: Mode, seconds: float) -> NDArray[np.float64]:
     """The weights (n + 2,) of the reference now and about half a period ago, after which a mode does not ring.
 
     They apply to the samples now and n and n + 1 samples ago, between which half a period lies. They sum to 1 and
     vanish at the mode's poles p, so that nothing of the mode remains after a step: `sum w_k p^-k = 0`, zero vibration
     in samples.
     """
-    a1, a2 = denominator(mode, seconds)
+    a1, a2 = mode.denominator(seconds)
     pole = complex(-0.5 * a1, math.sqrt(a2 - 0.25 * a1 * a1))
     half = math.pi / math.atan2(pole.imag, pole.real)
     n = max(math.ceil(half) - 1, 1)
     if n >= MOST_REFERENCES:
-        raise _too_long(f"half a period of {mode.frequency:g} Hz is {half:.0f} samples")
+        raise _too_long(mode, f"half a period of {mode.frequency:g} Hz is {half:.0f} samples")
     early, late = pole**-n, pole ** -(n + 1)
     rows = [[1.0, 1.0, 1.0], [1.0, early.real, late.real], [0.0, early.imag, late.imag]]
     now, soon, last = np.linalg.solve(rows, [1.0, 0.0, 0.0])
@@ -113,7 +115,7 @@ def shaper(mode: Resonance, seconds: float) -> NDArray[np.float64]:
     return weights
 
 
-def notch(mode: Resonance, seconds: float) -> NDArray[np.float64]:
+def notch(mode: Mode, seconds: float) -> NDArray[np.float64]:
     """The weights of the reference now and before, after which a mode does not ring: its poles as zeros, `A(z)/A(1)`,
     behind two averages over `coth(w0 T/2)` samples.
 
@@ -121,16 +123,16 @@ def notch(mode: Resonance, seconds: float) -> NDArray[np.float64]:
     a sample, and the same bound on the gain of two differences, `((1 - p)/(1 + p))^2`; but they approach a step slowly,
     within 0.1 % after 9.2 times `1/w0`, where the averages end after 4, and they keep a state that rounding may stall.
     """
-    a1, a2 = denominator(mode, seconds)
+    a1, a2 = mode.denominator(seconds)
     width = 1.0 / math.tanh(math.pi * mode.frequency * seconds)
     if 2.0 * width + 2.0 > MOST_REFERENCES:
-        raise _too_long(f"a notch for {mode.frequency:g} Hz takes {2.0 * width + 2.0:.0f} samples")
+        raise _too_long(mode, f"a notch for {mode.frequency:g} Hz takes {2.0 * width + 2.0:.0f} samples")
     return np.convolve(np.array([a2, a1, 1.0]) / (1.0 + a1 + a2), averages(2, width, centred=False))
 
 
-def _too_long(what: str) -> FormatError:
+def _too_long(mode: Mode, what: str) -> FormatError:
     message = f"{what}, and the C keeps {MOST_REFERENCES} at most; sample more slowly, or choose inverse"
-    return FormatError((("emit", "compensation", "resonance"), message))
+    return FormatError((("emit", "compensation", mode.name), message))
 
 
 def averages(times: int, width: float, centred: bool) -> NDArray[np.float64]:
@@ -157,7 +159,7 @@ class Shaped(NamedTuple):
     """The modes that a shaper or a notch keeps from ringing at steps `seconds` apart, and their weights."""
 
     by: By
-    modes: tuple[Resonance, ...]
+    modes: tuple[Mode, ...]
     seconds: float
     taps: Taps
 
@@ -179,9 +181,9 @@ class Shaped(NamedTuple):
         return abs(1.0 - found)
 
 
-def shaped(modes: Sequence[Resonance], seconds: float, by: By) -> Shaped | None:
+def shaped(modes: Sequence[Mode], seconds: float, by: By) -> Shaped | None:
     """The modes that `by` keeps from ringing; None if there are none."""
-    found = tuple(mode for mode in modes if rings(mode, by))
+    found = tuple(mode for mode in modes if mode.rings(by))
     return Shaped(by, found, seconds, taps(0.0, found, seconds, by=by)) if found else None
 
 

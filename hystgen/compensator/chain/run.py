@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from hystgen.compensator import reference
 from hystgen.compensator.chain.fixed_tables import setting_codes
 from hystgen.compensator.chain.layout import Compiled
+from hystgen.compensator.chain.parts import PARTS
 from hystgen.effects.base import Run
-from hystgen.effects.thermal.model import COLUMN
 from hystgen.plays import slots
 
 
@@ -33,11 +33,13 @@ def with_status(compiled: Compiled, record: Run, inverse: bool) -> tuple[NDArray
     later = np.append(x[ahead:], np.full(min(ahead, len(x)), x[-1:])) if ahead else x
     calls = [np.full(min(ahead, len(x)), slots.OP_PUSH, dtype=np.uint8)]
     given = [x[:ahead]]
-    if len(t.of("gain")):
+    heated = [part for part in PARTS if "set_temperature" in part.calls]
+    logged = [column for part in heated for effect in compiled.parts.blocks[part.name] for column in effect.columns]
+    if logged:
         op = np.tile(np.array([slots.OP_TEMPERATURE, slots.OP_STEP], dtype=np.uint8), len(x))
         calls.append(op)
         degree, _ = setting_codes(t)
-        warm = reference.nearest(t, degree * record.extra[COLUMN])
+        warm = reference.nearest(t, degree * record.extra[logged[0]])
         given.append(np.column_stack([warm, later]).ravel())
     else:
         calls.append(np.full(len(x), slots.OP_STEP, dtype=np.uint8))

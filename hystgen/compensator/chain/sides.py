@@ -19,7 +19,7 @@ class Blocks(NamedTuple):
     """The functions of a chain and its blocks in one arithmetic."""
 
     verbs: Callable[[ChainPart], Verbs]
-    bent: tuple[Function, Function]  # saturation: forward, inverse
+    bent: tuple[Function, Function]  # maps of the output: forward, inverse
     target: Function  # the output to reach, from the preview's line
     front: tuple[Function, Function]  # forward, inverse
     plays: tuple[Function, Function, Function, Function]  # start, follow, started, inverse input

@@ -32,7 +32,7 @@ from hystgen.compensator.chain.preview import Line
 from hystgen.compensator.chain.sides import Blocks
 from hystgen.compensator.chain.step import ChainState, Codes
 from hystgen.compensator.layout import FixedTables
-from hystgen.effects.saturation.fixed import saturated, unsaturated
+from hystgen.effects.maps import maps_forward, maps_inverse
 from hystgen.front import curve
 from hystgen.plays.fixed import divide_by_slope, nearest
 from hystgen.plays.slots import CODE_MAX, OUTPUT_CLAMPED, Reals, zero
@@ -186,7 +186,7 @@ def ramp(before: Any, rest: Any, move: Any, more: Any) -> tuple[Any, Any]:
 
 
 BLOCKS = Blocks(
-    lambda part: part.fixed.verbs, (saturated, unsaturated), preview_target, (front_forward, front_inverse),
+    lambda part: part.fixed.verbs, (maps_forward, maps_inverse), preview_target, (front_forward, front_inverse),
     moving_fixed.PLAYS, finer, braked, ramp,
 )
 CORNERS = BLOCKS._replace(plays=corners_fixed.PLAYS, finer=corners_fixed.finer)

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search.acceptance import is_noise
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.selection import Found, Outcome, Ranked, Refusal
+from hystgen.effects import TOLD_APART
 from hystgen.plays import operators
 
 Array = NDArray[np.float64]
@@ -39,15 +40,6 @@ ONE_LOOP = (
     "holds"
 )
 """Advice about records of only one loop."""
-
-ADVICE: dict[frozenset[str], str] = {
-    frozenset(("creep", "drift")): "record holds of a minute after moves both ways: creep follows the last move",
-    frozenset(("lag", "delay")): "record full steps with three samples or more to the edge: a lag has a tail",
-    frozenset(("lag", "resonance")): "record steps or a sweep: a resonance rings and has a peak",
-    frozenset(("lag", "rate_dependence")): "record small loops at high rate with reversals: a lag opens them",
-    frozenset(("asymmetry", "sensor_nonlinearity")): "record wide and nested loops: a sensor's curve is a line over y",
-}
-"""Experiments that separate two effects."""
 
 
 def result_of(
@@ -83,7 +75,7 @@ def result_of(
         where=worst(everything, [*before[0], *before[1]], noise.rms),
         not_separable=rivals,
         advice=(
-            *(ADVICE.get(frozenset(pair), _advice(*pair)) for pair in rivals),
+            *(TOLD_APART.get(frozenset(pair), _advice(*pair)) for pair in rivals),
             *([ONE_LOOP] if (rivals or structured) and one_loop else []),
             *(more for each in remaining for more in each.advice()),
         ),
@@ -94,8 +86,7 @@ def result_of(
         withdrawn=_withdrawn(found, unit),
         written=found.written,
     )
-    in_digits: Result = _in_digits(result)
-    return in_digits
+    return cast("Result", _in_digits(result))
 
 
 def _contender(ranked: Ranked, unit: str | None) -> Contender:
@@ -147,7 +138,7 @@ REFUSALS = {
 """Why an effect that was tried has no name, in words."""
 
 
-def _in_digits(value: object) -> Any:
+def _in_digits(value: object) -> object:
     """The value with eight digits in all its numbers, so that the same input gives the same text."""
     if is_dataclass(value) and not isinstance(value, type):
         return type(value)(**{each.name: _in_digits(getattr(value, each.name)) for each in fields(value)})

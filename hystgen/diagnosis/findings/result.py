@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from hystgen.model import Model
-    from hystgen.parameters.files import Parameters
+    from hystgen.parameters.schema import Parameters
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from hystgen.diagnosis.search import acceptance
 from hystgen.diagnosis.search.hypothesis import RANK, Actuator, NotFiniteError, Structure, Sums, Turns
 from hystgen.effects.base import Candidate, Effect
 from hystgen.identification import joint, pi, reduction, stage_content, start
-from hystgen.identification.joint import DIFFERENCE, Shaped
+from hystgen.identification.joint import DIFFERENCE, LocalFit
 from hystgen.identification.pi import root_mean_square
 from hystgen.identification.quality import SEED, TAILS, correlation_time
 from hystgen.identification.reduction import Reduced
@@ -209,14 +209,14 @@ def _open(blocks: Sequence[_Block], plays: int) -> Array:
     return pi.non_negative(reduction.triangle(*parts), np.arange(last))
 
 
-def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) -> Shaped:
+def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) -> LocalFit:
     """The best weights of a shape, and the system linearised about the shape and about weights `p` close to them."""
     n1 = len(structure.thresholds)
     here = structure.actuator(shape)
     try:
         blocks = [_Block(here, item, p) for item in items if item.known.any()]
     except NotFiniteError:
-        return Shaped(shape, p, math.inf, p, 1, lambda: Reduced(structure.thresholds, np.empty((0, 0)), (), ()))
+        return LocalFit(shape, p, math.inf, p, 1, lambda: Reduced(structure.thresholds, np.empty((0, 0)), (), ()))
     samples = sum(block.samples for block in blocks)
 
     def derived() -> Reduced:
@@ -227,8 +227,9 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
 
     whole, best = _solved(blocks, n1)
     if not np.isfinite(whole).all():  # the numbers are far from reasonable
-        return Shaped(shape, p, math.inf, p, samples, derived)
-    return Shaped(shape, p, root_mean_square(pi.residual(whole, np.arange(n1), best), samples), best, samples, derived)
+        return LocalFit(shape, p, math.inf, p, samples, derived)
+    rms = root_mean_square(pi.residual(whole, np.arange(n1), best), samples)
+    return LocalFit(shape, p, rms, best, samples, derived)
 
 
 @dataclass(frozen=True)
@@ -282,7 +283,7 @@ class Search:
 
     structure: Structure
     items: Sequence[Item]
-    now: Shaped
+    now: LocalFit
     damping: float = joint.DAMPING
 
     def further(self, steps: int = joint.MOST_STEPS, little: float = POLISHED) -> Search:

@@ -18,6 +18,7 @@ from hystgen.diagnosis.data.items import Item, compared, everything, needed, rms
 from hystgen.diagnosis.search import acceptance, fits
 from hystgen.diagnosis.search.fits import Fitted, Search
 from hystgen.diagnosis.search.hypothesis import Part, Starts, Structure
+from hystgen.effects import BEND, LIMIT
 from hystgen.effects.base import USER, About, Effect
 from hystgen.identification import joint
 from hystgen.identification.joint import Bent, DeadZones, Ends, Front, Tanh, even_breaks
@@ -111,7 +112,7 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
 
     def one(label: str, front: Front, starts: Sequence[Array], beyond: str = "") -> Option:
         pair = replace(structure, front=front), replace(held, front=front)
-        return Option(label, "asymmetry", *pair, tuple(starts), True, beyond)
+        return Option(label, BEND, *pair, tuple(starts), True, beyond)
 
     one_way, both_ways = Bent(drive, 1), Bent(drive, 2)
     dead_zones, finer = (DeadZones(drive, even_breaks(drive, n)) for n in (acceptance.BREAKS, acceptance.FINER_BREAKS))
@@ -131,7 +132,7 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
 
 
 def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple[str, ...]:
-    """`saturation` for a front that is straight between flatter ends, or bends alike at both; else `asymmetry`.
+    """`LIMIT` for a front that is straight between flatter ends, or bends alike at both; else `BEND`.
 
     Both names if only one end is a little flatter: a soft limit there and a bent actuator give the same front.
     """
@@ -145,13 +146,13 @@ def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple
     straight = float(np.mean(np.abs(slopes - middle) <= near)) >= acceptance.LIMITER_STRAIGHT
     if straight and other <= middle + near and flatter < middle - near:
         sure = flatter < acceptance.LIMITER_SLOPE * middle or other < middle - near
-        return ("saturation",) if sure else ("saturation", "asymmetry")
+        return (LIMIT,) if sure else (LIMIT, BEND)
     bent = w - np.polyval(np.polyfit(v, w, 1), v)
     odd, even = 0.5 * (bent - bent[::-1]), 0.5 * (bent + bent[::-1])
     ends = 0.5 * (slopes[: SLOPE_PLACES // 8].mean() + slopes[-SLOPE_PLACES // 8 :].mean())
     odd_wins = np.sum(odd**2) > acceptance.ODD_FRONT * np.sum(even**2)
     flat_ends = ends < slopes[SLOPE_PLACES // 3 : -SLOPE_PLACES // 3].mean()
-    return ("saturation",) if odd_wins and flat_ends else ("asymmetry",)
+    return (LIMIT,) if odd_wins and flat_ends else (BEND,)
 
 
 # Screening of the options ------------------------------------------------------------------------------------

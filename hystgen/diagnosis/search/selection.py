@@ -31,9 +31,6 @@ from hystgen.identification.quality import correlation_time
 
 Array = NDArray[np.float64]
 
-FRONTS = "asymmetry", "saturation"
-"""Names of effects that are a front."""
-
 EXTENDED, REFITTED, GIVEN, IDENTIFIED = "extended", "refitted", "given", "identified"
 """The models that may be written: with the effects, the nominal one refitted or as given, and the one from
 `identify`."""
@@ -230,22 +227,24 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
         for n in least
     }
 
-    def order(one: tuple[int, float, float, Tried]) -> tuple[int, float, float, int]:
+    def order(one: tuple[int, float, float, Tried]) -> tuple[int, float, float, tuple[float, int]]:
         n, everywhere, residual, each = one
         return n, max(everywhere, equal * least[n]), max(residual, equal * held_out[n]), place(each.name)
 
     return [*(each for *_, each in sorted(near, key=order)), *others]
 
 
-ORDER = "creep", "resonance", "lag", "delay", "rate_dependence", "asymmetry"
-"""The first of equal effects, in their order. A lag or a delay, which every amplifier or converter has, comes before
-late plays, and an asymmetric actuator before a nonlinear sensor."""
+BEND_RANK = 5
+"""Rank of a bent front: an asymmetric actuator comes before a nonlinear sensor."""
 
 
-def place(name: str) -> int:
-    """Place in that order, then in the catalogue, with the user's own effects after it."""
-    order = (*ORDER, *(each for each in effects.CATALOGUE if each not in ORDER))
-    return order.index(name) if name in order else len(order)
+def place(name: str) -> tuple[float, int]:
+    """Which of equal effects is named: the first by rank, then in the catalogue, with the user's own effects last."""
+    if name == effects.BEND:
+        return BEND_RANK, 0
+    if name not in effects.CATALOGUE:
+        return math.inf, len(effects.CATALOGUE)
+    return effects.shapes(name)[0].rank, effects.CATALOGUE.index(name)
 
 
 def _at_an_end(fitted: Fitted) -> bool:
@@ -457,7 +456,7 @@ class Outcome:
     @property
     def bends(self) -> bool:
         """Whether one of the effects is a front."""
-        return any(each.name in FRONTS for each in self.found)
+        return any(each.name in effects.FRONTS for each in self.found)
 
     @property
     def not_separable(self) -> tuple[tuple[str, str], ...]:
@@ -980,6 +979,6 @@ def _less(now: Fitted, name: str) -> tuple[Structure, Array] | None:
     if len(parts) < len(now.structure.parts):
         kept = tuple(part for part, _ in parts)
         return replace(now.structure, parts=kept), np.concatenate([front_shape, *(x for _, x in parts)])
-    if name in FRONTS and len(front_shape):
+    if name in effects.FRONTS and len(front_shape):
         return replace(now.structure, front=Kept()), np.concatenate([np.empty(0), *numbers])
     return None

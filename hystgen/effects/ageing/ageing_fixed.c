@@ -2,10 +2,7 @@
    functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_AGEING_AGEING_FIXED_C
 #define HYSTGEN_AGEING_AGEING_FIXED_C
-#include "arithmetic/fixed.h"
-#include "compensator/chain/model.h"
-#include "arithmetic/factors.c"
-#include "effects/thermal/gain_fixed.c"
+#include "effects/gains.c"
 
 /* Fraction bits of a position within a piece, and one half. */
 #define HYSTGEN_PART_BITS 20u

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,10 +12,22 @@ import numpy as np
 
 from hystgen.basics.jit import jit
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
-from hystgen.effects.base import Array
+from hystgen.effects.base import Array, Place
+from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import ChainPart, FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs, called, late
-from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE
+from hystgen.effects.part import (
+    ChainPart,
+    FloatSurroundings,
+    Gained,
+    Margin,
+    One,
+    Realized,
+    Setting,
+    Speed,
+    Verbs,
+    called,
+    late,
+)
 from hystgen.plays.slots import Counts, Reals, zero
 
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
@@ -51,6 +63,7 @@ def steepness(effect: Ageing, travelled: float) -> float:
     return -math.fsum(loss / travel * math.exp(-travelled / travel) for loss, travel in pairs)
 
 
+@functools.lru_cache(maxsize=16)
 def pieces(effect: Ageing) -> Array:
     """The gain as cubic pieces (m, 6): the beginning of each, 1 over its length, and coefficients in the share passed.
 
@@ -96,11 +109,14 @@ def most_at_once(effect: Ageing, span: float) -> float:
     return max(abs(gain(effect, x + span) / gain(effect, x) - 1.0) for x in places)
 
 
-def problems(effect: Ageing, span: float) -> Iterator[str]:
+def problems(effect: Ageing, at: Setting) -> Iterator[str]:
     """Why the C cannot follow the gain."""
-    change = most_at_once(effect, span)
+    if effect in at.listed[1:]:
+        yield "one gain follows the travel, and there is another one"
+        return
+    change = most_at_once(effect, at.ends[1] - at.ends[0])
     if len(pieces(effect)) == 0 or change > MOST_CHANGE:
-        yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST_CHANGE:.0%}"
+        yield too_fast(change)
 
 
 @dataclass(frozen=True)
@@ -121,12 +137,6 @@ class Aged(One):
     def asked(self, given: float, asked: float, margin: Margin) -> float:
         """Largest input that the inverse gives for outputs within `asked`."""
         return asked / LEAST_GAIN
-
-
-def turns(effect: Ageing, span: float, roundoff: float) -> int:
-    """Newton steps after which the reciprocal of the gain is exact up to rounding."""
-    left = max(most_at_once(effect, span), 1e-9)
-    return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
 
 
 # ---------------------------------------------------------------- ageing.c
@@ -161,7 +171,7 @@ def tables(blocks: Sequence[Aged], about: FloatSurroundings) -> AgeingTables:
         np.cumsum([0, *map(len, rows)]).astype(np.int64),
         about.reals(np.concatenate([np.empty((0, 6)), *rows]), "travels of the ageing"),
         about.reals([(1.0, 2.0, LEAST_GAIN, LARGEST_GAIN, x) for x in last], "travels of the ageing").reshape(-1, 5),
-        np.array([turns(one.effect, span, about.roundoff) for one in blocks], dtype=np.int64),
+        np.array([newton_steps(most_at_once(one.effect, span), about.roundoff) for one in blocks], dtype=np.int64),
     )
 
 
@@ -170,6 +180,24 @@ def constants(t: AgeingTables) -> Iterator[Constants]:
     for j, turns in enumerate(map(int, t.turns)):
         pieces = t.piece[t.first[j] : t.first[j + 1]]
         yield Constants(KIND, t.number[j, LEAST:], (5 + 2 * turns, 1), pieces, (len(pieces), turns))
+
+
+class UnevenAgeing:
+    """The gain in double precision."""
+
+    def __init__(self, effect: Ageing) -> None:
+        self.effect, self.travelled = effect, 0.0
+
+    def _travel(self, before: float, drive: float) -> float:
+        return self.travelled + (0.0 if math.isnan(before) else abs(drive - before))
+
+    def solve(self, y: float, before: float, drive: float, seconds: float) -> float:
+        """The input that gives the output y if the drive goes from `before` to `drive`."""
+        return y / gain(self.effect, self._travel(before, drive))
+
+    def move(self, before: float, drive: float, seconds: float) -> None:
+        """The drive has gone there."""
+        self.travelled = self._travel(before, drive)
 
 
 class AgeingState(NamedTuple):
@@ -284,9 +312,12 @@ ARITHMETIC = Realized(
     constants, tables,
 )
 
-AGEING = ChainPart(
-    "ageing", "ageing", called("ageing"), lambda effect, *_: Aged(effect),
+PART = ChainPart(
+    "ageing", "ageing", Place.GAIN, called("ageing"), lambda effect, *_: Aged(effect),
     ARITHMETIC, late("ageing"), calls=("set_gain", "travel", "set_travel"),
-    kinds=(KIND,),
+    kinds=(KIND,), problems=problems, code=("ageing",), following=UnevenAgeing,
+    longest=lambda t: float(t.number[0, LAST]),
 )
 """Ageing as a part of the chain: a gain over the travel, which the caller may set."""
+
+PARTS = (PART,)

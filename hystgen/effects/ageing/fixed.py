@@ -23,10 +23,20 @@ from hystgen.effects.ageing.compensator import (
     ageing_travelled,
 )
 from hystgen.effects.base import Array
+from hystgen.effects.gains import (
+    GAIN_BITS,
+    LARGEST,
+    LARGEST_GAIN,
+    LEAST,
+    LEAST_GAIN,
+    ONE,
+    RECIPROCAL_ERROR,
+    followed,
+    newton_steps,
+    reciprocal,
+)
 from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
-from hystgen.effects.thermal.compensator import LARGEST_GAIN, LEAST_GAIN
-from hystgen.effects.thermal.fixed import GAIN_BITS, LARGEST, LEAST, ONE, RECIPROCAL_ERROR, followed, reciprocal
 from hystgen.plays.slots import zero
 
 SHARE_BITS = 20
@@ -100,7 +110,7 @@ class AgeingFormats(Coded):
 
 def formats(one: Aged, about: FixedSurroundings, *_: float) -> AgeingFormats:
     """A block of a model."""
-    turns = floating.turns(one.effect, about.ends[1] - about.ends[0], 2.0**-GAIN_BITS)
+    turns = newton_steps(floating.most_at_once(one.effect, about.ends[1] - about.ends[0]), 2.0**-GAIN_BITS)
     return AgeingFormats(one, floating.pieces(one.effect), turns)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -24,6 +24,7 @@ class _Ageing(Effect):
     name: Literal["ageing"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.GAIN
+    shown_by: ClassVar[Mapping[str, int]] = {"cycles": 1, "slow_again": 2}
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact, from the distance that the drive has travelled"
     timed: ClassVar[bool] = False

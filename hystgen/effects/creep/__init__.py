@@ -1,1 +1,3 @@
 """Creep."""
+
+SOURCES = {"blocks": ("creep{}.c",)}

@@ -11,13 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
-from hystgen.effects.base import Array, Block, decays
+from hystgen.effects.base import Array, Block, Place, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
 from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import ChainPart, Margin, One, Realized, Responses, Verbs, called, late
 from hystgen.plays.slots import Counts, Reals, zero
-
-EFFECTS = (ExponentialCreep, LogarithmicCreep)
 
 
 def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:
@@ -254,10 +252,12 @@ class UnevenCreep(Block):
 
 FUNCTIONS: dict[str, Any] = {"rest": creep_rest, "resting": creep_resting, "solve": creep_solve, "absorb": creep_absorb}
 
-CREEP = ChainPart(
-    "creep", "creep", called("creep"),
+PART = ChainPart(
+    "creep", "creep", Place.LINEAR, called("creep"),
     lambda effect, seconds, _: numbers(effect, seconds),
     ARITHMETIC, late("creep"),
-    kinds=(KIND,),
+    kinds=(KIND,), code=("creep",), uneven=UnevenCreep, no_inverse=problems,
 )
 """Creep as a part of the chain."""
+
+PARTS = (PART,)

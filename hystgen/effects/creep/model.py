@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -89,6 +89,8 @@ class _Creep(Effect):
     name: Literal["creep"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.LINEAR
+    shown_by: ClassVar[Mapping[str, int]] = {"holds": 1, "slow_reversals": 1, "settling": 1, "reversals": 1}
+    rank: ClassVar[float] = 0
     compensated: ClassVar[Compensated] = "exact"
     compensation: ClassVar[str] = "exact and causal: the plays are solved for with the states known"
 

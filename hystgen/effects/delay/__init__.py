@@ -1,1 +1,3 @@
 """Dead time in front of the actuator."""
+
+SOURCES = {"blocks": ("delay.c", "preview.c"), "limits": ("forward.c",)}

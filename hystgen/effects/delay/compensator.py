@@ -6,7 +6,7 @@ The inverse has it in its preview (`hystgen.compensator.chain.preview`).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -14,7 +14,8 @@ import numpy as np
 
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
-from hystgen.effects.part import ChainPart, Function, One, Realized, Surroundings, Verbs, called
+from hystgen.effects.base import Place
+from hystgen.effects.part import ChainPart, Function, One, Realized, Setting, Surroundings, Verbs, called
 from hystgen.plays.slots import Counts, Reals
 
 MOST_SAMPLES = 2**15
@@ -131,8 +132,22 @@ FIXED_ARITHMETIC = Realized(
     lambda blocks, about: tables(blocks, about, lambda share: np.array(factor(share), dtype=np.int64)),
 )
 
-DELAY = ChainPart(
-    "wait", "a delay", called("delay", lambda effect: effect.time > 0.0),
+
+def problems(_: Any, at: Setting) -> Iterator[str]:
+    """Why the forward operator cannot keep the drives that wait."""
+    delay = math.fsum(each.dead_time for each in at.listed)
+    if at.operator != "inverse" and delay > MOST_SAMPLES * at.seconds:
+        yield (
+            f"{delay / at.seconds:.6g} samples, and the forward operator keeps {MOST_SAMPLES} at most; "
+            "emit the inverse alone"
+        )
+
+
+PART = ChainPart(
+    "wait", "a delay", Place.DRIVE, called("delay", lambda effect: effect.time > 0.0),
     lambda effect, *_: Wait(effect.time), ARITHMETIC, lambda: FIXED_ARITHMETIC, forward=True, joined=True,
+    problems=problems, code=("delay",),
 )
 """A delay as a part of the chain: the drive as the amplifier of the forward operator receives it."""
+
+PARTS = (PART,)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -26,6 +27,10 @@ class Delay(Effect):
     time: NotNegative = Field(description="T, s", examples=[2.0e-4])
 
     place: ClassVar[Place] = Place.DRIVE
+    shown_by: ClassVar[Mapping[str, int]] = {
+        "fast_steps": 2, "staircase": 2, "sweep": 3, "fast_triangles": 3, "fast_reversals": 3
+    }
+    rank: ClassVar[float] = 3
     compensated: ClassVar[Compensated] = "none without preview"
     compensation: ClassVar[str] = "the reference is read ahead of time; without preview the motion is late"
 

@@ -1,1 +1,3 @@
 """Drift of the output with session time."""
+
+SOURCES = {"blocks": ("clock.c",)}

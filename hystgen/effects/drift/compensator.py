@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from hystgen.basics.jit import jit
+from hystgen.effects.base import Place
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import ChainPart, FloatSurroundings, Function, Realized, Verbs, called, late
+from hystgen.effects.part import ChainPart, FloatSurroundings, Function, Realized, Unmeasured, Verbs, called, late
 from hystgen.plays.slots import Reals, zero
 
 # ---------------------------------------------------------------- clock.c
@@ -107,9 +108,17 @@ def tables(effects: Sequence[LinearDrift | CurvedDrift], about: FloatSurrounding
 
 ARITHMETIC = Realized(verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants, tables)
 
-CLOCK = ChainPart(
-    "clock", "drift", called("drift"), lambda effect, *_: effect,
+PART = ChainPart(
+    "clock", "drift", Place.ADDED, called("drift"), lambda effect, *_: effect,
     ARITHMETIC, late("drift"),
-    kinds=(KIND,),
+    kinds=(KIND,), code=("clock",),
+    unmeasured=Unmeasured(
+        "drift",
+        "a clock that runs alone, and nothing says when it began; set_offset takes it from outside, and "
+        "emit.compensation.compensate: [drift] lets the module count from there",
+        "drift (a clock that runs alone; nothing says when it began",
+    ),
 )
 """Drift as a part of the chain: a clock's contribution to the displacement."""
+
+PARTS = (PART,)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -17,6 +18,8 @@ class _Drift(Effect):
     rate: Number = Field(description="output units per s, at the start of the session", examples=[1e-4])
 
     place: ClassVar[Place] = Place.ADDED
+    from_start: ClassVar[bool] = True
+    shown_by: ClassVar[Mapping[str, int]] = {"slow_again": 1, "holds": 2}
     compensated: ClassVar[Compensated] = "needs a sensor"
     compensation: ClassVar[str] = (
         "by set_offset, where it is measured; over the time since then with emit.compensation.compensate: [drift]"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
-from hystgen.effects.base import Block, decays
+from hystgen.effects.base import Block, Place, decays
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag.model import Lag
 from hystgen.effects.part import ChainPart, Led, Margin, One, Realized, Responses, Verbs, called, late
@@ -377,11 +377,7 @@ ALL_HALVES = 64
 
 class UnevenLag(Block):
     """A lag in double precision at steps of any length: the first of two rows leads it, the second inverts it exactly
-    and gives its output.
-
-    `rises`: the direction of arrival, where two branches follow; with `always_led` the lag is then led however short it
-    is, since a rounded drive does not arrive exactly.
-    """
+    and gives its output. With `always_led` it is led since a rounded drive does not arrive exactly."""
 
     def __init__(self, effect: Lag) -> None:
         self.rises: Callable[[], bool] | None = None
@@ -442,9 +438,12 @@ def _uneven(effect: Lag, seconds: float) -> tuple[bool, LagTables]:
     long = numbers(effect, seconds).exact
     return long, tables([numbers(effect, seconds, exact=exact) for exact in (False, True)], lambda x, _: np.array(x))
 
-LAG = ChainPart(
-    "lag", "a lag", called("lag", lambda effect: effect.time_constant > 0.0), numbers,
+PART = ChainPart(
+    "lag", "a lag", Place.DRIVE, called("lag", lambda effect: effect.time_constant > 0.0), numbers,
     ARITHMETIC, late("lag"),
-    kinds=(KIND, EXACT_KIND, BRAKED_KIND),
+    kinds=(KIND, EXACT_KIND, BRAKED_KIND), code=("lag", "lag_exact"), uneven=UnevenLag,
+    counted=lambda t, blocks: (blocks - int(t.exact.sum()), int(t.exact.sum())),
 )
 """A lag as a part of the chain, in front of the plays."""
+
+PARTS = (PART,)

@@ -294,7 +294,7 @@ def coarsely(t: LagTables, x: Any, drop: Any) -> Any:
     return coarse(scaled(t, 0, x << (t.block[0, BITS] + drop), INVERSE), drop)
 
 
-LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked)
+LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked, coarse=COARSE)
 ARITHMETIC = Realized(
     Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
     tables, formats,

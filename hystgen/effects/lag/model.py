@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -22,6 +23,10 @@ class Lag(Effect):
     time_constant: NotNegative = Field(description="tau, s; 0 is no lag", examples=[0.0125])
 
     place: ClassVar[Place] = Place.DRIVE
+    shown_by: ClassVar[Mapping[str, int]] = {
+        "fast_steps": 1, "staircase": 1, "sweep": 2, "fast_triangles": 2, "fast_minor": 2, "fast_reversals": 2
+    }
+    rank: ClassVar[float] = 2
     order: ClassVar[int] = 2
     compensated: ClassVar[Compensated] = "approximate"
     compensation: ClassVar[str] = "a lead, exact on ramps; the error is a quarter of the second difference of the drive"

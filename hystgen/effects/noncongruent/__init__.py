@@ -1,1 +1,3 @@
 """Plays whose loops depend on where they lie."""
+
+SOURCES = {"bends": ("bent.c",)}

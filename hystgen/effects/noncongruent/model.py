@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -48,6 +48,7 @@ class _Noncongruent(Effect):
     name: Literal["noncongruent"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.PLAYS
+    shown_by: ClassVar[Mapping[str, int]] = {"slow_minor": 1, "fast_minor": 3, "reversals": 3, "slow_reversals": 5}
     order: ClassVar[int] = 1
     timed: ClassVar[bool] = False
     pointwise: ClassVar[bool] = True

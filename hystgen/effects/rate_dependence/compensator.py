@@ -1,18 +1,35 @@
-"""One step of rate-dependent plays, for a compensator."""
+"""Plays that depend on the rate of their input, for a compensator.
+
+A viscous play with the state q before a step is at `z = q + b1 dz_r(w - q)` at the end of the step, and its new state
+is `q = z + (1 - E/M) dz_r(w - z)`, with `M = (1 - E) tau/T` and dz_r the part beyond +-r: the exact response to a
+straight input while the play slides or rests.
+
+The state of a play with a nonlinear dashpot is its position, in two parts. In a step its input counts as standing still
+at a fraction a of the way: `z' = z + D(dz_r(x + a (w - x) - z))`, with D the yield of a stretch in a step by the
+dashpot's own law. Two such plays whose inputs differ by at most e stay within e of each other, so the error is at most
+a times the way.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import TypeGuard
+from collections.abc import Iterator, Sequence
+from typing import Any, TypeGuard
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hystgen.effects.base import Array, Effect
+from hystgen.basics.jit import jit
+from hystgen.effects.base import Array, Effect, decays
+from hystgen.effects.part import Function, late
+from hystgen.effects.plays import DASHPOT, DILATED, RELAXING, SEEN, Moved, Moves, MovingTables, PlaysPart, Response
 from hystgen.effects.rate_dependence.model import RelaxingPlays, ThresholdRate, dilated_plays, relaxed
+from hystgen.plays.loop import State
+from hystgen.plays.slots import Reals, zero
 
 
 class Movement:
-    """Where plays (n + 1) are after a step in which their input goes straight from `x` to `w`.
+    """How plays (n + 1) move whose thresholds grow with the rate, or that relax.
 
     Plays that relax move as in the forward model. Thresholds that grow with the rate have a bounded inverse only while
     `sum p_i beta_i < T/2 sum p_i` holds for every number of plays that slide together. Where it does not, plays that
@@ -21,6 +38,7 @@ class Movement:
 
     def __init__(self, effect: RelaxingPlays | ThresholdRate, thresholds: Array, weights: Array) -> None:
         self.r, self.weights = thresholds, weights
+        self.dashpot = effect if nonlinear(effect) else None
         self.betas = np.array(effect.betas) if isinstance(effect, ThresholdRate) else None
         self.exponent, self.scale = 1.0, float(thresholds[-1])
         if isinstance(effect, RelaxingPlays):
@@ -37,6 +55,68 @@ class Movement:
         least = p[0] + float(np.sum(p[1:] * np.minimum(0.0, 1.0 - self.betas / seconds)))
         return bool(np.all(sliding) and least > 0.0)
 
+    def moves(self, seconds: float) -> int:
+        """Their kind at steps of `seconds`."""
+        return DASHPOT if self.dashpot else DILATED if self.by_threshold(seconds) else RELAXING
+
+    @property
+    def in_order(self) -> bool:
+        """Whether none yields faster than one with a smaller threshold."""
+        return self.exponent >= 1.0 if self.betas is None else len(set(self.betas.tolist())) == 1
+
+    def stood_in_for(self, seconds: float) -> bool:
+        """Whether plays that relax stand in for thresholds that grow with the rate."""
+        return self.betas is not None and not self.by_threshold(seconds)
+
+    def falling(self, seconds: float, steep: float) -> float:
+        """A threshold that grows faster than the input moves takes its play back."""
+        if self.betas is None:
+            return 0.0
+        return steep * float(np.sum(self.weights[1:] * np.minimum(0.0, 1.0 - self.betas / seconds)))
+
+    def numbers(self, seconds: float, largest_step: float, span: float) -> Moved:
+        """Their constants at steps of `seconds`, for drive steps up to `largest_step` and stretches up to `span`."""
+        none, kind = np.zeros(len(self.taus)), self.moves(seconds)
+        if self.dashpot:
+            rows = pieces(self.dashpot, self.scale, seconds, span)
+            return Moved(kind, none, none, rows, seen_share(self.dashpot, self.scale, seconds, largest_step))
+        no_yields = np.zeros((0, C3 + 1))
+        if kind == DILATED:
+            return Moved(kind, np.asarray(self.betas) / seconds, none, no_yields, 0.0)
+        first, second = np.array([_viscous(seconds, tau) for tau in self.taus]).T
+        return Moved(kind, first, second, no_yields, 0.0)
+
+    def responses(self, z: NDArray[np.complex128], seconds: float) -> Iterator[Response]:
+        """As in `Mover`; a nonlinear dashpot has a stretch that is too slow for its play to follow."""
+        p = self.weights
+        if self.dashpot:
+            yield float(np.sum(p)), np.full_like(z, p[0]), float(p[0])
+            return
+        slope, response, at_once = float(p[0]), np.full_like(z, p[0]), float(p[0])
+        for weight, tau in zip(p[1:].tolist(), self.taus.tolist(), strict=True):
+            if self.by_threshold(seconds):
+                followed, first = 1.0 - tau / seconds * (1.0 - z), 1.0 - tau / seconds
+            else:
+                decay, early, first = (float(x[0]) for x in decays(np.array([seconds]), tau))
+                followed = (first + early * z) / (1.0 - decay * z)
+            slope, response, at_once = slope + weight, response + weight * followed, at_once + weight * first
+            yield slope, response, at_once
+
+    def whole_yields(
+        self, seconds: float, begins: Sequence[int], end: int, step: float, bits: int
+    ) -> list[tuple[int, ...]]:
+        """`FixedMovingTables.yields` for stretches up to `end` steps, with knots at `begins` among others."""
+        if not (dashpot := self.dashpot):
+            return []
+        found: list[tuple[int, ...]] = late("rate_dependence", "whole_yields")()(
+            lambda x: yielded(dashpot, self.scale, seconds, x), begins, end, step, bits
+        )
+        return found
+
+    def stretch_error(self, seconds: float, rows: Array, ways: tuple[float, float], held: Array) -> float:
+        """Largest difference between the stretches of plays by the table and by the law."""
+        return stretch_error(self.dashpot, self.scale, seconds, rows, ways, held) if self.dashpot else 0.0
+
     def after(self, plays: Array, x: float, w: float, seconds: float) -> Array:
         """The plays (n + 1) after the step, from where they were."""
         out = np.empty_like(plays)
@@ -51,6 +131,14 @@ class Movement:
             else:
                 out[i] = min(max(plays[i], w - self.r[i]), w + self.r[i])
         return out
+
+
+def _viscous(seconds: float, tau: float) -> tuple[float, float]:
+    """b1 and 1 - E/M of a step; a play with the time constant 0 follows at once."""
+    if not tau > 0.0:
+        return 1.0, 0.0
+    decay, _, late = (float(x[0]) for x in decays(np.array([seconds]), tau))
+    return late, 1.0 - decay / (1.0 - late)
 
 
 # ---------------------------------------------------------------- a nonlinear dashpot, by a table
@@ -92,7 +180,7 @@ def yielded(effect: RelaxingPlays, scale: float, seconds: float, x: float) -> tu
     return -x * math.expm1(-spent), -math.expm1(-effect.exponent * spent)
 
 
-def seen(effect: RelaxingPlays, scale: float, seconds: float, way: float) -> float:
+def seen_share(effect: RelaxingPlays, scale: float, seconds: float, way: float) -> float:
     """The share of the move `way` up to which the input counts as standing still.
 
     Exact for a linear dashpot as stiff as this one in steady motion by `way` a step.
@@ -157,3 +245,157 @@ def stretch_error(
     farther = np.interp(law, least, x) - x
     nearer = x - np.interp(law, most, x)
     return float(max(np.max(farther[reached]), np.max(nearer[reached])))
+
+
+# ---------------------------------------------------------------- moved.c and dashpot.c, in any arithmetic
+
+
+@jit(inline=True)
+def stretch(x: Any, r: Any) -> Any:
+    """The part of x beyond +-r."""
+    if x > r:
+        return x - r
+    if x < -r:
+        return x + r
+    return r - r
+
+
+def movement(
+    share_of: Function, yields: Function, seen: Function, moved_by: Function, yield_of: Function
+) -> tuple[Function, Function, Function, Function]:
+    """`moved`, `move`, `put` and `rest` of `Moves`, from the functions in which arithmetics differ: x times a play's
+    factor; a stretch's yield in a step; the part of a way at which the input counts as standing still; the move of a
+    play for its yield, and the reverse."""
+
+    @jit
+    def change(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
+        """Move, as a yield, of play i with a nonlinear dashpot while the input of the plays goes to w."""
+        x = s.play[0] + seen(m, w - s.play[0]) - s.play[i]
+        gained = zero(x)
+        if x > r[i]:
+            gained = yields(m, x - r[i])
+        elif x < -r[i]:
+            gained = -yields(m, -x - r[i])
+        return gained + lost[i]
+
+    @jit
+    def moved(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> Any:
+        """Play i after the input of the plays has gone to w."""
+        q = s.play[i]
+        if m.moves == DASHPOT:
+            return q + moved_by(m, change(m, r, i, s, lost, w))
+        if m.moves == RELAXING:
+            return q + share_of(m.first, i, stretch(w - q, r[i]))
+        threshold = r[i]
+        if m.moves == DILATED:
+            before = s.play[0]
+            way = w - before if w > before else before - w
+            threshold = r[i] + share_of(m.first, i, way)
+        low = w - threshold
+        high = w + threshold
+        upper = high if q > high else q
+        return low if upper < low else upper
+
+    @jit
+    def move(m: Any, r: Reals, i: int, s: State, lost: Reals, w: Any) -> None:
+        """Move play i while the input of the plays goes to w."""
+        if m.moves == DASHPOT:
+            gained = change(m, r, i, s, lost, w)
+            z = s.play[i] + moved_by(m, gained)
+            lost[i] = gained - yield_of(m, z - s.play[i])
+            s.play[i] = z
+        else:
+            s.play[i] = moved(m, r, i, s, lost, w)
+
+    @jit
+    def put(m: Any, i: int, s: State, lost: Reals, z: Any) -> None:
+        """Put play i to rest at z."""
+        if m.moves == DASHPOT:
+            lost[i] = zero(lost[i])
+        s.play[i] = z
+
+    @jit
+    def rest(m: Any, r: Reals, i: int, s: State) -> Any:
+        """Where play i would come to rest with its input held, as seen one step later."""
+        return s.play[i] + share_of(m.second, i, stretch(s.play[0] - s.play[i], r[i]))
+
+    return moved, move, put, rest
+
+
+# ---------------------------------------------------------------- yield.c, relaxing.c
+
+
+@jit
+def yields(t: MovingTables, x: Any) -> Any:
+    """The yield in a step of a play with a nonlinear dashpot at stretch x >= 0."""
+    low = 0
+    high = len(t.yields)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if x < t.yields[middle, BEGIN]:
+            high = middle
+        else:
+            low = middle
+    on = x - t.yields[low, BEGIN]
+    return ((t.yields[low, C3] * on + t.yields[low, C2]) * on + t.yields[low, C1]) * on + t.yields[low, C0]
+
+
+@jit(inline=True)
+def seen(t: MovingTables, way: Any) -> Any:
+    """The part of `way` at which the input counts as standing still."""
+    return way * t.number[SEEN]
+
+
+@jit(inline=True)
+def unchanged(t: MovingTables, x: Any) -> Any:  # noqa: ARG001  as in fixed point
+    """The move of a play for its yield, and the reverse."""
+    return x
+
+
+@jit(inline=True)
+def share_of(factors: Reals, i: int, x: Any) -> Any:
+    """x times the factor of play i."""
+    return factors[i] * x
+
+
+@jit
+def relaxing_follow(t: MovingTables, plays: Any, s: State, w: Any) -> Any:
+    """Move viscous plays with one time constant with their input w. Returns their sum."""
+    r, p = plays.threshold, plays.weight
+    total = p[0] * w
+    for i in range(1, len(r)):
+        z = s.play[i] + t.first[1] * stretch(w - s.play[i], r[i])
+        total = total + p[i] * z
+        s.play[i] = z + t.second[1] * stretch(w - z, r[i])
+    s.play[0] = w
+    return total
+
+
+@jit
+def relaxing_input(t: MovingTables, plays: Any, s: State, h: Any) -> Any:
+    """Input of viscous plays at which their sum is h: first without a stretched play, then with those stretched on the
+    way to it."""
+    r, p = plays.threshold, plays.weight
+    rest = r[0]
+    for i in range(1, len(r)):
+        rest = rest + p[i] * s.play[i]
+    rest = h - rest
+    w = rest * t.inverse[0]
+    rising = w > s.play[1]
+    for i in range(1, len(r)):
+        first = s.play[i] + r[i] if rising else s.play[i] - r[i]
+        if w <= first if rising else w >= first:
+            break
+        rest = rest + t.share[i] * first
+        w = rest * t.inverse[i]
+        if w < first if rising else w > first:
+            w = first
+    return w
+
+
+MOVES = PlaysPart(
+    Movement,
+    Moves(*movement(share_of, yields, seen, unchanged, unchanged), relaxing_follow, relaxing_input),
+    late("rate_dependence"),
+)
+"""Plays that depend on the rate as a part of the chain."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -241,6 +241,10 @@ class _RateDependence(Effect):
     name: Literal["rate_dependence"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.PLAYS
+    shown_by: ClassVar[Mapping[str, int]] = {
+        "fast_triangles": 1, "fast_minor": 1, "fast_reversals": 1, "settling": 2, "reversals": 2
+    }
+    rank: ClassVar[float] = 4
 
     def problems(self, thresholds: tuple[float, ...] | None) -> Iterator[Problem]:
         """There must be plays to depend on the rate."""

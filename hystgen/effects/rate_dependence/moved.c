@@ -3,9 +3,10 @@
 #ifndef HYSTGEN_RATE_DEPENDENCE_MOVED_C
 #define HYSTGEN_RATE_DEPENDENCE_MOVED_C
 #include "compensator/chain/model.h"
-#include "effects/noncongruent/bent.c"
 #include "effects/rate_dependence/stretch.c"
 #include "compensator/chain/signals.c"
+#define HYSTGEN_ASKS_BENDS
+#include "effects/catalogue.h"
 
 #ifdef HYSTGEN_HAS_RELAXING_PLAYS
 /* Viscous play i after the input of the plays has gone to w. Its state is where it would come to

@@ -2,11 +2,12 @@
    (`play`). At the end of a step its input w has stretched it by what lies beyond the threshold;
    the play gains a share of that. Exact while it slides or rests; contact that begins or ends
    within a step counts from the first touch. In fixed point a play stops where its stretch would
-   gain less than half a step of the plays' input in a sample. Called by relaxing_plays.c. */
-#ifndef HYSTGEN_RATE_DEPENDENCE_RELAXING_C
-#define HYSTGEN_RATE_DEPENDENCE_RELAXING_C
+   gain less than half a step of the plays' input in a sample. The first move finds the plays at
+   rest, as it finds plain ones. Called by chain.c and chain_calls.c. */
 #include "compensator/chain/model.h"
+#include "compensator/chain/plays_solve.c"
 #include "effects/rate_dependence/stretch.c"
+#include "compensator/chain/signals.c"
 #ifdef HYSTGEN_FIXED
 #include "arithmetic/factors.c"
 #endif
@@ -97,4 +98,26 @@ static hystgen_real_t hystgen_relaxing_input(const hystgen_real_t *play, hystgen
 }
 #endif
 
+/* Sum of the plays. */
+static hystgen_signal_t hystgen_operator_started(const hystgen_operator_t *self) {
+    return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
+}
+
+/* The plays follow their input w to another sum. */
+HYSTGEN_APART_IN_FIXED void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
+    if (self->moving) {
+        self->level = hystgen_level(hystgen_relaxing_follow(self->play, w));
+    } else {
+        hystgen_loop_absorb(&hystgen_model_tables, self->play, w);
+        self->level = hystgen_operator_started(self);
+    }
+}
+
+#ifdef HYSTGEN_INVERSE
+/* Input of the plays at which their sum is h. */
+HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_input(hystgen_inverse_t *self,
+                                                             hystgen_signal_t h) {
+    return self->moving ? hystgen_relaxing_input(self->play, hystgen_asked(h))
+                        : hystgen_input_of(self->play, self->level, h);
+}
 #endif

@@ -1,1 +1,3 @@
 """A mechanical mode of the stage."""
+
+SOURCES = {"blocks": ("mode.c",)}

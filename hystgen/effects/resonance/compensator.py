@@ -1,4 +1,4 @@
-"""A mode: its poles at samples, and as a block of the forward operator.
+"""A mode as a block of the forward operator.
 
 The block keeps the distance `off` of the output from the input, and its `rate`, both 0 at rest, so that rounding ends
 with the motion. Only the forward operator has it: the zeros of a second-order system sampled with straight input, near
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.effects.base import Array
+from hystgen.effects.base import Array, Place
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.part import ChainPart, Margin, One, Realized, Verbs, called, late
 from hystgen.effects.resonance.model import Resonance
@@ -26,17 +26,6 @@ MOST_SAMPLES = 2**20
 
 FADED = 45.0
 """Time constants after which an oscillation is below the last bit of a double."""
-
-
-def denominator(effect: Resonance, step: float) -> tuple[float, float]:
-    """`a1`, `a2` of the mode's exact poles over a step, `z^2 + a1 z + a2`."""
-    zeta, angle = effect.damping, 2.0 * math.pi * effect.frequency * step
-    if zeta < 1.0:
-        decay = math.exp(-zeta * angle)
-        return -2.0 * decay * math.cos(math.sqrt(1.0 - zeta * zeta) * angle), decay * decay
-    apart = math.sqrt(zeta * zeta - 1.0)
-    slow, fast = math.exp(-angle / (zeta + apart)), math.exp(-(zeta + apart) * angle)
-    return -(slow + fast), slow * fast
 
 
 @dataclass(frozen=True)
@@ -147,10 +136,12 @@ ARITHMETIC = Realized(
     lambda blocks, about: about.reals([one.table for one in blocks], "the modes").reshape(-1, 5),
 )
 
-MODE = ChainPart(
-    "mode", "resonance", called("resonance", lambda effect: effect.block is None),
+PART = ChainPart(
+    "mode", "resonance", Place.LINEAR, called("resonance", lambda effect: effect.block is None),
     lambda effect, seconds, _: numbers(effect, seconds),
     ARITHMETIC, late("resonance"), forward=True,
-    kinds=(KIND,),
+    kinds=(KIND,), code=("mode",),
 )
 """A mode as a part of the chain, of the forward operator alone."""
+
+PARTS = (PART,)

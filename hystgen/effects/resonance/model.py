@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -69,6 +70,8 @@ class _Mode(Effect):
     damping: Annotated[Positive, Field(le=10.0)] = Field(description="zeta, above 0, 1 is critical", examples=[0.02])
 
     place: ClassVar[Place] = Place.LINEAR
+    shown_by: ClassVar[Mapping[str, int]] = {"sweep": 1, "multisine": 3, "fast_steps": 4, "staircase": 4}
+    rank: ClassVar[float] = 1
     fades: ClassVar[bool] = True
     repeatable: ClassVar[bool] = True
 
@@ -106,6 +109,16 @@ class _Mode(Effect):
         step = np.where(short, x * (0.5 - zeta * x / 3.0 + curved / 24.0), step)
         return np.stack([c, s, ramp, step])
 
+    def denominator(self, step: float) -> tuple[float, float]:
+        """`a1`, `a2` of the exact poles over a step, `z^2 + a1 z + a2`."""
+        zeta, angle = self.damping, 2.0 * math.pi * self.frequency * step
+        if zeta < 1.0:
+            decay = math.exp(-zeta * angle)
+            return -2.0 * decay * math.cos(math.sqrt(1.0 - zeta * zeta) * angle), decay * decay
+        apart = math.sqrt(zeta * zeta - 1.0)
+        slow, fast = math.exp(-angle / (zeta + apart)), math.exp(-(zeta + apart) * angle)
+        return -(slow + fast), slow * fast
+
     def filtered(self, h: Array, run: Run) -> Array:
         """The response of the mode to the play sum."""
         rows = np.ascontiguousarray(np.atleast_2d(h))
@@ -120,6 +133,12 @@ class _Mode(Effect):
         return np.stack(self.factors(run.t - run.t[0])[1:])
 
 
+WELL_DAMPED = 0.7
+"""[damping ratio] From here on a mode is inverted rather than shaped or notched. It overshoots a step by
+`exp(-pi z/sqrt(1 - z^2))`, at most 4.6 %, while the half period that a shaper waits for is 1.4 times the undamped one
+and grows without bound towards 1. Both are closed forms; no run set it."""
+
+
 class Resonance(_Mode):
     """Mode `y'' + 2 zeta w0 y' + w0^2 y = w0^2 h`, `w0 = 2 pi frequency`, that carries the whole motion."""
 
@@ -129,6 +148,16 @@ class Resonance(_Mode):
     later: ClassVar[tuple[str, ...]] = ("shape",)
     compensated: ClassVar[Compensated] = "approximate"
     compensation: ClassVar[str] = "samples of the reference on either side of the present one: no ringing, no delay"
+
+    def rings(self, by: str) -> bool:
+        """Whether it is compensated by a shaper or a notch, as `by` says."""
+        return by in ("shaper", "notch") and self.damping < WELL_DAMPED
+
+    def corrected(self, resonance: str) -> str:
+        """By its inverse, a shaper or a notch, or not at all."""
+        if resonance == "none":
+            return "none, as emit.compensation.resonance says"
+        return f"a {resonance}, see below" if self.rings(resonance) else self.compensation
 
     @classmethod
     def candidates(cls, about: About) -> list[Candidate]:

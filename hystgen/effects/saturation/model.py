@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
@@ -30,6 +30,7 @@ class _Saturation(Effect):
     name: Literal["saturation"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.OUTPUT
+    shown_by: ClassVar[Mapping[str, int]] = {"slow": 2, "slow_reversals": 3}
     timed: ClassVar[bool] = False
     pointwise: ClassVar[bool] = True
     hint: ClassVar[str] = "this is saturation behind the plays; one in front is a stage of model.memoryless"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Annotated, ClassVar, Literal
 
@@ -32,11 +32,20 @@ class _Sensor(Effect):
     name: Literal["sensor_nonlinearity"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.OUTPUT
+    shown_by: ClassVar[Mapping[str, int]] = {"multisine": 2, "slow": 3, "slow_minor": 3, "slow_reversals": 4}
     order: ClassVar[int] = 1
     timed: ClassVar[bool] = False
     pointwise: ClassVar[bool] = True
     compensated: ClassVar[Compensated] = "none needed"
     compensation: ClassVar[str] = "corrected in the data, never inverted in the drive"
+    mistaken: ClassVar[Mapping[str, tuple[str, str]]] = {
+        "asymmetry": (
+            "the memoryless part was diagnosed as asymmetry, and the records could not tell it from a curved sensor; "
+            "if it is the sensor's, the inverse bends the true motion.",
+            "the sensor was diagnosed as curved, and the records could not tell that from an asymmetry of the stage; "
+            "if it is the stage's, the inverse leaves it as it is.",
+        )
+    }
 
 
 class SensorPolynomial(_Sensor):

@@ -1,1 +1,3 @@
 """Limited slew rate of the amplifier."""
+
+SOURCES = {"limits": ("slewed.c",), "brake": ("brake.c",)}

@@ -7,21 +7,8 @@
 #include "compensator/chain/signals.c"
 #include "compensator/chain/drive_signal.c"
 #include "effects/slew_limit/slewed.c"
-#ifdef HYSTGEN_HAS_STEADY_LAG
-#ifdef HYSTGEN_FIXED
-#include "effects/lag/steady_fixed.c"
-#else
-#include "effects/lag/steady.c"
-#endif
-#endif
-#ifdef HYSTGEN_HAS_QUIET_DRIVE
-#include "effects/lag/quiet.c"
-#endif
-#ifdef HYSTGEN_FIXED
-#include "effects/lag/braked_fixed.c"
-#else
-#include "effects/lag/braked.c"
-#endif
+#define HYSTGEN_ASKS_LED
+#include "effects/catalogue.h"
 
 /* The drive from which the lag behind the amplifier does not overshoot on its way to the answer v,
    of which `near` is the nearest that the amplifier reaches. */

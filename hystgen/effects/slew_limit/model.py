@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal, Self, cast
 
 import numpy as np
@@ -109,7 +110,9 @@ class _SlewLimit(Effect):
     )
 
     place: ClassVar[Place] = Place.DRIVE
+    shown_by: ClassVar[Mapping[str, int]] = {"fast_steps": 3, "staircase": 3, "fast_triangles": 4, "fast_reversals": 4}
     order: ClassVar[int] = 1
+    slews: ClassVar[bool] = True
     compensated: ClassVar[Compensated] = "none"
     compensation: ClassVar[str] = "the drive is kept within it, so the memory matches the actuator's"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -12,19 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
+from hystgen.effects.base import Place
+from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
 from hystgen.effects.kinds import Constants, Kind, Rows
-from hystgen.effects.part import ChainPart, FloatSurroundings, Gained, Margin, One, Realized, Speed, Verbs, called, late
-from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat
+from hystgen.effects.part import (
+    ChainPart,
+    FloatSurroundings,
+    Gained,
+    Margin,
+    One,
+    Realized,
+    Setting,
+    Speed,
+    Unmeasured,
+    Verbs,
+    called,
+    late,
+)
+from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat, lost_on
 from hystgen.plays.slots import Counts, Reals, zero
-
-LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
-"""[times] A gain set from outside is kept between these: one beyond them means a faulty sensor or a wrong unit. Set by
-fixed point: with `fixed.GAIN_BITS` fraction bits, 2 is the limit of a gain and of its reciprocal."""
-
-MOST_CHANGE = 0.25
-"""[share of the gain] The largest change of a gain in one sample that the C follows: five Newton steps from the last
-reciprocal leave `0.25^32`, less than the rounding of double precision. A limit of 0.5 would take six of them in every
-sample, one of 0.9 nine. Set by: benchmarks/chosen_numbers.py newton."""
 
 # ---------------------------------------------------------------- gain.c
 
@@ -302,18 +307,15 @@ def heat_numbers(effect: OwnHeat, ends: tuple[float, float], span: float, second
     return loss, per, effect.gain_per_degree, effect.offset_per_degree, hottest, 1.0, 2.0
 
 
-def heat_problems(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> Iterator[str]:
+def heat_problems(effect: OwnHeat, at: Setting) -> Iterator[str]:
     """Why the C cannot follow the gain."""
-    change = abs(effect.gain_per_degree) * most_at_once(effect, ends, ends[1] - ends[0], seconds) / LEAST_GAIN
-    if change > MOST_CHANGE:
-        yield f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST_CHANGE:.0%}"
+    if (change := heat_change(effect, at.ends, at.seconds)) > MOST_CHANGE:
+        yield too_fast(change)
 
 
-def heat_turns(effect: OwnHeat, ends: tuple[float, float], seconds: float, roundoff: float) -> int:
-    """Newton steps after which the reciprocal of the gain is exact up to rounding."""
-    change = abs(effect.gain_per_degree) * most_at_once(effect, ends, ends[1] - ends[0], seconds) / LEAST_GAIN
-    left = max(change, 1e-9)
-    return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
+def heat_change(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> float:
+    """Largest relative change of the gain in one move over the range."""
+    return abs(effect.gain_per_degree) * most_at_once(effect, ends, ends[1] - ends[0], seconds) / LEAST_GAIN
 
 
 def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
@@ -323,7 +325,7 @@ def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
     rubbing = [thresholds(each, ends) for each in effects]
     return HeatTables(
         about.reals([heat_numbers(e, ends, about.span, seconds) for e in effects], "temperatures").reshape(-1, 7),
-        np.array([heat_turns(each, ends, seconds, about.roundoff) for each in effects], dtype=np.int64),
+        np.array([newton_steps(heat_change(each, ends, seconds), about.roundoff) for each in effects], dtype=np.int64),
         about.reals(padded(rubbing), "thresholds"),
         np.array([len(each) for each in rubbing], dtype=np.int64),
     )
@@ -430,6 +432,46 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
     return amount
 
 
+# ---------------------------------------------------------------- at steps of any length
+
+
+class UnevenHeat:
+    """A temperature that follows the heat of a drive, with the turning points that friction remembers."""
+
+    def __init__(self, effect: OwnHeat) -> None:
+        self.effect, self.rise = effect, 0.0
+        self.first, self.corner, self.depth, self.up = math.nan, np.empty(16), 0, True
+
+    def _heat(self, before: float, drive: float, seconds: float) -> tuple[float, int, bool]:
+        """Final rise at the heat of a move, and the state of friction after it."""
+        effect = self.effect
+        if isinstance(effect, HysteresisHeating):
+            if self.depth == len(self.corner):
+                self.corner = np.append(self.corner, np.empty_like(self.corner))
+            energy, depth, up = lost_on(before, drive, self.first, effect.reach, self.corner, self.depth, self.up)
+            return effect.heating * energy / seconds, depth, up
+        return effect.heating * 0.25 * heat_way(before, drive) / seconds, 0, True
+
+    def _risen(self, before: float, drive: float, seconds: float) -> float:
+        """The rise after the drive has moved from `before`; unchanged at the first sample."""
+        if math.isnan(before) or math.isnan(drive) or seconds == 0.0:
+            return self.rise
+        return risen(self.effect, self.rise, self._heat(before, drive, seconds)[0], seconds)
+
+    def solve(self, y: float, before: float, drive: float, seconds: float) -> float:
+        """The input that gives the output y if the drive goes from `before` to `drive`."""
+        rise = self._risen(before, drive, seconds)
+        return (y - self.effect.offset_per_degree * rise) / (1.0 + self.effect.gain_per_degree * rise)
+
+    def move(self, before: float, drive: float, seconds: float) -> None:
+        """The drive has gone there."""
+        if math.isnan(before):
+            self.first = drive
+        elif seconds > 0.0:
+            self.rise = self._risen(before, drive, seconds)
+            _, self.depth, self.up = self._heat(before, drive, seconds)
+
+
 ARITHMETIC = Realized(
     Verbs(memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
     constants, tables,
@@ -440,15 +482,24 @@ HEAT_ARITHMETIC = Realized(
 )
 
 GAIN_PART = ChainPart(
-    "gain", "a temperature", called("thermal", lambda effect: bool(effect.columns)),
+    "gain", "a temperature", Place.GAIN, called("thermal", lambda effect: bool(effect.columns)),
     lambda effect, *_: Warm(effect), ARITHMETIC, late("thermal"), calls=("set_temperature",),
-    kinds=(KIND,),
+    kinds=(KIND,), code=("gain",),
 )
 
 HEAT_PART = ChainPart(
-    "heat", "own heat", called("thermal", lambda effect: not effect.columns),
+    "heat", "own heat", Place.GAIN, called("thermal", lambda effect: not effect.columns),
     lambda effect, *_: Warm(effect), HEAT_ARITHMETIC,
     late("thermal", "HEAT_ARITHMETIC"),
-    kinds=(HEAT_KIND, FRICTION_KIND),
+    kinds=(HEAT_KIND, FRICTION_KIND), problems=heat_problems, following=UnevenHeat,
+    unmeasured=Unmeasured(
+        "self_heating",
+        "the drive's own heat, open loop: its temperature drifts with the room's; measure it, or have it "
+        "followed by emit.compensation.compensate: [self_heating]",
+        "thermal from the drive's own heat (the temperature is not measured, and drifts with the room's",
+    ),
+    code=("heat", "friction"), counted=lambda t, blocks: (blocks, int(t.plays.any())),
 )
 """Temperatures as parts of the chain: set by the caller, or from own heat."""
+
+PARTS = (HEAT_PART, GAIN_PART)

@@ -11,6 +11,18 @@ import numpy as np
 
 from hystgen.arithmetic.factors import MANTISSA_BITS, factor, times
 from hystgen.basics.jit import jit
+from hystgen.effects.gains import (
+    GAIN_BITS,
+    LARGEST,
+    LARGEST_GAIN,
+    LEAST,
+    LEAST_GAIN,
+    ONE,
+    RECIPROCAL_ERROR,
+    followed,
+    newton_steps,
+    reciprocal,
+)
 from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
 from hystgen.effects.thermal import compensator as floating
@@ -19,8 +31,6 @@ from hystgen.effects.thermal.compensator import (
     BEGUN,
     GAIN,
     INVERSE,
-    LARGEST_GAIN,
-    LEAST_GAIN,
     OFFSET,
     HeatTables,
     Warm,
@@ -29,15 +39,8 @@ from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
 from hystgen.plays.fixed import nearest
 from hystgen.plays.slots import Reals, zero
 
-GAIN_BITS = 29
-"""Fraction bits of a gain: 2 is the largest, and mantissas have 31."""
-
-ONE = 1 << GAIN_BITS
-LEAST, LARGEST = int(LEAST_GAIN * ONE), int(LARGEST_GAIN * ONE)
-
-LINEAR_ERROR, RECIPROCAL_ERROR = (last_bits * 2.0**-GAIN_BITS for last_bits in (1.0, 4.0))
-"""[share of the signal] Errors of a gain linear in a temperature: one product; and of the reciprocal of a gain of at
-least 1/2: twice the error of a linear one, and a Newton step."""
+LINEAR_ERROR = 2.0**-GAIN_BITS
+"""[share of the signal] Error of a gain linear in a temperature: one product."""
 
 FACTOR_ERROR = 2.0**-MANTISSA_BITS
 """[share of a product] Error of a factor: half of its last bit. A temperature's reference has the same error."""
@@ -105,23 +108,6 @@ def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> Reals:
 # ---------------------------------------------------------------- gain_fixed.c
 
 PER_DEGREE, OFFSET_PER_DEGREE, REFERENCE, COLDEST, HOTTEST, BITS = 0, 2, 4, 5, 6, 7
-
-
-@jit
-def reciprocal(gain: Any) -> Any:
-    """1 over a gain."""
-    return ((1 << (2 * GAIN_BITS)) + (gain >> 1)) // gain
-
-
-@jit
-def followed(gain: Any, before: Any, turns: Any) -> Any:
-    """The reciprocal of a gain that has moved, by Newton steps from the one before."""
-    half = 1 << (GAIN_BITS - 1)
-    inverse = before
-    for _ in range(turns):
-        product = (gain * inverse + half) >> GAIN_BITS
-        inverse = (inverse * (2 * ONE - product) + half) >> GAIN_BITS
-    return inverse
 
 
 @jit
@@ -241,7 +227,7 @@ def heat_formats(one: Warm, about: FixedSurroundings, *_: float) -> Heat:
     effect: Any = one.effect
     numbers = floating.heat_numbers(effect, about.ends, about.span, about.seconds)
     rubbing = floating.thresholds(effect, about.ends)
-    turns = floating.heat_turns(effect, about.ends, about.seconds, 2.0**-GAIN_BITS)
+    turns = newton_steps(floating.heat_change(effect, about.ends, about.seconds), 2.0**-GAIN_BITS)
     found = heat(numbers, rubbing, about.drive, float(about.drive_lsb), about.level, about.code_bits)
     return replace(found, turns=turns, one=one)
 

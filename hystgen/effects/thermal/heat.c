@@ -4,7 +4,7 @@
 #include "compensator/chain/model.h"
 #ifdef HYSTGEN_FIXED
 #include "arithmetic/factors.c"
-#include "effects/thermal/gain_fixed.c"
+#include "effects/gains.c"
 #endif
 
 #ifdef HYSTGEN_FIXED

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -82,6 +83,7 @@ class _Thermal(Effect):
     name: Literal["thermal"] = Field(description="name of the effect")
 
     place: ClassVar[Place] = Place.GAIN
+    shown_by: ClassVar[Mapping[str, int]] = {"cycles": 2, "holds": 3, "settling": 3, "slow_again": 3}
     order: ClassVar[int] = 1
     selector: ClassVar[str] = "source"
 

@@ -17,6 +17,16 @@ Array = NDArray[np.float64]
 Branch = tuple[float, float, float, float]
 
 
+def _tanh(x: float) -> float:
+    """As compiled code computes it, on every machine."""
+    return float(kernels.tanh.py_func(float(x), kernels.SCALAR[0]))  # type: ignore[arg-type]
+
+
+def _atanh(x: float) -> float:
+    """As compiled code computes it, on every machine."""
+    return float(kernels.atanh.py_func(float(x), kernels.SCALAR[1]))  # type: ignore[arg-type]
+
+
 @dataclass(frozen=True)
 class TanhEnvelope:
     """Envelope `a0 tanh(a1 x + a2) + a3` with an ascending and a descending branch (45)-(47).
@@ -47,8 +57,7 @@ class TanhEnvelope:
         """Value of the branch at x. A single float gives the same result on every machine."""
         a0, a1, a2, a3 = self.branch(ascending)
         if isinstance(x, float):
-            tables = kernels.TANH_TABLES["float64"]
-            return np.asarray(a0 * float(kernels.tanh.py_func(np.float64(a1 * x + a2), tables)) + a3)
+            return np.asarray(a0 * _tanh(a1 * x + a2) + a3)
         return np.asarray(a0 * np.tanh(a1 * np.asarray(x, dtype=np.float64) + a2) + a3)
 
     def inverse(
@@ -59,9 +68,7 @@ class TanhEnvelope:
         a0, a1, a2, a3 = self.branch(ascending)
         edge = float(np.nextafter(1.0, 0.0))
         if isinstance(y, float):
-            tables = kernels.ATANH_TABLES["float64"]
-            argument = min(max((y - a3) / a0, -edge), edge)
-            return np.asarray((float(kernels.atanh.py_func(np.float64(argument), tables)) - a2) / a1)
+            return np.asarray((_atanh(min(max((y - a3) / a0, -edge), edge)) - a2) / a1)
         arguments = np.clip((np.asarray(y, dtype=np.float64) - a3) / a0, -edge, edge)
         return np.asarray((np.arctanh(arguments) - a2) / a1)
 
@@ -74,10 +81,9 @@ class TanhEnvelope:
         a0, a1, a2, _ = self.branch(ascending)
         ends = sorted((a1 * low + a2, a1 * high + a2))
         nearest = min(max(0.0, ends[0]), ends[1])
-        tables = kernels.TANH_TABLES["float64"]
 
         def slope(argument: float) -> float:
-            t = float(kernels.tanh.py_func(np.float64(argument), tables))
+            t = _tanh(argument)
             return a0 * a1 * (1.0 - t) * (1.0 + t)
 
         return min(slope(ends[0]), slope(ends[1])), slope(nearest)

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 2d05816aecfbaf233172b8c7ff485b00612cd916325be2ed3341bada295b72ad, without this line
+ * Text: sha256 d2e718108ae948a72b2ecdced8330457d2430efbe3ca6f8d5ec5c71a9a8782c4, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -144,7 +144,7 @@ static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *pl
         tail = tail + t->weight[last] * play[last];
         next = first;
     }
-    return play[0]; /* `output` differs from the present one only by rounding */
+    return play[0]; /* the output differs from the present one only by rounding */
 }
 
 static const struct {
@@ -199,7 +199,7 @@ static bent_real_t bent_front_forward(bent_real_t v) {
     return w;
 }
 
-/* v = G^-1[w]; sets `limited` if no drive gives w. */
+/* v = G^-1[w], or at an end of G for w beyond it. */
 static bent_real_t bent_front_inverse(bent_real_t w) {
     bent_real_t v = w;
     v = bent_dead_zone_inverse(&bent_stage_1, v);
@@ -211,7 +211,7 @@ static bent_real_t bent_forward_displaced(bent_real_t y) {
     return y + BENT_OFFSET;
 }
 
-/* The output of the chain that gives the displacement u; `limited` tells whether none does. */
+/* The output of the chain that gives the displacement u, or the nearest that there is. */
 static bent_real_t bent_inverse_undisplaced(bent_real_t u) {
     return u - BENT_OFFSET;
 }
@@ -270,9 +270,8 @@ static inline bent_real_t bent_applied_drive(bent_real_t v) {
     return bent_clamp_drive(v) + 0;
 }
 
-/* Input of the plays at which their sum is h; now it is `level`. The plays are summed up again
-   where that is not kept, as without effects, or lacks bits, as in fixed point, whose kernel does
-   that. */
+/* Input of the plays at which their sum is h. The plays are summed up again where their present
+   sum is not kept, as without effects, or lacks bits, as in fixed point, whose kernel does that. */
 static inline bent_real_t bent_input_of(const bent_real_t *play, bent_real_t h) {
     return bent_loop_solve(&bent_model_tables, play, bent_loop_output(&bent_model_tables, play), h);
 }

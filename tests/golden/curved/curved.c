@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 e457f5fdac454448c50b98046ccbe6296ae4e70e8fd6a547e5e4ca2a7428a514, without this line
+ * Text: sha256 db147d1ae515e7b980bbf0ab211b76fccb9dd0d301a426c7b9ac1d8467212d84, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -459,7 +459,7 @@ CURVED_APART curved_play_t curved_front_forward(curved_real_t v) {
         curved_front_coefficient, CURVED_FRONT_PIECES, CURVED_DEGREE, v);
 }
 
-/* v = G^-1[w]; sets `limited` if no drive gives w. */
+/* v = G^-1[w], or at an end of G for w beyond it. */
 CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool *limited) {
     const curved_ends_t *ends = &curved_back_ends;
     int64_t v;

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 4f2a4c7849b3f6bb331cb471682c397a5c307f0e7c7e594989cc271d41e27f3b, without this line
+ * Text: sha256 6b5c564c2d0c0e6b502f066968286548783c13cb75bbf4a43a13093119702afe, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -757,7 +757,7 @@ static two_branches_real_t two_branches_front_forward(two_branches_real_t v, boo
     return w;
 }
 
-/* v = G^-1[w]; sets `limited` if no drive gives w, on the branch of the drive's direction. */
+/* v = G^-1[w], on the branch of the drive's direction, or at an end of G for w beyond it. */
 static two_branches_real_t two_branches_front_inverse(two_branches_real_t w, bool ascending,
         bool *limited) {
     two_branches_real_t v = w;

@@ -1,7 +1,9 @@
-/* A smooth limit behind the plays, in fixed point: piecewise polynomials for it and its inverse.
-   Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
+/* Maps of the output, in fixed point: piecewise polynomials for one and its inverse, or stops,
+   beyond which the output continues with another slope. Called by the functions that emission
+   writes for a chain, see compensator/chain/model.h. */
 #include "arithmetic/fixed.h"
 #include "compensator/chain/model.h"
+#include "arithmetic/factors.c"
 
 /* The value of a curve at x; sets `limited` if x lies beyond its ends. */
 static int64_t hystgen_bend(const hystgen_bend_curve_t *c, int64_t x, bool *limited) {
@@ -28,4 +30,26 @@ static int64_t hystgen_bend_forward(const hystgen_bend_t *t, int64_t x) {
 
 static int64_t hystgen_bend_inverse(const hystgen_bend_t *t, int64_t y, bool *limited) {
     return hystgen_bend(&t->inverse, y, limited);
+}
+
+/* x between the stops, and a slope of f beyond them. */
+static int64_t hystgen_stops_beyond(const hystgen_stops_t *t, int64_t x,
+                                    const hystgen_factor_t *f) {
+    int64_t inside;
+    if (x < t->lower) {
+        inside = t->lower;
+    } else if (x > t->upper) {
+        inside = t->upper;
+    } else {
+        inside = x;
+    }
+    return inside + hystgen_times(x - inside, f);
+}
+
+static int64_t hystgen_stops_forward(const hystgen_stops_t *t, int64_t x) {
+    return hystgen_stops_beyond(t, x, &t->give);
+}
+
+static int64_t hystgen_stops_inverse(const hystgen_stops_t *t, int64_t y) {
+    return hystgen_stops_beyond(t, y, &t->inverse_give);
 }

@@ -1,0 +1,28 @@
+/* The catalogue in C, for an editor: functions of effects that a file asks for by what it defines
+   in front of this. Emission lists them by `SOURCES` of each effect. */
+#ifdef HYSTGEN_ASKS_LIMITS
+#include "effects/delay/forward.c"
+#include "effects/slew_limit/slewed.c"
+#endif
+#if defined(HYSTGEN_ASKS_BENDS) || defined(HYSTGEN_ASKS_MOVES)
+#include "effects/noncongruent/bent.c"
+#endif
+#ifdef HYSTGEN_ASKS_MOVES
+#ifdef HYSTGEN_HAS_DASHPOT_PLAYS
+#include "effects/rate_dependence/dashpot.c"
+#else
+#include "effects/rate_dependence/moved.c"
+#endif
+#endif
+#ifdef HYSTGEN_ASKS_LED
+#ifdef HYSTGEN_HAS_QUIET_DRIVE
+#include "effects/lag/quiet.c"
+#endif
+#ifdef HYSTGEN_FIXED
+#include "effects/lag/steady_fixed.c"
+#include "effects/lag/braked_fixed.c"
+#else
+#include "effects/lag/steady.c"
+#include "effects/lag/braked.c"
+#endif
+#endif

@@ -1,0 +1,58 @@
+"""Gains behind the plays that follow something: their limits, and in fixed point their reciprocals, as in `gains.c`."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+from hystgen.basics.jit import jit
+
+LEAST_GAIN, LARGEST_GAIN = 0.5, 2.0
+"""[times] A gain is kept between these: one beyond them, set from outside, is a faulty sensor or a wrong unit. Set by
+fixed point: with `GAIN_BITS` fraction bits, 2 is the limit of a gain and of its reciprocal."""
+
+MOST_CHANGE = 0.25
+"""[share of the gain] The largest change of a gain in one sample that the C follows: five Newton steps from the last
+reciprocal leave `0.25^32`, less than the rounding of double precision. A limit of 0.5 would take six of them in every
+sample, one of 0.9 nine. Set by: benchmarks/chosen_numbers.py newton."""
+
+GAIN_BITS = 29
+"""Fraction bits of a gain in fixed point: 2 is the largest, and mantissas have 31."""
+
+ONE = 1 << GAIN_BITS
+LEAST, LARGEST = int(LEAST_GAIN * ONE), int(LARGEST_GAIN * ONE)
+
+RECIPROCAL_ERROR = 4.0 * 2.0**-GAIN_BITS
+"""[share of the signal] Error of the reciprocal of a gain of at least 1/2, for a gain off by its last bit: twice that
+error, and a Newton step."""
+
+
+def too_fast(change: float) -> str:
+    """Why the C cannot follow a gain that changes by the share `change` in one move over the range."""
+    return f"its gain changes by {100.0 * change:.3g} % in one move over the range, more than {MOST_CHANGE:.0%}"
+
+
+def newton_steps(change: float, roundoff: float) -> int:
+    """Newton steps after which the reciprocal of a gain that has changed by a share is exact up to rounding."""
+    left = max(change, 1e-9)
+    return next(n for n in itertools.count(1) if left ** (2**n) < roundoff)
+
+
+# ---------------------------------------------------------------- gains.c
+
+
+@jit
+def reciprocal(gain: Any) -> Any:
+    """1 over a gain."""
+    return ((1 << (2 * GAIN_BITS)) + (gain >> 1)) // gain
+
+
+@jit
+def followed(gain: Any, before: Any, turns: Any) -> Any:
+    """The reciprocal of a gain that has moved, by Newton steps from the one before."""
+    half = 1 << (GAIN_BITS - 1)
+    inverse = before
+    for _ in range(turns):
+        product = (gain * inverse + half) >> GAIN_BITS
+        inverse = (inverse * (2 * ONE - product) + half) >> GAIN_BITS
+    return inverse

@@ -1,0 +1,178 @@
+"""Memoryless maps of the output, behind everything with a memory: what such an effect tells a compensator, and its
+functions in fixed point, curves of polynomials and straight pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from hystgen.arithmetic.factors import error as missed
+from hystgen.arithmetic.factors import times
+from hystgen.basics.jit import jit
+from hystgen.effects.base import Array, Effect, Run
+from hystgen.effects.bend import Bends, bend
+from hystgen.plays.slots import DEAD_ZONE, TANH, Counts, Reals
+
+
+class MapErrors(NamedTuple):
+    """Errors of maps from the last one on: the ends of the output in front of them, the slope of their inverse there,
+    the error of that inverse as one of its result, and that of the maps."""
+
+    ends: Array
+    slope: float
+    back: float
+    there: float
+
+
+class Fitted(Protocol):
+    """A curve as fitted in fixed point: its error in signals, for the largest slope."""
+
+    def error(self, slope: float, /) -> float: ...
+
+
+class Wanted(NamedTuple):
+    """A curve to be fitted in fixed point, in output codes: function, ends of its argument, and largest value."""
+
+    function: Callable[[float], float]
+    low: float
+    high: float
+    largest: float
+
+
+class Whole(NamedTuple):
+    """Units in fixed point: of a signal in output codes, of an output code, and the largest output in codes."""
+
+    signal: float
+    lsb: float
+    output: float
+
+
+class Map:
+    """An effect that maps the output: between two ends nothing changes, and beyond them there is another slope, unless
+    a subclass says otherwise. Sizes in fixed point are in output codes of `lsb`."""
+
+    def __init__(self, effect: Effect, lower: float = 0.0, upper: float = 0.0, give: float = 0.0) -> None:
+        self.effect, self.lower, self.upper, self.give = effect, lower, upper, give
+
+    def mapped(self, y: Array) -> Array:
+        """The output (N,) behind it, which does not depend on the run."""
+        return self.effect.mapped(y, Run(y, y))
+
+    def undone(self, y: Array) -> Array:
+        """The input (N,) that gives the output `y` (N,); for an output out of reach, of the nearest within reach."""
+        inside = np.clip(y, self.lower, self.upper)
+        return inside if self.give == 0.0 else np.asarray(inside + (y - inside) / self.give)
+
+    def stage(self, largest: float) -> tuple[int, int, list[float]]:
+        """Kind, size and data as in `hystgen.front.stage.StageTables`; `largest`: the largest number below 1."""
+        ends, anchors, give = [self.lower, self.upper], [self.lower, self.lower, self.upper], self.give
+        over = 1.0 / give if give else 0.0
+        return DEAD_ZONE, 2, [*ends, *ends, *anchors, *anchors, give, 1.0, give, over, 1.0, over]
+
+    def errors(self, found: MapErrors, u: float, kind: str) -> MapErrors:
+        """Those of the maps behind it and of this one, in floating point with roundings `u`."""
+        size, give = float(np.max(np.abs(found.ends))), self.give
+        slope = found.slope / (give if 0.0 < give < 1.0 else 1.0)
+        return MapErrors(found.ends, slope, found.back + 8.0 * u * size * slope, found.there + 8.0 * u * size)
+
+    def grown(self, size: float, lsb: float) -> float:
+        """Largest output for inputs within a size."""
+        return size
+
+    def asked(
+        self, back: float, ends: tuple[float, float], still: float, lsb: float
+    ) -> tuple[float, tuple[float, float] | None]:
+        """Largest input to which an output within `back` is inverted, and the least and largest one if a curve does
+        that; `ends`: of the settled input, `still`: the largest one."""
+        return back / self.give if self.give else max(abs(self.lower), abs(self.upper)) / lsb, None
+
+    def curves(self, size: float, ends: tuple[float, float] | None, lsb: float) -> list[Wanted]:
+        """Its curve for inputs within a size, and that of its inverse for results within `ends`, if it has any."""
+        return []
+
+    def whole_errors(self, found: MapErrors, curves: Sequence[Fitted], unit: Whole) -> MapErrors:
+        """As `errors` in fixed point, in output codes."""
+        give, (ends, slope, back, there) = self.give, found
+        over = 1.0 / give if 0.0 < give < 1.0 else 1.0
+        slope, back = slope * over, back * over
+        if give:
+            size = max(map(abs, ends.tolist())) / unit.lsb
+            back += (0.5 + over) * unit.signal + missed(1.0 / give) * size
+            there += 1.0 * unit.signal + missed(give) * unit.output
+        return MapErrors(ends, slope, back, there)
+
+
+@dataclass(frozen=True)
+class MapPart:
+    """Effects that map the output: `takes` tells whether an effect is one, and `of` makes its map."""
+
+    takes: Callable[[Effect], bool]
+    of: Callable[..., Map]
+
+
+# ---------------------------------------------------------------- maps.c
+
+LOWER, UPPER, GIVE, INVERSE_GIVE = 0, 1, 2, 4
+
+
+class MapTables(NamedTuple):
+    """All maps, in order from the plays.
+
+    `kind` (k,): TANH for a curve, or DEAD_ZONE for straight pieces; `piece` (k, 6): for straight pieces, the ends
+    between which nothing changes, the slope beyond them and 1 over it, as factors. `bends`: two curves for each k,
+    forward and inverse.
+    """
+
+    kind: Counts
+    piece: Reals
+    bends: Bends
+
+    @property
+    def kinds(self) -> list[int]:
+        """The kind of each map."""
+        return list(map(int, self.kind))
+
+    @property
+    def products(self) -> int:
+        """Multiplications of a curve."""
+        return int(self.bends.coefficient.shape[1])
+
+
+@jit
+def straight(t: MapTables, j: int, x: Any, slope: int) -> Any:
+    """x, with another slope beyond the ends."""
+    inside = x
+    if inside < t.piece[j, LOWER]:
+        inside = t.piece[j, LOWER]
+    elif inside > t.piece[j, UPPER]:
+        inside = t.piece[j, UPPER]
+    return inside + times(x - inside, t.piece[j, slope], t.piece[j, slope + 1])
+
+
+@jit
+def maps_forward(t: MapTables, x: Any) -> Any:
+    """x behind all maps."""
+    y = x
+    for j in range(len(t.kind)):
+        if t.kind[j] == TANH:
+            y, _ = bend(t.bends, 2 * j, y)
+        else:
+            y = straight(t, j, y, GIVE)
+    return y
+
+
+@jit
+def maps_inverse(t: MapTables, y: Any) -> tuple[Any, int]:
+    """The input of all maps for the output y, and whether no input gives it."""
+    x = y
+    limited = 0
+    for j in range(len(t.kind) - 1, -1, -1):
+        if t.kind[j] == TANH:
+            x, one = bend(t.bends, 2 * j + 1, x)
+            limited = limited | one
+        else:
+            x = straight(t, j, x, INVERSE_GIVE)
+    return x, limited

@@ -1,0 +1,76 @@
+"""Bent plays for a compensator: a polynomial, or more or less than the play around a centre."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from hystgen.basics.jit import jit
+from hystgen.effects import plays as at
+from hystgen.effects.base import Array
+from hystgen.effects.noncongruent.model import LoopCentre, PlayFunctions
+from hystgen.effects.part import late
+from hystgen.effects.plays import Bent, MovingTables, PlaysPart
+from hystgen.front.tanh.kernels import tanh
+from hystgen.front.tanh.model import TanhEnvelope
+
+
+def of(effect: PlayFunctions | LoopCentre, thresholds: Array, _: Array) -> Bent:
+    """How an effect bends plays with these thresholds."""
+    return _centred(effect) if isinstance(effect, LoopCentre) else _polynomials(effect, float(thresholds[-1]))
+
+
+def _polynomials(effect: PlayFunctions, scale: float) -> Bent:
+    rows = effect.coefficients
+    curve = np.zeros((len(rows), max(map(len, rows))))
+    for i, row in enumerate(rows):
+        curve[i, : len(row)] = row
+
+    def bump(i: int) -> tuple[object, Callable[[float], float]]:
+        def polynomial(z: float) -> float:
+            xi, total = z / scale, 0.0
+            for c in reversed(rows[i - 1]):
+                total = (total + c) * xi
+            return scale * (total * xi)
+
+        return rows[i - 1], polynomial
+
+    return Bent(at.POLYNOMIAL, curve, {at.SCALE: scale, at.INVERSE_SCALE: 1.0 / scale}, bump)
+
+
+def _centred(effect: LoopCentre) -> Bent:
+    high, inverse = effect.amplitude * effect.width, 1.0 / effect.width
+    envelope = TanhEnvelope((1.0, inverse, -effect.centre * inverse, 0.0))
+    begin = float(envelope.forward(0.0))
+    numbers = {
+        at.MIDDLE: effect.centre, at.INVERSE_WIDTH: inverse, at.BUMP: high,
+        at.TANH_CENTRE: math.tanh(effect.centre / effect.width),
+    }
+    return Bent(
+        at.CENTRE, np.zeros((1, 1)), numbers, lambda _: (None, lambda z: high * (float(envelope.forward(z)) - begin))
+    )
+
+
+# ---------------------------------------------------------------- bent.c
+
+
+@jit
+def bent(t: MovingTables, plays: Any, i: int, z: Any) -> Any:
+    """Contribution of play i at z."""
+    if t.bends == at.POLYNOMIAL:
+        x = z * t.number[at.INVERSE_SCALE]
+        total = z - z
+        for k in range(t.curve.shape[1] - 1, -1, -1):
+            total = (total + t.curve[i, k]) * x
+        return z + t.number[at.SCALE] * (total * x)
+    if t.bends == at.CENTRE:
+        x = (z - t.number[at.MIDDLE]) * t.number[at.INVERSE_WIDTH]
+        return z + t.number[at.BUMP] * (tanh(x, plays.tanh) + t.number[at.TANH_CENTRE])
+    return z
+
+
+BENDS = PlaysPart(of, bent, late("noncongruent"))
+"""Bent plays as a part of the chain."""

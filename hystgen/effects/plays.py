@@ -1,0 +1,159 @@
+"""Plays that an effect moves or bends in its own way: what such an effect tells a compensator, and its constants.
+
+The state of play i is where it would come to rest, and its contribution there. A plain play rests where it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.effects.base import Array
+from hystgen.effects.bend import Bends
+from hystgen.effects.part import Function
+from hystgen.plays.slots import Counts, Reals
+
+T = TypeVar("T")
+F = TypeVar("F")
+
+PLAIN, DILATED, RELAXING, DASHPOT = range(4)
+STRAIGHT, POLYNOMIAL, CENTRE = range(3)
+"""How plays move, and how they are bent."""
+
+SCALE, INVERSE_SCALE, MIDDLE, INVERSE_WIDTH, BUMP, TANH_CENTRE, LEAST_INPUT, LARGEST_INPUT, HALF, SEEN = range(10)
+"""Places in `MovingTables.number`."""
+
+
+class MovingTables(NamedTuple):
+    """Constants of moved or bent plays. `first`, `second` (n + 1,): for dilated plays the growth of a threshold per
+    unit of a step, for viscous ones b1 and 1 - E/M; `curve` (n + 1, K): coefficients of the polynomials; `halves`:
+    bisections of the search."""
+
+    moves: int
+    bends: int
+    first: Reals
+    second: Reals
+    curve: Reals
+    number: Reals
+    halves: int
+    scanned: int  # 1 for viscous plays with one time constant and no bend
+    share: Reals  # p_i b1 (n + 1,), if scanned
+    inverse: Reals  # 1 / (p_0 + b1 (p_1 + ... + p_i))
+    yields: Reals  # (K, 5): yields of a nonlinear dashpot, by pieces
+
+    @property
+    def used(self) -> bool:
+        """Whether an effect moves or bends the plays; if not, engine loop solves for them."""
+        return self.moves != PLAIN or self.bends != STRAIGHT
+
+
+class FixedMovingTables(NamedTuple):
+    """The same in fixed point. `first`, `second`: factors (n + 1, 2); `farthest`: the largest input that a search
+    tries; `relaxed`: tables of plays with the slopes that viscous plays with one time constant have in a step; `bump`:
+    curves of bent plays less the plays themselves, with `bump_bits` bits below a step of their input; `bump_of`
+    (n + 1,): the curve of each play; `yields` (K, 7): yields of a nonlinear dashpot with `yield_bits` bits below a
+    step, for stretches up to `stretch`; `seen`: a factor."""
+
+    moves: int
+    bends: int
+    scanned: int
+    first: Reals
+    second: Reals
+    farthest: int
+    relaxed: Any  # `hystgen.compensator.layout.FixedTables`
+    bump: Bends
+    bump_of: Counts
+    bump_bits: int
+    yields: Reals
+    yield_bits: int
+    stretch: int
+    seen: Reals
+
+    @property
+    def used(self) -> bool:
+        """Whether an effect moves or bends the plays; if not, engine loop solves for them."""
+        return self.moves != PLAIN or self.bends != STRAIGHT
+
+
+class Moved(NamedTuple):
+    """How plays move at one step length: their kind; `first`, `second` (n,) of plays with a threshold, `yields` and
+    `seen` as in `MovingTables`."""
+
+    moves: int
+    first: Array
+    second: Array
+    yields: Array
+    seen: float
+
+
+Response = tuple[float, NDArray[np.complex128], float]
+
+
+class Mover(Protocol):
+    """How an effect moves the plays (n + 1) of a model, at steps of any length in double precision.
+
+    `after`: the plays after a step in which their input goes straight from `x` to `w`; `numbers`: their constants for
+    drive steps up to `largest_step` and stretches up to `span`; `moves`: their kind; `in_order`: whether none yields
+    faster than one with a smaller threshold; `stood_in_for`: whether others stand in for them, as only the inverse may;
+    `falling`: least change of the sum of those with a threshold per change of their input in one step, at most 0, for
+    contributions that rise by up to `steep` times their play; `responses`: for each number of plays that follow, slope
+    at rest, response (N,) at the factors `z` of a delay by one sample, and the part of it that comes at once;
+    `whole_yields`: the yields in fixed point, for stretches up to `end` steps, with knots at `begins` among others;
+    `stretch_error`: largest difference between stretches by the yields and by their law, for moves of the input within
+    `ways` in a step and overall, and rounding errors `held` (K,).
+    """
+
+    def after(self, plays: Array, x: float, w: float, seconds: float) -> Array: ...
+    def numbers(self, seconds: float, largest_step: float, span: float) -> Moved: ...
+    def moves(self, seconds: float) -> int: ...
+    @property
+    def in_order(self) -> bool: ...
+    def stood_in_for(self, seconds: float) -> bool: ...
+    def falling(self, seconds: float, steep: float) -> float: ...
+    def responses(self, z: NDArray[np.complex128], seconds: float) -> Iterator[Response]: ...
+    def whole_yields(
+        self, seconds: float, begins: Sequence[int], end: int, step: float, bits: int
+    ) -> list[tuple[int, ...]]: ...
+    def stretch_error(self, seconds: float, rows: Array, ways: tuple[float, float], held: Array) -> float: ...
+
+
+class Bent(NamedTuple):
+    """How plays are bent: their kind, coefficients (n, K), or (1, K) for all, and some of `MovingTables.number`; `bump`
+    of play i > 0: a key that plays with the same bend share, and the difference between its contribution and itself."""
+
+    bends: int
+    curve: Array
+    numbers: Mapping[int, float]
+    bump: Callable[[int], tuple[object, Callable[[float], float]]]
+
+
+class Moves(NamedTuple):
+    """The functions of moving plays in one arithmetic, of the tables m, thresholds r, the index i of a play, the memory
+    s of all plays, their rounding remainders and their input w.
+
+    `moved`: play i after its input has gone to w; `move`: it moves there; `put`: it is put to rest at a place; `rest`:
+    where it would come to rest with its input held. `follow`: all plays with one time constant follow their input,
+    which gives their sum; `input`: that at which their sum is h.
+    """
+
+    moved: Function  # of m, r, i, s, lost, w
+    move: Function  # of m, r, i, s, lost, w
+    put: Function  # of m, i, s, lost and a place
+    rest: Function  # of m, r, i, s
+    follow: Function  # of m, plays, s, w
+    input: Function  # of m, plays, s, h
+
+
+@dataclass(frozen=True)
+class PlaysPart(Generic[T, F]):
+    """An effect on plays: `of` makes what it tells of a model's plays, from the effect, thresholds and weights;
+    `floating`: its functions, `Moves` or the contribution of play i at z, of m, plays, i and z; `coded` loads them in
+    fixed point."""
+
+    of: Callable[..., T]
+    floating: F
+    coded: Callable[[], F]
