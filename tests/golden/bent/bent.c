@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 8390ae01dd2e0ffb7d9173849e952a4ea54049076ab7072b78460d7d2f38724b, without this line
+ * Text: sha256 0cb93cf10b4b6b65d627aeaa5c3b5ee8d0c857e3d5a8474551143cda96a4596c, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -124,7 +124,7 @@ static bent_real_t bent_loop_output(const bent_tables_t *t, const bent_real_t *p
    rounding error of `output` is divided by the slope before that input, which may be small, and
    must not run on along the steeper slope behind it. */
 static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *play,
-                                   bent_real_t here, bent_real_t output) {
+        bent_real_t here, bent_real_t output) {
     const bool rising = output >= here;
     bent_real_t tail = 0;
     bent_real_t next = 0; /* input at which play k would start to follow */
@@ -356,7 +356,7 @@ bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {
     }
     bent_forward_played(self, inside);
     const bent_real_t answer = bent_forward_displaced(bent_loop_output(&bent_model_tables,
-                                                                       self->play));
+        self->play));
     self->answer = answer;
     return answer;
 }

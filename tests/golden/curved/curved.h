@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 7997ee1685e2a996284bce8038761ce6f7ffbf0ce48193b3e7e2b0ca15a08b5c, without this line
+ * Text: sha256 af832ff15b059a842bffb255f1147e2c5fde06120d21055284c618bbde7ca8b7, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -76,7 +76,9 @@ typedef int64_t curved_sum_t;
 
 /* The direction of a move, which has an entry of its own where both directions are listed. */
 typedef enum {
-    CURVED_FALLING = 0, CURVED_RISING = 1 } curved_direction_t;
+    CURVED_FALLING = 0,
+    CURVED_RISING = 1
+} curved_direction_t;
 
 /* Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others. */
 typedef struct {
