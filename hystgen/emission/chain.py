@@ -84,7 +84,7 @@ class Block:
         return [of_rows, writer.block(f"{kind.name}_table_t", self.name, [of_rows.name, *numbers])]
 
 
-def members(kind: type[Struct], one: Any) -> list[str]:
+def members(kind: type[Struct], one: np.void) -> list[str]:
     """The members of a structure as written in C."""
     return [_written(one[name]) for name in kind.members()]
 
