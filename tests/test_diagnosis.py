@@ -49,7 +49,7 @@ from hystgen.effects.noncongruent.model import PlayFunctions
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.effects.saturation.model import TanhSaturation
 from hystgen.effects.sensor_nonlinearity.model import SensorPolynomial
-from hystgen.identification.joint import Bent, DeadZones, Ends, Kept
+from hystgen.identification.joint import BentFront, DeadZones, Ends, Kept
 from hystgen.records import Record, read_record
 from hystgen.report import diagnosis as report
 
@@ -506,7 +506,7 @@ def test_a_limiter_is_straight_between_its_ends(drive: tuple[float, float]) -> N
 @pytest.mark.parametrize("shape", [(0.4,), (-0.7, 0.3)])
 def test_a_smooth_front_has_the_slopes_of_its_shape(drive: tuple[float, float], shape: tuple[float, ...]) -> None:
     low, high = drive
-    (stage,) = Bent(drive, len(shape)).stages(np.array(shape))
+    (stage,) = BentFront(drive, len(shape)).stages(np.array(shape))
     assert stage.forward(np.array([0.0]))[0] == 0.0
     edges = np.linspace(low, high, 17)
     middles = 0.5 * (edges[1:] + edges[:-1])

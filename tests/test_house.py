@@ -239,13 +239,13 @@ C_RUNTIME = PACKAGE.parent / "c_runtime"
 
 BOUNDS = {
     "lines of hystgen/": (53_206, 38_000),
-    "lines that ask `.fixed`": (21, 10),
-    "lines with `Any`": (682, 300),
+    "lines that ask `.fixed`": (15, 10),
+    "lines with `Any`": (673, 300),
     "`fmt: skip`": (3, 30),
     "files that name an effect outside its folder": (3, 0),
     "class names in several files": (14, 0),
     "files of C": (99, 120),
-    "lines of C": (6_862, 5_000),
+    "lines of C": (6_860, 5_000),
 }
 """Largest number of each today, and the target. A change that gets below the first lowers it; nothing raises it."""
 

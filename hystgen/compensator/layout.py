@@ -8,7 +8,8 @@ from typing import Any, NamedTuple, Protocol
 from hystgen.basics.jit import jit
 from hystgen.chain.static import StaticModel
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
-from hystgen.plays.corners.corners_float import Curve, Start
+from hystgen.plays.corners.corners_fixed import FixedMemory, new_fixed_memory
+from hystgen.plays.corners.corners_float import Curve, Memory, Start, new_memory
 from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, OUTPUT_MAX, OUTPUT_MIN, Counts, Reals
 
 
@@ -51,6 +52,10 @@ class Tables(NamedTuple):
         """Whether there is a memoryless part."""
         return len(self.stage_kind) > 0
 
+    def new_corners(self) -> Memory:
+        """Memory for one instance in engine corners; `init` of its operations sets it."""
+        return new_memory(len(self.threshold) - 1, self.threshold.dtype)
+
 
 class FixedTables(NamedTuple):
     """The constants of one model in fixed point; arrays of int64, however narrow in C."""
@@ -90,6 +95,10 @@ class FixedTables(NamedTuple):
     def has_front(self) -> bool:
         """Whether there is a memoryless part."""
         return self.fronts > 0
+
+    def new_corners(self) -> FixedMemory:
+        """Memory for one instance in engine corners; `init` of its operations sets it."""
+        return new_fixed_memory(len(self.threshold) - 1, self.threshold.dtype)
 
 
 # ---------------------------------------------------------------- clamp.c

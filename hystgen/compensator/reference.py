@@ -6,7 +6,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,7 @@ from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import arguments, jit
 from hystgen.basics.problems import NotInvertibleError
 from hystgen.chain.static import StaticModel
-from hystgen.compensator import step, step_fixed, step_float, tables
+from hystgen.compensator import step_fixed, step_float, tables
 from hystgen.compensator.corners import (
     forward,
     forward_fixed,
@@ -29,8 +29,6 @@ from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.compensator.step import Operations
 from hystgen.front import compensator, curve
 from hystgen.plays import loop
-from hystgen.plays.corners.corners_fixed import new_fixed_memory
-from hystgen.plays.corners.corners_float import new_memory
 from hystgen.plays.slots import (
     CODE_MAX,
     DRIVE_MAX,
@@ -45,50 +43,55 @@ if TYPE_CHECKING:
     from hystgen.effects.kinds import OwnBlock
 
 
-CORNERS = {
-    (False, False): (forward, inverse),
-    (False, True): (forward_front, inverse_front),
-    (True, False): (forward_fixed, inverse_fixed),
-    (True, True): (forward_fixed, inverse_front_fixed),
-}
-"""Both operators in engine corners, by whether they compute in fixed point and have a memoryless part."""
+class Engines(NamedTuple):
+    """One kind of arithmetic: the functions of its memoryless part, and forward and inverse operator in engine loop, in
+    engine corners without a memoryless part and with one."""
+
+    front: ModuleType
+    loop: tuple[Operations, Operations]
+    corners: tuple[tuple[Operations, Operations], tuple[Operations, Operations]]
+
+
+ENGINES = (
+    Engines(
+        compensator, step_float.OPERATIONS,
+        ((forward.OPERATIONS, inverse.OPERATIONS), (forward_front.OPERATIONS, inverse_front.OPERATIONS)),
+    ),
+    Engines(
+        curve, step_fixed.OPERATIONS,
+        ((forward_fixed.OPERATIONS, inverse_fixed.OPERATIONS),
+         (forward_fixed.OPERATIONS, inverse_front_fixed.OPERATIONS)),
+    ),
+)
+"""Floating and fixed point."""
 
 
 def front(t: Tables | FixedTables | ChainTables) -> ModuleType:
     """The module with the functions of the memoryless part, for the arithmetic of given tables."""
-    return curve if t.fixed else compensator
+    return ENGINES[t.fixed].front
 
 
 def operations(t: Tables | FixedTables | ChainTables, inverse: bool) -> Operations:
     """The functions of one operator in the bit reference, for the arithmetic and the engine of given tables."""
+    fixed = t.fixed
     if isinstance(t, Tables | FixedTables):
-        return _operations(inverse, t.engine == LOOP, t.fixed, t.has_front)
+        found = ENGINES[fixed]
+        return (found.loop if t.engine == LOOP else found.corners[t.has_front])[inverse]
     from hystgen.compensator.chain.layout import OwnChainTables
 
     drives, outputs = t.own_blocks if isinstance(t, OwnChainTables) else ((), ())
-    return _chain_operations(inverse, t.fixed, t.plays.engine == LOOP, drives, outputs)
-
-
-@functools.cache
-def _operations(inverse: bool, loops: bool, fixed: bool, front: bool) -> Operations:
-    if not loops:
-        found: Operations = CORNERS[fixed, front][inverse].OPERATIONS
-        return found
-    own, ends = (step_fixed, curve) if fixed else (step_float, compensator)
-    return step.made_of(
-        inverse, ends.front_forward, ends.front_inverse, own.output, own.inverse_solve, own.finite
-    )
+    return _chain_operations(fixed, t.plays.engine == LOOP, drives, outputs)[inverse]
 
 
 @functools.cache
 def _chain_operations(
-    inverse: bool, fixed: bool, loops: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
-) -> Operations:
+    fixed: bool, loops: bool, drives: tuple[OwnBlock, ...], outputs: tuple[OwnBlock, ...]
+) -> tuple[Operations, Operations]:
     from hystgen.compensator.chain import step as chain_step
     from hystgen.compensator.chain import step_fixed, step_float
 
     own = step_fixed if fixed else step_float
-    return chain_step.made_of(inverse, own.BLOCKS if loops else own.CORNERS, own.CODES, drives, outputs)
+    return chain_step.made_of(own.BLOCKS if loops else own.CORNERS, own.CODES, drives, outputs)
 
 
 def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
@@ -99,18 +102,27 @@ def new_state(t: Tables | FixedTables | ChainTables, inverse: bool) -> Any:
         return chain_step.new_state(t, inverse)
     if t.engine == LOOP:
         return loop.new_state(t)
-    memory = new_fixed_memory if t.fixed else new_memory
-    return memory(len(t.threshold) - 1, t.threshold.dtype)
+    return t.new_corners()
 
 
-def codes(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[Any]:
-    """Samples as codes of fixed point. Raises ValueError for numbers that are not codes."""
+def samples(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[Any]:
+    """Samples as the operators take them. In fixed point raises ValueError for numbers that are not codes."""
     with np.errstate(invalid="ignore"):  # numbers that are not codes are found below
         found = np.ascontiguousarray(x, dtype=t.threshold.dtype)
+    if not t.fixed:
+        return found
     most = int(t.limits[CODE_MAX])
     if np.any(x != found) or np.any(found < -most - 1) or np.any(found > most):
         raise ValueError(f"fixed point takes codes, whole numbers from {-most - 1} to {most}")
     return found
+
+
+def nearest(t: Tables | FixedTables | ChainTables, x: ArrayLike) -> NDArray[Any]:
+    """The numbers nearest to the given ones that a call takes as arguments."""
+    if t.fixed:
+        most = int(t.limits[CODE_MAX])
+        x = np.clip(np.rint(x), -most - 1, most)
+    return np.array(x, dtype=t.threshold.dtype)
 
 
 def answers(
@@ -196,10 +208,7 @@ class Session:
         return self.operate(np.full(len(samples), OP_STEP, dtype=np.uint8), samples)
 
     def _samples(self, x: ArrayLike) -> NDArray[Any]:
-        given = arguments.signal("u" if self.inverse else "v", x)
-        if self._fixed:
-            return codes(self.tables, given)
-        return np.ascontiguousarray(given, dtype=self.tables.threshold.dtype)
+        return samples(self.tables, arguments.signal("u" if self.inverse else "v", x))
 
     def operate(self, op: Bytes, x: NDArray[Any]) -> tuple[NDArray[Any], Bytes]:
         """Run a sequence of init, reset, step and commit with their arguments. Returns the answers of the steps, and

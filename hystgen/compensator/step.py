@@ -95,12 +95,9 @@ class PlayOperations(NamedTuple):
 
 
 def plays_of(
-    inverse: bool, front_forward: Callable[..., Any], front_inverse: Callable[..., Any], output: Callable[..., Any]
+    front_forward: Callable[..., Any], front_inverse: Callable[..., Any], output: Callable[..., Any]
 ) -> PlayOperations:
-    """The operations of one operator's plays, from the two functions of the memoryless part and `output` at the present
-    memory."""
-    after_init = 2 * int(inverse)  # as in `Tables.applied`
-    after_reset = after_init + 1
+    """The operations of plays, from the two functions of the memoryless part and `output` at the present memory."""
 
     @jit
     def begin(t: Tables | FixedTables, s: State, which: int) -> None:
@@ -119,19 +116,19 @@ def plays_of(
         s.real[ANSWER] = s.real[LEVEL]
 
     @jit
-    def init(t: Tables | FixedTables, s: State) -> None:
+    def init(t: Tables | FixedTables, s: State, inverse: bool) -> None:
         """Set the start memory of the parameter file."""
         if len(t.start) == 1:
             loop_rest(s, t.start[0])
         else:
             loop_start(s, t.start)
-        begin(t, s, after_init)
+        begin(t, s, 2 * inverse)
 
     @jit
-    def reset(t: Tables | FixedTables, s: State) -> None:
+    def reset(t: Tables | FixedTables, s: State, inverse: bool) -> None:
         """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
         loop_rest(s, t.limits[ZERO])
-        begin(t, s, after_reset)
+        begin(t, s, 2 * inverse + 1)
 
     @jit(inline=True)
     def set_drive(t: Tables | FixedTables, s: State, v: Any) -> None:
@@ -332,23 +329,22 @@ def operations_of(
 
 
 def made_of(
-    inverse: bool,
     front_forward: Callable[..., Any],
     front_inverse: Callable[..., Any],
     output: Callable[..., Any],
     inverse_solve: Callable[..., Any],
     finite: Callable[..., Any],
-) -> Operations:
-    """The operations of one operator of a chain without blocks, from the functions in which arithmetics differ: the
-    memoryless part, the output at the present memory with its status bits, the plays' input for an output, and whether
-    an argument is finite."""
+) -> tuple[Operations, Operations]:
+    """The operations of the forward operator and the inverse of a chain without blocks, from the functions in which
+    arithmetics differ: the memoryless part, the output at the present memory with its status bits, the plays' input for
+    an output, and whether an argument is finite."""
 
     @jit(inline=True)
     def level_of(t: Tables | FixedTables, s: State) -> Any:
         """The output at the present memory; its status is not reported, since this is no step."""
         return output(t, s)[0]
 
-    init, reset, arrive, inverse_drive = plays_of(inverse, front_forward, front_inverse, level_of)
+    plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, level_of)
 
     @jit(inline=True)
     def itself(s: State) -> State:
@@ -392,4 +388,20 @@ def made_of(
         return inverse_drive(t, s, level, inverse_solve(t, s, level))
 
     hooks = Hooks(itself, finite, absorb, absorb, output, unread, held, stands, sought, no_other)
-    return operations_of(inverse, init, reset, visit, hooks)
+
+    def operator(inverse: bool) -> Operations:
+        """The operations of one operator."""
+
+        @jit(inline=True)
+        def init(t: Tables | FixedTables, s: State) -> None:
+            """Set the start memory of the parameter file."""
+            plays_init(t, s, inverse)
+
+        @jit(inline=True)
+        def reset(t: Tables | FixedTables, s: State) -> None:
+            """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
+            plays_reset(t, s, inverse)
+
+        return operations_of(inverse, init, reset, visit, hooks)
+
+    return operator(False), operator(True)

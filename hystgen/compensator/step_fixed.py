@@ -6,6 +6,8 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import FixedTables
+from hystgen.compensator.step import made_of
+from hystgen.front.curve import front_forward, front_inverse
 from hystgen.plays.fixed import code, loop_solve
 from hystgen.plays.loop import State, loop_output
 from hystgen.plays.slots import FRACTION, OFFSET
@@ -27,3 +29,7 @@ def inverse_solve(t: FixedTables, s: State, level: Any) -> Any:
 def finite(t: FixedTables, x: Any) -> bool:  # noqa: ARG001  as in floating point
     """True: every code is finite."""
     return True
+
+
+OPERATIONS = made_of(front_forward, front_inverse, output, inverse_solve, finite)
+"""Forward and inverse operator."""

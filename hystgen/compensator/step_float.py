@@ -6,6 +6,8 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import Tables
+from hystgen.compensator.step import made_of
+from hystgen.front.compensator import front_forward, front_inverse
 from hystgen.plays.loop import State, loop_output, loop_solve
 from hystgen.plays.slots import OFFSET, REAL_MAX
 
@@ -26,3 +28,7 @@ def inverse_solve(t: Tables, s: State, level: Any) -> Any:
 def finite(t: Tables, x: Any) -> bool:
     """Whether x is neither NaN nor infinite."""
     return bool(-t.limits[REAL_MAX] <= x <= t.limits[REAL_MAX])
+
+
+OPERATIONS = made_of(front_forward, front_inverse, output, inverse_solve, finite)
+"""Forward and inverse operator."""

@@ -136,6 +136,13 @@ class Gained(NamedTuple):
     back: float
 
 
+class Arithmetical(Protocol):
+    """A model's tables, which tell their kind of arithmetic."""
+
+    @property
+    def fixed(self) -> bool: ...
+
+
 class One:
     """One block at a step length, in double precision."""
 
@@ -407,6 +414,6 @@ class ChainPart:
         """Its fixed-point version."""
         return self.coded()
 
-    def arithmetic(self, fixed: bool) -> Realized:
-        """Its fixed-point version, or else the floating-point one."""
-        return self.fixed if fixed else self.floating
+    def of(self, t: Arithmetical) -> Realized:
+        """Its version in the arithmetic of a model's tables."""
+        return self.fixed if t.fixed else self.floating

@@ -10,8 +10,6 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
-import numpy as np
-
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.layout import FixedTables, Tables
 from hystgen.emission import runtime
@@ -263,10 +261,6 @@ class Form(ABC):
         """Sizes of the codes that set a temperature or a gain."""
         return []
 
-    def setting_codes(self, t: ChainTables) -> tuple[float, float]:
-        """The change that sets one degree more, and the value that sets the gain 1."""
-        return 1.0, 1.0
-
     def drive_bits(self, t: ChainTables) -> int:
         """Bits of a signal in front of the plays below a drive."""
         return 0
@@ -278,10 +272,6 @@ class Form(ABC):
     @abstractmethod
     def between(self, low: Number, high: Number, part: float) -> Number:
         """The number at this fraction of a range, in operations of the arithmetic."""
-
-    def arguments(self, t: AnyTables, values: Sequence[Number]) -> Reals:
-        """The nearest arguments that calls can take."""
-        return np.array(values, dtype=t.threshold.dtype)
 
     def counted(self, side: str, unit: str) -> str:
         """The quantity that numbers of the drive or the output count."""

@@ -6,13 +6,10 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-
 from hystgen.chain.static import StaticModel
 from hystgen.compensator import fixed_tables
 from hystgen.compensator.layout import FixedTables
 from hystgen.emission.compensator import (
-    AnyTables,
     Effects,
     Errors,
     Field,
@@ -76,10 +73,6 @@ class Fixed(Form):
 
     def between(self, low: Number, high: Number, part: float) -> Number:
         return int(low) + (int(high) - int(low)) * part
-
-    def arguments(self, t: AnyTables, values: Sequence[Number]) -> Reals:
-        most = int(t.limits[slots.CODE_MAX])
-        return np.array([min(max(round(x), -most - 1), most) for x in values], dtype=t.threshold.dtype)
 
     def numbers(self, parameters: Parameters, cascade: StaticModel, options: Options, writer: Writer) -> Numbers:
         emit = parameters.emit
@@ -207,11 +200,6 @@ class Fixed(Form):
         from hystgen.compensator.chain import layout
 
         return int(t.number[layout.DRIVE_BITS])
-
-    def setting_codes(self, t: ChainTables) -> tuple[float, float]:
-        from hystgen.compensator.chain.fixed_tables import setting_codes
-
-        return setting_codes(t)
 
     def reference_temperature(self, t: ChainTables) -> float:
         from hystgen.effects.thermal import fixed as thermal

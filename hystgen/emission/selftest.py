@@ -82,9 +82,10 @@ def operators(one: Compensator) -> list[Operator]:
 def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
     """An argument of a setting, in fixed point before it is rounded to a code; every third one exceeds its limits, if
     any."""
+    from hystgen.compensator.chain.fixed_tables import setting_codes
     from hystgen.compensator.chain.parts import PARTS
 
-    degree, one = form.setting_codes(t)
+    degree, one = setting_codes(t)
     drive_low, drive_high, low, high = (float(end) for end in t.limits[: slots.OUTPUT_MAX + 1])
     way = (1.0, -1.0, 50.0)[turn % 3] * SHARE
     if call == "settle":
@@ -120,7 +121,7 @@ def _samples(one: Compensator, inverse: bool, settings: Sequence[str]) -> list[S
             calls.append(SETTINGS[call])
             argument = _setting(numbers, one.form, call, i // 11 // len(settings))
             arguments.append(argument)
-    x = one.form.arguments(numbers, arguments)
+    x = reference.nearest(numbers, np.array(arguments))
     op = np.array(calls, dtype=np.uint8)
     op[:-1:2] |= slots.OP_UNREAD  # so that bits have to persist until they are read
     answers, status = reference.answers(numbers, inverse, op, x, compiled=False)

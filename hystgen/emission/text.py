@@ -1,8 +1,9 @@
 """C text: exact literals, tables, comments, and lines of at most WIDTH characters, however long the model's name is.
 
-The files of `c_runtime/` and of effects are formatted for the prefix `hystgen_`; once another name replaces it, lines
-are broken again. Rows of tables are broken only if they are too long. clang-format formats those files but not emitted
-ones: its line breaks depend on its version, and the same parameters have to give the same bytes anywhere.
+Statements are broken by one rule that looks only at their code, not at the lines of the file they come from: that file
+is written for the prefix `hystgen_`, which another name replaces. clang-format formats the files of `c_runtime/` and of
+effects but not emitted ones: its line breaks depend on its version, and the same parameters have to give the same bytes
+anywhere.
 """
 
 from __future__ import annotations
@@ -21,19 +22,27 @@ WIDTH = 100
 Number: TypeAlias = "float | np.integer | np.floating"
 """A number in a table."""
 
+_ASSIGNED = re.compile(r"(?<= =) |(?<=return) ")
 _WAYS = [
     re.compile(form)
     for form in (
         r"(?<=,) ",
         r" (?=[?:] )",
         r"(?<= (?:\|\||&&)) ",
-        r"(?<=[\w)\]] [-+*/|^]) |(?<= (?:<<|>>)) ",
         r"(?<= (?:==|!=|<=|>=)) |(?<=[\w)\]] [<>]) ",
+        r"(?<=[\w)\]] [|^]) |(?<= (?:<<|>>)) ",
+        r"(?<=[\w)\]] [-+]) ",
+        r"(?<=[\w)\]] [*/]) ",
+        _ASSIGNED.pattern,
+        r"(?<=\w\()|(?<=_t\))(?=[\w(-])|(?<=\w) (?=[\w*])",
     )
 ]
-"""Where a line may be broken, best places first: after commas, before ? and :, after operators."""
-_ASSIGNED = re.compile(r"(?<= =) |(?<=return) ")
-"""Where a line is broken as a last resort, or to keep a sum or a choice together."""
+"""Where a line may be broken, best places first: after commas, before ? and :, after operators, those that bind least
+first."""
+_CHOICE = ("? ", ": ")
+"""Beginnings of lines whose rest is indented further."""
+_GOOD = 7
+"""As many of these ways are tried where the fewest parentheses are open, before the others."""
 
 
 def literal(x: Number) -> str:
@@ -187,8 +196,8 @@ def _fitted(lines: list[str]) -> Iterator[str]:
             end = next(i for i in range(at, len(lines)) if "*/" in lines[i])
             yield from _comment(lines[at : end + 1])
             at = end + 1
-        elif re.search(r"= \{$", line):  # a table
-            end = next(i for i in range(at, len(lines)) if lines[i].endswith("};"))
+        elif re.search(r"(=|enum) \{$", line):  # a table, or names one to a line
+            end = next(i for i in range(at, len(lines)) if re.search(r"\};$|^\} \w+;$", lines[i]))
             for row in lines[at : end + 1]:
                 yield from _broken(row, row[: len(row) - len(row.lstrip())])
             at = end + 1
@@ -208,108 +217,43 @@ def _ends(lines: list[str], at: int) -> bool:
 
 
 def _statement(lines: list[str], indent: str) -> Iterator[str]:
+    """A statement on as few lines as it needs; a comment behind it that does not fit moves above it."""
     last = re.match(r"^(.*?)(\s+/\*.*)?$", lines[-1])
     assert last
     code = re.sub(r"([(\[]) ", r"\1", " ".join([*(line.strip() for line in lines[:-1]), last[1].strip()]))
-    comment = (last[2] or "") if code else ""
-    code = re.sub(r" {2,}", " ", code)
-    kept = _aligned(lines)
-    anew = list(_broken(code, indent))
-    if len(indent + code + comment) <= WIDTH and "/*" not in code:
+    code, comment = re.sub(r" {2,}", " ", code), (last[2] or "") if code else ""
+    if len(indent + code + comment) <= WIDTH:
         yield indent + code + comment
-    elif max(map(len, kept)) <= WIDTH and (comment or "/*" in code or len(kept) <= len(anew)):
-        yield from kept
     elif comment and code.endswith("{"):
         yield from _broken(code, indent)
         yield from _comment([f"{indent}    {comment.strip()}"])
     else:
         if comment:
             yield from _comment([indent + comment.strip()])
-        yield from anew
+        yield from _broken(code, indent)
 
 
-def _aligned(lines: list[str]) -> list[str]:
-    """Align lines inside parentheses with the first character in them, as before names were replaced."""
-    made: list[str] = []
-    opened: list[int] = []
-    first: dict[int, int] = {}  # column of the first line inside, by column of the parenthesis
-    for line in lines:
-        column = len(line) - len(line.lstrip())
-        if opened:
-            base = first.setdefault(opened[-1], column)
-            choice = made[-1].rfind(" ? ") + 1
-            under = line.lstrip().startswith(": ") and column > base and choice  # the ? of the line before
-            column = under or opened[-1] + column - base
-        made.append(" " * column + line.lstrip())
-        for at, character in enumerate(re.sub(r"/\*.*", "", made[-1])):
-            if character == "(":
-                opened.append(at + 1)
-            elif character == ")":
-                opened.pop()
-    return made
-
-
-def _broken(code: str, indent: str) -> list[str]:
-    """Code on lines of WIDTH, broken where the fewest parentheses are open."""
-    inside = len(indent) + 4
-    lines = []
-    text = indent + code.strip()
-    opened: list[int] = []  # columns after parentheses of earlier lines that are still open
+def _broken(code: str, indent: str) -> Iterator[str]:
+    """Code on lines of WIDTH, each broken at its best place."""
+    inside = indent + " " * (8 if code.endswith("{") else 4)  # the body of a block is at 4
+    text, hang = indent + code.strip(), inside
     while len(text) > WIDTH:
-        found = _place(text, opened, inside)
-        if found is None:  # too far to the right
-            text, opened = " " * inside + text.lstrip(), [inside] * len(opened)
-            if len(text) <= WIDTH:
-                break
-            found = _place(text, opened, inside)
-        assert found, text
-        place, opened = found
-        lines.append(text[:place].rstrip())
-        text = " " * (opened[-1] if opened else inside) + text[place:].lstrip()
-    return [*lines, text]
-
-
-def _place(text: str, before: list[int], inside: int) -> tuple[int, list[int]] | None:
-    """Where to break a line that is too long, and the parentheses open there; None if there is no place."""
-    start = len(text) - len(text.lstrip())
-    opened = list(before)
-    stacks = []  # at each character
-    for at, character in enumerate(text):
-        if character in ")]}" and opened:
-            opened.pop()
-        if character in "([{":
-            opened.append(at + 1)
-        stacks.append(list(opened))
-    found = [
-        (len(stacks[m.start()]), way, m.end())
-        for way, form in enumerate(_WAYS)
-        for m in form.finditer(text, start + 1)
-        if m.start() <= WIDTH
-    ]
-    fitting = [each for each in found if _rest_fits(text, each[2], (stacks[each[2] - 1] or [inside])[-1])]
-    assigned = _ASSIGNED.search(text, start + 1, WIDTH)
-    whole = assigned and inside + len(text) - assigned.end() <= WIDTH
-    if assigned and not before and (not fitting or (whole and min(fitting)[0] == 0)):
-        return assigned.end(), []
-    if fitting:
-        depth, way, _ = min(fitting)
-        place = max(end for d, w, end in fitting if (d, w) == (depth, way))
-        return place, stacks[place - 1]
-    heads = [m.end() for m in re.finditer(r"(?<=\w) (?=[\w*])", text) if m.end() <= WIDTH and not stacks[m.start()]]
-    bracket = re.compile(r"\w\(").search(text, start, WIDTH)
-    if heads and not before and (start == 0 or not bracket):  # between a type and a name
-        return heads[-1], []
-    if bracket:
-        return bracket.end(), [*stacks[bracket.end() - 1][:-1], inside]
-    cast = re.compile(r"_t\)(?=[\w(-])").search(text, start, WIDTH)
-    last = cast.end() if cast else max((end for _, _, end in found), default=0)
-    return (last, stacks[last - 1]) if last else None
-
-
-def _rest_fits(text: str, place: int, column: int) -> bool:
-    """Whether the longest unbreakable piece would fit after the break."""
-    pieces = re.split(r"(?<=,) | ", text[place:])
-    return column + max(map(len, pieces)) <= WIDTH
+        start = len(text) - len(text.lstrip())
+        depth = list(itertools.accumulate(text, lambda d, c: d + (c in "([{") - (c in ")]}"), initial=0))
+        places = [
+            (way >= _GOOD, depth[found.start()], way, -found.end())
+            for way, form in enumerate(_WAYS) for found in form.finditer(text, start + 1, WIDTH + 1)
+        ]
+        assert places, text
+        other, depths, _, place = min(places)
+        assigned = _ASSIGNED.search(text, start + 1, WIDTH + 1)
+        if assigned and not other and depths == 0 and len(inside) + len(text) - assigned.end() <= WIDTH:
+            place = -assigned.end()  # a sum or a choice stays together
+        line, rest = text[:-place].rstrip(), text[-place:].lstrip()
+        yield line
+        hang = inside + "    " if line.lstrip().startswith(_CHOICE) else hang
+        text = (inside if rest.startswith(_CHOICE) else hang) + rest
+    yield text
 
 
 def _comment(lines: list[str]) -> Iterator[str]:

@@ -161,7 +161,7 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
         op[rng.random(length) < 0.001] = slots.OP_INIT
         drives = rng.uniform(drive_low - 5.0, drive_high + 5.0, length)
         x = np.where((op == slots.OP_SETTLE) | (op == slots.OP_COMMIT), drives, x)
-        degree, gain = (1.0, 1.0) if not tables.fixed else setting_codes(tables)
+        degree, gain = setting_codes(tables)
         x = np.where(op == slots.OP_OFFSET, rng.normal(0.0, 0.3 * (high - low), length), x)
         x = np.where(op == slots.OP_TEMPERATURE, degree * (20.0 + rng.standard_cauchy(length) * 30.0), x)
         x = np.where(op == slots.OP_GAIN, gain * rng.uniform(0.3, 2.2, length), x)

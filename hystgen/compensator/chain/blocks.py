@@ -19,7 +19,7 @@ def of(t: ChainTables, parts: Sequence[ChainPart], operator: str = "forward") ->
     pairs = [(every[k], t.blocks[k]) for k in map(PARTS.index, parts)]
     return [
         each for part, tables in pairs if operator == "forward" or not part.forward
-        for each in part.arithmetic(t.fixed).constants(tables)
+        for each in part.of(t).constants(tables)
     ]
 
 
@@ -36,7 +36,7 @@ def every(t: ChainTables, operator: str) -> list[Constants]:
 def rubbing(t: ChainTables) -> list[Constants | None]:
     """For each block of own heat, the plays whose friction warms it, or None if the square of the drive does."""
     pairs = zip(PARTS, t.blocks, strict=True)
-    return [each for part, tables in pairs for each in part.arithmetic(t.fixed).beside(tables)]
+    return [each for part, tables in pairs for each in part.of(t).beside(tables)]
 
 
 def clocks(t: ChainTables) -> list[Constants]:

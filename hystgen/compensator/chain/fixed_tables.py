@@ -450,6 +450,8 @@ class _Builder:
 
 
 def setting_codes(tables: ChainTables) -> tuple[float, float]:
-    """Codes per degree, and the code of the gain 1."""
+    """The change that sets one degree more, and the value that sets the gain 1: codes in fixed point."""
+    if not tables.fixed:
+        return 1.0, 1.0
     most = int(tables.limits[slots.CODE_MAX]) + 1
     return 2.0 ** TEMPERATURE_BITS[most.bit_length() - 1], most / 4

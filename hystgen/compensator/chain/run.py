@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.compensator import reference
-from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
+from hystgen.compensator.chain.fixed_tables import setting_codes
 from hystgen.compensator.chain.layout import Compiled
 from hystgen.compensator.chain.parts import PARTS
 from hystgen.effects.base import Run
@@ -28,7 +28,7 @@ def with_status(compiled: Compiled, record: Run, inverse: bool) -> tuple[NDArray
     takes and gives codes, except temperatures, which are in degC. Raises ValueError for numbers that are not codes.
     """
     t = compiled.tables
-    x = reference.codes(t, record.v) if t.fixed else record.v
+    x = reference.samples(t, record.v)
     ahead = compiled.ahead if inverse else 0
     later = np.append(x[ahead:], np.full(min(ahead, len(x)), x[-1:])) if ahead else x
     calls = [np.full(min(ahead, len(x)), slots.OP_PUSH, dtype=np.uint8)]
@@ -38,10 +38,8 @@ def with_status(compiled: Compiled, record: Run, inverse: bool) -> tuple[NDArray
     if logged:
         op = np.tile(np.array([slots.OP_TEMPERATURE, slots.OP_STEP], dtype=np.uint8), len(x))
         calls.append(op)
-        warm = record.extra[logged[0]]
-        if t.fixed:
-            most = int(t.limits[slots.CODE_MAX])
-            warm = np.clip(np.rint(warm * 2.0 ** TEMPERATURE_BITS[most.bit_length()]), -most, most)
+        degree, _ = setting_codes(t)
+        warm = reference.nearest(t, degree * record.extra[logged[0]])
         given.append(np.column_stack([warm, later]).ravel())
     else:
         calls.append(np.full(len(x), slots.OP_STEP, dtype=np.uint8))

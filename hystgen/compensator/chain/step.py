@@ -32,8 +32,6 @@ from hystgen.compensator.layout import clamp_drive, inverse_clamp
 from hystgen.compensator.step import Hooks, Operations, operations_of, plays_of
 from hystgen.effects.kinds import OwnBlock
 from hystgen.plays import loop
-from hystgen.plays.corners.corners_fixed import new_fixed_memory
-from hystgen.plays.corners.corners_float import new_memory
 from hystgen.plays.loop import (
     ANSWER,
     ASCENDING,
@@ -99,9 +97,8 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
     """Memory for one instance of an operator; `init` sets it."""
     dtype = t.threshold.dtype
     parts = parts_with(*t.own_blocks) if isinstance(t, OwnChainTables) else PARTS
-    verbs = [part.arithmetic(t.fixed).verbs for part in parts]
+    verbs = [part.of(t).verbs for part in parts]
     corners = int(t.plays.engine == CORNERS)
-    memory = new_fixed_memory if t.fixed else new_memory
     loops = loop.new_state(t.plays)
     return ChainState(
         loops._replace(play=loops.play[:0]) if corners else loops,
@@ -112,7 +109,7 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
         np.zeros(9, dtype),
         np.array([0, int(inverse), 0, 1], np.int64),
-        memory(len(t.threshold) - 1, dtype) if corners else (),
+        t.plays.new_corners() if corners else (),
         np.zeros(4 * corners, dtype),
     )
 
@@ -131,10 +128,10 @@ class Codes(NamedTuple):
 
 
 def made_of(
-    inverse: bool, blocks: Blocks, codes: Codes, drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] = ()
-) -> Operations:
-    """The operations of one operator of models with effects in one arithmetic, with a user's own blocks in front of
-    the plays and behind."""
+    blocks: Blocks, codes: Codes, drives: tuple[OwnBlock, ...] = (), outputs: tuple[OwnBlock, ...] = ()
+) -> tuple[Operations, Operations]:
+    """The operations of the forward operator and the inverse of models with effects in one arithmetic, with a user's
+    own blocks in front of the plays and behind."""
     every = [blocks.verbs(part) for part in parts_with(drives, outputs)]
     blocks_reset, blocks_move = resetting(every), moves(every)
     temperature_set, gain_set, travel_set = (told(every, f"set_{what}") for what in ("temperature", "gain", "travel"))
@@ -150,7 +147,7 @@ def made_of(
     assert led
     led_state, led_solve, led_kept, led_absorb, led_missed, *_ = led
     finite, drive_signal, arriving, level_signal, drive_code, output_code, entered_travel, shared = codes
-    plays_init, plays_reset, arrive, inverse_drive = plays_of(inverse, front_forward, front_inverse, loop_output)
+    plays_init, plays_reset, arrive, inverse_drive = plays_of(front_forward, front_inverse, loop_output)
 
     side = sides_of(every)
     sent_rest, sent_absorb = side.sent_rest, side.sent_absorb
@@ -312,25 +309,6 @@ def made_of(
         s.real[OUTPUT] = output_side_rest(t, s, s.plays.real[LEVEL])
 
     @jit
-    def init(t: ChainTables, s: ChainState) -> None:
-        """Set the start memory of the parameter file, and its settings."""
-        settings_reset(t, s)
-        plays_init(t.plays, s.plays)
-        start(t, s, 0)
-        begin(t, s)
-        if not inverse:
-            s.plays.real[ANSWER] = expected(t, s)
-
-    @jit
-    def reset(t: ChainTables, s: ChainState) -> None:
-        """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
-        plays_reset(t.plays, s.plays)
-        start(t, s, 1)
-        begin(t, s)
-        if not inverse:
-            s.plays.real[ANSWER] = expected(t, s)
-
-    @jit
     def absorb(t: ChainTables, s: ChainState, v: Any, reached: Any) -> None:
         """Absorb drive v, which is `reached` behind its delay and slew limit; the first drive finds everything at
         rest."""
@@ -429,22 +407,6 @@ def made_of(
     def inverse_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
         """Absorb drive v."""
         absorb(t, s, v, v)
-
-    seen = inverse_absorb if inverse else forward_absorb
-
-    @jit
-    def settle(t: ChainTables, s: ChainState, v: Any) -> None:
-        """Bring everything to rest at drive v; the plays move there as in any step."""
-        if not finite(t, v):
-            s.plays.counts[STATUS] |= HELD
-            return
-        inside = clamp_drive(t, v) + t.limits[ZERO]  # no drive is -0
-        if inside != v:
-            s.plays.counts[STATUS] |= INPUT_CLAMPED
-        if s.flags[MOVING]:
-            travelled(t, s, inside)
-        s.flags[MOVING] = 0
-        seen(t, s, inside)
 
     @jit(inline=True)
     def plays_in(s: ChainState) -> State:
@@ -567,33 +529,72 @@ def made_of(
         elif travel_set(t, s, travel):
             s.plays.counts[STATUS] |= LIMITED_SETTING
 
-    @jit
-    def other(t: ChainTables, s: ChainState, call: int, x: Any) -> Any:
-        """Run a call that only models with effects have. Returns its answer, or 0."""
-        if call == OP_PUSH:
-            inverse_push(t, s, x)
-        elif call == OP_SETTLE:
-            if s.plays.counts[HAS_PENDING]:
-                absorb(t, s, s.plays.real[PENDING], s.plays.real[PENDING])
-                s.plays.counts[HAS_PENDING] = 0
-            settle(t, s, x)
-        elif call == OP_OFFSET:
-            set_offset(t, s, level_signal(t, x))
-        elif call == OP_TEMPERATURE:
-            set_temperature(t, s, x)
-        elif call == OP_GAIN:
-            set_gain(t, s, x)
-        elif call == OP_TRAVEL:
-            set_travel(t, s, entered_travel(t, x))
-        elif call == OP_TRAVELLED:
-            return travelled_by(s.blocks[AGED], 0)
-        elif call == OP_CORRECT:
-            correct(t, s, x, t.number[SHARE])
-        elif call == OP_EXPECTED:
-            return expected(t, s)
-        return t.limits[ZERO]
+    def operator(inverse: bool) -> Operations:
+        """The operations of one operator."""
+        seen = inverse_absorb if inverse else forward_absorb
 
-    hooks = Hooks(
-        plays_in, finite, forward_absorb, inverse_absorb, shown, unread, inverse_held, stands, inverse_sought, other
-    )
-    return operations_of(inverse, init, reset, seen, hooks)
+        @jit
+        def init(t: ChainTables, s: ChainState) -> None:
+            """Set the start memory of the parameter file, and its settings."""
+            settings_reset(t, s)
+            plays_init(t.plays, s.plays, inverse)
+            start(t, s, 0)
+            begin(t, s)
+            if not inverse:
+                s.plays.real[ANSWER] = expected(t, s)
+
+        @jit
+        def reset(t: ChainTables, s: ChainState) -> None:
+            """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
+            plays_reset(t.plays, s.plays, inverse)
+            start(t, s, 1)
+            begin(t, s)
+            if not inverse:
+                s.plays.real[ANSWER] = expected(t, s)
+
+        @jit
+        def settle(t: ChainTables, s: ChainState, v: Any) -> None:
+            """Bring everything to rest at drive v; the plays move there as in any step."""
+            if not finite(t, v):
+                s.plays.counts[STATUS] |= HELD
+                return
+            inside = clamp_drive(t, v) + t.limits[ZERO]  # no drive is -0
+            if inside != v:
+                s.plays.counts[STATUS] |= INPUT_CLAMPED
+            if s.flags[MOVING]:
+                travelled(t, s, inside)
+            s.flags[MOVING] = 0
+            seen(t, s, inside)
+
+        @jit
+        def other(t: ChainTables, s: ChainState, call: int, x: Any) -> Any:
+            """Run a call that only models with effects have. Returns its answer, or 0."""
+            if call == OP_PUSH:
+                inverse_push(t, s, x)
+            elif call == OP_SETTLE:
+                if s.plays.counts[HAS_PENDING]:
+                    absorb(t, s, s.plays.real[PENDING], s.plays.real[PENDING])
+                    s.plays.counts[HAS_PENDING] = 0
+                settle(t, s, x)
+            elif call == OP_OFFSET:
+                set_offset(t, s, level_signal(t, x))
+            elif call == OP_TEMPERATURE:
+                set_temperature(t, s, x)
+            elif call == OP_GAIN:
+                set_gain(t, s, x)
+            elif call == OP_TRAVEL:
+                set_travel(t, s, entered_travel(t, x))
+            elif call == OP_TRAVELLED:
+                return travelled_by(s.blocks[AGED], 0)
+            elif call == OP_CORRECT:
+                correct(t, s, x, t.number[SHARE])
+            elif call == OP_EXPECTED:
+                return expected(t, s)
+            return t.limits[ZERO]
+
+        hooks = Hooks(
+            plays_in, finite, forward_absorb, inverse_absorb, shown, unread, inverse_held, stands, inverse_sought, other
+        )
+        return operations_of(inverse, init, reset, seen, hooks)
+
+    return operator(False), operator(True)

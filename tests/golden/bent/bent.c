@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 3d7531c1716b8b526a0e8205346f4d06a15e6927806e021c0e4af930c1c393f5, without this line
+ * Text: sha256 d2e718108ae948a72b2ecdced8330457d2430efbe3ca6f8d5ec5c71a9a8782c4, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -124,7 +124,7 @@ static bent_real_t bent_loop_output(const bent_tables_t *t, const bent_real_t *p
    rounding error of `output` is divided by the slope before that input, which may be small, and
    must not run on along the steeper slope behind it. */
 static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *play,
-                                   bent_real_t here, bent_real_t output) {
+        bent_real_t here, bent_real_t output) {
     const bool rising = output >= here;
     bent_real_t tail = 0;
     bent_real_t next = 0; /* input at which play k would start to follow */
@@ -356,7 +356,7 @@ bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {
     }
     bent_forward_played(self, inside);
     const bent_real_t answer = bent_forward_displaced(bent_loop_output(&bent_model_tables,
-                                                                       self->play));
+        self->play));
     self->answer = answer;
     return answer;
 }

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 bb81842bcd62eb3f9e03250748c0689764008c6ac4984931cd769e09fb327f5d, without this line
+ * Text: sha256 5106831d69091b3b72f10c855958ef4ca5957fb7c0e1104a81d99a1523f8f786, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent_selftest.h"
@@ -417,11 +417,11 @@ int bent_selftest(void) {
         if (sample->kind == 'r') {
             bent_forward_reset(&bent_selftest_instance.forward, sample->argument);
         } else if (!bent_selftest_same(bent_forward_step(&bent_selftest_instance.forward,
-                                                         sample->argument), sample->answer)) {
+                sample->argument), sample->answer)) {
             return index + 1;
         }
         if (sample->status != 128u &&
-            bent_forward_status(&bent_selftest_instance.forward) != sample->status) {
+                bent_forward_status(&bent_selftest_instance.forward) != sample->status) {
             return index + 1;
         }
         ++index;
@@ -434,11 +434,11 @@ int bent_selftest(void) {
         } else if (sample->kind == 'c') {
             bent_inverse_commit(&bent_selftest_instance.inverse, sample->argument);
         } else if (!bent_selftest_same(bent_inverse_step(&bent_selftest_instance.inverse,
-                                                         sample->argument), sample->answer)) {
+                sample->argument), sample->answer)) {
             return index + 1;
         }
         if (sample->status != 128u &&
-            bent_inverse_status(&bent_selftest_instance.inverse) != sample->status) {
+                bent_inverse_status(&bent_selftest_instance.inverse) != sample->status) {
             return index + 1;
         }
         ++index;

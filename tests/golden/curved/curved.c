@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 42b40a19aaae82b6935eddc702902d7ee136aeb71ab7548078acd1092623a8d4, without this line
+ * Text: sha256 db147d1ae515e7b980bbf0ab211b76fccb9dd0d301a426c7b9ac1d8467212d84, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -84,7 +84,7 @@ static uint64_t curved_wide(uint32_t a, uint32_t b) {
     const uint32_t other =
         (a & CURVED_LOW_HALF) * (b >> CURVED_HALF_WORD) + (one & CURVED_LOW_HALF);
     return (uint64_t)((a >> CURVED_HALF_WORD) * (b >> CURVED_HALF_WORD) +
-                      (one >> CURVED_HALF_WORD) + (other >> CURVED_HALF_WORD)) << CURVED_WORD |
+        (one >> CURVED_HALF_WORD) + (other >> CURVED_HALF_WORD)) << CURVED_WORD |
         (other << CURVED_HALF_WORD | (low & CURVED_LOW_HALF));
 #else
     return (uint64_t)a * b;
@@ -98,9 +98,9 @@ static int64_t curved_divide_by_slope(int64_t d, uint32_t reciprocal, unsigned i
     const uint64_t quotient = curved_wide((uint32_t)((uint64_t)d >> CURVED_WORD), reciprocal) + low;
     const uint32_t high = (uint32_t)(quotient >> CURVED_WORD);
     const uint32_t whole = (high & (((uint32_t)1 << shift) - 1u)) << (CURVED_WORD - shift) |
-                           (uint32_t)quotient >> shift;
+        (uint32_t)quotient >> shift;
     return (int64_t)(((uint64_t)(high >> shift) << CURVED_WORD | whole) +
-                     ((uint32_t)quotient >> (shift - 1u) & 1u));
+        ((uint32_t)quotient >> (shift - 1u) & 1u));
 }
 
 #define CURVED_HIGH_STEP ((int64_t)1 << 16) /* of a corner's `high`, in sums */
@@ -136,7 +136,7 @@ CURVED_APART void curved_leave_corner(curved_place_t *here, curved_corner_t *cor
 
 /* Where the play of a segment of a corner's block begins to follow, along the move. */
 static inline int64_t curved_begins(const curved_place_t *here, const curved_corner_t *c,
-                                    const curved_segment_t *s, bool by_output) {
+        const curved_segment_t *s, bool by_output) {
     const int64_t output = (int64_t)c->high * CURVED_HIGH_STEP + (int64_t)c->low;
     const int64_t whole = by_output ? s->reach : (int64_t)s->way;
     const int64_t held = curved_along(here, by_output ? output : c->input);
@@ -155,7 +155,7 @@ CURVED_APART void curved_turn_back(curved_place_t *here, curved_corner_t *corner
 /* The last kink before an output or input along the move, which kink->output gives: where another
    play begins to follow, or here. */
 CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *here,
-                              const curved_corner_t *corner, curved_kink_t *kink, bool by_output) {
+        const curved_corner_t *corner, curved_kink_t *kink, bool by_output) {
     const curved_corner_t *c = NULL; /* the corner that held play k until it began to follow */
     unsigned int low = 0;
     unsigned int left = here->depth;
@@ -198,7 +198,7 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
 
 /* The same for any move to an input. May turn back, but moves nothing. */
 static inline void curved_find_input(const curved_curve_t *t, curved_place_t *here,
-                                     curved_corner_t *corner, int32_t to, curved_kink_t *kink) {
+        curved_corner_t *corner, int32_t to, curved_kink_t *kink) {
     if (here->rising ? to < here->input : to > here->input) {
         curved_turn_back(here, corner);
     }
@@ -208,7 +208,7 @@ static inline void curved_find_input(const curved_curve_t *t, curved_place_t *he
 
 /* Moves the plays to an input short of the next kink; `moved` is the output since the last one. */
 static void curved_go_on(curved_place_t *here, const curved_kink_t *kink, int32_t to,
-                         int64_t moved) {
+        int64_t moved) {
     here->output = curved_along(here, kink->output + moved);
     here->input = to;
     here->k = kink->k;
@@ -217,14 +217,14 @@ static void curved_go_on(curved_place_t *here, const curved_kink_t *kink, int32_
 
 /* Output gained between a kink and the input `to`; -1 if `to` lies before the kink. */
 CURVED_APART int64_t curved_gained(const curved_curve_t *t, const curved_place_t *here,
-                                   const curved_kink_t *kink, int32_t to) {
+        const curved_kink_t *kink, int32_t to) {
     const int64_t way = curved_along(here, to) - kink->input;
     return way < 0 ? -1 : (int64_t)curved_wide(t->segment[kink->k].slope, (uint32_t)way);
 }
 
 /* Moves the plays to any input. */
 CURVED_APART void curved_move_to_input(const curved_curve_t *t, curved_place_t *here,
-                                       curved_corner_t *corner, curved_kink_t *kink, int32_t to) {
+        curved_corner_t *corner, curved_kink_t *kink, int32_t to) {
     curved_find_input(t, here, corner, to, kink);
     curved_go_on(here, kink, to, curved_gained(t, here, kink, to));
 }
@@ -232,7 +232,7 @@ CURVED_APART void curved_move_to_input(const curved_curve_t *t, curved_place_t *
 /* The input that gives `to`, an output beyond a kink along the move; at most a little outside the
    range. */
 CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t *here,
-                                   const curved_kink_t *kink, int64_t to) {
+        const curved_kink_t *kink, int64_t to) {
     const curved_segment_t *s = &t->segment[kink->k];
     const int64_t x =
         kink->input + curved_divide_by_slope(to - kink->output, s->reciprocal, s->shift);
@@ -244,7 +244,7 @@ CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t
    from. May turn back, but moves nothing. The same plays are known to follow up to the output
    `next`, along the move. */
 static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curved_corner_t *corner,
-                            int64_t output, int64_t next, curved_kink_t *kink) {
+        int64_t output, int64_t next, curved_kink_t *kink) {
     if (here->rising ? output < here->output : output > here->output) {
         curved_turn_back(here, corner);
         next = -CURVED_FAR;
@@ -264,16 +264,16 @@ static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curve
 
 /* Output, along the present move, at which another play begins to follow after a kink. */
 static int64_t curved_next_output(const curved_curve_t *t, const curved_place_t *here,
-                                  const curved_corner_t *corner, const curved_kink_t *kink) {
+        const curved_corner_t *corner, const curved_kink_t *kink) {
     return kink->depth > 0
-               ? curved_begins(here, &corner[kink->depth - 1u], &t->segment[kink->k + 1u], true)
-               : CURVED_FAR;
+        ? curved_begins(here, &corner[kink->depth - 1u], &t->segment[kink->k + 1u], true)
+        : CURVED_FAR;
 }
 
 /* Moves the plays to an input near the one that was solved for from a kink. Returns the output,
    along the move, at which another play begins to follow. */
 static int64_t curved_move_to_solution(const curved_curve_t *t, curved_place_t *here,
-                                       curved_corner_t *corner, curved_kink_t *kink, int32_t to) {
+        curved_corner_t *corner, curved_kink_t *kink, int32_t to) {
     int64_t next = curved_next_output(t, here, corner, kink);
     int64_t moved = curved_gained(t, here, kink, to);
     if (moved < 0 || kink->output + moved > next) { /* by rounding, or it was limited */
@@ -288,7 +288,7 @@ static int64_t curved_move_to_solution(const curved_curve_t *t, curved_place_t *
 /* Start memory: a value for each play (step 1), or one for all (step 0). Each play is a block of
    its own, left by a move to where it begins to follow. */
 CURVED_APART void curved_start(const curved_curve_t *t, curved_place_t *here,
-                               curved_corner_t *corner, const int32_t *play, unsigned int step) {
+        curved_corner_t *corner, const int32_t *play, unsigned int step) {
     int64_t aside = t->offset; /* output of the plays above play k, with the offset */
     unsigned int k;
     here->depth = 0;
@@ -320,7 +320,7 @@ static int64_t curved_nearest(int64_t x, unsigned int bits) {
    where the pieces begin, the left shifts that stretch them to 2^31, and their coefficients from
    degree 0. */
 static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,
-                            unsigned int pieces, unsigned int degree, int32_t x) {
+        unsigned int pieces, unsigned int degree, int32_t x) {
     unsigned int low = 0;
     unsigned int high = pieces - 1u;
     int64_t y = 0;
@@ -347,8 +347,8 @@ static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int
 /* Drive code for an input w of the plays outside the image of the drive range: the end of the
    range, and one code more if w is off by more than rounding. Sets `limited` if no envelope gives
    w. */
-static curved_reach_t curved_beyond(const curved_ends_t *e, curved_reach_t w,
-                                    int32_t drive_min, int32_t drive_max, bool *limited) {
+static curved_reach_t curved_beyond(const curved_ends_t *e, curved_reach_t w, int32_t drive_min,
+        int32_t drive_max, bool *limited) {
     if (w > e->last) {
         *limited = w > e->most && w > e->envelope_most;
         return (curved_reach_t)drive_max + (w > e->most ? 1 : 0);
@@ -456,8 +456,7 @@ static curved_real_t curved_inverse_clamp(curved_reach_t u) {
 /* Input of the plays: w = G[v]. */
 CURVED_APART curved_play_t curved_front_forward(curved_real_t v) {
     return (curved_play_t)curved_curve(curved_front_knot, curved_front_scale,
-                                       curved_front_coefficient, CURVED_FRONT_PIECES,
-                                       CURVED_DEGREE, v);
+        curved_front_coefficient, CURVED_FRONT_PIECES, CURVED_DEGREE, v);
 }
 
 /* v = G^-1[w], or at an end of G for w beyond it. */
@@ -469,7 +468,7 @@ CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool *limited
     }
     *limited = false;
     v = curved_curve(curved_back_knot, curved_back_scale, curved_back_coefficient,
-                     CURVED_BACK_PIECES, CURVED_DEGREE, (int32_t)w);
+        CURVED_BACK_PIECES, CURVED_DEGREE, (int32_t)w);
     return (curved_reach_t)curved_nearest(v, CURVED_BELOW);
 }
 
@@ -506,7 +505,7 @@ curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u) {
         self->repeat = true;
         self->bits = level != u ? CURVED_STATUS_INPUT_CLAMPED : 0u;
         const int64_t w = curved_solve(&curved_model_curve, &self->here, self->corner, output,
-                                       self->next, &self->kink);
+            self->next, &self->kink);
         const curved_reach_t v = curved_front_inverse((curved_reach_t)w, &self->limited);
         const curved_real_t inside = curved_clamp_drive(v);
         if (self->limited) {
@@ -517,7 +516,7 @@ curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u) {
         }
         const int32_t to = curved_inverse_arrive(self, inside);
         self->next = curved_move_to_solution(&curved_model_curve, &self->here, self->corner,
-                                             &self->kink, to);
+            &self->kink, to);
     }
     self->status |= self->bits;
     return self->drive;
@@ -533,14 +532,14 @@ void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied) {
     self->repeat = false;
     self->next = -CURVED_FAR;
     curved_move_to_input(&curved_model_curve, &self->here, self->corner, &self->kink,
-                         curved_inverse_arrive(self, v));
+        curved_inverse_arrive(self, v));
 }
 
 /* The part common to init and reset. */
 static void curved_inverse_begin(curved_inverse_t *self, bool reset) {
     const curved_drive_t *first = &curved_inverse_first_drive[reset ? 1 : 0];
     curved_start(&curved_model_curve, &self->here, self->corner,
-                 reset ? curved_model_zero : curved_model_start, reset ? 0u : CURVED_START_STEP);
+        reset ? curved_model_zero : curved_model_start, reset ? 0u : CURVED_START_STEP);
     self->drive = (curved_real_t)first->drive;
     curved_inverse_keep(self);
     self->reference = 0;

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 97a57af2a7341e3488bb7b4f755b1752585244e45504086bef13d4e1e0afbb62, without this line
+ * Text: sha256 7a04c0472262eb8b683f98ec7ddbd76e8b4f5b89acfabd6c71853d18f71fedad, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -76,7 +76,9 @@ typedef int64_t curved_sum_t;
 
 /* The direction of a move, which has an entry of its own where both directions are listed. */
 typedef enum {
-    CURVED_FALLING = 0, CURVED_RISING = 1 } curved_direction_t;
+    CURVED_FALLING = 0,
+    CURVED_RISING = 1
+} curved_direction_t;
 
 /* Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others. */
 typedef struct {

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 e4872bde5c6aaa438ab80d38d456111895b6ac20dd3e297e8ac1c1d31ec70510, without this line
+ * Text: sha256 326a86e7ff5d61cf0d4fea4f407dd11b58df1983062559a7a0965ac71969e972, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved_selftest.h"
@@ -235,11 +235,11 @@ int curved_selftest(void) {
         } else if (sample->kind == 'c') {
             curved_inverse_commit(&curved_selftest_instance, sample->argument);
         } else if (!curved_selftest_same(curved_inverse_step(&curved_selftest_instance,
-                                                             sample->argument), sample->answer)) {
+                sample->argument), sample->answer)) {
             return index + 1;
         }
         if (sample->status != 128u &&
-            curved_inverse_status(&curved_selftest_instance) != sample->status) {
+                curved_inverse_status(&curved_selftest_instance) != sample->status) {
             return index + 1;
         }
         ++index;

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 6df23b603a3149eb5a95e2913d9baaab8bd7e114ff198f74f66e83de97751b04, without this line
+ * Text: sha256 fd6ba101d4af5112d1bfae20bf1d41841b56db35d8d886004d0d7006dccd4843, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -105,7 +105,7 @@ static void plain_forget_line(plain_plays_t *m) {
 
 /* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
 PLAIN_APART void plain_leave_corner(const plain_curve_t *t, plain_plays_t *m,
-                                    plain_corner_t *corner) {
+        plain_corner_t *corner) {
     const plain_segment_t *s = &t->segment[m->here.k];
     const plain_direction_t on = plain_direction(m->here.rising);
     const plain_direction_t back = plain_direction(!m->here.rising);
@@ -131,7 +131,7 @@ static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corn
 
 /* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k does. */
 static inline unsigned int plain_find_segment(const plain_segment_t *segment, unsigned int k,
-                                              unsigned int end, plain_real_t x, bool by_reach) {
+        unsigned int end, plain_real_t x, bool by_reach) {
     unsigned int middle = (k + end) / 2;
     while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
         const plain_segment_t *s = &segment[middle];
@@ -145,8 +145,7 @@ static inline unsigned int plain_find_segment(const plain_segment_t *segment, un
 
 /* Ends the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
 PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
-                                     const plain_corner_t *corner, plain_real_t output,
-                                     plain_real_t input) {
+        const plain_corner_t *corner, plain_real_t output, plain_real_t input) {
     const plain_corner_t *c = &corner[m->here.depth - 1u];
     plain_real_t reach = plain_along(m, output - c->output);
     const plain_direction_t on = plain_direction(m->here.rising);
@@ -166,7 +165,7 @@ PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
 
 /* Moves the plays to where their sum is `output`, up to rounding. */
 PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
-                                      plain_corner_t *corner, plain_real_t output) {
+        plain_corner_t *corner, plain_real_t output) {
     if (plain_along(m, output) < plain_along(m, m->here.output)) {
         plain_turn_back(t, m, corner);
     }
@@ -187,7 +186,7 @@ PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
 
 /* Moves the plays to any input. False if the limit comes first; the caller then stops there. */
 PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
-                                     plain_corner_t *corner, plain_real_t input) {
+        plain_corner_t *corner, plain_real_t input) {
     if (plain_along(m, input) < plain_along(m, m->here.input)) {
         plain_turn_back(t, m, corner);
     }
@@ -275,8 +274,8 @@ PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, p
 }
 
 /* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
-PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m,
-                             plain_corner_t *corner, const plain_start_t *start) {
+PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m, plain_corner_t *corner,
+        const plain_start_t *start) {
     unsigned int k;
     corner[0].output = start->bottom.output;
     corner[0].pass[PLAIN_FALLING] = start->bottom.pass[PLAIN_FALLING];
@@ -340,9 +339,9 @@ PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_
     } else if (m->limited && (m->here.rising ? x >= m->here.input : x <= m->here.input)) {
         bits |= PLAIN_STATUS_OUTPUT_CLAMPED;
     } else if ((x < m->here.input || x > m->here.input) &&
-               !plain_move_to_input(t, m, self->corner, x)) {
-        plain_stop_in_block(t, m, self->corner,
-                            m->here.rising ? PLAIN_DRIVE_MAX : PLAIN_DRIVE_MIN, x);
+            !plain_move_to_input(t, m, self->corner, x)) {
+        plain_stop_in_block(t, m, self->corner, m->here.rising ? PLAIN_DRIVE_MAX : PLAIN_DRIVE_MIN,
+            x);
         m->limited = true;
         bits |= PLAIN_STATUS_OUTPUT_CLAMPED;
     }
@@ -371,7 +370,7 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u) {
         same = m->here.rising ? x < m->next : x > m->next;
     } else if (m->here.k == 0) {
         same = m->here.rising ? x > m->behind && x < m->here.input
-                              : x < m->behind && x > m->here.input;
+            : x < m->behind && x > m->here.input;
     }
     if (same) { /* the usual sample */
         self->before = m->here.input;
@@ -415,9 +414,9 @@ void plain_inverse_commit(plain_inverse_t *self, plain_real_t applied) {
 /* The part common to init and reset: the drive rests within its range. */
 PLAIN_APART void plain_inverse_begin(plain_inverse_t *self, bool reset) {
     plain_start(&plain_inverse_curve, &self->plays, self->corner,
-                &plain_inverse_start[reset ? 1 : 0]);
+        &plain_inverse_start[reset ? 1 : 0]);
     plain_move_to_output(&plain_inverse_curve, &self->plays, self->corner,
-                         plain_clamp_drive(self->plays.here.output));
+        plain_clamp_drive(self->plays.here.output));
     plain_copy_place(&self->undo, &self->plays.here);
     self->before = self->plays.here.input;
     self->stepped = false;

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 ef7883ee6a848167b83f69a6a475be7a4ffa61413ea5259de9e660fec1e68869, without this line
+ * Text: sha256 498096def5fc885b1ffeeb363155bea04e841a2ab9620c2e9ec4f154160906ee, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain_selftest.h"
@@ -235,11 +235,11 @@ int plain_selftest(void) {
         } else if (sample->kind == 'c') {
             plain_inverse_commit(&plain_selftest_instance, sample->argument);
         } else if (!plain_selftest_same(plain_inverse_step(&plain_selftest_instance,
-                                                           sample->argument), sample->answer)) {
+                sample->argument), sample->answer)) {
             return index + 1;
         }
         if (sample->status != 128u &&
-            plain_inverse_status(&plain_selftest_instance) != sample->status) {
+                plain_inverse_status(&plain_selftest_instance) != sample->status) {
             return index + 1;
         }
         ++index;

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 db470961162fcf51f9c04e0fc320b757e1c786d125aa4406dbd732eed080dd43, without this line
+ * Text: sha256 6b5c564c2d0c0e6b502f066968286548783c13cb75bbf4a43a13093119702afe, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -323,8 +323,7 @@ typedef struct {
  * give +-1.
  */
 static const two_branches_real_t two_branches_tanh_odd[5] = {-0.33333313f, 0.13332483f,
-                                                             -0.053843424f, 0.021039838f,
-                                                             -0.0062336805f};
+    -0.053843424f, 0.021039838f, -0.0062336805f};
 
 static const two_branches_real_t two_branches_tanh_knot[8] = {
     0.55078125f, 0.92578125f, 1.4101562f, 1.9179688f, 2.765625f, 3.625f, 4.7148438f, 6.2773438f};
@@ -384,15 +383,14 @@ static two_branches_real_t two_branches_tanh(two_branches_real_t x) {
  * zero.
  */
 static const two_branches_real_t two_branches_atanh_odd[6] = {0.33333296f, 0.20002694f, 0.14220285f,
-                                                              0.11839814f, 0.050866313f,
-                                                              0.17726555f};
+    0.11839814f, 0.050866313f, 0.17726555f};
 
 static const two_branches_real_t two_branches_atanh_center[8] = {
     1.0612793f, 1.1879883f, 1.3120117f, 1.440918f, 1.5683594f, 1.6894531f, 1.8212891f, 1.9360352f};
 
 /* center - 1, for the upper half of the pieces */
 static const two_branches_real_t two_branches_atanh_offset[4] = {0.5683594f, 0.6894531f,
-                                                                 0.82128906f, 0.93603516f};
+    0.82128906f, 0.93603516f};
 
 static const two_branches_real_t two_branches_atanh_row[8][5] = {
     {0.029737532f, 0.47112915f, -0.22196332f, 0.13979696f, -0.098547764f},
@@ -440,7 +438,7 @@ static two_branches_real_t two_branches_atanh(two_branches_real_t x) {
     const two_branches_real_t *p = two_branches_atanh_row[i];
     const two_branches_real_t *q = two_branches_atanh_row[j];
     const two_branches_real_t difference = e * (q[1] + e * (q[2] + e * (q[3] + e * q[4]))) -
-                                      d * (p[1] + d * (p[2] + d * (p[3] + d * p[4])));
+        d * (p[1] + d * (p[2] + d * (p[3] + d * p[4])));
     const two_branches_real_t y =
         (two_branches_real_t)k * 0.3465736f + ((q[0] - p[0]) + difference);
     return x < 0.0f ? -y : y;
@@ -448,13 +446,13 @@ static two_branches_real_t two_branches_atanh(two_branches_real_t x) {
 
 /* a0 tanh(a1 x + a2) + a3 */
 static two_branches_real_t two_branches_envelope_forward(const two_branches_envelope_t *e,
-                                                         two_branches_real_t x) {
+        two_branches_real_t x) {
     return e->a0 * two_branches_tanh(e->a1 * x + e->a2) + e->a3;
 }
 
 /* (atanh((y - a3) / a0) - a2) / a1. If no x gives y, limits the argument and sets `limited`. */
 static two_branches_real_t two_branches_envelope_inverse(const two_branches_envelope_t *e,
-                                                         two_branches_real_t y, bool *limited) {
+        two_branches_real_t y, bool *limited) {
     two_branches_real_t argument = (y - e->a3) * e->inverse_a0;
     if (argument > e->limit) {
         argument = e->limit;
@@ -481,7 +479,7 @@ static inline two_branches_direction_t two_branches_direction(bool rising) {
 
 /* x as seen along the present move: a falling move is a rising one with all signs changed. */
 static inline two_branches_real_t two_branches_along(const two_branches_plays_t *m,
-                                                     two_branches_real_t x) {
+        two_branches_real_t x) {
 #ifdef TWO_BRANCHES_SOFT_FLOAT
     return m->here.rising ? x : -x;
 #else
@@ -499,8 +497,7 @@ static void two_branches_forget_line(two_branches_plays_t *m) {
 
 /* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
 TWO_BRANCHES_APART void two_branches_leave_corner(const two_branches_curve_t *t,
-                                                  two_branches_plays_t *m,
-                                                  two_branches_corner_t *corner) {
+        two_branches_plays_t *m, two_branches_corner_t *corner) {
     const two_branches_segment_t *s = &t->segment[m->here.k];
     const two_branches_direction_t on = two_branches_direction(m->here.rising);
     const two_branches_direction_t back = two_branches_direction(!m->here.rising);
@@ -515,7 +512,7 @@ TWO_BRANCHES_APART void two_branches_leave_corner(const two_branches_curve_t *t,
 }
 
 static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_plays_t *m,
-                                   two_branches_corner_t *corner) {
+        two_branches_corner_t *corner) {
     if (m->here.k > 0) {
         two_branches_leave_corner(t, m, corner);
         m->here.k = 0;
@@ -527,8 +524,7 @@ static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_p
 
 /* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k does. */
 static inline unsigned int two_branches_find_segment(const two_branches_segment_t *segment,
-                                                     unsigned int k, unsigned int end,
-                                                     two_branches_real_t x, bool by_reach) {
+        unsigned int k, unsigned int end, two_branches_real_t x, bool by_reach) {
     unsigned int middle = (k + end) / 2;
     while (middle > k) { /* bisect: segment k begins before x, segment `end` does not */
         const two_branches_segment_t *s = &segment[middle];
@@ -542,10 +538,8 @@ static inline unsigned int two_branches_find_segment(const two_branches_segment_
 
 /* Ends the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
 TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t,
-                                                   two_branches_plays_t *m,
-                                                   const two_branches_corner_t *corner,
-                                                   two_branches_real_t output,
-                                                   two_branches_real_t input) {
+        two_branches_plays_t *m, const two_branches_corner_t *corner, two_branches_real_t output,
+        two_branches_real_t input) {
     const two_branches_corner_t *c = &corner[m->here.depth - 1u];
     two_branches_real_t reach = two_branches_along(m, output - c->output);
     const two_branches_direction_t on = two_branches_direction(m->here.rising);
@@ -565,9 +559,7 @@ TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t
 
 /* Moves the plays to where their sum is `output`, up to rounding. */
 TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *t,
-                                                    two_branches_plays_t *m,
-                                                    two_branches_corner_t *corner,
-                                                    two_branches_real_t output) {
+        two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t output) {
     if (two_branches_along(m, output) < two_branches_along(m, m->here.output)) {
         two_branches_turn_back(t, m, corner);
     }
@@ -588,9 +580,7 @@ TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *
 
 /* Moves the plays to any input. False if the limit comes first; the caller then stops there. */
 TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t,
-                                                   two_branches_plays_t *m,
-                                                   two_branches_corner_t *corner,
-                                                   two_branches_real_t input) {
+        two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t input) {
     if (two_branches_along(m, input) < two_branches_along(m, m->here.input)) {
         two_branches_turn_back(t, m, corner);
     }
@@ -656,8 +646,7 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
 
 /* Moves on, short of `cap`: more plays of the block follow. False if a search would be faster. */
 TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t,
-                                                   two_branches_plays_t *m,
-                                                   two_branches_real_t input) {
+        two_branches_plays_t *m, two_branches_real_t input) {
     const two_branches_real_t way = two_branches_along(m, input - m->from);
     unsigned int k = m->here.k;
     const unsigned int many = k + 8u; /* from there on bisection is faster */
@@ -682,9 +671,7 @@ TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t
 
 /* The sum of the plays for the next input; a NaN moves nothing. */
 static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t,
-                                                   two_branches_plays_t *m,
-                                                   two_branches_corner_t *corner,
-                                                   two_branches_real_t input) {
+        two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t input) {
     const bool on = m->here.rising ? input > m->here.input : input < m->here.input;
     bool same = false; /* the same plays follow */
     if (on) {
@@ -698,7 +685,7 @@ static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t
         return m->here.output;
     }
     if (on && (m->here.rising ? input < m->cap : input > m->cap) &&
-        two_branches_move_in_block(t, m, input)) {
+            two_branches_move_in_block(t, m, input)) {
         return m->here.output;
     }
     if (input < m->here.input || input > m->here.input) {
@@ -709,8 +696,7 @@ static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t
 
 /* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
 TWO_BRANCHES_APART void two_branches_start(const two_branches_curve_t *t, two_branches_plays_t *m,
-                                           two_branches_corner_t *corner,
-                                           const two_branches_start_t *start) {
+        two_branches_corner_t *corner, const two_branches_start_t *start) {
     unsigned int k;
     corner[0].output = start->bottom.output;
     corner[0].pass[TWO_BRANCHES_FALLING] = start->bottom.pass[TWO_BRANCHES_FALLING];
@@ -750,8 +736,7 @@ static const two_branches_start_t two_branches_inverse_start[2] = {
     {two_branches_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, TWO_BRANCHES_BOTTOM}}
 };
 static const two_branches_drive_t two_branches_inverse_first_drive[2] = {{-0.33336422f, 0.0f, true},
-                                                                         {-0.33336422f, 0.0f,
-                                                                          true}};
+    {-0.33336422f, 0.0f, true}};
 /* a0 tanh(a1 x + a2) + a3, then 1/a0, 1/a1 and the largest argument of atanh */
 static const two_branches_envelope_t two_branches_stage_1_ascending = {
     6.0f, 0.4f, 0.1f, 0.2f, 0.16666667f, 2.5f, 0.99999994f
@@ -768,17 +753,17 @@ static const two_branches_envelope_t two_branches_stage_1_descending = {
 static two_branches_real_t two_branches_front_forward(two_branches_real_t v, bool ascending) {
     two_branches_real_t w = v;
     w = two_branches_envelope_forward(ascending ? &two_branches_stage_1_ascending
-                                      : &two_branches_stage_1_descending, w);
+        : &two_branches_stage_1_descending, w);
     return w;
 }
 
 /* v = G^-1[w], on the branch of the drive's direction, or at an end of G for w beyond it. */
 static two_branches_real_t two_branches_front_inverse(two_branches_real_t w, bool ascending,
-                                                      bool *limited) {
+        bool *limited) {
     two_branches_real_t v = w;
     *limited = false;
     v = two_branches_envelope_inverse(ascending ? &two_branches_stage_1_ascending
-                                      : &two_branches_stage_1_descending, v, limited);
+        : &two_branches_stage_1_descending, v, limited);
     return v;
 }
 
@@ -789,7 +774,7 @@ static two_branches_real_t two_branches_clamp_drive(two_branches_real_t v) {
 
 /* Whether the move to v belongs to the branch that v was computed on. */
 static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_branches_real_t v,
-                                      bool ascending) {
+        bool ascending) {
     const two_branches_real_t inside = two_branches_clamp_drive(v);
     if (inside > self->drive) {
         return ascending;
@@ -803,8 +788,8 @@ static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_br
 /* The drive that gives w on the branch of its own move. Tries the branch of the reference's move,
    then the other one; if neither fits, the drive holds. Sets `limited` if no drive gives w. */
 TWO_BRANCHES_APART two_branches_real_t
-    two_branches_inverse_choose(const two_branches_inverse_t *self, two_branches_real_t level,
-                                two_branches_real_t w, bool *limited) {
+        two_branches_inverse_choose(const two_branches_inverse_t *self, two_branches_real_t level,
+        two_branches_real_t w, bool *limited) {
     bool up = self->ascending;
     if (level > self->last) {
         up = true;
@@ -837,7 +822,7 @@ static void two_branches_inverse_set_drive(two_branches_inverse_t *self, two_bra
 
 /* The actuator is at drive v. Returns the input of the plays. */
 static two_branches_real_t two_branches_inverse_arrive(two_branches_inverse_t *self,
-                                                       two_branches_real_t v) {
+        two_branches_real_t v) {
     two_branches_inverse_set_drive(self, v);
     return two_branches_front_forward(v, self->ascending);
 }
@@ -851,7 +836,7 @@ static void two_branches_inverse_keep(two_branches_inverse_t *self) {
 
 /* Undoes the last step: the actuator has gone to v instead. */
 TWO_BRANCHES_APART void two_branches_inverse_replace(two_branches_inverse_t *self,
-                                                     two_branches_real_t v) {
+        two_branches_real_t v) {
     two_branches_copy_place(&self->plays.here, &self->undo);
     two_branches_forget_line(&self->plays);
     self->drive = self->undo_drive;
@@ -866,7 +851,7 @@ TWO_BRANCHES_APART void two_branches_inverse_replace(two_branches_inverse_t *sel
 static two_branches_real_t two_branches_inverse_hold(two_branches_inverse_t *self) {
     two_branches_inverse_keep(self);
     two_branches_inverse_replace(self,
-                                 self->stepped && self->committed ? self->returned : self->drive);
+        self->stepped && self->committed ? self->returned : self->drive);
     self->stepped = true;
     self->committed = false;
     self->status |= TWO_BRANCHES_STATUS_HELD;
@@ -896,8 +881,7 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
         self->bits = level < u || level > u ? TWO_BRANCHES_STATUS_INPUT_CLAMPED : 0u;
         self->reference = u;
         const two_branches_real_t w = two_branches_plays_step(&two_branches_inverse_curve,
-                                                              &self->plays, self->corner,
-                                                              level - TWO_BRANCHES_OFFSET);
+            &self->plays, self->corner, level - TWO_BRANCHES_OFFSET);
         const two_branches_real_t v = two_branches_inverse_choose(self, level, w, &self->limited);
         const two_branches_real_t inside = two_branches_clamp_drive(v);
         const bool clamped = inside < v || inside > v;
@@ -939,7 +923,7 @@ void two_branches_inverse_commit(two_branches_inverse_t *self, two_branches_real
 TWO_BRANCHES_APART void two_branches_inverse_begin(two_branches_inverse_t *self, bool reset) {
     const two_branches_drive_t *first = &two_branches_inverse_first_drive[reset ? 1 : 0];
     two_branches_start(&two_branches_inverse_curve, &self->plays, self->corner,
-                       &two_branches_inverse_start[reset ? 1 : 0]);
+        &two_branches_inverse_start[reset ? 1 : 0]);
     self->last = self->plays.here.input + TWO_BRANCHES_OFFSET;
     two_branches_move_to_output(&two_branches_inverse_curve, &self->plays, self->corner, first->w);
     self->drive = first->drive;

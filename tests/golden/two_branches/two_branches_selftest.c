@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 582416592a624f74b03b91a09ca30250a801b16f332bcced6e186e32ad181e64, without this line
+ * Text: sha256 82a0cf9e0090adc6000eacf7464b59e9076696c38223111ab2c9ec53ad64689d, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "two_branches_selftest.h"
@@ -234,13 +234,14 @@ int two_branches_selftest(void) {
             two_branches_inverse_reset(&two_branches_selftest_instance, sample->argument);
         } else if (sample->kind == 'c') {
             two_branches_inverse_commit(&two_branches_selftest_instance, sample->argument);
-        } else if (!two_branches_selftest_same(
-            two_branches_inverse_step(&two_branches_selftest_instance, sample->argument),
-            sample->answer)) {
+        } else
+                if (!two_branches_selftest_same(
+                two_branches_inverse_step(&two_branches_selftest_instance, sample->argument),
+                sample->answer)) {
             return index + 1;
         }
         if (sample->status != 128u &&
-            two_branches_inverse_status(&two_branches_selftest_instance) != sample->status) {
+                two_branches_inverse_status(&two_branches_selftest_instance) != sample->status) {
             return index + 1;
         }
         ++index;
