@@ -150,7 +150,7 @@ class Jit(Generic[P, R]):
         return made
 
     @property
-    def _numba_type_(self) -> Any:
+    def _numba_type_(self) -> object:
         """Numba's type of the function when another one calls it."""
         return self.inner._numba_type_
 
