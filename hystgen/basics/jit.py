@@ -110,7 +110,7 @@ class Jit(Generic[P, R]):
         """A copy of `py_func` in which the names of jitted functions mean such copies of them, which saves half the
         time of a record: a call of `self` looks at how to run, and a step makes some hundred calls."""
         made: list[types.FunctionType] = []
-        todo: list[Jit[..., Any]] = [self]
+        todo = [self]
         for one in todo:  # grows meanwhile
             if "interpreted" not in one.__dict__:
                 made.append(_copy(one.py_func, dict(one.py_func.__globals__)))
@@ -150,7 +150,7 @@ class Jit(Generic[P, R]):
         return made
 
     @property
-    def _numba_type_(self) -> Any:
+    def _numba_type_(self) -> object:
         """Numba's type of the function when another one calls it."""
         return self.inner._numba_type_
 
@@ -170,7 +170,7 @@ class Jit(Generic[P, R]):
         return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
-def _copy(function: Callable[..., object], names: dict[str, Any]) -> types.FunctionType:
+def _copy(function: Callable[..., object], names: dict[str, object]) -> types.FunctionType:
     """The function with these globals, and with cells of its own around what its closure holds."""
     assert isinstance(function, types.FunctionType)
     cells = tuple(types.CellType(cell.cell_contents) for cell in function.__closure__ or ())
