@@ -400,14 +400,14 @@ class ChainPart:
     calls: tuple[str, ...] = ()
     forward: bool = False
     joined: bool = False
-    longest: Callable[[Any], float] | None = None
-    problems: Callable[[Any, Setting], Iterator[str]] = lambda *_: iter(())
+    longest: Callable[..., float] | None = None
+    problems: Callable[..., Iterator[str]] = lambda *_: iter(())
     unmeasured: Unmeasured | None = None
     code: tuple[str, ...] = ()
-    counted: Callable[[Any, int], Iterable[int]] = lambda _, blocks: (blocks,)
-    uneven: Callable[[Any], Block | None] = lambda _: None
-    following: Callable[[Any], Following | None] = lambda _: None
-    no_inverse: Callable[[Any], Iterable[str]] = lambda _: ()
+    counted: Callable[..., Iterable[int]] = lambda _, blocks: (blocks,)
+    uneven: Callable[..., Block | None] = lambda _: None
+    following: Callable[..., Following | None] = lambda _: None
+    no_inverse: Callable[..., Iterable[str]] = lambda _: ()
 
     @functools.cached_property
     def fixed(self) -> Realized:
