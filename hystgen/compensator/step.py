@@ -32,15 +32,17 @@ from hystgen.plays.slots import (
     Reals,
 )
 
+Function = Callable[..., Any]
+
 
 class Operations(NamedTuple):
     """The operations on an instance of one operator: `init` sets the start memory, `visit` moves the actuator before
     the next sample, `step` answers a sample, `run` makes a sequence of calls."""
 
-    init: Callable[..., Any]
-    visit: Callable[..., Any]
-    step: Callable[..., Any]
-    run: Callable[..., Any]
+    init: Function
+    visit: Function
+    step: Function
+    run: Function
 
 
 @jit(inline=True)
@@ -71,15 +73,13 @@ class PlayOperations(NamedTuple):
     """Operations of plays behind a memoryless part, in any chain: `init` and `reset` set a start memory, `arrive` moves
     to a drive, `drive` finds the drive for an input of the plays."""
 
-    init: Callable[..., Any]
-    reset: Callable[..., Any]
-    arrive: Callable[..., Any]
-    drive: Callable[..., Any]
+    init: Function
+    reset: Function
+    arrive: Function
+    drive: Function
 
 
-def plays_of(
-    front_forward: Callable[..., Any], front_inverse: Callable[..., Any], output: Callable[..., Any]
-) -> PlayOperations:
+def plays_of(front_forward: Function, front_inverse: Function, output: Function) -> PlayOperations:
     """The operations of plays, from the two functions of the memoryless part and `output` at the present memory."""
 
     @jit
@@ -166,26 +166,21 @@ def plays_of(
 class Hooks(NamedTuple):
     """The functions of a chain that a step calls, as functions of tables and memory."""
 
-    plays: Callable[..., Any]  # the memory of the step itself
-    finite: Callable[..., Any]
-    forward_absorb: Callable[..., Any]
-    inverse_absorb: Callable[..., Any]
-    shown: Callable[..., Any]  # the present output, and status bits
-    unread: Callable[..., Any]  # note a reference that is not finite
-    held: Callable[..., Any]  # the drive for it
-    stands: Callable[..., Any]  # whether the last answer holds for a reference
-    sought: Callable[..., Any]  # the drive for a limited reference, which may lie beyond its range; sets BITS
-    other: Callable[..., Any]  # a call that models without effects do not have
+    plays: Function  # the memory of the step itself
+    finite: Function
+    forward_absorb: Function
+    inverse_absorb: Function
+    shown: Function  # the present output, and status bits
+    unread: Function  # note a reference that is not finite
+    held: Function  # the drive for it
+    stands: Function  # whether the last answer holds for a reference
+    sought: Function  # the drive for a limited reference, which may lie beyond its range; sets BITS
+    other: Function  # a call that models without effects do not have
 
 
 def run_of(
-    init: Callable[..., Any],
-    reset: Callable[..., Any],
-    step: Callable[..., Any],
-    commit: Callable[..., Any],
-    plays: Callable[..., Any],
-    other: Callable[..., Any],
-) -> Callable[..., Any]:
+    init: Function, reset: Function, step: Function, commit: Function, plays: Function, other: Function
+) -> Function:
     """`Operations.run` of any engine."""
 
     @jit
@@ -215,11 +210,7 @@ def run_of(
 
 
 def corners_of(
-    init: Callable[..., Any],
-    reset: Callable[..., Any],
-    visit: Callable[..., Any],
-    step: Callable[..., Any],
-    commit: Callable[..., Any] = forward_commit,
+    init: Function, reset: Function, visit: Function, step: Function, commit: Function = forward_commit
 ) -> Operations:
     """The operations of one operator in engine corners without effects, whose memory is only that of the plays."""
 
@@ -237,13 +228,7 @@ def no_other(t: Any, s: Any, call: int, x: Any) -> Any:  # noqa: ARG001  the sam
     return t.limits[ZERO]
 
 
-def operations_of(
-    inverse: bool,
-    init: Callable[..., Any],
-    reset: Callable[..., Any],
-    visit: Callable[..., Any],
-    hooks: Hooks,
-) -> Operations:
+def operations_of(inverse: bool, init: Function, reset: Function, visit: Function, hooks: Hooks) -> Operations:
     """The operations of one operator on a chain: step, commit, hold, clamp and status are the same for every chain."""
     plays, finite, forward_absorb, inverse_absorb, shown, unread, held, stands, sought, other = hooks
 
@@ -311,11 +296,7 @@ def operations_of(
 
 
 def made_of(
-    front_forward: Callable[..., Any],
-    front_inverse: Callable[..., Any],
-    output: Callable[..., Any],
-    inverse_solve: Callable[..., Any],
-    finite: Callable[..., Any],
+    front_forward: Function, front_inverse: Function, output: Function, inverse_solve: Function, finite: Function
 ) -> tuple[Operations, Operations]:
     """The operations of the forward operator and the inverse of a chain without blocks, from the functions in which
     arithmetics differ: the memoryless part, the output at the present memory with its status bits, the plays' input for
