@@ -13,8 +13,9 @@ import pytest
 
 from hystgen.arithmetic import ARITHMETICS
 from hystgen.basics import jit
+from hystgen.basics.structures import Struct
 from hystgen.compensator import reference
-from hystgen.compensator.chain import moving_float
+from hystgen.effects.noncongruent import compensator as bends
 from hystgen.emission import cost
 from hystgen.front.tanh import compensator as envelopes
 from hystgen.model import Model
@@ -93,8 +94,37 @@ for each in ("lt", "le", "gt", "ge", "eq", "ne"):
     setattr(Number, f"__{each}__", comparison(each))
 
 
+PLACES = {"bool", "uint8_t", "uint_least8_t", "uint_least16_t"}
+"""Types of members that are flags, places or numbers of bits."""
+
+
+def counting_layout(kind: type[Struct]) -> np.dtype[np.void]:
+    """The structured type in which a structure's numbers count."""
+    fields: list[Any] = []
+    for name, (word, length) in kind.members().items():
+        if isinstance(word, type):
+            fields.append((name, counting_layout(word)))
+        else:
+            number = np.int64 if word in PLACES or name in INDICES else object
+            fields.append((name, number, (length,) if length else ()))
+    return np.dtype(fields)
+
+
+def count_in(out: Struct, x: Struct) -> Struct:
+    """Fill a structure whose numbers count with those of another one."""
+    for name, (word, _) in type(x).members().items():
+        if isinstance(word, type):
+            count_in(getattr(out, name), getattr(x, name))
+        else:
+            counts = getattr(out, name).dtype == object
+            getattr(out, name)[...] = counting(np.asarray(getattr(x, name))) if counts else getattr(x, name)
+    return out
+
+
 def counting(x: Any, name: str = "") -> Any:
     """Tables or memory in which every number counts."""
+    if isinstance(x, Struct):
+        return count_in(np.zeros(x.shape, counting_layout(type(x))).view(type(x)), x)
     if isinstance(x, np.ndarray) and name not in INDICES and (x.dtype.kind == "f" or x.dtype == np.int64):
         out = np.empty(x.shape, dtype=object)
         for place in np.ndindex(*x.shape):
@@ -199,7 +229,7 @@ PLAY_EFFECTS = {
 def test_nor_does_one_of_engine_loop_with_an_effect(effect: str, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Comparisons are printed of the plays alone, which one that bends or moves them has too."""
     for module, kernel, of in ((envelopes, "tanh", math.tanh), (envelopes, "atanh", math.atanh),
-                               (moving_float, "tanh", math.tanh)):  # fmt: skip
+                               (bends, "tanh", math.tanh)):  # fmt: skip
         monkeypatch.setattr(module, kernel, lambda x, _, of=of: Number(of(float(x))))
     how = "emit: {compensation: {compensate: [drift, self_heating], noise_gain: 1.0e+9}}\n"
     written = (EFFECTS | PLAY_EFFECTS)[effect]
