@@ -116,7 +116,7 @@ def plays_of(front_forward: Function, front_inverse: Function, output: Function)
         s.real[ANSWER] = s.real[LEVEL]
 
     @jit
-    def init(t: Tables | FixedTables, s: State, inverse: bool) -> None:
+    def init(t: Tables | FixedTables, s: State, inverse: int) -> None:
         """Set the start memory of the parameter file."""
         if len(t.start) == 1:
             loop_rest(s, t.start[0])
@@ -125,7 +125,7 @@ def plays_of(front_forward: Function, front_inverse: Function, output: Function)
         begin(t, s, 2 * inverse)
 
     @jit
-    def reset(t: Tables | FixedTables, s: State, inverse: bool) -> None:
+    def reset(t: Tables | FixedTables, s: State, inverse: int) -> None:
         """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
         loop_rest(s, t.limits[ZERO])
         begin(t, s, 2 * inverse + 1)
