@@ -41,10 +41,10 @@ demo: $(VENV)/demo
 test: $(VENV)/ready
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough"
 
-# All that CI runs
+# All that CI runs; each file in one process too, whose tests share what they compute
 check: $(VENV)/ready lint
 	$(BIN)/python tests/static_checks.py
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 # All proofs of Frama-C, which has to be there; `make check` does a third of them
 prove: $(VENV)/ready

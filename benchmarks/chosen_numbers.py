@@ -39,7 +39,7 @@ from hystgen.effects.ageing import compensator as ageing
 from hystgen.effects.ageing.model import LogarithmicAgeing
 from hystgen.effects.base import Run
 from hystgen.effects.lag import compensator as led
-from hystgen.effects.lag.compensator import EARLY, LATE, UnevenLag
+from hystgen.effects.lag.compensator import UnevenLag
 from hystgen.effects.lag.model import Lag
 from hystgen.parameters.files import parse_parameters
 from hystgen.parameters.schema import Compensation
@@ -72,7 +72,7 @@ def lag() -> None:
     for step in (0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0):
         block = UnevenLag(Lag(name="lag", time_constant=1.0))
         block.advance(step)
-        pole = -float(block.table.block[1, EARLY] / block.table.block[1, LATE])
+        pole = -float(block.table.inverted.early[1] / block.table.inverted.late[1])
 
         def drives(reference: NDArray[np.float64], exact: bool, block: UnevenLag = block) -> tuple[Any, Any]:
             block.rest(0.0)
@@ -103,7 +103,7 @@ def decades() -> None:
     effect = LogarithmicAgeing(name="ageing", loss=0.05, travel=1.0)
     whole = ageing.pieces(effect)
     for power in (2, 3, 4, 5, 6):
-        count = int(np.sum(whole[:, 0] < 10.0**power))
+        count = int(np.sum(whole.begin < 10.0**power))
         print(f"  {power:3} {count:4} {24 * count:6} {ageing.gain(effect, 10.0**power):7.3f}")
 
 

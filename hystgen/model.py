@@ -66,6 +66,10 @@ def cascade_of(parameters: Parameters) -> Cascade:
     return Cascade(pi, tuple(stages), part.output_offset, parameters.input_range)
 
 
+Answers: TypeAlias = tuple[NDArray[Any], list[str]]
+"""Samples (N,) of an operator, in the type of its arithmetic, and remarks about them."""
+
+
 @dataclass(frozen=True, repr=False)
 class Model:
     """A model as given by its parameter file: `parameters`, and the mathematics in `cascade`."""
@@ -300,7 +304,7 @@ class Model:
         *,
         t: ArrayLike | None = None,
         extra: Mapping[str, ArrayLike] | None = None,
-    ) -> tuple[NDArray[Any], list[str]]:
+    ) -> Answers:
         """The result of `simulate`, and its warnings as sentences."""
         if not self.effects:
             session = self.session("forward", arithmetic, engine, clamp)
@@ -325,7 +329,7 @@ class Model:
         t: ArrayLike | None,
         extra: Mapping[str, ArrayLike] | None,
         inverse: bool,
-    ) -> tuple[NDArray[Any], list[str]]:
+    ) -> Answers:
         """Output (N,) of the bit reference of a model with effects, and remarks; see `simulate`."""
         from hystgen.compensator.chain import run, tables
         from hystgen.compensator.chained import EVEN
@@ -465,7 +469,7 @@ class InverseModel:
         *,
         t: ArrayLike | None = None,
         extra: Mapping[str, ArrayLike] | None = None,
-    ) -> tuple[NDArray[Any], list[str]]:
+    ) -> Answers:
         """The result of `simulate`, and its warnings as sentences."""
         model = self.forward
         if not model.effects:

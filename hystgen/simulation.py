@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hystgen.basics.problems import EffectsError
 from hystgen.chain.chain import join
 from hystgen.compensator import remarks
-from hystgen.model import Model
+from hystgen.model import Answers, Model
 from hystgen.records import Record, in_units
 
 
@@ -23,7 +21,7 @@ def simulate_records(
     engine: str | None = None,
     history: Sequence[float] = (),
     rest: float = 0.0,
-) -> list[tuple[NDArray[Any], list[str]]]:
+) -> list[Answers]:
     """Answers of the model (column v) or its inverse (column u) for records that are one session, each with remarks.
 
     `history`: drives visited before the first record; `rest`: seconds of pause before every record, which effects
@@ -48,7 +46,7 @@ def _simulated(
     engine: str | None,
     history: Sequence[float],
     rest: float,
-) -> list[tuple[NDArray[Any], list[str]]]:
+) -> list[Answers]:
     """The same for records in the model's units."""
     if operator == "inverse":
         model.inverse()
@@ -76,7 +74,7 @@ def _simulated(
 
 def _emulated(
     model: Model, records: Sequence[Record], operator: str, arithmetic: str | None
-) -> tuple[NDArray[Any], list[str]]:
+) -> Answers:
     """Answers of the bit reference of a model with effects, which takes one record, and remarks."""
     if len(records) > 1:
         raise EffectsError("the bit reference of a model with effects takes one record; simulate them one by one")
@@ -89,7 +87,7 @@ def _emulated(
 
 def _compensated(
     model: Model, records: Sequence[Record], history: Sequence[float], rest: float
-) -> list[tuple[NDArray[Any], list[str]]]:
+) -> list[Answers]:
     """Drives for the references of records that are one session, of a model with effects."""
     runs = [model.run(record.columns()["u"], record.t, record.extra, rest=rest) for record in records]
     session = join(runs, history)

@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import re
 
-from hystgen.compensator.chain.layout import ARRIVING_BITS, Compiled
+import numpy as np
+from numpy.typing import NDArray
+
+from hystgen.compensator.chain.layout import Compiled
 from hystgen.compensator.fixed_tables import build
-from hystgen.effects.creep import fixed as creep
 from hystgen.effects.lag import fixed as lag
-from hystgen.effects.resonance import fixed as resonance
 from hystgen.effects.thermal import fixed as thermal
 from hystgen.effects.thermal.compensator import FRICTION_PLAYS
 from hystgen.model import Model
@@ -186,7 +187,7 @@ STATES = [
 ]  # fmt: skip
 
 
-def clock(table: list[int]) -> dict[str, int]:
+def clock(table: tuple[int, ...]) -> dict[str, int]:
     """What a clock with this table counts to at most: a parabola over its samples, where it turns and where it ends."""
     slope, change, samples, _, bits, *_ = table
     turn = -slope // change if change else 0
@@ -201,18 +202,18 @@ def granted_states(text: str, compiled: Compiled, name: str, wrong: str = "") ->
     t, codes = compiled.tables, compiled.codes
     assert codes is not None
 
-    def most(rows: list[list[int]], place: int, bits: int) -> int:
-        return 2 ** (bits + max((int(row[place]) for row in rows), default=0))
+    def most(dropped: NDArray[np.int64], bits: int) -> int:
+        return 2 ** (bits + int(np.max(dropped, initial=0)))
 
     ends = [*t.plays.limits[[PLAY_MIN, PLAY_MAX]].tolist(), *t.plays.start.tolist()]
-    drive = max(map(abs, t.plays.limits[:2].tolist())) * 2 ** int(t.number[ARRIVING_BITS])
-    led = most(t.of("lag").block.tolist(), lag.DROP, 50)
-    rubbed = int(t.limits[CODE_MAX]) * most(t.of("heat").number.tolist(), thermal.BITS_BELOW, 0)
+    drive = max(map(abs, t.plays.limits[:2].tolist())) * 2 ** int(t.number.arriving_bits[0])
+    led = most(t.of("lag").led.drop, 50)
+    rubbed = int(t.limits[CODE_MAX]) * most(t.of("heat").friction.bits, 0)
     numbers = {
         "SIGNAL": codes.largest, "CODE": int(t.limits[CODE_MAX]),
         "DRIVE": drive,
-        "CREEP": most(t.of("creep").block.tolist(), creep.DROP, 50) - 1, "LAG": led, "ASKED": led // 3,
-        "COARSE": lag.COARSE, "MOVED": 2 * drive + 2, "MODE": most(t.of("mode").tolist(), resonance.DROP, 50),
+        "CREEP": most(t.of("creep").block.drop, 50) - 1, "LAG": led, "ASKED": led // 3,
+        "COARSE": lag.COARSE, "MOVED": 2 * drive + 2, "MODE": most(t.of("mode").drop, 50),
         **(clock(t.of("clock")[0].tolist()) if t.number_of("clock") else {}),
         "RISE": 2 ** (thermal.RISE_BITS + 1), "INVERSE": 2 * thermal.ONE + 2, "PLAY": max(map(abs, ends)),
         "RUBBED": rubbed, "AMOUNT": 2 * rubbed * FRICTION_PLAYS**2,

@@ -4,8 +4,8 @@
 
 Emits the modules of MODULES and fails on every finding of a rule or check that `deviations.yaml` does not list with a
 reason, and on every one listed there that no module shows any more. gcc has to find nothing at all. The files of
-`c_runtime/` and of effects are looked at as they stand too, by clang-tidy and gcc in the units of UNITS, and by
-clang-format.
+`c_runtime/` and of effects are looked at as they stand too, by clang-tidy and gcc in the units of `units.ANALYSED`,
+and by clang-format.
 """
 
 from __future__ import annotations
@@ -216,7 +216,7 @@ def main() -> int:
         emitted = [emit(Path(name) / "-".join(module), *module) for module in MODULES]
         jobs = [pool.submit(lambda t, s: list(RUN[t](tools[t], s)), tool, files) for files in emitted for tool in RUN]
         jobs += [pool.submit(lambda s: list(extensions(s)), files) for files in emitted]
-        jobs += [pool.submit(lambda u: list(standing(tools, Path(name), u)), unit) for unit in units.UNITS]
+        jobs += [pool.submit(lambda u: list(standing(tools, Path(name), u)), unit) for unit in units.ANALYSED]
         jobs.append(pool.submit(lambda: list(clang_format(tools["clang-format"], units.standing()))))
         findings = [finding for job in jobs for finding in job.result()]
     said = problems(findings, deviations())

@@ -16,7 +16,6 @@ from hystgen.basics import jit
 from hystgen.compensator import reference
 from hystgen.compensator.chain import bounds, tables
 from hystgen.compensator.chain.layout import Compiled
-from hystgen.compensator.chain.step import RISES
 from hystgen.compensator.chained import Compensator
 from hystgen.model import Model
 from hystgen.parameters.files import parse_parameters
@@ -192,7 +191,7 @@ def test_answers_are_within_the_bound_of_blocks_that_saw_the_same_drives(name: s
                 y = block.solve(y) if k else block.resting(y)
             sent = float(code.step(numbers.tables, state, numbers.tables.threshold.dtype.type(each))) * drive
             apart.append(abs(min(max(y, low), high) - sent))
-            same[k + 2] = k == 0 or bool(state.flags[RISES]) == compensator.actuator.rises
+            same[k + 2] = k == 0 or bool(state.steady.rises[0]) == compensator.actuator.rises
             for block in compensator.blocks:
                 sent = block.absorb(sent) if k else block.rest(sent)
     near = same[2:] & same[1:-1] & same[:-2]

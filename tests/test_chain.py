@@ -166,9 +166,9 @@ def test_a_quiet_drive_stands_still(name: str, arithmetic: str) -> None:
     drive, output, unit = 1.0, 1.0, 1.0
     if numbers.codes:
         drive, output = float(numbers.codes.drive_lsb), float(numbers.codes.output_lsb)
-        unit = drive / 2.0 ** int(numbers.tables.number[layout.DRIVE_BITS])
+        unit = drive / 2.0 ** int(numbers.tables.number.drive_bits[0])
     error = np.abs(one.simulate(v * drive, t=t) / output - u)
-    kept = 2.0 * unit * float(numbers.tables.number[layout.DITHER]) + 0.5 * drive * (numbers.codes is not None)
+    kept = 2.0 * unit * float(numbers.tables.number.dither[0]) + 0.5 * drive * (numbers.codes is not None)
     allowed = 1.1 * one.cascade.pi.slopes[-1] * one.cascade.front_slopes[1] * kept / output  # creep adds 10 %
     allowed += 2e-8 * (high - low) + np.max(np.abs(np.diff(u, 2))) / 8.0 * (name == "late")  # between two samples
     for end in (120 + held, len(u)):
@@ -394,7 +394,7 @@ def test_drift_is_counted_from_set_offset_on_and_survives_a_correction() -> None
                                  (slots.OP_EXPECTED, 0.0)])  # fmt: skip
     assert float(trimmed[-1]) == float(answer[-1]), "a sensor that sees what is expected changes nothing"
     assert drifted > 0.1
-    span = float(numbers.tables.number[layout.FARTHEST])
+    span = float(numbers.tables.number.farthest_offset[0])
     far = chain("far", "name: drift, rate: 1.0e+4", compensate="drift")
     late, _ = run_calls(model("far", far), [(slots.OP_STEP, 0.0)] * 50 + [(slots.OP_EXPECTED, 0.0)])
     none, _ = run_calls(model("far", far), [(slots.OP_STEP, 0.0), (slots.OP_EXPECTED, 0.0)])
@@ -403,15 +403,15 @@ def test_drift_is_counted_from_set_offset_on_and_survives_a_correction() -> None
 
 def test_a_clock_counts_beyond_the_digits_of_a_float() -> None:
     one = compiled(model("drifting"), "float32").tables
-    state = np.zeros((1, 3), np.float32)
+    state = drift.ClockState.zeros(1, np.float32)
     with jit.plain():
         for start in (0.0, 2.0**24 - 2.0):
             state[0] = 0.0, start, 0.0
             for _ in range(5):
                 drift.clock_tick(one.of("clock"), state, 0, 0.0, 0.0)
-            assert float(state[0, drift.HIGH]) * 2.0**24 + float(state[0, drift.LOW]) == start + 5.0
+            assert float(state.high[0]) * 2.0**24 + float(state.low[0]) == start + 5.0
         seconds = (2.0**24 + 3.0) * T
-        limited = min(0.05 * seconds + 0.005 * seconds**2, float(one.of("clock")[0, drift.FARTHEST]))
+        limited = min(0.05 * seconds + 0.005 * seconds**2, float(one.of("clock").farthest[0]))
         assert float(drift.clock_drift(one.of("clock"), state, 0, np.float32(0.0))) == pytest.approx(limited, rel=1e-6)
 
 

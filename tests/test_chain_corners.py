@@ -13,7 +13,7 @@ from hystgen.basics import jit
 from hystgen.basics.problems import FormatError, UnsupportedEffectsError
 from hystgen.compensator import reference
 from hystgen.compensator.chain import bounds, tables
-from hystgen.compensator.chain.layout import ARRIVING_BITS, Compiled
+from hystgen.compensator.chain.layout import Compiled
 from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
 from hystgen.effects import Run
@@ -105,7 +105,7 @@ def test_engines_agree_in_fixed_point_whatever_is_called(arithmetic: str) -> Non
             assert np.array_equal(given[0][1], given[1][1]), one.parameters
             compared += 1
             different += len(np.unique(given[0][0]))
-        finer += bool(pair[1].tables.number[ARRIVING_BITS])
+        finer += bool(pair[1].tables.number.arriving_bits[0])
     assert compared >= 24
     assert different > 50 * compared, "most answers are no limits"
     assert finer >= 3 * (arithmetic == "q31")

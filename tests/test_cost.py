@@ -112,6 +112,12 @@ def model(front: str, n: int, more: str = "") -> Model:
     return Model(parse_parameters(f"{text}    weights: {weights}\n{FRONTS[front]}{more}", "m.yaml"))
 
 
+@pytest.fixture(autouse=True)
+def _as_written(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Functions run as they stand in their modules, where a test may have put others in place of those they call."""
+    monkeypatch.setattr(jit.Jit, "interpreted", property(lambda one: one.py_func))
+
+
 def dearest(one: Model, name: str, engine: str, inverse: bool, samples: int = SAMPLES) -> tuple[int, int]:
     """Most multiplications and comparisons of a step over jumps of all sizes, beyond the limits too, with commits."""
     tables = one.tables(name, engine)

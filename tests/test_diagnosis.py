@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import functools
 import html
 import json
 import os
@@ -48,7 +49,7 @@ from hystgen.effects.noncongruent.model import PlayFunctions
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.effects.saturation.model import TanhSaturation
 from hystgen.effects.sensor_nonlinearity.model import SensorPolynomial
-from hystgen.identification.joint import Bent, DeadZones, Ends, Kept
+from hystgen.identification.joint import BentFront, DeadZones, Ends, Kept
 from hystgen.records import Record, read_record
 from hystgen.report import diagnosis as report
 
@@ -82,13 +83,25 @@ def diagnosed(case: Path) -> dict[str, Any]:
     return content
 
 
+@pytest.fixture(scope="module")
+def singles(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Path, dict[str, Any]]]:
+    """Cases of a single effect with their labels."""
+    return made(tmp_path_factory.mktemp("singles"), "single", SINGLES)
+
+
+@functools.cache
+def diagnosed_once(case: Path) -> dict[str, Any]:
+    """As `diagnosed`, for tests that compare with what another one found too."""
+    return diagnosed(case)
+
+
 class TestBlindPlants:
     @pytest.mark.thorough
-    def test_single_effects(self, tmp_path: Path) -> None:
+    def test_single_effects(self, singles: list[tuple[Path, dict[str, Any]]]) -> None:
         """A bounded sample: most are named, first and alone, and the gap shrinks."""
         right, alone, wrong = 0, 0, []
-        for case, label in made(tmp_path, "single", SINGLES):
-            content = diagnosed(case)
+        for case, label in singles:
+            content = diagnosed_once(case)
             names = [effect["name"] for effect in content["effects"]]
             (true,) = [effect["name"] for effect in label["effects"]]
             tied = [set(pair) for pair in content["not_separable"]]
@@ -173,12 +186,15 @@ class TestSeveralProcesses:
         return case
 
     @pytest.mark.thorough
-    def test_they_find_the_same(self, case: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        found = []
-        for cores in (1, 3):
-            monkeypatch.setattr(parallel, "cores", lambda cores=cores: cores)
-            found.append(diagnosed(case))
-        assert json.dumps(found[0]) == json.dumps(found[1])
+    def test_they_find_the_same(
+        self, singles: list[tuple[Path, dict[str, Any]]], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        """Three processes instead of one, or one instead of several."""
+        case, _ = singles[0]
+        found = diagnosed_once(case)
+        cores = parallel.cores()
+        monkeypatch.setattr(parallel, "cores", lambda: 1 if cores > 1 else 3)
+        assert json.dumps(diagnosed(case)) == json.dumps(found)
 
     @pytest.mark.parametrize(("forks", "fits"), [(1, 0), (2, 0), (2, 10)])
     @pytest.mark.thorough
@@ -490,7 +506,7 @@ def test_a_limiter_is_straight_between_its_ends(drive: tuple[float, float]) -> N
 @pytest.mark.parametrize("shape", [(0.4,), (-0.7, 0.3)])
 def test_a_smooth_front_has_the_slopes_of_its_shape(drive: tuple[float, float], shape: tuple[float, ...]) -> None:
     low, high = drive
-    (stage,) = Bent(drive, len(shape)).stages(np.array(shape))
+    (stage,) = BentFront(drive, len(shape)).stages(np.array(shape))
     assert stage.forward(np.array([0.0]))[0] == 0.0
     edges = np.linspace(low, high, 17)
     middles = 0.5 * (edges[1:] + edges[:-1])

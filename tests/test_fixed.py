@@ -28,7 +28,6 @@ from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.model import Model, cascade_of
 from hystgen.parameters.files import parse_parameters
 from hystgen.plays import fixed, slots
-from hystgen.plays.corners import corners_float
 
 pytestmark = pytest.mark.thorough
 
@@ -157,7 +156,7 @@ def test_rounding_of_the_inverse_is_apart_from_what_another_branch_makes(
     for code in codes:
         answer = ours.run([code])[0][0]
         errors.append(abs(answer - exact.run([code * float(form.output_lsb)])[0][0] / float(form.drive_lsb)))
-        assert ours.state.counts[corners_float.ASCENDING] == exact.state.counts[corners_float.ASCENDING]
+        assert ours.state.step.ascending[0] == exact.state.step.ascending[0]
     assert 0 < max(errors) <= form.inverse_rounding
 
 
@@ -186,8 +185,8 @@ def test_no_sum_exceeds_the_stated_bound(name: str, arithmetic: str) -> None:
         for code in codes.tolist():
             with plain():
                 answers.append(operations.step(whole, state, code))
-            assert max(map(abs, [state.real[corners_float.OUTPUT], *state.output])) <= form.largest_sum
-            assert max(map(abs, [state.real[corners_float.INPUT], *state.input])) < 2**31
+            assert max(map(abs, [state.here.output[0], *state.corner.output])) <= form.largest_sum
+            assert max(map(abs, [state.here.input[0], *state.corner.input])) < 2**31
         steps = np.full(len(codes), slots.OP_STEP)
         assert answers == reference.answers(tables, bool(inverse), steps, codes, compiled=False)[0].tolist()
 

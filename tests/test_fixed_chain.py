@@ -18,6 +18,7 @@ from modelfiles import BRAKED, CALM, CHAINS, INVERSE_ALONE, STEADY, TANH, chain
 
 from hystgen.arithmetic import ARITHMETICS, factors
 from hystgen.basics import jit
+from hystgen.basics.structures import memory_of
 from hystgen.compensator import reference
 from hystgen.compensator.chain import bounds, moving, tables
 from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
@@ -471,6 +472,7 @@ def test_products_get_numbers_of_their_size(name: str, arithmetic: str, monkeypa
         return plain(value, mantissa, shift)
 
     monkeypatch.setattr(factors.times, "py_func", watched)
+    monkeypatch.setattr(jit.Jit, "interpreted", property(lambda one: one.py_func))  # all of them ask for it
     with np.errstate(over="raise"):
         reference.answers(numbers, inverse, call, x, compiled=False)
     assert 2**30 < largest < factors.LARGEST
@@ -533,22 +535,22 @@ def test_a_drift_is_counted_without_rounding() -> None:
             assert abs(whole) <= most["WHOLE"]
             assert abs(gained) <= most["GAINED"]
             farthest = max(farthest, abs(whole))
-            state = np.array([[whole, total - (whole << bits), 0, gained, counted]])
+            state = drift.FixedClockState.of([(whole, total - (whole << bits), 0, gained, counted)])
             for lead in (0, ahead):
-                table = np.array([one.table])
+                table = drift.FixedClockNumbers.of([one.table])
                 with jit.plain(), np.errstate(over="raise"):
                     found = int(drift.clock_drift(table, state, 0, np.int64(lead)))
                 t = (n + lead) * Fraction(T)
                 exact = (Fraction(rate) + Fraction(change) / 2 * t) * t / signal
                 assert abs(found - min(max(exact, -Fraction(far)), Fraction(far))) <= one.error
         assert farthest >= 0.999 * most["WHOLE"] - 2 or samples == drift.MOST_SAMPLES
-        state = np.zeros((1, 5), dtype=np.int64)
+        state = drift.FixedClockState.zeros(1)
         with jit.plain():
             for _ in range(20):
-                drift.clock_tick(np.array([one.table]), state, 0, 0, 0)
+                drift.clock_tick(drift.FixedClockNumbers.of([one.table]), state, 0, 0, 0)
         counted = min(20, samples)
         total = slope * counted + twice * (counted * (counted - 1) // 2)
-        assert int(state[0, drift.WHOLE]) * 2**bits + int(state[0, drift.PART]) == total
+        assert int(state.whole[0]) * 2**bits + int(state.part[0]) == total
 
 
 @BOTH
@@ -656,19 +658,16 @@ def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int, rubs: bo
     )  # fmt: skip
     effect = effect.model_copy(update={"gain_per_degree": -0.002, "offset_per_degree": 0.01})
     row, thresholds = thermal.heat_numbers(effect, ends, 20.0, seconds), thermal.thresholds(effect, ends)
-    one = thermal_fixed.heat(row, thresholds, largest, lsb, 2.0**20, about.code_bits)
-    t = thermal.HeatTables(
-        np.array([one.table], dtype=np.int64), np.array([4]), np.array(thermal.padded([one.thresholds])),
-        np.array([len(thresholds)]),
-    )  # fmt: skip
-    state = np.zeros((1, thermal.HEAT_STATE), dtype=np.int64)
+    one = thermal_fixed.heat(row, 4, thresholds, largest, lsb, 2.0**20, about.code_bits)
+    t = thermal_fixed.heat_tables([one])
+    state = memory_of(thermal_fixed.FixedHeatMemory)(t, np.int64)
     rng = np.random.default_rng(bits)
     steps = rng.integers(-largest // 50, largest // 50, 2000)
     v = np.cumsum(2 * np.abs(steps) if rubs else steps)  # small loops hardly rub
     v = np.abs((v + largest) % (4 * largest) - 2 * largest) - largest
     v[1000:] = v[1000]
-    rate, heated = Fraction(row[thermal.HEAT_RATE]), Fraction(row[thermal.PER_AMOUNT]) * Fraction(lsb) ** (2 - rubs)
-    warmest = float(heated) * 2 * (256 * largest if rubs else largest**2) / row[thermal.HEAT_RATE]
+    rate, heated = Fraction(row[0]), Fraction(row[1]) * Fraction(lsb) ** (2 - rubs)
+    warmest = float(heated) * 2 * (256 * largest if rubs else largest**2) / row[0]
     unit = 2.0 ** (math.ceil(math.log2(warmest)) - thermal_fixed.RISE_BITS)
     rise, before, peak, worst = 0, 0, 0, 0.0
     r, z = np.array(thresholds) / lsb, np.zeros(len(thresholds))
@@ -681,13 +680,13 @@ def test_own_heat_neither_stalls_nor_drifts(arithmetic: str, bits: int, rubs: bo
                 moved = np.clip(z, each - r, each + r)
                 way, z = Fraction(float((2 * np.arange(len(r)) + 1) @ np.abs(moved - z))), moved
             rise += round(way * heated * 2**100 - rise * rate)
-            worst = max(worst, abs(int(state[0, thermal_fixed.RISE]) * unit - rise / 2**100))
+            worst = max(worst, abs(int(state.block.rise[0]) * unit - rise / 2**100))
             peak, before = max(peak, rise), each
         assert worst <= one.error < 0.1 * peak / 2**100
         warmest = 2 ** (thermal_fixed.RISE_BITS + 1) - 1  # what proofs take for granted is kept even from there
-        state[0, thermal_fixed.RISE] = warmest
+        state.block.rise[0] = warmest
         thermal_fixed.heat_move(t, state, 0, np.int64(-largest), np.int64(largest))
-        assert 0 <= state[0, thermal_fixed.RISE] <= warmest
+        assert 0 <= state.block.rise[0] <= warmest
 
 
 @pytest.mark.parametrize(("level", "centre"), [(15.0, 4.0), (6.0, -8.0)])

@@ -17,8 +17,11 @@ from modelfiles import BRANCHES, CREEP, PLAYS, head
 import hystgen
 from hystgen.basics import jit
 from hystgen.basics.problems import EffectsError, UnsupportedEffectsError
-from hystgen.compensator.chain import blocks, bounds, own, tables
+from hystgen.basics.structures import Factor, Struct
+from hystgen.compensator.chain import bounds, own, tables
+from hystgen.compensator.chain.parts import PARTS
 from hystgen.compensator.chain.run import answers
+from hystgen.compensator.chain.step import QuietState, RampState, SteadyState
 from hystgen.compensator.chained import Compensator
 from hystgen.compensator.reference import answers as computed
 from hystgen.effects import Run, load_user_effects
@@ -29,6 +32,7 @@ from hystgen.emission import runtime
 from hystgen.emission.calls import emit_options, emitted_files
 from hystgen.model import Model
 from hystgen.plays import slots
+from hystgen.plays.corners.corners_float import PlaceState, PlaysState
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "my_effect"
 T = 1e-3
@@ -522,30 +526,60 @@ def test_two_folders_give_one_file_of_both(tmp_path: Path) -> None:
     assert max(map(len, text["stage.c"].splitlines())) <= 100
 
 
-@pytest.mark.parametrize("kind", blocks.KINDS, ids=lambda kind: kind.name)
-def test_the_catalogue_s_blocks_are_what_their_c_says(kind: Kind) -> None:
-    """Names and order of numbers in the headers of the run time are those that tables are written by."""
-    text = {piece.name: piece.text for piece in runtime._pieces(runtime.CHAIN_TYPES, ())}
+@pytest.mark.parametrize(
+    ("kind", "family"),
+    [
+        pytest.param(kind, family, id=f"{kind.name}-{name}")
+        for name, family in runtime.FAMILIES.items()
+        if name in ("float32", "q31")
+        for part in PARTS
+        for kind in (part.coded() if name == "q31" else part.floating).kinds
+    ],
+)
+def test_the_catalogue_s_blocks_are_what_their_c_says(kind: Kind, family: runtime.Family) -> None:
+    """Type, name and order of numbers in the headers of the run time are those that Python has declared."""
+    text = {piece.name: piece.text for piece in runtime._pieces(family.chain_types, family.facts)}
+    inside = {"hystgen_lag_t"}  # of another block's memory, in whose place its members stand
 
-    def members(name: str) -> list[tuple[str, str]]:
-        """Type and name of each, those of a block inside another one in its place."""
+    def in_c(name: str) -> list[tuple[str, str, int]]:
+        """Type, name and length of each member, 0 for no array."""
         code = re.sub(r"/\*.*?\*/", "", text[name], flags=re.DOTALL)
-        found = re.findall(r"(\w+) \*?(\w+);", code.partition("{")[2].rpartition("}")[0])
-        inner = {f"hystgen_{each.name}_t" for each in blocks.KINDS}
-        return [one for type_, own in found for one in (members(type_) if type_ in inner else [(type_, own)])]
+        found = re.findall(r"(\w+)\s+(\*?\w+)(?:\[(\d+)\])?;", code.partition("{")[2].rpartition("}")[0])
+        own = [(type_, member, int(length or 0)) for type_, member, length in found]
+        return [each for one in own for each in (in_c(one[0]) if one[0] in inside else [one])]
 
-    rows = [(f"hystgen_{kind.name}_{kind.rows.name}_t", kind.rows.name)] if kind.rows else []
-    counts = list(zip(("uint_least16_t", "uint_least8_t"), kind.counts, strict=False))
-    reals = [("hystgen_real_t", name) for name in kind.table]
-    assert members(f"hystgen_{kind.tabled}_table_t") == [*rows, *reals, *counts]
-    memory = [("hystgen_real_t", name) for name in kind.state] + [("bool", name) for name in kind.flags]
-    assert members(f"hystgen_{kind.name}_t") == memory
+    def in_python(struct: type[Struct]) -> list[tuple[str, str, int]]:
+        fixed = family.kind == "fixed"
+        types = {
+            "real_t": "hystgen_real_t", Factor: "hystgen_factor_t",
+            "signal_t": "int64_t" if fixed else "hystgen_real_t", "narrow_t": "int32_t" if fixed else "hystgen_real_t",
+        }
+        return [(str(types.get(type_, type_)), name, length) for name, (type_, length) in struct.members().items()]
+
+    rows = [(f"hystgen_{kind.name}_{kind.rows.name}_t", f"*{kind.rows.name}", 0)] if kind.rows else []
+    assert in_c(f"hystgen_{kind.tabled}_table_t") == [*rows, *in_python(kind.table)]
+    assert in_c(f"hystgen_{kind.name}_t") == in_python(kind.state)
     if kind.rows:
-        assert [name for _, name in members(rows[0][0])] == list(kind.rows.table)
+        assert in_c(rows[0][0]) == in_python(kind.rows.table)
         if kind.rows.state:
-            assert [name for _, name in members(f"hystgen_{kind.name}_state_t")] == list(kind.rows.state)
-    functions = {piece.name for piece in runtime._pieces(runtime.FAMILIES["float32"].chain_blocks, ())}
+            assert in_c(f"hystgen_{kind.name}_state_t") == in_python(kind.rows.state)
+    functions = {piece.name for piece in runtime._pieces(family.chain_blocks, family.facts)}
     assert {f"hystgen_{kind.name}_{verb}" for verb in kind.own} <= functions
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "q31"])
+def test_the_memory_of_a_chain_is_named_as_in_c(arithmetic: str) -> None:
+    """Of plays, and of what a step keeps for a slew limit and a lag."""
+    family = runtime.FAMILIES[arithmetic]
+    text = {piece.name: piece.code for piece in runtime._pieces((*family.states, *family.chain_types), family.facts)}
+    same: list[tuple[str, type[Struct]]] = [
+        ("place", PlaceState), ("ramp", RampState), ("quiet", QuietState), ("steady", SteadyState),
+    ]
+    if family.kind == "float":
+        same.append(("plays", PlaysState))
+    for name, struct in same:
+        named = re.findall(r"\w+ (\w+);", text[f"hystgen_{name}_t"].partition("{")[2].rpartition("}")[0])
+        assert set(named) - {"here"} == set(struct.members()), name
 
 
 def test_a_block_says_what_it_does_to_signals() -> None:

@@ -161,6 +161,11 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
     one, real = units.model(name), ARITHMETICS[arithmetic].number
     numbers = one.tables(arithmetic, engine)
     number = {"f4": "float", "f8": "double", "i4": "int32_t", "i2": "int16_t"}[real.str[1:]]
+    records = {}
+    for op, record in (("forward", "resets"), ("inverse", "commits")):
+        _, call, x = next(c for c in signals.suite(numbers, real, op == "inverse", 2000) if c[0] == record)
+        values = x.astype(real).astype(numbers.threshold.dtype)
+        records[op] = call, values, reference.answers(numbers, op == "inverse", call, values)
     for compiler in ("gcc", "clang"):
         binary = tmp_path / f"{compiler}.so"
         command = [compiler, *flags, *units.INCLUDES, str(source), "-o", str(binary)]
@@ -174,13 +179,9 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
             )
         ffi.cdef(f"void hystgen_inverse_commit(void *, {number});")
         library = ffi.dlopen(str(binary))
-        for op in ("forward", "inverse"):
-            record = "commits" if op == "inverse" else "resets"
-            _, call, x = next(c for c in signals.suite(numbers, real, op == "inverse", 2000) if c[0] == record)
-            values = x.astype(real).astype(numbers.threshold.dtype)
-            expected, bits = reference.answers(numbers, op == "inverse", call, values)
+        for op, (call, values, (expected, bits)) in records.items():
             self = ffi.new("double[]", 4096)
-            found, status = np.zeros(len(x), real), np.zeros(len(x), np.uint8)
+            found, status = np.zeros(len(values), real), np.zeros(len(values), np.uint8)
             own = (getattr(library, f"hystgen_{op}_{word}") for word in ("init", "reset", "step", "status"))
             init, reset, step, read = own
             init(self)
@@ -199,7 +200,12 @@ def test_operators_as_they_stand_give_the_bits_of_the_reference(unit: tuple[str,
 
 
 def test_every_line_is_in_a_unit() -> None:
-    found = set().union(*(units.lines(*unit) for unit in units.UNITS))
+    """And in one that is analysed, of both kinds of arithmetic if it is in units of both."""
+    found = set().union(*(units.lines(*unit) for unit in units.ANALYSED))
+    for coded in (False, True):
+        analysed = set().union(*(units.lines(*unit) for unit in units.ANALYSED if ARITHMETICS[unit[1]].fixed == coded))
+        others = [unit for unit in units.UNITS if unit not in units.ANALYSED and ARITHMETICS[unit[1]].fixed == coded]
+        assert set().union(*(units.lines(*unit) for unit in others)) - analysed == set()
     whole = {units.RUNTIME / "hystgen_runtime.c", units.EFFECTS / "resonance" / "part.c"}
     memory = {units.RUNTIME / "plays" / f"state_{kind}.h" for kind in ("float", "fixed")}  # of kernels, in all units
     files = [path for path in units.standing() if path.suffix == ".c" or "state" in path.stem.split("_")]

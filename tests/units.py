@@ -34,56 +34,62 @@ DEFINES = {
 FLAGS = ["-ffp-contract=off", "-Wno-unused-function", "-Wno-unused-parameter"]
 """A file has functions and parameters for every model; emission leaves out those that one model has no use for."""
 
-UNITS = (
-    ("two_branches", "float32", "loop"),
+ANALYSED = (
     ("two_branches", "q15", "loop"),
     ("two_branches", "float32", "corners"),
     ("listed", "float64", "loop"),
-    ("bent", "q31", "loop"),
     ("bent", "q31", "corners"),
-    ("bent", "float64", "corners"),
     ("plain", "float32", "corners"),
     ("plain", "q15", "corners"),
     ("above", "q31", "corners"),
     ("far_low", "q15", "loop"),
-    ("lagging", "float32", "loop"),
     ("quick", "float64", "loop"),
-    ("warm", "float32", "loop"),
-    ("aged", "float32", "loop"),
     ("viscous", "float32", "loop"),
     ("dilated", "float64", "loop"),
     ("dashpot", "float32", "loop"),
     ("bumpy", "float32", "loop"),
-    ("viscous_twin", "float32", "loop"),
     ("everything", "float32", "loop"),
     ("everything", "q31", "loop"),
     ("relaxing", "float32", "loop"),
-    ("lagging", "q15", "loop"),
     ("quick", "q31", "loop"),
-    ("warm", "q31", "loop"),
-    ("worn", "q15", "loop"),
-    ("straight", "q31", "loop"),
     ("relaxing", "q15", "loop"),
-    ("wider", "q31", "loop"),
     ("viscous_twin", "q15", "loop"),
     ("bumpy", "q15", "loop"),
     ("soft_dashpot", "q31", "loop"),
     ("dilated", "q15", "loop"),
+    ("calm", "float32", "loop"),
+    ("calm", "q15", "loop"),
+    ("braked", "q31", "loop"),
+    ("creeping", "float32", "corners"),
+    ("led", "q31", "corners"),
+)
+"""Every line of `c_runtime/` and of the C of effects is in one of them, and in one of either kind of arithmetic if any
+of `UNITS` has it there."""
+
+UNITS = (
+    *ANALYSED,
+    ("two_branches", "float32", "loop"),
+    ("bent", "q31", "loop"),
+    ("bent", "float64", "corners"),
+    ("lagging", "float32", "loop"),
+    ("warm", "float32", "loop"),
+    ("aged", "float32", "loop"),
+    ("viscous_twin", "float32", "loop"),
+    ("lagging", "q15", "loop"),
+    ("warm", "q31", "loop"),
+    ("worn", "q15", "loop"),
+    ("straight", "q31", "loop"),
+    ("wider", "q31", "loop"),
     ("drifting", "float32", "loop"),
     ("drifting_late", "q15", "loop"),
     ("heated", "float64", "loop"),
     ("rubbed", "float32", "loop"),
     ("rubbed", "q15", "loop"),
     ("heated", "q31", "loop"),
-    ("calm", "float32", "loop"),
-    ("calm", "q15", "loop"),
-    ("braked", "q31", "loop"),
     ("steady", "float32", "loop"),
     ("steady", "q15", "loop"),
-    ("creeping", "float32", "corners"),
-    ("led", "q31", "corners"),
 )
-"""Every line of `c_runtime/` and of the C of effects is in one of them."""
+"""Every effect by itself too, in floating point and in fixed point."""
 
 
 def model(name: str) -> Model:

@@ -156,9 +156,9 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
         if (t->segment[c->top].reach > room) { /* gains fall, so the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
         }
-        m->from = -hystgen_along(m, from);
-        m->base = c->output;
-        m->behind = k == 0 && from <= t->range[other] ? m->from : input; /* the same line back */
+        m->from_input = -hystgen_along(m, from);
+        m->from_output = c->output;
+        m->behind = k == 0 && from <= t->range[other] ? m->from_input : input; /* same line back */
     }
     m->begin = hystgen_along(m, begin);
     m->start = hystgen_along(m, start);
@@ -184,21 +184,21 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
 /* Moves on, short of `cap`: more plays of the block follow. False if a search would be faster. */
 HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           hystgen_real_t input) {
-    const hystgen_real_t way = hystgen_along(m, input - m->from);
+    const hystgen_real_t way = hystgen_along(m, input - m->from_input);
     unsigned int k = m->here.k;
     const unsigned int many = k + 8u; /* from there on bisection is faster */
     do {
         ++k;
     } while (k < many && way > t->segment[k + 1u].way);
     const hystgen_segment_t *s = &t->segment[k];
-    m->begin = m->from + hystgen_along(m, s->way);
-    m->start = m->base + hystgen_along(m, s->reach);
+    m->begin = m->from_input + hystgen_along(m, s->way);
+    m->start = m->from_output + hystgen_along(m, s->reach);
     m->gain = s->gain;
     const hystgen_real_t output = m->start + (input - m->begin) * m->gain;
     if (k == many || hystgen_along(m, output - m->here.output) < 0) {
         return false;
     }
-    const hystgen_real_t next = m->from + hystgen_along(m, s[1].way);
+    const hystgen_real_t next = m->from_input + hystgen_along(m, s[1].way);
     m->next = hystgen_along(m, next - m->cap) < 0 ? next : m->cap;
     m->here.k = (uint_least16_t)k;
     m->here.input = input;

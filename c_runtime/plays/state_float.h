@@ -32,11 +32,11 @@ typedef struct {
 /* The place of the play sum, and the line that its next outputs lie on. */
 typedef struct {
     hystgen_place_t here;
-    hystgen_real_t next;   /* input up to which the same plays follow and nothing is limited */
-    hystgen_real_t cap;    /* input up to which the same corner counts and nothing is limited */
-    hystgen_real_t behind; /* while no play follows: the same as `next`, on the other side */
-    hystgen_real_t from;   /* input and output that the top corner's block counts from */
-    hystgen_real_t base;
+    hystgen_real_t next;       /* input up to which the same plays follow and nothing is limited */
+    hystgen_real_t cap;        /* input up to which the same corner counts and nothing is limited */
+    hystgen_real_t behind;     /* while no play follows: the same as `next`, on the other side */
+    hystgen_real_t from_input; /* input and output that the top corner's block counts from */
+    hystgen_real_t from_output;
     hystgen_real_t begin; /* output = start + (input - begin) gain */
     hystgen_real_t start;
     hystgen_real_t gain;

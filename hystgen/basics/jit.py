@@ -3,9 +3,9 @@
     @jit
     def followed(state, x, r): ...
 
-`followed` is then the compiled function, wherever it is called from; inside `with plain():` it is the Python function,
-as `followed.py_func` is everywhere. Numba is imported with the first call that needs it; without numba everything runs
-as Python, with the same bits.
+`followed` is then the compiled function, wherever it is called from; inside `with plain():` it is the Python function
+`followed.interpreted`, which calls others directly; `followed.py_func` is the function as it was written. Numba is
+imported with the first call that needs it; without numba everything runs as Python, with the same bits.
 
 Compiled code is cached on disk; its cache key contains the source of every function that takes part, so that a change
 in a helper can never leave a stale caller behind. The cache saves time but is not required: if no folder is writable,
@@ -56,8 +56,8 @@ _plain = contextvars.ContextVar("plain", default=False)
 
 SHORT = 10_000
 """[samples] As many of one function and type run as Python in a process before it is compiled or loaded: 0.3 s of a
-plain model, whose functions take 8 s to compile, and 1 s with many effects, where that takes 80 s. Set by: `verify` of
-`mixed` and `everything` of tests/modelfiles.py, inverse, 0.035 and 0.10 ms a sample."""
+plain model, whose functions take 8 s to compile, and 0.8 s with many effects, where that takes 80 s. Set by: `verify`
+of `mixed` and `everything` of tests/modelfiles.py, inverse, 0.028 and 0.083 ms a sample."""
 
 _samples: collections.Counter[tuple[object, np.dtype[np.generic]]] = collections.Counter()
 
@@ -98,12 +98,32 @@ class Jit(Generic[P, R]):
 
     def __call__(self, *given: P.args, **named: P.kwargs) -> R:
         if _plain.get():
-            return self.py_func(*given, **named)
+            return self.interpreted(*given, **named)
         if _has_numba():
             return self.entry(*given, **named)  # type: ignore[no-any-return]
         _announce(interpreted)
         with plain():
-            return self.py_func(*given, **named)
+            return self.interpreted(*given, **named)
+
+    @functools.cached_property
+    def interpreted(self) -> Callable[P, R]:
+        """A copy of `py_func` in which the names of jitted functions mean such copies of them, which saves half the
+        time of a record: a call of `self` looks at how to run, and a step makes some hundred calls."""
+        made: list[types.FunctionType] = []
+        todo = [self]
+        for one in todo:  # grows meanwhile
+            if "interpreted" not in one.__dict__:
+                made.append(_copy(one.py_func, dict(one.py_func.__globals__)))
+                one.__dict__["interpreted"] = made[-1]
+                parts = [*made[-1].__globals__.values(), *(cell.cell_contents for cell in made[-1].__closure__ or ())]
+                todo += [each for each in parts if isinstance(each, Jit)]
+        for function in made:
+            names = function.__globals__
+            names.update({key: each.interpreted for key, each in names.items() if isinstance(each, Jit)})
+            for cell in function.__closure__ or ():
+                if isinstance(cell.cell_contents, Jit):
+                    cell.cell_contents = cell.cell_contents.interpreted
+        return self.__dict__["interpreted"]  # type: ignore[no-any-return]
 
     @functools.cached_property
     def entry(self) -> Any:
@@ -122,20 +142,15 @@ class Jit(Generic[P, R]):
         import numba
 
         _listen()
-        function = self.py_func
-        assert isinstance(function, types.FunctionType)
-        twin = types.FunctionType(
-            function.__code__, function.__globals__, function.__name__, function.__defaults__, function.__closure__
-        )
-        twin.__module__ = function.__module__
-        twin.__qualname__ = f"{function.__name__}_{kind}_{self.mark}"
+        twin = _copy(self.py_func, self.py_func.__globals__)
+        twin.__qualname__ = f"{twin.__name__}_{kind}_{self.mark}"
         made = numba.njit(**options)(twin)
         with contextlib.suppress(RuntimeError):  # no folder is writable
             made._cache = _cache_class()(twin)  # as its enable_caching does with numba's own class
         return made
 
     @property
-    def _numba_type_(self) -> Any:
+    def _numba_type_(self) -> object:
         """Numba's type of the function when another one calls it."""
         return self.inner._numba_type_
 
@@ -153,6 +168,15 @@ class Jit(Generic[P, R]):
                 elif isinstance(value, Jit) and not any(value is each for each in functions):
                     functions.append(value)
         return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
+def _copy(function: Callable[..., object], names: dict[str, object]) -> types.FunctionType:
+    """The function with these globals, and with cells of its own around what its closure holds."""
+    assert isinstance(function, types.FunctionType)
+    cells = tuple(types.CellType(cell.cell_contents) for cell in function.__closure__ or ())
+    made = types.FunctionType(function.__code__, names, function.__name__, function.__defaults__, cells or None)
+    made.__module__ = function.__module__
+    return made
 
 
 @overload

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-
 import click
 
 from hystgen.basics import console
@@ -25,8 +23,6 @@ def main() -> None:
     from hystgen.basics import jit
 
     jit.announce = console.note
-    # No plugin of pydantic is wanted here, and looking for one reads the metadata of every installed package
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 
 for command in (emit, verify, simulate, identify, diagnose, track, show, schema):

@@ -131,7 +131,7 @@ def diagnose(
 
     def run() -> None:
         own = [kind for path in effects for kind in load_user_effects(path)]
-        to_fit: list[Any] = list(data)
+        to_fit: Sequence[records.Source] = data
         if session is not None:
             played = Session.read(session)
             read = records.read_records(to_fit, **read_as)

@@ -22,7 +22,7 @@ from hystgen.front.dead_zone.model import DeadZone
 from hystgen.front.tanh import kernels
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.plays import slots
-from hystgen.plays.corners.corners_float import Curve, Start
+from hystgen.plays.corners.corners_float import Curve, Literals, Start
 
 
 def inward(low: float, high: float, dtype: Any) -> tuple[Any, Any]:
@@ -131,7 +131,7 @@ def _curve(rows: Sequence[Sequence[Fraction]], dtype: Any) -> Curve:
     ends = (largest / 2, largest / 2, 0, 0)  # a play that never follows
     way, reach, gain, slope = (np.append(column, dtype(end)) for column, end in zip(columns, ends, strict=True))
     two = np.array([largest, largest], dtype)
-    return Curve(way, reach, gain, slope, two, two.copy(), two.copy(), np.array([largest, 0, 0.5, 1], dtype))
+    return Curve(way, reach, gain, slope, two, two.copy(), two.copy(), Literals.of([(largest, 0, 0.5, 1)], dtype))
 
 
 def _start(

@@ -14,24 +14,7 @@ from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import FixedTables, Tables, clamp_drive, inverse_clamp
-from hystgen.plays.corners.corners_float import STATUS as CORNERS_STATUS
-from hystgen.plays.loop import (
-    ANSWER,
-    ASCENDING,
-    BITS,
-    DRIVE,
-    HAS_PENDING,
-    LEVEL,
-    PENDING,
-    REFERENCE,
-    REPEAT,
-    STATUS,
-    STEPPED,
-    State,
-    loop_absorb,
-    loop_rest,
-    loop_start,
-)
+from hystgen.plays.loop import State, loop_absorb, loop_rest, loop_start
 from hystgen.plays.slots import (
     DOMAIN,
     HELD,
@@ -70,10 +53,10 @@ def forward_commit(t: Any, s: Any, applied: Any) -> None:
 @jit(inline=True)
 def inverse_answer(s: State, v: Any) -> Any:
     """Leave drive v pending and return it."""
-    s.real[ANSWER] = v
-    s.real[PENDING] = v
-    s.counts[HAS_PENDING] = 1
-    s.counts[STEPPED] = 1
+    s.step.answer[0] = v
+    s.step.pending[0] = v
+    s.step.has_pending[0] = 1
+    s.step.stepped[0] = 1
     return v
 
 
@@ -81,9 +64,9 @@ def inverse_answer(s: State, v: Any) -> Any:
 def inverse_fits(t: Tables | FixedTables, s: State, v: Any, ascending: int) -> bool:
     """Whether the move to v lies on the branch for which v was computed."""
     inside = clamp_drive(t, v)
-    if inside == s.real[DRIVE]:
-        return bool(s.counts[ASCENDING] == ascending)
-    return bool((inside > s.real[DRIVE]) == (ascending != 0))
+    if inside == s.step.drive[0]:
+        return bool(s.step.ascending[0] == ascending)
+    return bool((inside > s.step.drive[0]) == (ascending != 0))
 
 
 class PlayOperations(NamedTuple):
@@ -103,17 +86,17 @@ def plays_of(front_forward: Function, front_inverse: Function, output: Function)
     def begin(t: Tables | FixedTables, s: State, which: int) -> None:
         """The part that init and reset share, once the plays are set; `which` as in `Tables.applied`."""
         drive = t.applied[which]
-        s.counts[ASCENDING] = t.ascending[which]
-        s.counts[HAS_PENDING] = 0
-        s.counts[REPEAT] = 0
-        s.counts[STEPPED] = 0
-        s.counts[BITS] = 0
-        s.real[PENDING] = drive
-        s.real[DRIVE] = drive
-        s.real[LEVEL] = output(t, s)
-        s.counts[STATUS] = 0
-        s.real[REFERENCE] = s.real[LEVEL]
-        s.real[ANSWER] = s.real[LEVEL]
+        s.step.ascending[0] = t.ascending[which]
+        s.step.has_pending[0] = 0
+        s.step.repeated[0] = 0
+        s.step.stepped[0] = 0
+        s.step.bits[0] = 0
+        s.step.pending[0] = drive
+        s.step.drive[0] = drive
+        s.step.last[0] = output(t, s)
+        s.step.status[0] = 0
+        s.step.reference[0] = s.step.last[0]
+        s.step.answer[0] = s.step.last[0]
 
     @jit
     def init(t: Tables | FixedTables, s: State, inverse: int) -> None:
@@ -134,17 +117,17 @@ def plays_of(front_forward: Function, front_inverse: Function, output: Function)
     def set_drive(t: Tables | FixedTables, s: State, v: Any) -> None:
         """Move the actuator to drive v; with two branches, the direction of the move picks one."""
         if t.branches:
-            if v > s.real[DRIVE]:
-                s.counts[ASCENDING] = 1
-            elif v < s.real[DRIVE]:
-                s.counts[ASCENDING] = 0
-        s.real[DRIVE] = v
+            if v > s.step.drive[0]:
+                s.step.ascending[0] = 1
+            elif v < s.step.drive[0]:
+                s.step.ascending[0] = 0
+        s.step.drive[0] = v
 
     @jit(inline=True)
     def arrive(t: Tables | FixedTables, s: State, v: Any) -> Any:
         """Move the actuator to drive v. Returns the input of the plays."""
         set_drive(t, s, v)
-        return front_forward(t, v, s.counts[ASCENDING])
+        return front_forward(t, v, s.step.ascending[0])
 
     @jit
     def inverse_choose(t: Tables | FixedTables, s: State, level: Any, w: Any) -> tuple[Any, int]:
@@ -152,29 +135,29 @@ def plays_of(front_forward: Function, front_inverse: Function, output: Function)
         other one; if neither fits, the drive holds."""
         if not t.branches:
             return front_inverse(t, w, 1)  # type: ignore[no-any-return]
-        up = s.counts[ASCENDING]
-        if level > s.real[LEVEL]:
+        up = s.step.ascending[0]
+        if level > s.step.last[0]:
             up = 1
-        elif level < s.real[LEVEL]:
+        elif level < s.step.last[0]:
             up = 0
         v, limited = front_inverse(t, w, up)
         if inverse_fits(t, s, v, up):
             return v, limited
-        back = clamp_drive(t, v) - s.real[DRIVE]
-        if up == s.counts[ASCENDING] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
-            return s.real[DRIVE], limited
+        back = clamp_drive(t, v) - s.step.drive[0]
+        if up == s.step.ascending[0] and -t.limits[HOLD] <= back <= t.limits[HOLD]:
+            return s.step.drive[0], limited
         v, limited = front_inverse(t, w, 1 - up)
         if inverse_fits(t, s, v, 1 - up):
             return v, limited
-        return s.real[DRIVE], limited
+        return s.step.drive[0], limited
 
     @jit
     def inverse_drive(t: Tables | FixedTables, s: State, level: Any, w: Any) -> Any:
         """The drive that gives w."""
         v, limited = inverse_choose(t, s, level, w)
-        s.real[LEVEL] = level
+        s.step.last[0] = level
         if limited:
-            s.counts[BITS] |= DOMAIN
+            s.step.bits[0] |= DOMAIN
         return v
 
     return PlayOperations(init, reset, arrive, inverse_drive)
@@ -185,8 +168,7 @@ class Hooks(NamedTuple):
 
     plays: Function  # the memory of the step itself
     finite: Function
-    forward_absorb: Function
-    inverse_absorb: Function
+    absorb: Function
     shown: Function  # the present output, and status bits
     unread: Function  # note a reference that is not finite
     held: Function  # the drive for it
@@ -196,15 +178,15 @@ class Hooks(NamedTuple):
 
 
 def run_of(
-    init: Function, reset: Function, step: Function, commit: Function, plays: Function, place: int, other: Function
+    init: Function, reset: Function, step: Function, commit: Function, plays: Function, other: Function
 ) -> Function:
-    """`Operations.run` of any engine; `place`: of the status in the counts of the memory."""
+    """`Operations.run` of any engine."""
 
     @jit
     def run(t: Any, s: Any, op: Bytes, x: Reals, answers: Reals, status: Bytes) -> None:
         """Run op[i] with argument x[i]. answers[i] is the answer of a call that has one, else 0, also for a reset;
         status[i] is read and cleared, or 0 and left for a later call."""
-        counts = plays(s).counts
+        m = plays(s).step
         for i in range(len(op)):
             call = op[i] & OP_CALL
             answers[i] = t.limits[ZERO]
@@ -219,9 +201,9 @@ def run_of(
                 answers[i] = step(t, s, x[i])
             else:
                 answers[i] = other(t, s, call, x[i])
-            left = counts[place] if op[i] & OP_UNREAD else 0
-            status[i] = counts[place] - left
-            counts[place] = left
+            left = m.status[0] if op[i] & OP_UNREAD else 0
+            status[i] = m.status[0] - left
+            m.status[0] = left
 
     return run
 
@@ -236,7 +218,7 @@ def corners_of(
         """The memory itself."""
         return m
 
-    return Operations(init, visit, step, run_of(init, reset, step, commit, itself, CORNERS_STATUS, no_other))
+    return Operations(init, visit, step, run_of(init, reset, step, commit, itself, no_other))
 
 
 @jit(inline=True)
@@ -247,30 +229,30 @@ def no_other(t: Any, s: Any, call: int, x: Any) -> Any:  # noqa: ARG001  the sam
 
 def operations_of(inverse: bool, init: Function, reset: Function, visit: Function, hooks: Hooks) -> Operations:
     """The operations of one operator on a chain: step, commit, hold, clamp and status are the same for every chain."""
-    plays, finite, forward_absorb, inverse_absorb, shown, unread, held, stands, sought, other = hooks
+    plays, finite, absorb, shown, unread, held, stands, sought, other = hooks
 
     @jit(inline=True)
     def forward_step(t: Any, s: Any, v: Any) -> Any:
         """Answer one sample of the forward operator."""
         m = plays(s)
         if not finite(t, v):
-            m.counts[STATUS] |= HELD
-            return m.real[ANSWER]
+            m.step.status[0] |= HELD
+            return m.step.answer[0]
         inside = clamp_drive(t, v)
         if inside != v:
-            m.counts[STATUS] |= INPUT_CLAMPED
-        forward_absorb(t, s, inside)
-        m.real[ANSWER], bits = shown(t, s)
-        m.counts[STATUS] |= bits
-        return m.real[ANSWER]
+            m.step.status[0] |= INPUT_CLAMPED
+        absorb(t, s, inside)
+        m.step.answer[0], bits = shown(t, s)
+        m.step.status[0] |= bits
+        return m.step.answer[0]
 
     @jit
     def inverse_take(t: Any, s: Any) -> None:
         """Absorb the pending drive."""
         m = plays(s)
-        if m.counts[HAS_PENDING]:
-            inverse_absorb(t, s, m.real[PENDING])
-            m.counts[HAS_PENDING] = 0
+        if m.step.has_pending[0]:
+            absorb(t, s, m.step.pending[0])
+            m.step.has_pending[0] = 0
 
     @jit
     def inverse_step(t: Any, s: Any, u: Any) -> Any:
@@ -278,20 +260,20 @@ def operations_of(inverse: bool, init: Function, reset: Function, visit: Functio
         m = plays(s)
         inverse_take(t, s)
         if not finite(t, u):
-            m.counts[STATUS] |= HELD
+            m.step.status[0] |= HELD
             unread(t, s)
             return inverse_answer(m, held(t, s))
         level = inverse_clamp(t, u)
         if level != u:
-            m.counts[STATUS] |= INPUT_CLAMPED
+            m.step.status[0] |= INPUT_CLAMPED
         if stands(t, s, u):
-            m.counts[STATUS] |= m.counts[BITS]
-            return inverse_answer(m, m.real[ANSWER])
+            m.step.status[0] |= m.step.bits[0]
+            return inverse_answer(m, m.step.answer[0])
         v = sought(t, s, level)
         inside = clamp_drive(t, v)
         if inside != v:
-            m.counts[BITS] |= OUTPUT_CLAMPED
-        m.counts[STATUS] |= m.counts[BITS]
+            m.step.bits[0] |= OUTPUT_CLAMPED
+        m.step.status[0] |= m.step.bits[0]
         return inverse_answer(m, inside)
 
     @jit
@@ -299,17 +281,17 @@ def operations_of(inverse: bool, init: Function, reset: Function, visit: Functio
         """Replace the last answer by the drive that was really applied."""
         m = plays(s)
         if not finite(t, applied):
-            m.counts[STATUS] |= HELD
+            m.step.status[0] |= HELD
             return
         v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
         if v != applied:
-            m.counts[STATUS] |= INPUT_CLAMPED
-        m.counts[REPEAT] = 0
-        m.real[PENDING] = v
-        m.counts[HAS_PENDING] = 1
+            m.step.status[0] |= INPUT_CLAMPED
+        m.step.repeated[0] = 0
+        m.step.pending[0] = v
+        m.step.has_pending[0] = 1
 
     step, commit = (inverse_step, inverse_commit) if inverse else (forward_step, forward_commit)
-    return Operations(init, visit, step, run_of(init, reset, step, commit, plays, STATUS, other))
+    return Operations(init, visit, step, run_of(init, reset, step, commit, plays, other))
 
 
 def made_of(
@@ -340,8 +322,8 @@ def made_of(
     def visit(t: Tables | FixedTables, s: State, v: Any) -> None:
         """Move the actuator to drive v before the next sample."""
         absorb(t, s, v)
-        s.real[LEVEL], bits = output(t, s)
-        s.counts[STATUS] |= bits
+        s.step.last[0], bits = output(t, s)
+        s.step.status[0] |= bits
 
     @jit(inline=True)
     def unread(t: Tables | FixedTables, s: State) -> None:
@@ -350,24 +332,24 @@ def made_of(
     @jit(inline=True)
     def held(t: Tables | FixedTables, s: State) -> Any:  # noqa: ARG001  the same call for every chain
         """The last answer again."""
-        return s.real[ANSWER] if s.counts[STEPPED] else s.real[DRIVE]
+        return s.step.answer[0] if s.step.stepped[0] else s.step.drive[0]
 
     @jit(inline=True)
     def stands(t: Tables | FixedTables, s: State, u: Any) -> bool:  # noqa: ARG001
         """Whether the last answer holds for reference u; u becomes the last reference."""
-        if s.counts[REPEAT] and u == s.real[REFERENCE]:
+        if s.step.repeated[0] and u == s.step.reference[0]:
             return True
-        s.real[REFERENCE] = u
-        s.counts[REPEAT] = 1
+        s.step.reference[0] = u
+        s.step.repeated[0] = 1
         return False
 
     @jit(inline=True)
     def sought(t: Tables | FixedTables, s: State, level: Any) -> Any:
         """The drive for the limited reference `level`."""
-        s.counts[BITS] = 0
+        s.step.bits[0] = 0
         return inverse_drive(t, s, level, inverse_solve(t, s, level))
 
-    hooks = Hooks(itself, finite, absorb, absorb, output, unread, held, stands, sought, no_other)
+    hooks = Hooks(itself, finite, absorb, output, unread, held, stands, sought, no_other)
 
     def operator(inverse: bool) -> Operations:
         """The operations of one operator."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hystgen.basics.jit import Jit, jit
+from hystgen.basics.structures import Struct
 
 VERBS = ("rest", "resting", "solve", "absorb")
 """The verbs of every block: settle at an input, give the input of a settled output, solve for an input, absorb one."""
@@ -19,42 +20,29 @@ VERBS = ("rest", "resting", "solve", "absorb")
 
 @dataclass(frozen=True)
 class Rows:
-    """The repeated entries of a block: an entry's name, real numbers, and memory; in fixed point `letters` and `memory`
-    give their types, as in `Kind`."""
+    """The repeated entries of a block: an entry's name, its numbers, and its memory if it has any."""
 
     name: str
-    table: tuple[str, ...] = ()
-    state: tuple[str, ...] = ()
-    letters: str = ""
-    memory: str = ""
+    table: type[Struct]
+    state: type[Struct] | None = None
 
 
 @dataclass(frozen=True)
 class Kind:
-    """One kind of block, in the order of its C types.
+    """One kind of block in one arithmetic.
 
-    `name`: in its functions, `hystgen_NAME_solve` and so on; `table`: its real constants, after a pointer to `rows` if
-    it has any; `counts`: whole numbers after them, the first of 16 bits, others of 8; `state`, `flags`: real numbers
-    and booleans of its memory; `reading`: the verbs that take the table; `own`: the verbs that it has; without `rest`
-    it settles as it absorbs, without `resting` it rests as it solves.
-
-    In fixed point, `letters` and `memory` give the types of table and memory: f for a factor, which takes two numbers,
-    n for a number of a user's block, which takes four, w for 64 bits, i for 32, c for an array of four of these, and b
-    for 8.
-
-    `like`: the kind whose table type it shares.
+    `name`: in its functions, `hystgen_NAME_solve` and so on; `table`: its constants, which follow a pointer to `rows`
+    in C if it has any; `state`: its memory; `reading`: the verbs that take the table; `own`: the verbs that it has;
+    without `rest` it settles as it absorbs, without `resting` it rests as it solves; `like`: the kind whose table type
+    it shares.
     """
 
     name: str
-    table: tuple[str, ...] = ()
-    state: tuple[str, ...] = ()
+    table: type[Struct]
+    state: type[Struct]
     rows: Rows | None = None
-    counts: tuple[str, ...] = ()
-    flags: tuple[str, ...] = ()
     reading: tuple[str, ...] = VERBS
     own: tuple[str, ...] = VERBS
-    letters: str = ""
-    memory: str = ""
     like: str = ""
 
     @property
@@ -69,14 +57,14 @@ class Kind:
 
 @dataclass(frozen=True)
 class Constants:
-    """The numbers of one block: its table (n,), rows (m, k) and counts; `products`: multiplications in absorb and in
-    solve; `bits`: fraction bits of its signals beyond the chain's, if it computes with finer ones."""
+    """The numbers of one block: its table, a record with the members of `kind.table`, and its rows (m,); `products`:
+    multiplications in absorb and in solve; `bits`: fraction bits of its signals beyond the chain's, if it computes with
+    finer ones."""
 
     kind: Kind
     table: Any
     products: tuple[int, int]
     rows: Any = ()
-    counts: tuple[int, ...] = ()
     bits: int = 0
 
 

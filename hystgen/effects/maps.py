@@ -27,7 +27,7 @@ class MapErrors(NamedTuple):
     there: float
 
 
-class Fitted(Protocol):
+class FittedCurve(Protocol):
     """A curve as fitted in fixed point: its error in signals, for the largest slope."""
 
     def error(self, slope: float, /) -> float: ...
@@ -93,7 +93,7 @@ class Map:
         """Its curve for inputs within a size, and that of its inverse for results within `ends`, if it has any."""
         return []
 
-    def whole_errors(self, found: MapErrors, curves: Sequence[Fitted], unit: Whole) -> MapErrors:
+    def whole_errors(self, found: MapErrors, curves: Sequence[FittedCurve], unit: Whole) -> MapErrors:
         """As `errors` in fixed point, in output codes."""
         give, (ends, slope, back, there) = self.give, found
         over = 1.0 / give if 0.0 < give < 1.0 else 1.0

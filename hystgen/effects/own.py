@@ -26,6 +26,7 @@ import numpy as np
 
 from hystgen.basics.names import KEYWORDS
 from hystgen.basics.problems import EffectsError
+from hystgen.basics.structures import Number, Signal, declared
 from hystgen.effects.base import USER, Array, Block, Effect, Place
 from hystgen.effects.kinds import Kind, OwnBlock, product
 
@@ -39,6 +40,7 @@ WORD = re.compile(r"[a-z][a-z0-9_]{0,30}")
 """Names of a block's numbers, which are also their names in C."""
 
 
+@functools.cache
 def kind(effect: type[Effect]) -> Kind:
     """The kind of an effect's block."""
     assert effect.block is not None
@@ -46,7 +48,7 @@ def kind(effect: type[Effect]) -> Kind:
     called = _name(effect)
     shape = str(effect.model_fields["shape"].annotation.__args__[0]) if not called.startswith(USER) else ""  # type: ignore[union-attr]
     name = f"{called}_{shape}" if shape else f"user_{called.partition(':')[2]}"
-    return Kind(name, table, state, letters=len(table) * "n", memory=len(state) * "w")
+    return Kind(name, declared(f"{name}_table", table, Number), declared(name, state, Signal))
 
 
 def source(effect: type[Effect]) -> Path:

@@ -327,13 +327,14 @@ class Realized:
     """A kind of block in one arithmetic: its verbs, its constants from its tables, and the tables of its blocks; in
     fixed point the tables come from `formats`, made from a block, the surroundings, and the largest input and output.
 
-    `beside`: constants of an additional struct for each block.
+    `kinds`: in its C; `beside`: constants of an additional struct for each block.
     """
 
     verbs: Verbs
     constants: Callable[[Any], Iterable[Constants]]
     tables: Callable[[Sequence[Any], Any], Any]
     formats: Callable[[Any, FixedSurroundings, float, float], Any] = lambda one, *_: one
+    kinds: tuple[Kind, ...] = ()
     beside: Callable[[Any], Iterable[Constants | None]] = lambda _: ()
 
 
@@ -379,7 +380,7 @@ class ChainPart:
     """One kind of block. `name`: in C; `words`: in messages; `place`: in the chain; `takes`: whether it is the block of
     an effect; `one`: makes a block from an effect, a step length, and whether it may be `turning`; `calls`: of the
     interface that it serves; `forward`: only the forward operator has it; `joined`: all of them form one block;
-    `kinds`: in its C, in floating point; `coded`: loads its fixed-point version, for models in fixed point.
+    `coded`: loads its fixed-point version, for models in fixed point.
 
     `longest`: the longest travel that can be set, in its tables. `problems`: why the C cannot include an effect;
     `unmeasured`: if nothing measures it; `code`: parts of its code in `hystgen.compensator.chain.costs`, and `counted`:
@@ -399,15 +400,14 @@ class ChainPart:
     calls: tuple[str, ...] = ()
     forward: bool = False
     joined: bool = False
-    kinds: tuple[Kind, ...] = ()
-    longest: Callable[[Any], float] | None = None
-    problems: Callable[[Any, Setting], Iterator[str]] = lambda *_: iter(())
+    longest: Callable[..., float] | None = None
+    problems: Callable[..., Iterator[str]] = lambda *_: iter(())
     unmeasured: Unmeasured | None = None
     code: tuple[str, ...] = ()
-    counted: Callable[[Any, int], Iterable[int]] = lambda _, blocks: (blocks,)
-    uneven: Callable[[Any], Block | None] = lambda _: None
-    following: Callable[[Any], Following | None] = lambda _: None
-    no_inverse: Callable[[Any], Iterable[str]] = lambda _: ()
+    counted: Callable[..., Iterable[int]] = lambda _, blocks: (blocks,)
+    uneven: Callable[..., Block | None] = lambda _: None
+    following: Callable[..., Following | None] = lambda _: None
+    no_inverse: Callable[..., Iterable[str]] = lambda _: ()
 
     @functools.cached_property
     def fixed(self) -> Realized:

@@ -114,8 +114,8 @@ def doubts(model: Model) -> list[str]:
     found = []
     for taken, other in model.parameters.not_separable:
         for name, fault, which in ((other, taken, 0), (taken, other, 1)):
-            mistaken = shapes(name)[0].mistaken if taken in present and name in CATALOGUE else {}
-            found += [f"{mistaken[fault][which]} {advice}"] * (fault in mistaken)
+            if taken in present and name in CATALOGUE and (doubt := shapes(name)[0].mistaken.get(fault)):
+                found.append(f"{doubt[which]} {advice}")
     if model.effects and (reach := _swing(model)):
         found.append(
             "an effect of your own leads the drive in front of two branches of the memoryless part, between which it "

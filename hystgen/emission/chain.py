@@ -6,14 +6,17 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from hystgen.emission.compensator import Effects, Field, Form, Glue, Stage, Table, Writer, entries
+import numpy as np
+
+from hystgen.emission.compensator import Effects, Field, Form, Glue, Stage, Table, Writer
 from hystgen.emission.runtime import template
-from hystgen.emission.text import operand
+from hystgen.emission.text import literal, operand
 from hystgen.plays import slots
 
 if TYPE_CHECKING:
+    from hystgen.basics.structures import Struct
     from hystgen.compensator.chain.layout import ChainTables, Compiled
     from hystgen.effects.kinds import Constants, Kind
 
@@ -25,7 +28,7 @@ NUMBERS = {
     "SLEW_RISING_REST": "and what rounding took from that",
     "SLEW_FALLING_REST": "",
 }
-"""Macros for the first places of `ChainTables.number`."""
+"""Macros for members of `ChainTables.number`."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class Block:
         """The fields of its memory."""
         kind, rows = self.kind, self.kind.rows
         found = [Field(f"{kind.name}_t", self.name)]
-        if rows and (rows.state or rows.memory):
+        if rows and rows.state:
             found.append(Field(f"{kind.name}_state_t", f"{self.name}_state", count=len(self.constants.rows)))
         return found
 
@@ -73,13 +76,23 @@ class Block:
     def tables(self, writer: Writer) -> list[Table]:
         """Its table, after the table of its rows if it has one."""
         kind, constants = self.kind, self.constants
-        numbers = [entries(constants.table, kind.letters)] * (len(constants.table) > 0)
-        numbers += map(str, constants.counts)
+        numbers = members(kind.table, constants.table)
         if not kind.rows:
             return [writer.block(f"{kind.tabled}_table_t", self.name, numbers)]
-        rows = [entries(row, kind.rows.letters) for row in constants.rows]
+        rows = [", ".join(members(kind.rows.table, row)) for row in constants.rows]
         of_rows = writer.rows(f"{kind.name}_{kind.rows.name}_t", f"{self.name}_{kind.rows.name}", rows, len(rows))
         return [of_rows, writer.block(f"{kind.name}_table_t", self.name, [of_rows.name, *numbers])]
+
+
+def members(kind: type[Struct], one: np.void) -> list[str]:
+    """The members of a structure as written in C."""
+    return [_written(one[name]) for name in kind.members()]
+
+
+def _written(number: Any) -> str:
+    if isinstance(number, np.void):
+        return f"{{{', '.join(_written(number[name]) for name in number.dtype.names or ())}}}"
+    return f"{{{', '.join(map(literal, number))}}}" if isinstance(number, np.ndarray) else literal(number)
 
 
 def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
@@ -175,14 +188,13 @@ def effects(
     compiled: Compiled, operators: Sequence[str], form: Form, behind: Sequence[Stage], writer: Writer
 ) -> Effects:
     """Tables and macros of a model's effects; `behind`: its stages of saturation."""
-    from hystgen.compensator.chain.layout import DITHER
 
     t, chain = compiled.tables, Chain.of(compiled.tables, operators)
     largest = max(map(chain.blocks, operators), key=len)  # the forward operator has the inverse's blocks, and modes
     tables = [table for block in largest for table in block.tables(writer)]
-    numbers = dict(zip(NUMBERS, t.number, strict=False))
+    numbers = {name: t.number[name.lower()][0] for name in NUMBERS}
     constants = [(name, operand(value), NUMBERS[name]) for name, value in numbers.items()]
-    constants += [("LEAD", operand(row[-1]), "samples that references come ahead") for row in t.of("clock")]
+    constants += [("LEAD", operand(row["most_ahead"]), "samples that references come ahead") for row in t.of("clock")]
     constants.append(("WAITING", f"{t.of('wait').samples}u", "samples of the drive that wait"))
     if t.of("wait").samples:
         waited, share = form.waited(t, writer)
@@ -192,7 +204,7 @@ def effects(
         tables.append(form.tap(t, writer))
     constants += [
         ("QUIET", f"{t.quiet}u", "equal references after which the drive stands still"),
-        ("DITHER", operand(t.number[DITHER]), "signal by which a drive at rest goes to and fro"),
+        ("DITHER", operand(t.number.dither[0]), "signal by which a drive at rest goes to and fro"),
         ("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"),
         *form.effects(t),
     ]
@@ -261,7 +273,7 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
         Field("bool", "moving", "a drive was applied"),
         *[
             Field("bool", "has_pending"),
-            Field("bool", "repeat", "the last answer still stands for `reference`"),
+            Field("bool", "repeated", "the last answer still stands for `reference`"),
             Field("bool", "stepped", "a step has answered"),
             Field("bool", "filled", "there are references"),
             Field("unsigned int", "bits", "of the last step"),
@@ -295,7 +307,7 @@ def _functions(
         settled, absorbed = "    hystgen_quiet_rest(&self->quiet, v);\n", "    self->quiet.arrived = v;\n"
     from hystgen.compensator.chain.parts import PARTS
 
-    moved = {kind.name for part in PARTS if part.floating.verbs.move for kind in part.kinds}
+    moved = {kind.name for part in PARTS if part.floating.verbs.move for kind in part.floating.kinds}
     kinds: defaultdict[str, list[Block]] = defaultdict(list)
     for block in after:
         kinds[block.kind.name].append(block)

@@ -216,9 +216,7 @@ def _counts(t: AnyTables) -> Counts:
 
 def _refined(t: ChainTables) -> bool:
     """Whether an inverse's solution has a remainder, which also takes a search."""
-    from hystgen.compensator.chain.layout import ARRIVING_BITS
-
-    return len(t.number) > ARRIVING_BITS and bool(t.number[ARRIVING_BITS])
+    return isinstance(t.plays, FixedTables) and bool(t.number.arriving_bits[0])
 
 
 def chain_products(t: ChainTables) -> dict[str, int]:

@@ -100,7 +100,6 @@ class Fixed(Form):
     def chained(
         self, parameters: Parameters, effects: Effects, stages: Sequence[Stage], options: Options, writer: Writer
     ) -> Numbers:
-        from hystgen.compensator.chain import layout
 
         compiled, tables, codes = effects.compiled, effects.compiled.tables, effects.compiled.codes
         plays: FixedTables = tables.plays
@@ -116,12 +115,12 @@ class Fixed(Form):
             _errors(options, (codes.forward_error, codes.inverse_error, codes.inverse_rounding), codes.condition),
             fronts=bool(plays.fronts),
             envelopes=_envelopes(compiled.static) or any(one.kind == "bend" for one in stages),
-            finer=bool(tables.number[layout.ARRIVING_BITS]), saturates=True,
+            finer=bool(tables.number.arriving_bits[0]), saturates=True,
             lsb=(float(codes.drive_lsb), float(codes.output_lsb)),
             precision=(
                 *_precision(parameters, codes, where),
                 f"Range: every signal behind the plays stays below 2^{codes.largest.bit_length()}, with "
-                f"{tables.number[layout.LEVEL_BITS]} bits below an output code; states of effects below 2^62 (64 bits "
+                f"{tables.number.level_bits[0]} bits below an output code; states of effects below 2^62 (64 bits "
                 "hold 2^63)",
             ),
         )
@@ -169,42 +168,39 @@ class Fixed(Form):
         return arrays, numbers
 
     def effects(self, t: ChainTables) -> list[Macro]:
-        from hystgen.compensator.chain import layout as at
 
         number = t.number
         low, high = t.plays.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
         return [
             ("FINE_MIN", operand(low), "what the ends of the drive's range are in front of the plays"),
             ("FINE_MAX", operand(high), ""),
-            ("LEAST_CODE", operand(number[at.LEAST_CODE]), "between which a drive is kept before it is limited"),
-            ("MOST_CODE", operand(number[at.MOST_CODE]), ""),
-            ("DRIVE_BITS", f"{number[at.DRIVE_BITS]}u", "bits of a signal in front of the plays below a drive code"),
-            ("ARRIVING_BITS", f"{number[at.ARRIVING_BITS]}u", "and below an input of the plays"),
-            ("LEVEL_BITS", f"{number[at.LEVEL_BITS]}u", "bits of a signal behind the plays below an output code"),
-            ("LEVEL_DROP", f"{number[at.LEVEL_DROP]}u", "and those that a sum of the plays has beyond that"),
-            ("LARGEST_LEVEL", operand(number[at.LARGEST_LEVEL]), "sum that is asked of the plays"),
-            ("SHARE_BITS", f"{number[at.SHARE_BITS]}u", "bits of a mantissa below a code"),
-            ("BRAKED_DROP", f"{number[at.BRAKED_DROP]}u", "bits of a signal beyond those of a search for a lead"),
+            ("LEAST_CODE", operand(number.least_code[0]), "between which a drive is kept before it is limited"),
+            ("MOST_CODE", operand(number.most_code[0]), ""),
+            ("DRIVE_BITS", f"{number.drive_bits[0]}u", "bits of a signal in front of the plays below a drive code"),
+            ("ARRIVING_BITS", f"{number.arriving_bits[0]}u", "and below an input of the plays"),
+            ("LEVEL_BITS", f"{number.level_bits[0]}u", "bits of a signal behind the plays below an output code"),
+            ("LEVEL_DROP", f"{number.level_drop[0]}u", "and those that a sum of the plays has beyond that"),
+            ("LARGEST_LEVEL", operand(number.largest_level[0]), "sum that is asked of the plays"),
+            ("SHARE_BITS", f"{number.share_bits[0]}u", "bits of a mantissa below a code"),
+            ("BRAKED_DROP", f"{number.braked_drop[0]}u", "bits of a signal beyond those of a search for a lead"),
         ]
 
     def code_sizes(self, t: ChainTables) -> list[Macro]:
-        from hystgen.compensator.chain import layout
         from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 
-        bits = int(31 - t.number[layout.SHARE_BITS])
+        bits = int(31 - t.number.share_bits[0])
         degree = ("TEMPERATURE_LSB", repr(2.0 ** -TEMPERATURE_BITS[bits]), "degC a code of set_temperature")
         gain = ("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")
         return [*[degree] * ("set_temperature" in t.calls), *[gain] * ("set_gain" in t.calls)]
 
     def drive_bits(self, t: ChainTables) -> int:
-        from hystgen.compensator.chain import layout
 
-        return int(t.number[layout.DRIVE_BITS])
+        return int(t.number.drive_bits[0])
 
     def reference_temperature(self, t: ChainTables) -> float:
         from hystgen.effects.thermal import fixed as thermal
 
-        degrees: float = t.of("gain")[0, thermal.REFERENCE].item() / 2.0**thermal.TEMPERATURE_BITS
+        degrees: float = t.of("gain").reference[0].item() / 2.0**thermal.TEMPERATURE_BITS
         return degrees
 
     def tap(self, t: ChainTables, writer: Writer) -> Table:

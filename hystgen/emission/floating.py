@@ -133,9 +133,8 @@ class Floating(Form):
         ]
 
     def reference_temperature(self, t: ChainTables) -> float:
-        from hystgen.effects.thermal import compensator as thermal
 
-        return float(t.of("gain")[0, thermal.REFERENCE])
+        return float(t.of("gain").reference[0])
 
     def tap(self, t: ChainTables, writer: Writer) -> Table:
         return writer.array("real_t", "tap", list(t.tap))

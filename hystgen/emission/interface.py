@@ -126,13 +126,12 @@ def _branches(compiled: Compiled, parameters: Parameters) -> list[str]:
 
 def _quiet(one: Compensator, compiled: Compiled) -> list[str]:
     """When and how closely a drive is kept at rest."""
-    from hystgen.compensator.chain.layout import DITHER
 
     t = compiled.tables
     if not one.variant.quiet:
         return []
     unit = one.form.unit(one.units.drive, "drive")
-    kept = float(t.number[DITHER]) / 2.0 ** one.form.drive_bits(t)
+    kept = float(t.number.dither[0]) / 2.0 ** one.form.drive_bits(t)
     return [
         f"Quiet: after {t.quiet} equal references the drive stands still as long as it is within {kept:.4g}{unit} of "
         "the drive that is needed at rest; the input of the plays is then within twice that of the one sought"

@@ -248,8 +248,9 @@ def _bare(declared: str) -> str:
 def _declared(kind: Kind) -> Iterator[tuple[str, str]]:
     """Names of a block's types and functions, and their declarations."""
     name = f"hystgen_{kind.name}"
-    for own_type, member, names in ((f"{name}_table_t", "number", kind.table), (f"{name}_t", "signal", kind.state)):
-        yield own_type, f"typedef struct {{ {' '.join(f'hystgen_{member}_t {each};' for each in names)} }} {own_type};"
+    for own_type, struct in ((f"{name}_table_t", kind.table), (f"{name}_t", kind.state)):
+        members = " ".join(f"hystgen_{word} {each};" for each, (word, _) in struct.members().items())
+        yield own_type, f"typedef struct {{ {members} }} {own_type};"
     for verb in VERBS:
         memory = "" if verb == "resting" else f"{name}_t *self, "
         x = "x" if verb in ("rest", "absorb") else "y"

@@ -21,7 +21,6 @@ from typing import ClassVar
 import jinja2
 
 from hystgen.arithmetic import FIXED, FLOATING, Arithmetic
-from hystgen.effects import sources
 from hystgen.emission import folding
 
 FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")
@@ -169,6 +168,8 @@ class Family(ABC):
     def chain_blocks(self) -> tuple[str, ...]:
         """The files of blocks, which models with effects carry themselves, even with a shared run time; callees before
         callers."""
+        from hystgen.effects import sources
+
         blocks, drives = (sources.files(use, self.ending) for use in ("blocks", "drives"))
         return (*self.helpers, *blocks, "compensator/chain/drive_signal.c", *drives, "arithmetic/product.c")
 
@@ -320,7 +321,9 @@ class Variant:
 
     def _chain(self) -> tuple[str, ...]:
         """The files of a chain except its blocks: for a model with effects, or for engine loop."""
-        chain, files = "compensator/chain/", sources.files
+        from hystgen.effects.sources import files  # late: a plain model has no effect
+
+        chain = "compensator/chain/"
         loops, solve, refined = self.engine == "loop", f"{chain}plays_solve.c", f"{chain}refined_input.c"
         if not loops:
             plays: tuple[str, ...] = (refined, f"{chain}corners_{self.family.kind}.c")

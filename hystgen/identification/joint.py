@@ -189,7 +189,7 @@ class Ends(_Bounded):
 
 
 @dataclass(frozen=True)
-class Bent(_Bounded):
+class BentFront(_Bounded):
     """A front whose slope changes smoothly over the drive range, as a dead-zone sum (41) of many equal pieces.
 
     The shape is the coefficients of u, u^2, .. up to `degree` in the logarithm of the slope; u runs from -1 to 1.

@@ -10,7 +10,7 @@ import difflib
 import itertools
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
@@ -231,7 +231,7 @@ class _Checker:
 
     def _empty_values(self) -> None:
         """Keys without a value, which pydantic accepts if None is the default."""
-        todo: list[tuple[Path, Any]] = [((), self.data)]
+        todo: list[tuple[Path, object]] = [((), self.data)]
         while todo:
             path, value = todo.pop()
             if value is None and not self.judged(path):
@@ -472,9 +472,7 @@ class _Checker:
 
 def _literals(shape: type[Effect], key: str) -> tuple[str, ...]:
     """The words by which a shape of an effect is called."""
-    found: Any = shape.model_fields[key].annotation
-    words: tuple[str, ...] = found.__args__
-    return words
+    return get_args(shape.model_fields[key].annotation)
 
 
 _TWO_NUMBERS = "must be two numbers; write [lowest, highest]"
@@ -549,8 +547,7 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
         return _choice(value, re.findall(r"'([^']*)'", context["expected"]))
     if kind == "literal_error":
         fields = {**schema.EmitDefaults.model_fields, **schema.Compensation.model_fields}
-        known: Any = fields[key].annotation if key != "kind" else None
-        return _choice(value, known.__args__ if known else schema.STAGE_KINDS)
+        return _choice(value, get_args(fields[key].annotation) if key != "kind" else schema.STAGE_KINDS)
     if kind in _BOUNDS:
         limit, what = _BOUNDS[kind]
         return f"{what} {context[limit]:g}, not {shown(value)}; correct the number"

@@ -13,10 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.plays.slots import ZERO, Counts, Reals
-
-PENDING, DRIVE, REFERENCE, LEVEL, ANSWER = 0, 1, 2, 3, 4
-ASCENDING, HAS_PENDING, REPEAT, STEPPED, BITS, STATUS = 0, 1, 2, 3, 4, 5
+from hystgen.plays.slots import ZERO, Reals, StepState
 
 
 class PlayTables(Protocol):
@@ -40,17 +37,16 @@ class LoopTables(PlayTables, Protocol):
 
 
 class State(NamedTuple):
-    """One instance: plain arrays."""
+    """One instance."""
 
-    real: Reals
-    counts: Counts
+    step: StepState
     play: Reals
 
 
 def new_state(t: PlayTables) -> State:
     """Memory for one instance of the model; `init` gives it its values."""
     dtype = t.threshold.dtype
-    return State(real=np.zeros(5, dtype), counts=np.zeros(6, np.int64), play=np.zeros(len(t.threshold), dtype))
+    return State(StepState.zeros(1, dtype), np.zeros(len(t.threshold), dtype))
 
 
 # ---------------------------------------------------------------- loop_absorb.c, loop_solve.c

@@ -6,8 +6,6 @@ one-dimensional arrays `v_0, v_1, ...`; equation numbers refer to the tutorial n
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -152,7 +150,7 @@ def stop(v: ArrayLike, threshold: float, start: float = 0.0) -> Array:
     return out
 
 
-def dead_zone(v: ArrayLike, threshold: float) -> NDArray[Any]:
+def dead_zone(v: ArrayLike, threshold: float) -> NDArray[np.float64]:
     """Dead-zone operator (42): the part of `v` beyond the threshold, on the threshold's own side of zero."""
     x = np.asarray(v, dtype=np.float64)
     if threshold > 0:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
+from hystgen.basics.structures import Flag, Real, Struct, UInt32
 
 Reals = NDArray[Any]
 Counts = NDArray[np.int64]
@@ -29,6 +30,31 @@ OP_PUSH, OP_SETTLE, OP_OFFSET, OP_GAIN, OP_TEMPERATURE, OP_TRAVEL, OP_CORRECT, O
 OP_CALL, OP_UNREAD = 127, 128
 # more places in `limits`, of fixed point
 PLAY_MIN, PLAY_MAX, MARGIN, FRACTION, FINE, CODE_MAX, SATURATED, SHY = range(10, 18)
+
+
+class StepState(Struct):
+    """The memory of one operator besides its plays; each engine needs a part of it."""
+
+    pending: Real  # drive sent but not yet part of the memory
+    drive: Real  # seen last
+    undo_drive: Real  # the same before the last step
+    before: Real  # input of the plays before the last step
+    returned: Real  # by the last step, if another drive was committed since
+    reference: Real  # of the last step
+    last: Real  # the same, limited: the next reference moves up or down from here
+    next: Real  # input or output at which another play begins to follow
+    level: Real  # sum of the plays
+    answer: Real  # returned last
+    ascending: Flag  # direction of the drive's last move
+    undo_ascending: Flag
+    has_pending: Flag
+    stepped: Flag  # a step has answered
+    committed: Flag  # a drive was committed since
+    repeated: Flag  # the last answer still stands for `reference`
+    usual: Flag  # in the last step the same plays followed
+    sought: Flag  # a solution has been found since the plays followed
+    bits: UInt32  # status of the last answer
+    status: UInt32
 
 
 @jit(inline=True)

@@ -127,7 +127,7 @@ def conversion(unit: str, to: str, column: str = "") -> Conversion | None:
     return Conversion(Fraction(1)) if plain(unit).casefold() == plain(to).casefold() else None
 
 
-class Wanted(NamedTuple):
+class UnitGoal(NamedTuple):
     """The target unit for the drive or the displacement of records.
 
     `unit`: empty if the first record with a unit decides; `whose`: the quantity as messages call it; `named`: given by
@@ -162,20 +162,21 @@ KEYS = {"v": "input", "y": "output", "u": "output"}
 
 def wanted(
     model: HasUnits | None, file: tuple[str, Mapping[str, str]], named: tuple[str, Mapping[str, str]]
-) -> dict[str, Wanted]:
+) -> dict[str, UnitGoal]:
     """Target units for `input` and `output`: the user's, else the file's, else the model's."""
-    found: dict[str, Wanted] = {}
+    found: dict[str, UnitGoal] = {}
     for key, quantity in QUANTITIES.items():
         if model is not None:
-            found[key] = Wanted(getattr(model, key), f"the model's {quantity}", told=True)
+            found[key] = UnitGoal(getattr(model, key), f"the model's {quantity}", told=True)
         for of, units, by_user in ((f"in {file[0]}", file[1], False), (f"of {named[0]}", named[1], True)):
             if units.get(key):
-                found[key] = Wanted(units[key], f"the {quantity} {of}", by_user)
+                found[key] = UnitGoal(units[key], f"the {quantity} {of}", by_user)
     return found
 
 
 def converted(
-    records: Sequence[Record], goals: Mapping[str, Wanted], need: Sequence[str], sources: Sequence[object], option: str
+    records: Sequence[Record], goals: Mapping[str, UnitGoal], need: Sequence[str], sources: Sequence[object],
+    option: str,
 ) -> list[Record]:
     """The records in the units of `goals`; see `hystgen.records.in_units`."""
     taken = dict(goals)
@@ -190,11 +191,11 @@ def converted(
             key = KEYS[column] if column in KEYS and column in need else ""
             if not own or len(own) > MAX_UNIT or not own.isprintable() or not (key or column == TEMPERATURE):
                 continue
-            goal = taken.get(key, Wanted()) if key else Wanted("degC", "a temperature", named=True)
+            goal = taken.get(key, UnitGoal()) if key else UnitGoal("degC", "a temperature", named=True)
             if not goal.unit:
                 said = f"{goal.whose} has no unit; it was assumed to be in {own}, as column {column} is"
                 notes += [said] if goal.told and said not in record.notes else []
-                taken[key] = Wanted(own, f"column {column} of {printable(record.name)}")
+                taken[key] = UnitGoal(own, f"column {column} of {printable(record.name)}")
                 continue
             how = conversion(own, goal.unit, column)
             if how is None and goal.named and (not key or quantity(own) is None):
@@ -217,7 +218,7 @@ def _named(column: str, unit: str) -> str:
     return f"column {column} [{printable(unit)}]"
 
 
-def _apart(column: str, own: str, goal: Wanted, option: str) -> str:
+def _apart(column: str, own: str, goal: UnitGoal, option: str) -> str:
     """The message that a column cannot be converted to the target unit, and what to do."""
     said = f"column {column} is in {own} and {goal.whose} in {goal.unit}"
     strange = [unit for unit in (own, goal.unit) if quantity(unit, column) is None]

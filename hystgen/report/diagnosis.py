@@ -234,8 +234,8 @@ def _faults(result: Result) -> list[Text | HtmlTable]:
         )
         rows.append(
             [
-                each["record"],
-                f"{WHAT[each['kind']]}{' of ' + each['channel'] if 'channel' in each else ''}",
+                str(each["record"]),
+                WHAT[str(each["kind"])] + (f" of {each['channel']}" if "channel" in each else ""),
                 "" if single or "count" not in each else str(each["count"]),
                 "" if samples is None else str(samples),
                 f"{each['first']:.6g}" if "first" in each else "",

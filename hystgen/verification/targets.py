@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 HOST = "host"
 
 
-@dataclass(frozen=True)
-class Machine:
+class Machine(NamedTuple):
     """A qemu-system-arm board that a whole firmware image runs on, with its memory map."""
 
     name: str
@@ -16,8 +15,7 @@ class Machine:
     ram: int
 
 
-@dataclass(frozen=True)
-class Target:
+class Target(NamedTuple):
     """A core: how compilers name it, and which processor of the emulator it is.
 
     `fpu`: floating point in hardware, where a user's flags can contract a product and a sum to one rounding. `calls`:
@@ -35,8 +33,7 @@ class Target:
     machine: Machine | None = None
 
 
-@dataclass(frozen=True)
-class Board:
+class Board(NamedTuple):
     """A controller whose core the emulator of `Target` lacks: only gcc builds, another emulator runs the firmware.
 
     8-bit with a 16-bit `int`: this exposes expressions that rely on a wider one. `ram` in bytes.

@@ -107,7 +107,7 @@ HYSTGEN_APART_IN_CHAIN void hystgen_operator_begin(hystgen_operator_t *self, hys
     self->answer = drive;
     self->reference = 0;
     self->has_pending = false;
-    self->repeat = false;
+    self->repeated = false;
     self->stepped = false;
     self->filled = false;
     self->bits = 0;

@@ -111,7 +111,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     if (inside < applied || inside > applied) {
         self->status |= HYSTGEN_STATUS_INPUT_CLAMPED;
     }
-    self->repeat = false;
+    self->repeated = false;
     self->pending = inside;
     self->has_pending = true;
 }

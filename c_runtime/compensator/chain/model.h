@@ -119,7 +119,7 @@ typedef struct {
     bool ascending;
     bool moving;
     bool has_pending;
-    bool repeat;
+    bool repeated;
     bool stepped;
     bool filled;
     unsigned int bits;

@@ -57,11 +57,11 @@ HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t n
 HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_copy_place(&self->undo, &self->here);
     self->usual = false;
-    if (!self->repeat || u != self->reference) {
+    if (!self->repeated || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
         const int64_t output = (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION);
         self->reference = u;
-        self->repeat = true;
+        self->repeated = true;
         self->bits = level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
         const int64_t w = hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output,
                                         -HYSTGEN_FAR, &self->kink);
@@ -126,7 +126,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     }
     hystgen_copy_place(&self->here, &self->undo);
     hystgen_inverse_stay(self);
-    self->repeat = false;
+    self->repeated = false;
     hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, &self->kink,
                           hystgen_front_forward(v));
 }
@@ -140,7 +140,7 @@ static void hystgen_operator_begin(hystgen_operator_t *self, bool reset) {
     hystgen_inverse_stay(self);
     self->before = 0;
     self->reference = 0;
-    self->repeat = false;
+    self->repeated = false;
     self->bits = 0;
     self->status = 0;
 }

@@ -49,7 +49,7 @@ hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u)
         return hystgen_inverse_hold(self);
     }
     hystgen_inverse_keep(self);
-    if (!self->repeat || u < self->reference || u > self->reference) {
+    if (!self->repeated || u < self->reference || u > self->reference) {
         hystgen_real_t level = u;
         if (u < HYSTGEN_OUTPUT_MIN) {
             level = HYSTGEN_OUTPUT_MIN;
@@ -72,7 +72,7 @@ hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u)
             hystgen_operator_set_drive(self, inside);
         }
         self->last = level;
-        self->repeat = true;
+        self->repeated = true;
     }
     self->stepped = true;
     self->committed = false;
@@ -93,7 +93,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
         self->returned = self->drive;
     }
     self->committed = true;
-    self->repeat = false;
+    self->repeated = false;
     hystgen_inverse_replace(self, v);
 }
 
@@ -111,7 +111,7 @@ HYSTGEN_APART void hystgen_operator_begin(hystgen_operator_t *self, bool reset) 
     self->reference = 0;
     self->stepped = false;
     self->committed = false;
-    self->repeat = false;
+    self->repeated = false;
     self->bits = 0;
     self->status = 0;
 }

@@ -25,11 +25,11 @@ HYSTGEN_APART void hystgen_inverse_keep(hystgen_inverse_t *self) {
    commit      the committed drive   the committed drive   is solved for */
 hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u) {
     hystgen_inverse_keep(self);
-    if (!self->repeat || u != self->reference) {
+    if (!self->repeated || u != self->reference) {
         const hystgen_real_t level = hystgen_inverse_clamp(u);
         const int64_t output = (int64_t)level * ((int64_t)1 << HYSTGEN_FRACTION);
         self->reference = u;
-        self->repeat = true;
+        self->repeated = true;
         self->bits = level != u ? HYSTGEN_STATUS_INPUT_CLAMPED : 0u;
         const int64_t w = hystgen_solve(&hystgen_model_curve, &self->here, self->corner, output,
                                         self->next, &self->kink);
@@ -59,7 +59,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
     hystgen_copy_place(&self->here, &self->undo);
     self->drive = self->undo_drive;
     self->ascending = self->undo_ascending;
-    self->repeat = false;
+    self->repeated = false;
     self->next = -HYSTGEN_FAR;
     hystgen_move_to_input(&hystgen_model_curve, &self->here, self->corner, &self->kink,
                           hystgen_operator_arrive(self, v));
@@ -77,7 +77,7 @@ static void hystgen_operator_begin(hystgen_operator_t *self, bool reset) {
     hystgen_inverse_keep(self);
     self->reference = 0;
     self->last = hystgen_code(self->here.output, &status);
-    self->repeat = false;
+    self->repeated = false;
     self->next = -HYSTGEN_FAR;
     self->bits = 0;
     self->status = 0;

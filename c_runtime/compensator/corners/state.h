@@ -47,8 +47,8 @@ typedef struct {
     bool stepped;   /* a step has answered */
     bool committed; /* a drive was committed since */
 #endif
-    bool repeat;  /* the last answer still stands for `reference` */
-    bool limited; /* no drive gives it; here rather than on the stack */
+    bool repeated; /* the last answer still stands for `reference` */
+    bool limited;  /* no drive gives it; here rather than on the stack */
 #ifdef HYSTGEN_FIXED
     uint_least8_t bits; /* status of that answer */
 #else
@@ -70,7 +70,7 @@ typedef struct {
     int32_t next;   /* reference, along the present move, short of which steps are usual */
     hystgen_real_t reference; /* of the last step */
     bool usual;               /* in the last step the same plays followed */
-    bool repeat;              /* the last answer still stands for `reference` */
+    bool repeated;            /* the last answer still stands for `reference` */
     uint_least8_t bits;       /* status of that answer */
     unsigned int status;
     hystgen_place_t undo; /* where the plays were before the last step, if not a usual one */

@@ -9,9 +9,6 @@ from hystgen.compensator.chain.parts import AHEAD, BEHIND, BESIDE, PARTS, parts_
 from hystgen.effects.kinds import Constants
 from hystgen.effects.part import ChainPart
 
-KINDS = tuple(kind for part in PARTS for kind in part.kinds)
-"""The kinds of blocks in the catalogue, each with its C in the folder of its effect."""
-
 
 def of(t: ChainTables, parts: Sequence[ChainPart], operator: str = "forward") -> list[Constants]:
     """The blocks of an operator that belong to some parts of the chain."""

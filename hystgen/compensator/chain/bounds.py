@@ -29,7 +29,7 @@ from hystgen.chain.static import StaticModel
 from hystgen.compensator import engines
 from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, ErrorBounds, LoopRoundings, error_bounds, together
 from hystgen.compensator.chain import moving
-from hystgen.compensator.chain.layout import DITHER, DRIVE_BITS, Compiled, ahead_of, crossing, lead
+from hystgen.compensator.chain.layout import Compiled, ahead_of, crossing, lead
 from hystgen.compensator.chain.parts import SENT, Parts
 from hystgen.effects.maps import MapErrors
 from hystgen.effects.part import Gained, Speed
@@ -169,7 +169,7 @@ def _seen(compiled: Compiled) -> float:
 def _kept(compiled: Compiled) -> float:
     """How far the input of the plays can be from its target while the drive stands still. Also how far a drive that
     keeps a lag on its branch can be from the state of that lag, which the model in double precision keeps it at."""
-    return 2.0 * float(compiled.tables.number[DITHER])
+    return 2.0 * float(compiled.tables.number.dither[0])
 
 
 def _slewed(compiled: Compiled, kind: str) -> float:
@@ -194,10 +194,10 @@ def kept_branch(compiled: Compiled) -> float:
     points, so their values there bound all values in between.
     """
     static, t = compiled.static, compiled.tables
-    theta = ahead_of(compiled.ones)[0].row[1] if t.turning else 0.0
+    theta = ahead_of(compiled.ones)[0].second if t.turning else 0.0
     unit = 1.0
     if compiled.codes is not None:
-        unit = float(compiled.codes.drive_lsb) / 2.0 ** float(t.number[DRIVE_BITS])
+        unit = float(compiled.codes.drive_lsb) / 2.0 ** float(t.number.drive_bits[0])
     more = 1.5 * float(t.plays.limits[slots.HOLD]) * unit
     low, high = static.input_range
     drives = [low + (high - low) * i / CELLS for i in range(CELLS + 1)]

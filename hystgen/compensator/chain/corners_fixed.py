@@ -7,9 +7,9 @@ from __future__ import annotations
 from typing import Any
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.chain.layout import ARRIVING_BITS, LARGEST_LEVEL, LEVEL_DROP, ChainTables
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.moving_fixed import asked, level
-from hystgen.compensator.chain.step import OPERATOR, ChainState
+from hystgen.compensator.chain.step import ChainState
 from hystgen.plays.corners import corners_fixed
 from hystgen.plays.corners.corners_fixed import (
     FAR,
@@ -23,7 +23,6 @@ from hystgen.plays.corners.corners_fixed import (
     next_output,
     solve,
 )
-from hystgen.plays.corners.corners_float import INPUT, NEXT, OUTPUT, RISING, SOUGHT
 from hystgen.plays.fixed import FixedPlayTables, divide_by_slope
 from hystgen.plays.slots import Reals
 
@@ -42,14 +41,14 @@ def start(t: ChainTables, s: ChainState, zero: int) -> None:
     corners_fixed.start(t.plays, m, t.plays.zero if zero else t.plays.start)
     for i in range(4):
         s.kink[i] = 0
-    m.real[NEXT] = -FAR
-    m.counts[SOUGHT] = 0
+    m.step.next[0] = -FAR
+    m.step.sought[0] = 0
 
 
 @jit
 def started(t: ChainTables, s: ChainState) -> Any:
     """Sum of the plays."""
-    return level(t, s.corners.real[OUTPUT])
+    return level(t, s.corners.here.output[0])
 
 
 @jit
@@ -57,7 +56,7 @@ def move_on(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: Any) -> bool:
     """Move the plays to an input between the kink and the next one. Returns False if the input lies elsewhere."""
     kink = (kept[0], kept[1], kept[2], kept[3])
     moved = gained(t, m, kink, w)
-    if moved < 0 or kink[0] + moved > m.real[NEXT]:
+    if moved < 0 or kink[0] + moved > m.step.next[0]:
         return False
     go_on(m, kink, w, moved)
     return True
@@ -66,7 +65,7 @@ def move_on(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: Any) -> bool:
 @jit
 def moved(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: Any) -> bool:
     """Move the plays to any input between this kink and the next one, which it finds."""
-    m.real[NEXT] = next_output(t, m, (kept[0], kept[1], kept[2], kept[3]))
+    m.step.next[0] = next_output(t, m, (kept[0], kept[1], kept[2], kept[3]))
     return move_on(t, m, kept, w)
 
 
@@ -74,23 +73,23 @@ def moved(t: FixedPlayTables, m: FixedMemory, kept: Reals, w: Any) -> bool:
 def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
     """Move the plays with their input w. Returns their sum."""
     m = s.corners
-    if s.flags[OPERATOR]:
-        there = m.counts[SOUGHT] != 0 and moved(t.plays, m, s.kink, w)
+    if s.own.inverse[0]:
+        there = m.step.sought[0] != 0 and moved(t.plays, m, s.kink, w)
     else:
-        turns = w < m.real[INPUT] if m.counts[RISING] else w > m.real[INPUT]
+        turns = w < m.here.input[0] if m.here.rising[0] else w > m.here.input[0]
         there = not turns and move_on(t.plays, m, s.kink, w)
     if not there:
         keep(s.kink, find_input(t.plays, m, w))
         moved(t.plays, m, s.kink, w)
-    m.counts[SOUGHT] = 0
-    return level(t, m.real[OUTPUT])
+    m.step.sought[0] = 0
+    return level(t, m.here.output[0])
 
 
 @jit
 def seen(t: ChainTables, m: FixedMemory, kept: Reals, w: Any) -> None:
     """The kink before a solution w that is refined: plays that begin to follow at w do not count."""
     x = along(m, w)
-    if t.number[ARRIVING_BITS] > 0 and x > along(m, m.real[INPUT]):
+    if t.number.arriving_bits[0] > 0 and x > along(m, m.here.input[0]):
         keep(kept, find(t.plays, m, x - 1, False))
 
 
@@ -98,9 +97,9 @@ def seen(t: ChainTables, m: FixedMemory, kept: Reals, w: Any) -> None:
 def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
     """Input of the plays at which their sum is h."""
     m = s.corners
-    w, kink = solve(t.plays, m, asked(t, h), m.real[NEXT])
+    w, kink = solve(t.plays, m, asked(t, h), m.step.next[0])
     keep(s.kink, kink)
-    m.counts[SOUGHT] = 1
+    m.step.sought[0] = 1
     seen(t, m, s.kink, w)
     return w
 
@@ -108,17 +107,17 @@ def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
 @jit
 def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
     """As in engine loop: the signal in front of the plays that gives their sum h, with more bits than their input w."""
-    bits = t.number[ARRIVING_BITS]
+    bits = t.number.arriving_bits[0]
     if bits == 0:
         return a
     m = s.corners
     whole = a << bits
     x = along(m, w)
-    on = x - along(m, m.real[INPUT])
-    if h > t.number[LARGEST_LEVEL] or h < -t.number[LARGEST_LEVEL] or on < 0:
+    on = x - along(m, m.here.input[0])
+    if h > t.number.largest_level[0] or h < -t.number.largest_level[0] or on < 0:
         return whole
     k = s.kink[2] + 1 if on > 0 else 1
-    left = along(m, h << t.number[LEVEL_DROP]) - s.kink[0] - t.plays.slope[k] * (x - s.kink[1])
+    left = along(m, h << t.number.level_drop[0]) - s.kink[0] - t.plays.slope[k] * (x - s.kink[1])
     size = -left if left < 0 else left
     if size > t.plays.slope[k]:
         return whole

@@ -6,27 +6,17 @@ from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import ChainTables
-from hystgen.compensator.chain.step import OPERATOR, ChainState
+from hystgen.compensator.chain.step import ChainState
 from hystgen.plays.corners import corners_float
-from hystgen.plays.corners.corners_float import (
-    HERE,
-    INPUT,
-    OUTPUT,
-    SOUGHT,
-    UNDO,
-    copy_place,
-    forget_line,
-    move_to_output,
-    plays_step,
-)
+from hystgen.plays.corners.corners_float import copy_place, forget_line, move_to_output, plays_step
 
 
 @jit
 def start(t: ChainTables, s: ChainState, zero: int) -> None:
     """Set the plays to the start memory, or all to 0."""
     p = t.plays
-    s.corners.counts[SOUGHT] = 0
-    if s.flags[OPERATOR]:
+    s.corners.step.sought[0] = 0
+    if s.own.inverse[0]:
         corners_float.start(p.inverse, s.corners, p.inverse_zero if zero else p.inverse_first)
     else:
         corners_float.start(p.forward, s.corners, p.forward_zero if zero else p.forward_first)
@@ -35,31 +25,31 @@ def start(t: ChainTables, s: ChainState, zero: int) -> None:
 @jit
 def started(t: ChainTables, s: ChainState) -> Any:  # noqa: ARG001  as in fixed point
     """Sum of the plays."""
-    return s.corners.real[INPUT] if s.flags[OPERATOR] else s.corners.real[OUTPUT]
+    return s.corners.here.input[0] if s.own.inverse[0] else s.corners.here.output[0]
 
 
 @jit
 def follow(t: ChainTables, s: ChainState, w: Any) -> Any:
     """Move the plays with their input w. Returns their sum."""
     m = s.corners
-    if not s.flags[OPERATOR]:
+    if not s.own.inverse[0]:
         return plays_step(t.plays.forward, m, w)
-    if w != m.real[OUTPUT]:
-        if m.counts[SOUGHT]:
-            copy_place(m, HERE, UNDO)
+    if w != m.here.output[0]:
+        if m.step.sought[0]:
+            copy_place(m.here, m.undo)
             forget_line(t.plays.inverse, m)
-        if w != m.real[OUTPUT]:
+        if w != m.here.output[0]:
             move_to_output(t.plays.inverse, m, w)
-    m.counts[SOUGHT] = 0
-    return m.real[INPUT]
+    m.step.sought[0] = 0
+    return m.here.input[0]
 
 
 @jit
 def inverse_input(t: ChainTables, s: ChainState, h: Any) -> Any:
     """Input of the plays at which their sum is h."""
     m = s.corners
-    copy_place(m, UNDO, HERE)
-    m.counts[SOUGHT] = 1
+    copy_place(m.undo, m.here)
+    m.step.sought[0] = 1
     return plays_step(t.plays.inverse, m, h)
 
 

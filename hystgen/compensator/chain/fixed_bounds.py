@@ -27,7 +27,7 @@ from hystgen.arithmetic.factors import error as missed
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.bounds import SECOND_ORDER, UNSLEWED, together
 from hystgen.compensator.chain.bounds import SAME, STILL
-from hystgen.compensator.chain.layout import DITHER, ChainTables, ahead_of, largest_way
+from hystgen.compensator.chain.layout import ChainTables, ahead_of, largest_way
 from hystgen.compensator.chain.moving import (
     Bumps,
     least_dilated,
@@ -191,7 +191,7 @@ class Bounds:
     @property
     def _kept(self) -> float:
         """How far the input of the plays can be from its target while the drive stands still."""
-        return 2.0 * float(self.tables.number[DITHER]) if self.tables.quiet and not self.condition else 0.0
+        return 2.0 * float(self.tables.number.dither[0]) if self.tables.quiet and not self.condition else 0.0
 
     @cached_property
     def _shares(self) -> list[tuple[float, float]]:
@@ -364,7 +364,7 @@ class Bounds:
         for each in reversed(self._ahead):
             code = 0.5 * 2.0**self._fine if each is self._ahead[0] else 0.5
             error = each.led(error, code, bool(self.condition), turning)
-        return error + 2.0 * float(self.tables.number[DITHER]) * turning
+        return error + 2.0 * float(self.tables.number.dither[0]) * turning
 
     def _codes(self, error: float) -> float:
         """The error of the drive in drive codes, for an error in front of the plays in units of signals."""

@@ -26,27 +26,13 @@ from hystgen.chain.chain import Chain
 from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.fixed_bounds import Bend, Bounds, Sizes
 from hystgen.compensator.chain.layout import (
-    ARRIVING_BITS,
-    BRAKED_DROP,
-    DITHER,
-    DRIVE_BITS,
-    FALLING_REST,
-    FARTHEST,
-    LARGEST_LEVEL,
-    LEAST_CODE,
-    LEVEL_BITS,
-    LEVEL_DROP,
-    MOST_CODE,
     MOST_SLEWED,
-    OFFSET,
     REST_BITS,
-    RISING,
-    SHARE,
-    SHARE_BITS,
     VERIFIED_SHARE,
     ChainTables,
     Codes,
     Compiled,
+    FixedChainNumbers,
     OwnChainTables,
     ahead_of,
     braked,
@@ -150,7 +136,7 @@ class _Builder:
             self.parts.counts,
             maps,
             self._need(self._tap, "the preview"),
-            np.array(self._numbers(), dtype=np.int64),
+            self._numbers(),
             int(bool(self.parts.slew)),
             quiet(self.how, self.taps),
             int(self.turning),
@@ -168,7 +154,7 @@ class _Builder:
             self.bumps,
         )
         if static.branches_differ:
-            plays.limits[slots.HOLD] = hold(bounds.hold(), tables.number[DITHER], self.turning)
+            plays.limits[slots.HOLD] = hold(bounds.hold(), tables.number.dither[0], self.turning)
         codes = Codes(
             self.drive_lsb, self.output_lsb, bounds.forward(), bounds.inverse(), bounds.rounding(),
             bounds.condition, math.ceil(self.sizes.largest * 2**self.bits),
@@ -303,25 +289,19 @@ class _Builder:
         """A displacement as a signal."""
         return nearest(Fraction(x) / self.output_lsb * 2**self.bits)
 
-    def _numbers(self) -> list[int]:
+    def _numbers(self) -> FixedChainNumbers:
         span = self.inner.drive[1] - self.inner.drive[0]
-        found = [0] * 17
-        found[OFFSET] = self.signal(self.static.output_offset)
-        found[FARTHEST] = self.signal(self.high - self.low)
-        found[RISING : FALLING_REST + 1] = self.slew(span)
-        found[SHARE] = round(VERIFIED_SHARE * (self.about.code_max + 1))
-        found[LEVEL_BITS], found[LEVEL_DROP] = self.bits, self.drop
-        most = self._farthest + math.ceil(self.bumps.largest)
-        found[LARGEST_LEVEL] = min(self.inner.slope[-1] * most >> self.drop, LARGEST)
-        found[LEAST_CODE] = self.inner.drive[0] - 2 * span
-        found[MOST_CODE] = self.inner.drive[1] + 2 * span
-        found[SHARE_BITS] = 31 - self.about.code_bits
-        found[DRIVE_BITS], found[ARRIVING_BITS] = self.inner.fine + self.finer, self.finer
-        found[DITHER] = (1 << found[DRIVE_BITS]) + math.ceil(lead(self.leading))
+        drive_bits, most = self.inner.fine + self.finer, self._farthest + math.ceil(self.bumps.largest)
+        common = (
+            self.signal(self.static.output_offset), self.signal(self.high - self.low), *self.slew(span),
+            round(VERIFIED_SHARE * (self.about.code_max + 1)), (1 << drive_bits) + math.ceil(lead(self.leading)),
+        )
+        levels = self.bits, self.drop, min(self.inner.slope[-1] * most >> self.drop, LARGEST)
+        codes = self.inner.drive[0] - 2 * span, self.inner.drive[1] + 2 * span, 31 - self.about.code_bits
         led = PARTS[LED].coded().verbs.led
         coarse = led.coarse.bit_length() if led else 0
-        found[BRAKED_DROP] = max((span << found[DRIVE_BITS]).bit_length() + 2 - coarse, 0)
-        return found
+        braked = max((span << drive_bits).bit_length() + 2 - coarse, 0)
+        return FixedChainNumbers.of([(*common, *levels, *codes, drive_bits, self.finer, braked)])
 
     def _largest_step(self) -> float:
         """`Compiled.largest_step`, plus the code that a limited drive catches up at once."""

@@ -17,6 +17,7 @@ from hystgen.compensator.chain import moving
 from hystgen.compensator.chain.layout import (
     MOST_SLEWED,
     VERIFIED_SHARE,
+    ChainNumbers,
     ChainTables,
     Compiled,
     OwnChainTables,
@@ -120,6 +121,7 @@ def build(
     about = FloatSurroundings(
         seconds, static.input_range, span, ahead, braked(parts, ones), reals, float(np.finfo(dtype).eps) / 2
     )
+    number = reals([static.output_offset, span, *slew[::2], *slew[1::2], VERIFIED_SHARE, dither], "offset or rates")
     tables = ChainTables(
         plays,
         plays.limits,
@@ -128,7 +130,7 @@ def build(
         parts.counts,
         _behind(parts, arithmetic),
         reals(taps.weights if taps else [], "weights of the preview"),
-        reals([static.output_offset, span, *slew[::2], *slew[1::2], VERIFIED_SHARE, dither], "offset or rates"),
+        ChainNumbers.of([number], dtype),
         int(bool(parts.slew)),
         quiet(how, taps),
         int(turning),

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hystgen.basics.structures import Int64, Real, Struct, UInt8
 from hystgen.chain.static import StaticModel
 from hystgen.compensator.chain import noise, preview
 from hystgen.compensator.chain.noise import Smoothing
@@ -23,18 +24,33 @@ from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.parameters.schema import MOST_REFERENCES, Compensation
 from hystgen.plays.slots import Counts, Reals
 
-OFFSET, FARTHEST, RISING, FALLING, RISING_REST, FALLING_REST, SHARE, DITHER = range(8)
-"""Places in `ChainTables.number`: output offset, the largest offset that may be set, how far the drive may rise and
-fall in a step, the parts of these two lost to rounding, the share by which verification corrects, and how far a drive
-at rest dithers, as a signal in front of the plays."""
 
-LEVEL_BITS, LEVEL_DROP, LARGEST_LEVEL, LEAST_CODE, MOST_CODE, SHARE_BITS, DRIVE_BITS, ARRIVING_BITS, BRAKED_DROP = (
-    range(8, 17)
-)
-"""Further places in fixed point: bits of a signal behind the plays below an output code, bits that a sum of the plays
-has below such a signal, the largest sum asked of the plays, the least and largest code of a drive before it is limited,
-bits of a mantissa below a code, bits of a signal in front of the plays below a drive code and below their input, and
-bits that such a signal has below the numbers in the search for the lead of a braked lag."""
+class ChainNumbers(Struct):
+    """Numbers of a chain besides those of its plays and blocks."""
+
+    output_offset: Real
+    farthest_offset: Real  # largest that may be set beside it
+    slew_rising: Real  # how far the drive may rise and fall in a step,
+    slew_falling: Real
+    slew_rising_rest: Real  # and what rounding took from these
+    slew_falling_rest: Real
+    share: Real  # by which verification corrects
+    dither: Real  # how far a drive at rest dithers, as a signal in front of the plays
+
+
+class FixedChainNumbers(ChainNumbers):
+    """The same in fixed point."""
+
+    level_bits: UInt8  # of a signal behind the plays below an output code
+    level_drop: UInt8  # that a sum of the plays has below such a signal
+    largest_level: Int64  # sum asked of the plays
+    least_code: Int64  # of a drive before it is limited
+    most_code: Int64
+    share_bits: UInt8  # of a mantissa below a code
+    drive_bits: UInt8  # of a signal in front of the plays below a drive code
+    arriving_bits: UInt8  # of such a signal below an input of the plays
+    braked_drop: UInt8  # that it has below the numbers in the search for the lead of a braked lag
+
 
 TRAVEL_BITS = 16
 """In fixed point, verification sets travels in multiples of 2^16 drive codes."""
@@ -92,7 +108,7 @@ class ChainTables(NamedTuple):
     counts: Counts  # of their blocks
     behind: Any  # `Stages`, or in fixed point `hystgen.effects.maps.MapTables`
     tap: Reals  # (L,), as factors (L, 2) in fixed point; empty without a preview
-    number: Reals
+    number: Any  # `ChainNumbers` or `FixedChainNumbers`
     slew: int  # 1 if the rate of the drive is limited
     quiet: int  # equal references after which the drive stands still, 0 if it never has to
     turning: int  # 1 if a lag must not arrive at two branches from the wrong side

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.chain.layout import LARGEST_LEVEL, LEVEL_DROP, ChainTables
+from hystgen.compensator.chain.layout import ChainTables
 from hystgen.compensator.chain.moving_plays import Kind, operators
 from hystgen.compensator.chain.parts import BENDS, MOVES
 from hystgen.compensator.chain.step import ChainState
@@ -45,18 +45,18 @@ def search(sum_at: Callable[..., Any]) -> Callable[..., Any]:
 @jit
 def level(t: ChainTables, total: Any) -> Any:
     """A sum of the plays, which has bits below a signal's, as a signal."""
-    return nearest(total, t.number[LEVEL_DROP])
+    return nearest(total, t.number.level_drop[0])
 
 
 @jit
 def asked(t: ChainTables, h: Any) -> Any:
     """The sum of the plays that a signal asks for, limited to their range."""
     inside = h
-    if inside > t.number[LARGEST_LEVEL]:
-        inside = t.number[LARGEST_LEVEL]
-    elif inside < -t.number[LARGEST_LEVEL]:
-        inside = -t.number[LARGEST_LEVEL]
-    return inside << t.number[LEVEL_DROP]
+    if inside > t.number.largest_level[0]:
+        inside = t.number.largest_level[0]
+    elif inside < -t.number.largest_level[0]:
+        inside = -t.number.largest_level[0]
+    return inside << t.number.level_drop[0]
 
 
 PLAYS = operators(Kind(level, asked, loop_solve, MOVES.coded(), BENDS.coded(), search))

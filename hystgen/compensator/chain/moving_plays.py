@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from hystgen.basics.jit import jit
 from hystgen.compensator.chain.layout import ChainTables
-from hystgen.compensator.chain.step import MOVING, ChainState
+from hystgen.compensator.chain.step import ChainState
 from hystgen.effects.part import Function
 from hystgen.effects.plays import PLAIN, RELAXING, STRAIGHT, Moves
 from hystgen.plays.loop import State, loop_absorb, loop_output
@@ -98,7 +98,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
     @jit
     def sum_at(t: ChainTables, s: ChainState, w: Any) -> Any:
         """The sum of the plays with their input at w."""
-        if s.flags[MOVING]:
+        if s.own.moving[0]:
             return moved_sum(t.moving, t.plays, s.plays, s.lost, s.bent, w)
         return resting_sum(t.moving, t.plays, s.plays, s.bent, w)
 
@@ -116,11 +116,11 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
             loop_absorb(t.plays, s.plays, w)
             return level(t, loop_output(t.plays, s.plays))
         if m.scanned:
-            if s.flags[MOVING]:
+            if s.own.moving[0]:
                 return level(t, relaxing_follow(m, t.plays, s.plays, w))
             loop_absorb(t.plays, s.plays, w)
             return level(t, loop_output(t.plays, s.plays))
-        if s.flags[MOVING]:
+        if s.own.moving[0]:
             total = moved_follow(m, t.plays, s.plays, s.lost, s.bent, w)
             relax(m, t.plays, s.plays, s.bent)
             return level(t, total)
@@ -142,7 +142,7 @@ def operators(kind: Kind) -> tuple[Function, Function, Function, Function]:
         if m.moves == PLAIN and m.bends == STRAIGHT:
             return solve(t.plays, s.plays, total)
         if m.scanned:
-            if s.flags[MOVING]:
+            if s.own.moving[0]:
                 return relaxing_input(m, t.plays, s.plays, total)
             return solve(t.plays, s.plays, total)
         return searched(t, s, total)

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,8 +33,9 @@ samples, at which a difference of states loses that many digits."""
 
 
 class OwnTables(NamedTuple):
-    """Blocks on one side of the plays. `number` (m,), in fixed point (m, 4): block j's begin at `first[j]` (k + 1); its
-    memory begins at `place[j]` (k + 1); `bits` (k,): bits of its signals below the chain's, in fixed point."""
+    """Blocks on one side of the plays. `number` (m,), in fixed point an `own_fixed.FixedNumber`: block j's begin at
+    `first[j]` (k + 1); its memory begins at `place[j]` (k + 1); `bits` (k,): bits of its signals below the chain's, in
+    fixed point."""
 
     first: Counts
     number: Reals
@@ -366,18 +367,14 @@ def build(every: Sequence[Linear], reals: Any) -> OwnTables:
     )
 
 
-def constants(t: OwnTables, kinds: Sequence[type[Effect]]) -> list[Constants]:
-    """The numbers of each of these effects' blocks."""
+def constants(t: OwnTables, kinds: Sequence[type[Effect]], products: int = 1) -> list[Constants]:
+    """The numbers of each of these effects' blocks; `products`: multiplications in one of theirs."""
     found = []
     for j, effect in enumerate(kinds):
         assert effect.block is not None
-        row = t.number[t.first[j] : t.first[j + 1]]
-        kind, products = own.kind(effect), effect.block.products
-        if row.ndim > 1:  # fixed point: two products each
-            absorb, solve = products
-            found.append(Constants(kind, row.ravel(), (2 * absorb, 2 * solve), bits=int(t.bits[j])))
-        else:
-            found.append(Constants(replace(kind, letters="", memory=""), row, products))
+        numbers = dict(zip(effect.block.table, t.number[t.first[j] : t.first[j + 1]], strict=True))
+        absorb, solve = effect.block.products
+        found.append(Constants(own.kind(effect), numbers, (products * absorb, products * solve), bits=int(t.bits[j])))
     return found
 
 
@@ -405,10 +402,15 @@ def memory(t: OwnTables, dtype: Any) -> Reals:
 
 
 def arithmetic(
-    blocks: Sequence[OwnBlock], effects: Sequence[type[Effect]], made: Glue, *tables: Callable[..., Any]
+    blocks: Sequence[OwnBlock],
+    effects: Sequence[type[Effect]],
+    made: Glue,
+    products: int,
+    tables: Function,
+    formats: Function = lambda one, *_: one,
 ) -> Realized:
-    """Blocks on one side of the plays in series, as one block of the chain; `tables`: its makers of tables and
-    formats."""
+    """Blocks on one side of the plays in series, as one block of the chain; `products`: multiplications in one of
+    theirs; `tables`, `formats`: as in `Realized`."""
 
     def through(verb: str) -> Function:
         calls = [_one(made, block, verb, j) for j, block in enumerate(blocks)]
@@ -417,7 +419,7 @@ def arithmetic(
     verbs = Verbs(memory)
     if blocks:
         verbs = Verbs(memory, through("rest"), through("absorb"), through("resting"), through("solve"))
-    return Realized(verbs, lambda t: constants(t, effects), *tables)
+    return Realized(verbs, lambda t: constants(t, effects, products), tables, formats)
 
 
 def _both(first: Function, behind: Function) -> Function:

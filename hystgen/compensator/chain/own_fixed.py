@@ -16,6 +16,7 @@ import numpy as np
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, error, factor, lifted, times
 from hystgen.basics.jit import jit
+from hystgen.basics.structures import Factor, Struct, UInt8
 from hystgen.compensator.chain import own
 from hystgen.compensator.chain.own import Linear, OwnTables
 from hystgen.effects.base import Effect, Place
@@ -24,17 +25,26 @@ from hystgen.effects.own import Instance
 from hystgen.effects.part import ChainPart, Coded, FixedSurroundings, Setting, Sought, given
 from hystgen.plays.fixed import nearest
 
-MANTISSA, SHIFT, DROP, LIFT = range(4)
+Row = tuple[tuple[int, int], int, int]
+"""The members of a `FixedNumber`."""
+
+
+class FixedNumber(Struct):
+    """A factor of a block of the user's own, and the bits that a product leaves out of its argument and of its
+    result."""
+
+    factor: Factor
+    drop: UInt8
+    lift: UInt8
 
 
 @dataclass(frozen=True)
 class Formats(Coded):
-    """A block in fixed point: `table` (n, 4) of its numbers, each a factor and the bits that a product leaves out of
-    its argument and of its result; `bits` of its signals below the chain's; `output` and `answer`: roundings of the
-    results of absorb and solve, in units of the chain's signals."""
+    """A block in fixed point: `table` of its numbers; `bits` of its signals below the chain's; `output` and `answer`:
+    roundings of the results of absorb and solve, in units of the chain's signals."""
 
     linear: Linear
-    table: list[tuple[int, int, int, int]]
+    table: list[Row]
     bits: int
     output: float
     answer: float
@@ -76,13 +86,13 @@ class _Number:
     """A number of a table, and the largest size of its arguments; `exact`: whether its factor counts as exact."""
 
     value: float
-    row: tuple[int, int, int, int]
+    row: Row
     exact: bool
     seen: float = 0.0
 
     def __mul__(self, x: _Traced) -> _Traced:
         self.seen = max(self.seen, x.size)
-        *_, drop, lift = self.row
+        _, drop, lift = self.row
         scaled = self.value * 2.0 ** (drop - lift)
         wrong = abs(self.value) * (x.error + (2.0**drop if drop else 0.0))
         wrong += 2.0**lift * (0.5 + (0.0 if self.exact else error(scaled) * x.size / 2.0**drop))
@@ -110,11 +120,11 @@ class _Traced:
         return self
 
 
-def _row(value: float, seen: float) -> tuple[int, int, int, int]:
+def _row(value: float, seen: float) -> Row:
     """A number of the table for arguments up to `seen`."""
     drop = max(0, math.ceil(math.log2(max(seen, 1.0))) + 1 - (LARGEST.bit_length() - 1))
     lift = lifted(value * 2.0**drop, 0)
-    return (*factor(value * 2.0 ** (drop - lift)), drop, lift)
+    return factor(value * 2.0 ** (drop - lift)), drop, lift
 
 
 @dataclass(frozen=True)
@@ -126,7 +136,7 @@ class _Trace:
     asked: float
 
     def run(
-        self, rows: Sequence[tuple[int, int, int, int]], bits: int, exact: bool
+        self, rows: Sequence[Row], bits: int, exact: bool
     ) -> tuple[list[float], float, float, float]:
         """The largest argument of each number, the largest size, and the roundings of absorb and of solve, with `bits`
         more bits for signals; `exact`: without the errors of factors, which are proportional to the signals and which
@@ -173,10 +183,9 @@ def formats(linear: Linear, given: float, asked: float, code: int) -> Formats:
 
 def build(rows: Sequence[Formats]) -> OwnTables:
     """The numbers of the blocks on one side of the plays."""
-    table = [number for each in rows for number in each.table]
     return OwnTables(
         np.cumsum([0, *(len(each.table) for each in rows)]).astype(np.int64),
-        np.array(table, dtype=np.int64).reshape(-1, 4),
+        FixedNumber.of([number for each in rows for number in each.table]),
         np.cumsum([0, *(len(each.linear.settled) for each in rows)]).astype(np.int64),
         np.array([each.bits for each in rows], dtype=np.int64),
     )
@@ -188,7 +197,7 @@ def build(rows: Sequence[Formats]) -> OwnTables:
 @jit
 def product(number: Any, x: Any) -> Any:
     """A number of the table times x, rounded to the nearest whole number."""
-    return times(x >> number[DROP], number[MANTISSA], number[SHIFT]) << number[LIFT]
+    return times(x >> number["drop"], number["factor"]["mantissa"], number["factor"]["shift"]) << number["lift"]
 
 
 @jit
@@ -221,7 +230,7 @@ def part(name: str, place: Place, blocks: Sequence[OwnBlock] = (), effects: Sequ
     return ChainPart(
         name, "effects in front of the plays" if ahead else "", place, given(place),
         lambda effect, seconds, _: own.linear(effect, seconds),
-        own.arithmetic(blocks, effects, own.GLUE, lambda every, about: own.build(every, about.reals)),
-        lambda: own.arithmetic(blocks, effects, (product, entered, left), lambda rows, _: build(rows), format_of),
+        own.arithmetic(blocks, effects, own.GLUE, 1, lambda every, about: own.build(every, about.reals)),
+        lambda: own.arithmetic(blocks, effects, (product, entered, left), 2, lambda rows, _: build(rows), format_of),
         joined=True, problems=problems, uneven=Instance, counted=lambda *_: (),
     )

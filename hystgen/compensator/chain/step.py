@@ -13,18 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.compensator.chain.layout import (
-    DITHER,
-    FALLING,
-    FALLING_REST,
-    FARTHEST,
-    OFFSET,
-    RISING,
-    RISING_REST,
-    SHARE,
-    ChainTables,
-    OwnChainTables,
-)
+from hystgen.basics.structures import Flag, Real, Signal, Struct, UInt32
+from hystgen.compensator.chain.layout import ChainTables, OwnChainTables
 from hystgen.compensator.chain.parts import BESIDE, LED, PARTS, parts_with
 from hystgen.compensator.chain.preview import Line, preview_put, preview_repeat
 from hystgen.compensator.chain.sides import Blocks, moves, resetting, sides_of, told
@@ -32,19 +22,7 @@ from hystgen.compensator.layout import clamp_drive, inverse_clamp
 from hystgen.compensator.step import Hooks, Operations, operations_of, plays_of
 from hystgen.effects.kinds import OwnBlock
 from hystgen.plays import loop
-from hystgen.plays.loop import (
-    ANSWER,
-    ASCENDING,
-    BITS,
-    DRIVE,
-    HAS_PENDING,
-    LEVEL,
-    PENDING,
-    STATUS,
-    STEPPED,
-    State,
-    loop_output,
-)
+from hystgen.plays.loop import State, loop_output
 from hystgen.plays.slots import (
     CORNERS,
     DOMAIN,
@@ -67,19 +45,45 @@ from hystgen.plays.slots import (
     Reals,
 )
 
-SET, OUTPUT, APPLIED, REACHED, ARRIVED, REFERENCE, WAY, MOVED, REST = range(9)
-MOVING, OPERATOR, EQUAL, RISES = range(4)
 (CLOCK,) = map(PARTS.index, BESIDE)
 AGED = next(k for k, part in enumerate(PARTS) if "travel" in part.calls)
 
 
+class RampState(Struct):
+    """A drive on its way at a limited rate: as it is sent, and its rounding remainder."""
+
+    drive: Real
+    rest: Real
+
+
+class QuietState(Struct):
+    """A drive that stands still while the reference does."""
+
+    arrived: Signal  # in front of the plays
+    reference: Signal
+    equal: UInt32  # references in a row, up to one more than a drive waits for to stand still
+
+
+class SteadyState(Struct):
+    """A lag in front of two branches."""
+
+    way: Signal  # of what the lag is led to, in this sample,
+    moved: Signal  # and in the one before
+    rises: Flag  # it arrives from below
+
+
+class OwnState(Struct):
+    """What every model with effects keeps besides `StepState`."""
+
+    applied: Real  # drive seen last
+    output: Signal  # what the output side made of the sum of the plays
+    offset: Signal  # set beside that of the model
+    moving: Flag  # a drive was applied
+    inverse: Flag  # whether it is the inverse operator
+
+
 class ChainState(NamedTuple):
-    """One instance. `real`: the offset set from outside, the last result of the output side, the last applied drive,
-    the slew-limited drive, for a quiet drive the signal that arrived in front of the plays and the last reference, in
-    front of two branches the last moves of a led lag's goal, and the rounding remainder of the slew-limited drive;
-    `flags`: whether a drive has been applied, 1 for the inverse operator, the number of equal references, and whether a
-    lag arrives at two branches from below; `corners`: the plays of engine corners, or `()` in engine loop, which has
-    them in `plays`."""
+    """One instance. `corners`: the plays of engine corners, or `()` in engine loop, which has them in `plays`."""
 
     plays: State
     lost: Reals  # (n + 1,), rounding remainder of each play that a nonlinear dashpot moves
@@ -87,8 +91,10 @@ class ChainState(NamedTuple):
     blocks: tuple[Any, ...]  # memory of each of `parts.PARTS`
     counts: Counts  # of their blocks in this operator
     line: Line
-    real: Reals
-    flags: Counts
+    own: OwnState
+    reached: RampState
+    quiet: QuietState
+    steady: SteadyState
     corners: Any
     kink: Reals  # (4,), in fixed point: the kink of the solution found by engine corners
 
@@ -107,8 +113,10 @@ def new_state(t: ChainTables, inverse: bool) -> ChainState:
         tuple(each.memory(tables, dtype) for each, tables in zip(verbs, t.blocks, strict=True)),
         np.where([inverse and part.forward for part in parts], 0, t.counts),
         Line(np.zeros(len(t.tap), dtype), np.zeros(1, np.int64)),
-        np.zeros(9, dtype),
-        np.array([0, int(inverse), 0, 1], np.int64),
+        OwnState.of([(0, 0, 0, 0, inverse)], dtype),
+        RampState.zeros(1, dtype),
+        QuietState.zeros(1, dtype),
+        SteadyState.of([(0, 0, 1)], dtype),
         t.plays.new_corners() if corners else (),
         np.zeros(4 * corners, dtype),
     )
@@ -158,7 +166,7 @@ def made_of(
     @jit(inline=True)
     def displacement(t: ChainTables, s: ChainState, y: Any) -> Any:
         """The displacement: the result of the output side after saturation, plus the offsets."""
-        offset = t.number[OFFSET] + s.real[SET]
+        offset = t.number.output_offset[0] + s.own.offset[0]
         for j in range(s.counts[CLOCK]):
             offset = offset + clock_added(t.blocks[CLOCK], s.blocks[CLOCK], j)
         return bent(t.behind, y) + offset
@@ -166,9 +174,9 @@ def made_of(
     @jit(inline=True)
     def undisplaced(t: ChainTables, s: ChainState, u: Any) -> tuple[Any, int]:
         """The result that the output side has to give for the displacement u, and whether there is none."""
-        offset = t.number[OFFSET] + s.real[SET]
+        offset = t.number.output_offset[0] + s.own.offset[0]
         for j in range(s.counts[CLOCK]):
-            filled, moving = s.line.filled[0], s.flags[MOVING]
+            filled, moving = s.line.filled[0], s.own.moving[0]
             offset = offset + clock_ahead(t.blocks[CLOCK], s.blocks[CLOCK], j, filled, moving)
         y, limited = unbent(t.behind, u - offset)
         return y, limited
@@ -176,15 +184,15 @@ def made_of(
     @jit
     def settings_reset(t: ChainTables, s: ChainState) -> None:
         """Reset offset and gains to their values in the parameter file."""
-        s.real[SET] = t.limits[ZERO]
-        s.real[REACHED] = t.limits[ZERO]
-        s.real[REST] = t.limits[ZERO]
+        s.own.offset[0] = t.limits[ZERO]
+        s.reached.drive[0] = t.limits[ZERO]
+        s.reached.rest[0] = t.limits[ZERO]
         blocks_reset(t, s)
 
     @jit
     def travelled(t: ChainTables, s: ChainState, v: Any) -> None:
         """Move the drive from where it was to v, in one sample."""
-        blocks_move(t, s, s.real[APPLIED], v)
+        blocks_move(t, s, s.own.applied[0], v)
 
     # ---------------------------------------------------------------- chain_turn.c, chain_turn_late.c
 
@@ -205,7 +213,7 @@ def made_of(
         turns only for more than rounding."""
         if not t.plays.branches:
             return inverse_drive(t.plays, s.plays, h, w)
-        up, drive = s.plays.counts[ASCENDING], s.plays.real[DRIVE]
+        up, drive = s.plays.step.ascending[0], s.plays.step.drive[0]
         v, limited = front_inverse(t.plays, w, up)
         inside = clamp_drive(t.plays, v)
         back = drive - inside if up else inside - drive
@@ -216,7 +224,7 @@ def made_of(
             if not (fits and turns(t, back, other - inside)):
                 v = drive
         if limited:
-            s.plays.counts[BITS] |= DOMAIN
+            s.plays.step.bits[0] |= DOMAIN
         return v
 
     # ---------------------------------------------------------------- lag_steady.c, lag_steady_fixed.c
@@ -224,63 +232,63 @@ def made_of(
     @jit
     def steady_rest(t: ChainTables, s: ChainState) -> None:
         """Settle everything."""
-        s.real[WAY] = t.limits[ZERO]
-        s.real[MOVED] = t.limits[ZERO]
-        s.flags[RISES] = 1
+        s.steady.way[0] = t.limits[ZERO]
+        s.steady.moved[0] = t.limits[ZERO]
+        s.steady.rises[0] = 1
 
     @jit
     def steady_drive(t: ChainTables, s: ChainState, a: Any) -> Any:
         """The drive that leads to a in front of two branches, through a lag arriving from the side of its branch."""
-        s.flags[RISES] = s.plays.counts[ASCENDING]
-        if a > s.plays.real[DRIVE]:
-            s.flags[RISES] = 1
-        elif a < s.plays.real[DRIVE]:
-            s.flags[RISES] = 0
-        last = drive_signal(t, s.real[APPLIED])
-        moved, rises = s.real[MOVED], s.flags[RISES]
-        v, s.real[WAY] = led_solve(t.blocks[LED], s.blocks[LED], a, moved, rises, last, t.number[DITHER])
+        s.steady.rises[0] = s.plays.step.ascending[0]
+        if a > s.plays.step.drive[0]:
+            s.steady.rises[0] = 1
+        elif a < s.plays.step.drive[0]:
+            s.steady.rises[0] = 0
+        last = drive_signal(t, s.own.applied[0])
+        moved, rises = s.steady.moved[0], s.steady.rises[0]
+        v, s.steady.way[0] = led_solve(t.blocks[LED], s.blocks[LED], a, moved, rises, last, t.number.dither[0])
         return v
 
     @jit
     def steady_hold(t: ChainTables, s: ChainState, v: Any) -> Any:
         """The drive v, or one that keeps the lag on its branch."""
-        last = drive_signal(t, s.real[APPLIED])
-        return led_kept(t.blocks[LED], s.blocks[LED], v, s.flags[RISES], last, t.number[DITHER])
+        last = drive_signal(t, s.own.applied[0])
+        return led_kept(t.blocks[LED], s.blocks[LED], v, s.steady.rises[0], last, t.number.dither[0])
 
     # ---------------------------------------------------------------- quiet.c
 
     @jit
     def quiet_rest(t: ChainTables, s: ChainState, a: Any) -> None:
         """Settle everything with a in front of the plays."""
-        s.real[ARRIVED] = a
-        s.real[REFERENCE] = t.limits[ZERO]
-        s.flags[EQUAL] = 0
+        s.quiet.arrived[0] = a
+        s.quiet.reference[0] = t.limits[ZERO]
+        s.quiet.equal[0] = 0
 
     @jit
     def quiet_count(t: ChainTables, s: ChainState, u: Any) -> None:
         """Count references equal to the next one, u."""
-        if u != s.real[REFERENCE]:
-            s.real[REFERENCE] = u
-            s.flags[EQUAL] = 0
-        if s.flags[EQUAL] <= t.quiet:
-            s.flags[EQUAL] += 1
+        if u != s.quiet.reference[0]:
+            s.quiet.reference[0] = u
+            s.quiet.equal[0] = 0
+        if s.quiet.equal[0] <= t.quiet:
+            s.quiet.equal[0] += 1
 
     @jit
     def quiet_drive(t: ChainTables, s: ChainState, a: Any, v: Any) -> Any:
         """The drive for a in front of the plays: v, which leads there, or one that stands still."""
-        most = t.number[DITHER]
+        most = t.number.dither[0]
         away = v - a
-        if s.flags[EQUAL] > t.quiet:
+        if s.quiet.equal[0] > t.quiet:
             most = most + most
-            away = a - s.real[ARRIVED]
+            away = a - s.quiet.arrived[0]
         if away > most or away < -most:
-            s.flags[EQUAL] = 0
-        if s.flags[EQUAL] < t.quiet:
+            s.quiet.equal[0] = 0
+        if s.quiet.equal[0] < t.quiet:
             return v
-        if s.flags[EQUAL] == t.quiet:
+        if s.quiet.equal[0] == t.quiet:
             return a
-        last = drive_signal(t, s.real[APPLIED])
-        if a - last > t.number[DITHER] or last - a > t.number[DITHER]:
+        last = drive_signal(t, s.own.applied[0])
+        if a - last > t.number.dither[0] or last - a > t.number.dither[0]:
             return a
         return last
 
@@ -289,51 +297,51 @@ def made_of(
     @jit
     def expected(t: ChainTables, s: ChainState) -> Any:
         """The displacement that the model expects from the last absorbed drive."""
-        code, _ = output_code(t, displacement(t, s, s.real[OUTPUT]))
+        code, _ = output_code(t, displacement(t, s, s.own.output[0]))
         return code
 
     @jit
     def begin(t: ChainTables, s: ChainState) -> None:
         """Bring everything to rest at the start memory, once the plays are set; shared by init and reset."""
         s.line.filled[0] = 0
-        s.flags[MOVING] = 0
-        drive = s.plays.real[DRIVE]
-        s.plays.real[DRIVE] = arriving(t, drive_signal(t, drive))
-        s.real[APPLIED] = drive
+        s.own.moving[0] = 0
+        drive = s.plays.step.drive[0]
+        s.plays.step.drive[0] = arriving(t, drive_signal(t, drive))
+        s.own.applied[0] = drive
         a = drive_side_rest(t, s, drive_signal(t, drive))
         if t.turning:
             steady_rest(t, s)
         if t.quiet:
             quiet_rest(t, s, a)
-        s.plays.real[LEVEL] = started(t, s)
-        s.real[OUTPUT] = output_side_rest(t, s, s.plays.real[LEVEL])
+        s.plays.step.level[0] = started(t, s)
+        s.own.output[0] = output_side_rest(t, s, s.plays.step.level[0])
 
     @jit
     def absorb(t: ChainTables, s: ChainState, v: Any, reached: Any) -> None:
         """Absorb drive v, which is `reached` behind its delay and slew limit; the first drive finds everything at
         rest."""
-        moving = s.flags[MOVING] != 0
+        moving = s.own.moving[0] != 0
         if moving:
             travelled(t, s, v)
         x = drive_signal(t, reached)
-        steady = t.turning and s.flags[OPERATOR]
+        steady = t.turning and s.own.inverse[0]
         before = led_state(s.blocks[LED]) if steady else t.limits[ZERO]
         a = drive_side_absorb(t, s, x) if moving else drive_side_rest(t, s, x)
         if steady and moving:
             led_absorb(s.blocks[LED], before)
-            s.real[MOVED] = s.real[WAY]
-            s.real[WAY] = t.limits[ZERO]
+            s.steady.moved[0] = s.steady.way[0]
+            s.steady.way[0] = t.limits[ZERO]
         elif steady:
             steady_rest(t, s)
         if t.quiet:
-            s.real[ARRIVED] = a
+            s.quiet.arrived[0] = a
             if not moving:
                 quiet_rest(t, s, a)
         h = follow(t, s, arrive(t.plays, s.plays, arriving(t, a)))
-        s.plays.real[LEVEL] = h
-        s.real[OUTPUT] = output_side_absorb(t, s, h) if moving else output_side_rest(t, s, h)
-        s.real[APPLIED] = v
-        s.flags[MOVING] = 1
+        s.plays.step.level[0] = h
+        s.own.output[0] = output_side_absorb(t, s, h) if moving else output_side_rest(t, s, h)
+        s.own.applied[0] = v
+        s.own.moving[0] = 1
 
     # ---------------------------------------------------------------- chain_slew.c
 
@@ -342,10 +350,10 @@ def made_of(
         """The drive nearest to v that the amplifier reaches in one step from `before` with rounding remainder `rest`,
         and its own remainder."""
         if v > before or (v == before and rest < 0):
-            drive, left = ramp(before, rest, t.number[RISING], t.number[RISING_REST])
+            drive, left = ramp(before, rest, t.number.slew_rising[0], t.number.slew_rising_rest[0])
             beyond = v > drive or (v == drive and left < 0)
         else:
-            drive, left = ramp(before, rest, -t.number[FALLING], -t.number[FALLING_REST])
+            drive, left = ramp(before, rest, -t.number.slew_falling[0], -t.number.slew_falling_rest[0])
             beyond = v < drive or (v == drive and left > 0)
         return (drive, left) if beyond else (v, t.limits[ZERO])
 
@@ -355,58 +363,53 @@ def made_of(
         if not t.slew:
             return v
         drive, rest = v, t.limits[ZERO]
-        if s.flags[MOVING]:
-            drive, rest = nearest_ramp(t, s.real[REACHED], s.real[REST], v)
-        s.real[REACHED], s.real[REST] = drive, rest
+        if s.own.moving[0]:
+            drive, rest = nearest_ramp(t, s.reached.drive[0], s.reached.rest[0], v)
+        s.reached.drive[0], s.reached.rest[0] = drive, rest
         return drive
 
     @jit
     def inverse_within(t: ChainTables, s: ChainState, v: Any) -> tuple[Any, Any]:
         """The drive nearest to v that the amplifier reaches in one step from the last applied drive, and its rounding
         remainder; the last drive keeps its own remainder if it was the answer."""
-        rest = s.real[REST] if s.real[APPLIED] == s.real[REACHED] else t.limits[ZERO]
-        return nearest_ramp(t, s.real[APPLIED], rest, v)
+        rest = s.reached.rest[0] if s.own.applied[0] == s.reached.drive[0] else t.limits[ZERO]
+        return nearest_ramp(t, s.own.applied[0], rest, v)
 
     @jit
     def inverse_held(t: ChainTables, s: ChainState) -> Any:
         """The last answer again, or the drive nearest to it that the amplifier reaches in one step."""
-        last = s.plays.real[ANSWER] if s.plays.counts[STEPPED] else s.real[APPLIED]
-        if not t.slew or not s.flags[MOVING]:
+        last = s.plays.step.answer[0] if s.plays.step.stepped[0] else s.own.applied[0]
+        if not t.slew or not s.own.moving[0]:
             return last
-        s.real[REACHED], s.real[REST] = inverse_within(t, s, last)
-        if s.real[REACHED] != last:
-            s.plays.counts[STATUS] |= SLEW_LIMITED
-        return s.real[REACHED]
+        s.reached.drive[0], s.reached.rest[0] = inverse_within(t, s, last)
+        if s.reached.drive[0] != last:
+            s.plays.step.status[0] |= SLEW_LIMITED
+        return s.reached.drive[0]
 
     # ---------------------------------------------------------------- chain_unbraked.c or one of chain_braked*.c
 
     @jit
     def inverse_slewed(t: ChainTables, s: ChainState, v: Any) -> Any:
         """The drive in reach nearest to v, or the one from which a lag does not overshoot."""
-        if not t.slew or not s.flags[MOVING]:
+        if not t.slew or not s.own.moving[0]:
             return v
         near, rest = inverse_within(t, s, v)
-        if t.blocks[LED].braked and not (t.quiet and s.flags[EQUAL] >= t.quiet):
+        if t.blocks[LED].braked and not (t.quiet and s.quiet.equal[0] >= t.quiet):
             drive = braked(t, s, v, near)
             if t.turning:
                 drive = drive_code(t, steady_hold(t, s, drive_signal(t, drive)))
             near, rest = inverse_within(t, s, drive)
-        s.real[REACHED], s.real[REST] = near, rest
+        s.reached.drive[0], s.reached.rest[0] = near, rest
         return near
 
     @jit
     def forward_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
         """Absorb drive v: it passes the delay, and the amplifier follows."""
-        late = sent_absorb(t, s, v) if s.flags[MOVING] else sent_rest(t, s, v)
+        late = sent_absorb(t, s, v) if s.own.moving[0] else sent_rest(t, s, v)
         reached = forward_slewed(t, s, late)
         if reached != late:
-            s.plays.counts[STATUS] |= SLEW_LIMITED
+            s.plays.step.status[0] |= SLEW_LIMITED
         absorb(t, s, v, reached)
-
-    @jit(inline=True)
-    def inverse_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
-        """Absorb drive v."""
-        absorb(t, s, v, v)
 
     @jit(inline=True)
     def plays_in(s: ChainState) -> State:
@@ -416,7 +419,7 @@ def made_of(
     @jit(inline=True)
     def shown(t: ChainTables, s: ChainState) -> tuple[Any, int]:
         """The present displacement, and its status."""
-        return output_code(t, displacement(t, s, s.real[OUTPUT]))  # type: ignore[no-any-return]
+        return output_code(t, displacement(t, s, s.own.output[0]))  # type: ignore[no-any-return]
 
     @jit
     def inverse_put(t: ChainTables, s: ChainState, level: Any) -> Any:
@@ -426,7 +429,7 @@ def made_of(
             quiet_count(t, s, level_signal(t, level))
         wanted, limited = undisplaced(t, s, level_signal(t, level))
         if limited:
-            s.plays.counts[STATUS] |= DOMAIN
+            s.plays.step.status[0] |= DOMAIN
         if len(t.tap) == 0:
             return wanted
         for j in range(s.counts[CLOCK]):
@@ -438,12 +441,12 @@ def made_of(
     def inverse_push(t: ChainTables, s: ChainState, u: Any) -> None:
         """Take the next reference of the preview without answering it."""
         if not finite(t, u):
-            s.plays.counts[STATUS] |= HELD
+            s.plays.step.status[0] |= HELD
             unread(t, s)
             return
         level = inverse_clamp(t, u)
         if level != u:
-            s.plays.counts[STATUS] |= INPUT_CLAMPED
+            s.plays.step.status[0] |= INPUT_CLAMPED
         inverse_put(t, s, level)
 
     @jit(inline=True)
@@ -460,9 +463,9 @@ def made_of(
     def inverse_sought(t: ChainTables, s: ChainState, level: Any) -> Any:
         """The drive for the limited reference `level`, within reach of a slew limit."""
         y = inverse_put(t, s, level)
-        moving = s.flags[MOVING] != 0
+        moving = s.own.moving[0] != 0
         h = output_side_solve(t, s, y) if moving else output_side_resting(t, s, y)
-        s.plays.counts[BITS] = 0
+        s.plays.step.bits[0] = 0
         w = inverse_input(t, s, h)
         a = finer(t, s, h, w, branch_drive(t, s, h, w))
         v = a
@@ -473,23 +476,23 @@ def made_of(
         v = drive_code(t, v)
         reached = inverse_slewed(t, s, v)
         if reached != v:
-            s.plays.counts[BITS] |= SLEW_LIMITED
+            s.plays.step.bits[0] |= SLEW_LIMITED
         return reached
 
     @jit
     def put_offset(t: ChainTables, s: ChainState, d: Any) -> None:
         """Set the offset of the displacement, within its limits."""
         if not finite(t, d):
-            s.plays.counts[STATUS] |= HELD
+            s.plays.step.status[0] |= HELD
             return
         inside = d
-        if inside > t.number[FARTHEST]:
-            inside = t.number[FARTHEST]
-        elif inside < -t.number[FARTHEST]:
-            inside = -t.number[FARTHEST]
+        if inside > t.number.farthest_offset[0]:
+            inside = t.number.farthest_offset[0]
+        elif inside < -t.number.farthest_offset[0]:
+            inside = -t.number.farthest_offset[0]
         if inside != d:
-            s.plays.counts[STATUS] |= LIMITED_SETTING
-        s.real[SET] = inside
+            s.plays.step.status[0] |= LIMITED_SETTING
+        s.own.offset[0] = inside
 
     @jit
     def set_offset(t: ChainTables, s: ChainState, d: Any) -> None:
@@ -502,56 +505,56 @@ def made_of(
     @jit
     def correct(t: ChainTables, s: ChainState, measured: Any, share: Any) -> None:
         """Trim the offset by a share of the difference between measured and expected displacement."""
-        more = shared(t, share, level_signal(t, measured) - displacement(t, s, s.real[OUTPUT]))
-        put_offset(t, s, s.real[SET] + more)
+        more = shared(t, share, level_signal(t, measured) - displacement(t, s, s.own.output[0]))
+        put_offset(t, s, s.own.offset[0] + more)
 
     @jit
     def set_temperature(t: ChainTables, s: ChainState, degrees: Any) -> None:
         """Set the temperature."""
         if not finite(t, degrees):
-            s.plays.counts[STATUS] |= HELD
+            s.plays.step.status[0] |= HELD
         elif temperature_set(t, s, degrees):
-            s.plays.counts[STATUS] |= LIMITED_SETTING
+            s.plays.step.status[0] |= LIMITED_SETTING
 
     @jit
     def set_gain(t: ChainTables, s: ChainState, gain: Any) -> None:
         """Set a gain that replaces the one that follows the travel."""
         if not finite(t, gain):
-            s.plays.counts[STATUS] |= HELD
+            s.plays.step.status[0] |= HELD
         elif gain_set(t, s, gain):
-            s.plays.counts[STATUS] |= LIMITED_SETTING
+            s.plays.step.status[0] |= LIMITED_SETTING
 
     @jit
     def set_travel(t: ChainTables, s: ChainState, travel: Any) -> None:
         """Set the distance travelled."""
         if not finite(t, travel):
-            s.plays.counts[STATUS] |= HELD
+            s.plays.step.status[0] |= HELD
         elif travel_set(t, s, travel):
-            s.plays.counts[STATUS] |= LIMITED_SETTING
+            s.plays.step.status[0] |= LIMITED_SETTING
 
     @jit
     def init(t: ChainTables, s: ChainState) -> None:
         """Set the start memory of the parameter file, and its settings."""
         settings_reset(t, s)
-        plays_init(t.plays, s.plays, s.flags[OPERATOR])
+        plays_init(t.plays, s.plays, s.own.inverse[0])
         start(t, s, 0)
         begin(t, s)
-        if not s.flags[OPERATOR]:
-            s.plays.real[ANSWER] = expected(t, s)
+        if not s.own.inverse[0]:
+            s.plays.step.answer[0] = expected(t, s)
 
     @jit
     def reset(t: ChainTables, s: ChainState) -> None:
         """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
-        plays_reset(t.plays, s.plays, s.flags[OPERATOR])
+        plays_reset(t.plays, s.plays, s.own.inverse[0])
         start(t, s, 1)
         begin(t, s)
-        if not s.flags[OPERATOR]:
-            s.plays.real[ANSWER] = expected(t, s)
+        if not s.own.inverse[0]:
+            s.plays.step.answer[0] = expected(t, s)
 
     @jit
     def seen(t: ChainTables, s: ChainState, v: Any) -> None:
         """Absorb drive v in either operator."""
-        if s.flags[OPERATOR]:
+        if s.own.inverse[0]:
             absorb(t, s, v, v)
         else:
             forward_absorb(t, s, v)
@@ -560,14 +563,14 @@ def made_of(
     def settle(t: ChainTables, s: ChainState, v: Any) -> None:
         """Bring everything to rest at drive v; the plays move there as in any step."""
         if not finite(t, v):
-            s.plays.counts[STATUS] |= HELD
+            s.plays.step.status[0] |= HELD
             return
         inside = clamp_drive(t, v) + t.limits[ZERO]  # no drive is -0
         if inside != v:
-            s.plays.counts[STATUS] |= INPUT_CLAMPED
-        if s.flags[MOVING]:
+            s.plays.step.status[0] |= INPUT_CLAMPED
+        if s.own.moving[0]:
             travelled(t, s, inside)
-        s.flags[MOVING] = 0
+        s.own.moving[0] = 0
         seen(t, s, inside)
 
     @jit
@@ -576,9 +579,9 @@ def made_of(
         if call == OP_PUSH:
             inverse_push(t, s, x)
         elif call == OP_SETTLE:
-            if s.plays.counts[HAS_PENDING]:
-                absorb(t, s, s.plays.real[PENDING], s.plays.real[PENDING])
-                s.plays.counts[HAS_PENDING] = 0
+            if s.plays.step.has_pending[0]:
+                absorb(t, s, s.plays.step.pending[0], s.plays.step.pending[0])
+                s.plays.step.has_pending[0] = 0
             settle(t, s, x)
         elif call == OP_OFFSET:
             set_offset(t, s, level_signal(t, x))
@@ -591,12 +594,10 @@ def made_of(
         elif call == OP_TRAVELLED:
             return travelled_by(s.blocks[AGED], 0)
         elif call == OP_CORRECT:
-            correct(t, s, x, t.number[SHARE])
+            correct(t, s, x, t.number.share[0])
         elif call == OP_EXPECTED:
             return expected(t, s)
         return t.limits[ZERO]
 
-    hooks = Hooks(
-        plays_in, finite, forward_absorb, inverse_absorb, shown, unread, inverse_held, stands, inverse_sought, other
-    )
+    hooks = Hooks(plays_in, finite, seen, shown, unread, inverse_held, stands, inverse_sought, other)
     return operations_of(False, init, reset, seen, hooks), operations_of(True, init, reset, seen, hooks)

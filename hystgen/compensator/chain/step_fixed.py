@@ -11,22 +11,7 @@ from hystgen.arithmetic.factors import times
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_fixed
 from hystgen.compensator.chain import corners_fixed, moving_fixed
-from hystgen.compensator.chain.layout import (
-    ARRIVING_BITS,
-    BRAKED_DROP,
-    DRIVE_BITS,
-    FALLING,
-    LARGEST_LEVEL,
-    LEAST_CODE,
-    LEVEL_BITS,
-    LEVEL_DROP,
-    MOST_CODE,
-    REST_BITS,
-    RISING,
-    SHARE_BITS,
-    TRAVEL_BITS,
-    ChainTables,
-)
+from hystgen.compensator.chain.layout import REST_BITS, TRAVEL_BITS, ChainTables
 from hystgen.compensator.chain.parts import LED, PARTS
 from hystgen.compensator.chain.preview import Line
 from hystgen.compensator.chain.sides import Blocks
@@ -61,13 +46,13 @@ def front_inverse(t: FixedTables, w: Any, ascending: int) -> tuple[Any, int]:
 def finer(t: ChainTables, s: ChainState, h: Any, w: Any, a: Any) -> Any:
     """The signal in front of the plays at which their sum is h, with more bits than their input w: the remainder of h
     at w is divided by the slope."""
-    bits = t.number[ARRIVING_BITS]
+    bits = t.number.arriving_bits[0]
     if bits == 0:
         return a
     whole = a << bits
-    if h > t.number[LARGEST_LEVEL] or h < -t.number[LARGEST_LEVEL]:
+    if h > t.number.largest_level[0] or h < -t.number.largest_level[0]:
         return whole
-    left = h << t.number[LEVEL_DROP]
+    left = h << t.number.level_drop[0]
     k = 1
     for i in range(len(s.plays.play)):
         low = w - t.plays.threshold[i]
@@ -106,36 +91,36 @@ def preview_target(tap: Reals, line: Line) -> Any:
 @jit
 def drive_signal(t: ChainTables, v: Any) -> Any:
     """A drive code as a signal."""
-    return v << t.number[DRIVE_BITS]
+    return v << t.number.drive_bits[0]
 
 
 @jit
 def arriving(t: ChainTables, a: Any) -> Any:
     """A signal in front of the plays in units of their input."""
-    return nearest(a, t.number[ARRIVING_BITS])
+    return nearest(a, t.number.arriving_bits[0])
 
 
 @jit
 def level_signal(t: ChainTables, u: Any) -> Any:
     """An output code as a signal."""
-    return u << t.number[LEVEL_BITS]
+    return u << t.number.level_bits[0]
 
 
 @jit
 def drive_code(t: ChainTables, x: Any) -> Any:
     """The drive code of a signal, limited to two spans beyond the range."""
-    code = nearest(x, t.number[DRIVE_BITS])
-    if code > t.number[MOST_CODE]:
-        return t.number[MOST_CODE]
-    if code < t.number[LEAST_CODE]:
-        return t.number[LEAST_CODE]
+    code = nearest(x, t.number.drive_bits[0])
+    if code > t.number.most_code[0]:
+        return t.number.most_code[0]
+    if code < t.number.least_code[0]:
+        return t.number.least_code[0]
     return code
 
 
 @jit
 def output_code(t: ChainTables, y: Any) -> tuple[Any, int]:
     """The output code of a signal, limited to the type, and its status."""
-    code = nearest(y, t.number[LEVEL_BITS])
+    code = nearest(y, t.number.level_bits[0])
     if code > t.limits[CODE_MAX]:
         return t.limits[CODE_MAX], OUTPUT_CLAMPED
     if code < -t.limits[CODE_MAX]:
@@ -152,7 +137,7 @@ def entered_travel(t: ChainTables, x: Any) -> Any:  # noqa: ARG001  as in floati
 @jit
 def shared(t: ChainTables, share: Any, x: Any) -> Any:
     """A share of a signal. The share is a code; the largest code stands for almost 1."""
-    return times(x, share << t.number[SHARE_BITS], 31)
+    return times(x, share << t.number.share_bits[0], 31)
 
 
 # ---------------------------------------------------------------- chain_braked.c
@@ -165,11 +150,11 @@ led_braked = led.braked
 @jit
 def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
     """The drive from which the lag does not overshoot, if `near` is in reach instead of v."""
-    bits = t.number[DRIVE_BITS]
+    bits = t.number.drive_bits[0]
     beyond = v - near if v > near else near - v
+    falling, rising = t.number.slew_falling[0] << bits, t.number.slew_rising[0] << bits
     drive = led_braked(
-        t.blocks[LED], s.blocks[LED], near << bits, beyond << bits, t.number[FALLING] << bits, t.number[RISING] << bits,
-        1 << bits, t.number[BRAKED_DROP],
+        t.blocks[LED], s.blocks[LED], near << bits, beyond << bits, falling, rising, 1 << bits, t.number.braked_drop[0]
     )
     return drive_code(t, drive)
 

@@ -7,7 +7,7 @@ from typing import Any
 from hystgen.basics.jit import jit
 from hystgen.compensator import step_float
 from hystgen.compensator.chain import corners_float, moving_float
-from hystgen.compensator.chain.layout import FALLING, RISING, ChainTables, Stages
+from hystgen.compensator.chain.layout import ChainTables, Stages
 from hystgen.compensator.chain.parts import LED, PARTS
 from hystgen.compensator.chain.preview import preview_target
 from hystgen.compensator.chain.sides import Blocks
@@ -64,7 +64,8 @@ led_braked, HALVES = led.braked, led.halves
 def braked(t: ChainTables, s: ChainState, v: Any, near: Any) -> Any:
     """The drive from which the lag does not overshoot, if `near` is in reach instead of v."""
     beyond = v - near if v > near else near - v
-    return led_braked(t.blocks[LED], s.blocks[LED], near, beyond, t.number[FALLING], t.number[RISING], HALVES)
+    falling, rising = t.number.slew_falling[0], t.number.slew_rising[0]
+    return led_braked(t.blocks[LED], s.blocks[LED], near, beyond, falling, rising, HALVES)
 
 
 # ---------------------------------------------------------------- slew_float.c

@@ -7,7 +7,7 @@ from typing import Any
 from hystgen.basics.jit import jit
 from hystgen.compensator.layout import Tables
 from hystgen.compensator.step import corners_of
-from hystgen.plays.corners.corners_float import OUTPUT, STATUS, Memory, Start, plays_step, start
+from hystgen.plays.corners.corners_float import Memory, Start, plays_step, start
 from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, HELD, INPUT_CLAMPED, OFFSET, REAL_MAX
 
 
@@ -16,10 +16,10 @@ def forward_step(t: Tables, m: Memory, v: Any) -> Any:
     """Answer one sample."""
     if not (t.limits[DRIVE_MIN] <= v <= t.limits[DRIVE_MAX]):
         if not (-t.limits[REAL_MAX] <= v <= t.limits[REAL_MAX]):
-            m.counts[STATUS] |= HELD
-            return m.real[OUTPUT] + t.limits[OFFSET]
+            m.step.status[0] |= HELD
+            return m.here.output[0] + t.limits[OFFSET]
         v = t.limits[DRIVE_MIN] if v < t.limits[DRIVE_MIN] else t.limits[DRIVE_MAX]
-        m.counts[STATUS] |= INPUT_CLAMPED
+        m.step.status[0] |= INPUT_CLAMPED
     return plays_step(t.forward, m, v) + t.limits[OFFSET]
 
 
@@ -27,7 +27,7 @@ def forward_step(t: Tables, m: Memory, v: Any) -> Any:
 def forward_begin(t: Tables, m: Memory, which: Start) -> None:
     """The part that init and reset share."""
     start(t.forward, m, which)
-    m.counts[STATUS] = 0
+    m.step.status[0] = 0
 
 
 @jit

@@ -9,7 +9,6 @@ from hystgen.compensator.layout import FixedTables, clamp_drive
 from hystgen.compensator.step import corners_of
 from hystgen.front.curve import front_forward
 from hystgen.plays.corners.corners_fixed import FixedMemory, plays_step, start
-from hystgen.plays.corners.corners_float import ASCENDING, DRIVE, INPUT, NEXT, OUTPUT, STATUS
 from hystgen.plays.fixed import code
 from hystgen.plays.slots import INPUT_CLAMPED, Reals
 
@@ -17,12 +16,12 @@ from hystgen.plays.slots import INPUT_CLAMPED, Reals
 @jit
 def forward_arrive(t: FixedTables, m: FixedMemory, v: Any) -> None:
     """Move the actuator to drive v; the direction of the move picks the branch."""
-    if v > m.real[DRIVE]:
-        m.counts[ASCENDING] = 1
-    elif v < m.real[DRIVE]:
-        m.counts[ASCENDING] = 0
-    m.real[DRIVE] = v
-    plays_step(t, m, front_forward(t, v, m.counts[ASCENDING]))
+    if v > m.step.drive[0]:
+        m.step.ascending[0] = 1
+    elif v < m.step.drive[0]:
+        m.step.ascending[0] = 0
+    m.step.drive[0] = v
+    plays_step(t, m, front_forward(t, v, m.step.ascending[0]))
 
 
 @jit(inline=True)
@@ -30,10 +29,10 @@ def forward_step(t: FixedTables, m: FixedMemory, v: Any) -> Any:
     """Answer one sample."""
     inside = clamp_drive(t, v)
     if inside != v:
-        m.counts[STATUS] |= INPUT_CLAMPED
+        m.step.status[0] |= INPUT_CLAMPED
     forward_arrive(t, m, inside)
-    found, bits = code(t, m.real[OUTPUT])
-    m.counts[STATUS] |= bits
+    found, bits = code(t, m.here.output[0])
+    m.step.status[0] |= bits
     return found
 
 
@@ -41,10 +40,10 @@ def forward_step(t: FixedTables, m: FixedMemory, v: Any) -> Any:
 def forward_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> None:
     """The part that init and reset share; `first` as in `FixedTables.applied`."""
     start(t, m, play)
-    m.real[NEXT] = m.real[INPUT]
-    m.real[DRIVE] = t.applied[first]
-    m.counts[ASCENDING] = t.ascending[first]
-    m.counts[STATUS] = 0
+    m.step.next[0] = m.here.input[0]
+    m.step.drive[0] = t.applied[first]
+    m.step.ascending[0] = t.ascending[first]
+    m.step.status[0] = 0
 
 
 @jit

@@ -8,18 +8,18 @@ from hystgen.basics.jit import jit
 from hystgen.compensator.layout import Tables
 from hystgen.compensator.step import corners_of
 from hystgen.front.compensator import front_forward
-from hystgen.plays.corners.corners_float import ASCENDING, DRIVE, OUTPUT, STATUS, Memory, Start, plays_step, start
+from hystgen.plays.corners.corners_float import Memory, Start, plays_step, start
 from hystgen.plays.slots import DRIVE_MAX, DRIVE_MIN, HELD, INPUT_CLAMPED, OFFSET, REAL_MAX
 
 
 @jit
 def forward_arrive(m: Memory, v: Any) -> None:
     """Move the actuator to drive v; the direction of the move picks the branch."""
-    if v > m.real[DRIVE]:
-        m.counts[ASCENDING] = 1
-    elif v < m.real[DRIVE]:
-        m.counts[ASCENDING] = 0
-    m.real[DRIVE] = v
+    if v > m.step.drive[0]:
+        m.step.ascending[0] = 1
+    elif v < m.step.drive[0]:
+        m.step.ascending[0] = 0
+    m.step.drive[0] = v
 
 
 @jit(inline=True)
@@ -27,21 +27,21 @@ def forward_step(t: Tables, m: Memory, v: Any) -> Any:
     """Answer one sample."""
     if not (t.limits[DRIVE_MIN] <= v <= t.limits[DRIVE_MAX]):
         if not (-t.limits[REAL_MAX] <= v <= t.limits[REAL_MAX]):
-            m.counts[STATUS] |= HELD
-            return m.real[OUTPUT] + t.limits[OFFSET]
+            m.step.status[0] |= HELD
+            return m.here.output[0] + t.limits[OFFSET]
         v = t.limits[DRIVE_MIN] if v < t.limits[DRIVE_MIN] else t.limits[DRIVE_MAX]
-        m.counts[STATUS] |= INPUT_CLAMPED
+        m.step.status[0] |= INPUT_CLAMPED
     forward_arrive(m, v)
-    return plays_step(t.forward, m, front_forward(t, v, m.counts[ASCENDING])) + t.limits[OFFSET]
+    return plays_step(t.forward, m, front_forward(t, v, m.step.ascending[0])) + t.limits[OFFSET]
 
 
 @jit
 def forward_begin(t: Tables, m: Memory, which: Start, first: int) -> None:
     """The part that init and reset share; `first` as in `Tables.applied`."""
     start(t.forward, m, which)
-    m.real[DRIVE] = t.applied[first]
-    m.counts[ASCENDING] = t.ascending[first]
-    m.counts[STATUS] = 0
+    m.step.drive[0] = t.applied[first]
+    m.step.ascending[0] = t.ascending[first]
+    m.step.status[0] = 0
 
 
 @jit
@@ -60,7 +60,7 @@ def forward_reset(t: Tables, m: Memory) -> None:
 def forward_visit(t: Tables, m: Memory, v: Any) -> None:
     """Move the actuator to drive v, in range or not, before the next sample."""
     forward_arrive(m, v)
-    plays_step(t.forward, m, front_forward(t, v, m.counts[ASCENDING]))
+    plays_step(t.forward, m, front_forward(t, v, m.step.ascending[0]))
 
 
 OPERATIONS = corners_of(forward_init, forward_reset, forward_visit, forward_step)

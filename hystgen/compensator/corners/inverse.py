@@ -8,26 +8,6 @@ from hystgen.basics.jit import jit
 from hystgen.compensator.layout import Tables, clamp_drive
 from hystgen.compensator.step import corners_of
 from hystgen.plays.corners.corners_float import (
-    BEFORE,
-    BEGIN,
-    BEHIND,
-    CAP,
-    COMMITTED,
-    GAIN,
-    HERE,
-    INPUT,
-    LIMITED,
-    NEXT,
-    OUTPUT,
-    RETURNED,
-    RISING,
-    START,
-    STATUS,
-    STEPPED,
-    UNDO,
-    UNDO_INPUT,
-    UNDO_OUTPUT,
-    K,
     Memory,
     Start,
     copy_place,
@@ -57,45 +37,45 @@ def inverse_search(t: Tables, m: Memory, u: Any) -> Any:
     """Answer any sample except a usual one."""
     x = u - t.limits[OFFSET]
     bits = 0
-    copy_place(m, UNDO, HERE)
+    copy_place(m.undo, m.here)
     if not (t.limits[OUTPUT_MIN] <= u <= t.limits[OUTPUT_MAX]):
         bits = INPUT_CLAMPED if -t.limits[REAL_MAX] <= u <= t.limits[REAL_MAX] else HELD
         x = (t.limits[OUTPUT_MIN] if u < t.limits[OUTPUT_MIN] else t.limits[OUTPUT_MAX]) - t.limits[OFFSET]
     if bits == HELD:
-        if m.counts[STEPPED] and m.counts[COMMITTED]:
-            move_to_output(t.inverse, m, m.real[RETURNED])
-    elif m.counts[LIMITED] and (x >= m.real[INPUT] if m.counts[RISING] else x <= m.real[INPUT]):
+        if m.step.stepped[0] and m.step.committed[0]:
+            move_to_output(t.inverse, m, m.step.returned[0])
+    elif m.plays.limited[0] and (x >= m.here.input[0] if m.here.rising[0] else x <= m.here.input[0]):
         bits |= OUTPUT_CLAMPED
-    elif x != m.real[INPUT] and not move_to_input(t.inverse, m, x):
-        stop_in_block(t.inverse, m, t.limits[DRIVE_MAX] if m.counts[RISING] else t.limits[DRIVE_MIN], x)
-        m.counts[LIMITED] = 1
+    elif x != m.here.input[0] and not move_to_input(t.inverse, m, x):
+        stop_in_block(t.inverse, m, t.limits[DRIVE_MAX] if m.here.rising[0] else t.limits[DRIVE_MIN], x)
+        m.plays.limited[0] = 1
         bits |= OUTPUT_CLAMPED
-    m.real[BEFORE] = m.real[INPUT]
-    m.counts[STEPPED] = 1
-    m.counts[COMMITTED] = 0
-    m.counts[STATUS] |= bits
-    return m.real[OUTPUT]
+    m.step.before[0] = m.here.input[0]
+    m.step.stepped[0] = 1
+    m.step.committed[0] = 0
+    m.step.status[0] |= bits
+    return m.here.output[0]
 
 
 @jit(inline=True)
 def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
     """Answer one sample."""
-    rising = m.counts[RISING]
+    rising = m.here.rising[0]
     x = u - t.limits[OFFSET]
-    at = m.real[INPUT]
+    at = m.here.input[0]
     on = x > at if rising else x < at
-    most = m.real[NEXT] if on else at
-    least = at if on or m.counts[K] > 0 else m.real[BEHIND]
+    most = m.plays.next[0] if on else at
+    least = at if on or m.here.k[0] > 0 else m.plays.behind[0]
     if least < x < most if rising else most < x < least:
-        m.real[BEFORE] = m.real[INPUT]
-        m.real[INPUT] = x
-        m.real[OUTPUT] = m.real[START] + (x - m.real[BEGIN]) * m.real[GAIN]
-        return m.real[OUTPUT]
-    if on and (x < m.real[CAP] if rising else x > m.real[CAP]):
-        copy_place(m, UNDO, HERE)
-        m.real[BEFORE] = x
+        m.step.before[0] = m.here.input[0]
+        m.here.input[0] = x
+        m.here.output[0] = m.plays.start[0] + (x - m.plays.begin[0]) * m.plays.gain[0]
+        return m.here.output[0]
+    if on and (x < m.plays.cap[0] if rising else x > m.plays.cap[0]):
+        copy_place(m.undo, m.here)
+        m.step.before[0] = x
         if move_in_block(t.inverse, m, x):
-            return m.real[OUTPUT]
+            return m.here.output[0]
     return inverse_search(t, m, u)
 
 
@@ -104,33 +84,33 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
     """Replace the last answer by the drive that was really applied."""
     v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
     if not (-t.limits[REAL_MAX] <= applied <= t.limits[REAL_MAX]):
-        m.counts[STATUS] |= HELD
+        m.step.status[0] |= HELD
         return
     if v != applied:
-        m.counts[STATUS] |= INPUT_CLAMPED
-    if m.counts[STEPPED] and not m.counts[COMMITTED]:
-        m.real[RETURNED] = m.real[OUTPUT]
-    m.counts[COMMITTED] = 1
-    if m.real[BEFORE] != m.real[INPUT]:
-        copy_place(m, UNDO, HERE)
-        m.real[UNDO_INPUT] = m.real[BEFORE]
-        m.real[UNDO_OUTPUT] = m.real[START] + (m.real[BEFORE] - m.real[BEGIN]) * m.real[GAIN]
-    copy_place(m, HERE, UNDO)
+        m.step.status[0] |= INPUT_CLAMPED
+    if m.step.stepped[0] and not m.step.committed[0]:
+        m.step.returned[0] = m.here.output[0]
+    m.step.committed[0] = 1
+    if m.step.before[0] != m.here.input[0]:
+        copy_place(m.undo, m.here)
+        m.undo.input[0] = m.step.before[0]
+        m.undo.output[0] = m.plays.start[0] + (m.step.before[0] - m.plays.begin[0]) * m.plays.gain[0]
+    copy_place(m.here, m.undo)
     forget_line(t.inverse, m)
     move_to_output(t.inverse, m, v)
-    m.real[BEFORE] = m.real[INPUT]
+    m.step.before[0] = m.here.input[0]
 
 
 @jit
 def inverse_begin(t: Tables, m: Memory, which: Start) -> None:
     """The part that init and reset share."""
     start(t.inverse, m, which)
-    move_to_output(t.inverse, m, clamp_drive(t, m.real[OUTPUT]))
-    copy_place(m, UNDO, HERE)
-    m.real[BEFORE] = m.real[INPUT]
-    m.counts[STEPPED] = 0
-    m.counts[COMMITTED] = 0
-    m.counts[STATUS] = 0
+    move_to_output(t.inverse, m, clamp_drive(t, m.here.output[0]))
+    copy_place(m.undo, m.here)
+    m.step.before[0] = m.here.input[0]
+    m.step.stepped[0] = 0
+    m.step.committed[0] = 0
+    m.step.status[0] = 0
 
 
 @jit
@@ -149,8 +129,8 @@ def inverse_reset(t: Tables, m: Memory) -> None:
 def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
     """Move the actuator to drive v, in range or not, before the next sample."""
     move_to_output(t.inverse, m, v)
-    copy_place(m, UNDO, HERE)
-    m.real[BEFORE] = m.real[INPUT]
+    copy_place(m.undo, m.here)
+    m.step.before[0] = m.here.input[0]
 
 
 OPERATIONS = corners_of(inverse_init, inverse_reset, inverse_visit, inverse_step, inverse_commit)

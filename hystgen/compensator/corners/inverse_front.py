@@ -10,22 +10,6 @@ from hystgen.compensator.layout import Tables, clamp_drive
 from hystgen.compensator.step import corners_of
 from hystgen.front.compensator import front_forward, front_inverse
 from hystgen.plays.corners.corners_float import (
-    ASCENDING,
-    BITS,
-    COMMITTED,
-    DRIVE,
-    HERE,
-    INPUT,
-    LEVEL,
-    OUTPUT,
-    REFERENCE,
-    REPEAT,
-    RETURNED,
-    STATUS,
-    STEPPED,
-    UNDO,
-    UNDO_ASCENDING,
-    UNDO_DRIVE,
     Memory,
     Start,
     copy_place,
@@ -51,31 +35,31 @@ from hystgen.plays.slots import (
 @jit
 def inverse_keep(m: Memory) -> None:
     """Keep the place to which a commit goes back."""
-    copy_place(m, UNDO, HERE)
-    m.real[UNDO_DRIVE] = m.real[DRIVE]
-    m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
+    copy_place(m.undo, m.here)
+    m.step.undo_drive[0] = m.step.drive[0]
+    m.step.undo_ascending[0] = m.step.ascending[0]
 
 
 @jit
 def inverse_arrive(m: Memory, v: Any) -> None:
     """Move the actuator to drive v; the direction of the move picks the branch."""
-    if v > m.real[DRIVE]:
-        m.counts[ASCENDING] = 1
-    elif v < m.real[DRIVE]:
-        m.counts[ASCENDING] = 0
-    m.real[DRIVE] = v
+    if v > m.step.drive[0]:
+        m.step.ascending[0] = 1
+    elif v < m.step.drive[0]:
+        m.step.ascending[0] = 0
+    m.step.drive[0] = v
 
 
 @jit
 def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
     """Undo the last step: the actuator went to v instead."""
-    copy_place(m, HERE, UNDO)
+    copy_place(m.here, m.undo)
     forget_line(t.inverse, m)
-    m.real[DRIVE] = m.real[UNDO_DRIVE]
-    m.counts[ASCENDING] = m.counts[UNDO_ASCENDING]
+    m.step.drive[0] = m.step.undo_drive[0]
+    m.step.ascending[0] = m.step.undo_ascending[0]
     inverse_arrive(m, v)
-    w = front_forward(t, v, m.counts[ASCENDING])
-    if w != m.real[OUTPUT]:
+    w = front_forward(t, v, m.step.ascending[0])
+    if w != m.here.output[0]:
         move_to_output(t.inverse, m, w)
 
 
@@ -83,20 +67,20 @@ def inverse_replace(t: Tables, m: Memory, v: Any) -> None:
 def inverse_hold(t: Tables, m: Memory) -> Any:
     """Repeat the last answer for a sample that is not finite."""
     inverse_keep(m)
-    inverse_replace(t, m, m.real[RETURNED] if m.counts[STEPPED] and m.counts[COMMITTED] else m.real[DRIVE])
-    m.counts[STEPPED] = 1
-    m.counts[COMMITTED] = 0
-    m.counts[STATUS] |= HELD
-    return m.real[DRIVE]
+    inverse_replace(t, m, m.step.returned[0] if m.step.stepped[0] and m.step.committed[0] else m.step.drive[0])
+    m.step.stepped[0] = 1
+    m.step.committed[0] = 0
+    m.step.status[0] |= HELD
+    return m.step.drive[0]
 
 
 @jit
 def inverse_fits(t: Any, m: Any, v: Any, ascending: int) -> bool:
     """Whether the move to v lies on the branch for which v was computed."""
     inside = clamp_drive(t, v)
-    if inside == m.real[DRIVE]:
-        return bool(m.counts[ASCENDING] == ascending)
-    return bool((inside > m.real[DRIVE]) == (ascending != 0))
+    if inside == m.step.drive[0]:
+        return bool(m.step.ascending[0] == ascending)
+    return bool((inside > m.step.drive[0]) == (ascending != 0))
 
 
 def choosing(front_inverse: Callable[..., Any]) -> Jit[[Any, Any, Any, Any], tuple[Any, int]]:
@@ -107,20 +91,20 @@ def choosing(front_inverse: Callable[..., Any]) -> Jit[[Any, Any, Any, Any], tup
         """The drive that gives w on the branch of its own move, and whether an envelope cannot give w."""
         up = 1
         if t.branches:
-            up = m.counts[ASCENDING]
-            if level > m.real[LEVEL]:
+            up = m.step.ascending[0]
+            if level > m.step.last[0]:
                 up = 1
-            elif level < m.real[LEVEL]:
+            elif level < m.step.last[0]:
                 up = 0
         v, limited = front_inverse(t, w, up)
         if t.branches:
             fits = inverse_fits(t, m, v, up)
-            back = clamp_drive(t, v) - m.real[DRIVE]
-            if not fits and (up != m.counts[ASCENDING] or back < -t.limits[HOLD] or back > t.limits[HOLD]):
+            back = clamp_drive(t, v) - m.step.drive[0]
+            if not fits and (up != m.step.ascending[0] or back < -t.limits[HOLD] or back > t.limits[HOLD]):
                 v, limited = front_inverse(t, w, 1 - up)
                 fits = inverse_fits(t, m, v, 1 - up)
             if not fits:
-                v = m.real[DRIVE]
+                v = m.step.drive[0]
         return v, limited
 
     return inverse_choose
@@ -135,29 +119,29 @@ def inverse_step(t: Tables, m: Memory, u: Any) -> Any:
     if not (-t.limits[REAL_MAX] <= u <= t.limits[REAL_MAX]):
         return inverse_hold(t, m)
     inverse_keep(m)
-    if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
+    if not (m.step.repeated[0] and u == m.step.reference[0]):
         level = u
         if u < t.limits[OUTPUT_MIN]:
             level = t.limits[OUTPUT_MIN]
         elif u > t.limits[OUTPUT_MAX]:
             level = t.limits[OUTPUT_MAX]
-        m.counts[BITS] = 0 if level == u else INPUT_CLAMPED
-        m.real[REFERENCE] = u
+        m.step.bits[0] = 0 if level == u else INPUT_CLAMPED
+        m.step.reference[0] = u
         w = plays_step(t.inverse, m, level - t.limits[OFFSET])
         v, limited = inverse_choose(t, m, level, w)
         inside = clamp_drive(t, v)
-        m.counts[BITS] |= DOMAIN if limited else 0
-        if inside != v or inside == m.real[DRIVE]:
-            m.counts[BITS] |= 0 if inside == v else OUTPUT_CLAMPED
+        m.step.bits[0] |= DOMAIN if limited else 0
+        if inside != v or inside == m.step.drive[0]:
+            m.step.bits[0] |= 0 if inside == v else OUTPUT_CLAMPED
             inverse_replace(t, m, inside)
         else:
             inverse_arrive(m, inside)
-        m.real[LEVEL] = level
-        m.counts[REPEAT] = 1
-    m.counts[STEPPED] = 1
-    m.counts[COMMITTED] = 0
-    m.counts[STATUS] |= m.counts[BITS]
-    return m.real[DRIVE]
+        m.step.last[0] = level
+        m.step.repeated[0] = 1
+    m.step.stepped[0] = 1
+    m.step.committed[0] = 0
+    m.step.status[0] |= m.step.bits[0]
+    return m.step.drive[0]
 
 
 @jit
@@ -165,14 +149,14 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
     """Replace the last answer by the drive that was really applied."""
     v = clamp_drive(t, applied) + t.limits[ZERO]  # no drive is -0
     if not (-t.limits[REAL_MAX] <= applied <= t.limits[REAL_MAX]):
-        m.counts[STATUS] |= HELD
+        m.step.status[0] |= HELD
         return
     if v != applied:
-        m.counts[STATUS] |= INPUT_CLAMPED
-    if m.counts[STEPPED] and not m.counts[COMMITTED]:
-        m.real[RETURNED] = m.real[DRIVE]
-    m.counts[COMMITTED] = 1
-    m.counts[REPEAT] = 0
+        m.step.status[0] |= INPUT_CLAMPED
+    if m.step.stepped[0] and not m.step.committed[0]:
+        m.step.returned[0] = m.step.drive[0]
+    m.step.committed[0] = 1
+    m.step.repeated[0] = 0
     inverse_replace(t, m, v)
 
 
@@ -180,18 +164,18 @@ def inverse_commit(t: Tables, m: Memory, applied: Any) -> None:
 def inverse_begin(t: Tables, m: Memory, which: Start, first: int) -> None:
     """The part that init and reset share; `first` as in `Tables.applied`."""
     start(t.inverse, m, which)
-    m.real[LEVEL] = m.real[INPUT] + t.limits[OFFSET]
+    m.step.last[0] = m.here.input[0] + t.limits[OFFSET]
     move_to_output(t.inverse, m, t.begin[first])
-    m.real[DRIVE] = t.applied[first]
-    m.counts[ASCENDING] = t.ascending[first]
+    m.step.drive[0] = t.applied[first]
+    m.step.ascending[0] = t.ascending[first]
     inverse_keep(m)
-    m.real[RETURNED] = m.real[DRIVE]
-    m.real[REFERENCE] = t.limits[ZERO]
-    m.counts[STEPPED] = 0
-    m.counts[COMMITTED] = 0
-    m.counts[REPEAT] = 0
-    m.counts[BITS] = 0
-    m.counts[STATUS] = 0
+    m.step.returned[0] = m.step.drive[0]
+    m.step.reference[0] = t.limits[ZERO]
+    m.step.stepped[0] = 0
+    m.step.committed[0] = 0
+    m.step.repeated[0] = 0
+    m.step.bits[0] = 0
+    m.step.status[0] = 0
 
 
 @jit
@@ -212,7 +196,7 @@ def inverse_visit(t: Tables, m: Memory, v: Any) -> None:
     inverse_keep(m)
     inverse_replace(t, m, v)
     inverse_keep(m)
-    m.real[LEVEL] = m.real[INPUT] + t.limits[OFFSET]
+    m.step.last[0] = m.here.input[0] + t.limits[OFFSET]
 
 
 OPERATIONS = corners_of(inverse_init, inverse_reset, inverse_visit, inverse_step, inverse_commit)

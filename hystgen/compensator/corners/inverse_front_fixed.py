@@ -10,22 +10,7 @@ from hystgen.compensator.layout import FixedTables, clamp_drive, inverse_clamp
 from hystgen.compensator.step import corners_of
 from hystgen.front.curve import front_forward, front_inverse
 from hystgen.plays.corners.corners_fixed import FAR, FixedMemory, move_to_input, move_to_solution, solve, start
-from hystgen.plays.corners.corners_float import (
-    ASCENDING,
-    BITS,
-    DRIVE,
-    HERE,
-    LEVEL,
-    NEXT,
-    OUTPUT,
-    REFERENCE,
-    REPEAT,
-    STATUS,
-    UNDO,
-    UNDO_ASCENDING,
-    UNDO_DRIVE,
-    copy_place,
-)
+from hystgen.plays.corners.corners_float import copy_place
 from hystgen.plays.fixed import code
 from hystgen.plays.slots import DOMAIN, FRACTION, INPUT_CLAMPED, OUTPUT_CLAMPED, Reals
 
@@ -35,40 +20,40 @@ inverse_choose = choosing(front_inverse)
 @jit
 def inverse_keep(m: FixedMemory) -> None:
     """Keep the place to which a commit goes back."""
-    copy_place(m, UNDO, HERE)
-    m.real[UNDO_DRIVE] = m.real[DRIVE]
-    m.counts[UNDO_ASCENDING] = m.counts[ASCENDING]
+    copy_place(m.undo, m.here)
+    m.step.undo_drive[0] = m.step.drive[0]
+    m.step.undo_ascending[0] = m.step.ascending[0]
 
 
 @jit
 def inverse_arrive(t: FixedTables, m: FixedMemory, v: Any) -> Any:
     """Move the actuator to drive v; the direction of the move picks the branch. Returns the input of the plays."""
-    if v > m.real[DRIVE]:
-        m.counts[ASCENDING] = 1
-    elif v < m.real[DRIVE]:
-        m.counts[ASCENDING] = 0
-    m.real[DRIVE] = v
-    return front_forward(t, v, m.counts[ASCENDING])
+    if v > m.step.drive[0]:
+        m.step.ascending[0] = 1
+    elif v < m.step.drive[0]:
+        m.step.ascending[0] = 0
+    m.step.drive[0] = v
+    return front_forward(t, v, m.step.ascending[0])
 
 
 @jit
 def inverse_step(t: FixedTables, m: FixedMemory, u: Any) -> Any:
     """Answer one sample."""
     inverse_keep(m)
-    if not (m.counts[REPEAT] and u == m.real[REFERENCE]):
+    if not (m.step.repeated[0] and u == m.step.reference[0]):
         level = inverse_clamp(t, u)
-        w, kink = solve(t, m, level << t.limits[FRACTION], m.real[NEXT])
+        w, kink = solve(t, m, level << t.limits[FRACTION], m.step.next[0])
         v, limited = inverse_choose(t, m, level, w)
         inside = clamp_drive(t, v)
-        m.counts[BITS] = 0 if level == u else INPUT_CLAMPED
-        m.counts[BITS] |= DOMAIN if limited else 0
-        m.counts[BITS] |= 0 if inside == v else OUTPUT_CLAMPED
-        m.real[NEXT] = move_to_solution(t, m, kink, inverse_arrive(t, m, inside))
-        m.real[REFERENCE] = u
-        m.real[LEVEL] = level
-        m.counts[REPEAT] = 1
-    m.counts[STATUS] |= m.counts[BITS]
-    return m.real[DRIVE]
+        m.step.bits[0] = 0 if level == u else INPUT_CLAMPED
+        m.step.bits[0] |= DOMAIN if limited else 0
+        m.step.bits[0] |= 0 if inside == v else OUTPUT_CLAMPED
+        m.step.next[0] = move_to_solution(t, m, kink, inverse_arrive(t, m, inside))
+        m.step.reference[0] = u
+        m.step.last[0] = level
+        m.step.repeated[0] = 1
+    m.step.status[0] |= m.step.bits[0]
+    return m.step.drive[0]
 
 
 @jit
@@ -76,12 +61,12 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
     """Replace the last answer by the drive that was really applied."""
     v = clamp_drive(t, applied)
     if v != applied:
-        m.counts[STATUS] |= INPUT_CLAMPED
-    copy_place(m, HERE, UNDO)
-    m.real[DRIVE] = m.real[UNDO_DRIVE]
-    m.counts[ASCENDING] = m.counts[UNDO_ASCENDING]
-    m.counts[REPEAT] = 0
-    m.real[NEXT] = -FAR
+        m.step.status[0] |= INPUT_CLAMPED
+    copy_place(m.here, m.undo)
+    m.step.drive[0] = m.step.undo_drive[0]
+    m.step.ascending[0] = m.step.undo_ascending[0]
+    m.step.repeated[0] = 0
+    m.step.next[0] = -FAR
     move_to_input(t, m, inverse_arrive(t, m, v))
 
 
@@ -89,15 +74,15 @@ def inverse_commit(t: FixedTables, m: FixedMemory, applied: Any) -> None:
 def inverse_begin(t: FixedTables, m: FixedMemory, play: Reals, first: int) -> None:
     """The part that init and reset share; `first` as in `FixedTables.applied`."""
     start(t, m, play)
-    m.real[DRIVE] = t.applied[first]
-    m.counts[ASCENDING] = t.ascending[first]
+    m.step.drive[0] = t.applied[first]
+    m.step.ascending[0] = t.ascending[first]
     inverse_keep(m)
-    m.real[REFERENCE] = 0
-    m.real[LEVEL] = code(t, m.real[OUTPUT])[0]
-    m.counts[REPEAT] = 0
-    m.real[NEXT] = -FAR
-    m.counts[BITS] = 0
-    m.counts[STATUS] = 0
+    m.step.reference[0] = 0
+    m.step.last[0] = code(t, m.here.output[0])[0]
+    m.step.repeated[0] = 0
+    m.step.next[0] = -FAR
+    m.step.bits[0] = 0
+    m.step.status[0] = 0
 
 
 @jit
@@ -117,7 +102,7 @@ def inverse_visit(t: FixedTables, m: FixedMemory, v: Any) -> None:
     """Move the actuator to drive v, in range or not, before the next sample."""
     move_to_input(t, m, inverse_arrive(t, m, v))
     inverse_keep(m)
-    m.real[LEVEL] = code(t, m.real[OUTPUT])[0]
+    m.step.last[0] = code(t, m.here.output[0])[0]
 
 
 OPERATIONS = corners_of(inverse_init, inverse_reset, inverse_visit, inverse_step, inverse_commit)

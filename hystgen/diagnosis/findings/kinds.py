@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from hystgen.basics.problems import counted
 
@@ -22,7 +22,7 @@ class Finding(ABC):
     kind: ClassVar[str]
     optional: ClassVar[frozenset[str]] = frozenset()
 
-    def entry(self) -> dict[str, Any]:
+    def entry(self) -> dict[str, object]:
         """The entry as in `diagnosis.json`."""
         entry: dict[str, object] = {"kind": self.kind}
         for each in fields(self):

@@ -21,7 +21,7 @@ from hystgen.diagnosis.search.hypothesis import Part, Starts, Structure
 from hystgen.effects import BEND, LIMIT
 from hystgen.effects.base import USER, About, Effect
 from hystgen.identification import joint
-from hystgen.identification.joint import Bent, DeadZones, Ends, Front, Tanh, even_breaks
+from hystgen.identification.joint import BentFront, DeadZones, Ends, Front, Tanh, even_breaks
 
 Array = NDArray[np.float64]
 
@@ -114,7 +114,7 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
         pair = replace(structure, front=front), replace(held, front=front)
         return Option(label, BEND, *pair, tuple(starts), True, beyond)
 
-    one_way, both_ways = Bent(drive, 1), Bent(drive, 2)
+    one_way, both_ways = BentFront(drive, 1), BentFront(drive, 2)
     dead_zones, finer = (DeadZones(drive, even_breaks(drive, n)) for n in (acceptance.BREAKS, acceptance.FINER_BREAKS))
     tanh = Tanh(drive)
     sides = (-acceptance.TANH_SIDE, acceptance.TANH_SIDE)

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
+from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct, memory_of
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
-from hystgen.effects.base import Array, Place
+from hystgen.effects.base import Place
 from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
 from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import (
@@ -28,7 +29,7 @@ from hystgen.effects.part import (
     called,
     late,
 )
-from hystgen.plays.slots import Counts, Reals, zero
+from hystgen.plays.slots import Counts, zero
 
 Ageing = LogarithmicAgeing | ExponentialAgeing | SeveralAgeing
 
@@ -63,9 +64,20 @@ def steepness(effect: Ageing, travelled: float) -> float:
     return -math.fsum(loss / travel * math.exp(-travelled / travel) for loss, travel in pairs)
 
 
+class AgeingPiece(Struct):
+    """A piece of the gain over travel: a cubic in the share of its length."""
+
+    begin: Real
+    inverse_length: Real
+    c0: Real
+    c1: Real
+    c2: Real
+    c3: Real
+
+
 @functools.lru_cache(maxsize=16)
-def pieces(effect: Ageing) -> Array:
-    """The gain as cubic pieces (m, 6): the beginning of each, 1 over its length, and coefficients in the share passed.
+def pieces(effect: Ageing) -> AgeingPiece:
+    """The gain as cubic pieces (m,) in double precision.
 
     A piece matches the gain's values and slopes at its ends, and is as long as TABLE_ERROR allows.
     """
@@ -84,7 +96,7 @@ def pieces(effect: Ageing) -> Array:
             break
         rows.append(row)
         at += length
-    return np.array(rows).reshape(-1, 6)
+    return AgeingPiece.of(rows, np.float64)
 
 
 def _piece(effect: Ageing, at: float, length: float) -> tuple[float, ...]:
@@ -104,8 +116,7 @@ def _error(effect: Ageing, row: tuple[float, ...]) -> float:
 
 def most_at_once(effect: Ageing, span: float) -> float:
     """Largest relative change of the gain in one move over `span`."""
-    rows = pieces(effect)
-    places = [0.0, *rows[:, 0].tolist()] if len(rows) else [0.0]
+    places = [0.0, *pieces(effect).begin.tolist()]
     return max(abs(gain(effect, x + span) / gain(effect, x) - 1.0) for x in places)
 
 
@@ -141,45 +152,65 @@ class Aged(One):
 
 # ---------------------------------------------------------------- ageing.c
 
-BEGIN, INVERSE_LENGTH, C0, C1, C2, C3 = range(6)
-HIGH, LOW, GAIN, INVERSE = range(4)
-ONE, TWO, LEAST, LARGEST, LAST = range(5)
+
+class AgeingTable(Struct):
+    """Gain over travel up to `last`; one set from outside lies between `least` and `largest`."""
+
+    least: Real
+    largest: Real
+    last: Real
+    n: Count
+    turns: SmallCount  # Newton steps for the reciprocal of a gain that has changed
 
 
-KIND = Kind(
-    "ageing", ("least", "largest", "last"), ("high", "low", "gain", "inverse"),
-    rows=Rows("piece", ("begin", "inverse_length", "c0", "c1", "c2", "c3")), counts=("n", "turns"), flags=("own",),
-    reading=(), own=("solve", "absorb"),
-)
+class AgeingNumbers(AgeingTable):
+    """The same with numbers that are not in the table in C."""
+
+    one: Real
+    two: Real
+
+
+class AgeingState(Struct):
+    """A gain."""
+
+    high: Real  # travel, in two parts
+    low: Real
+    gain: Real
+    inverse: Real
+    own: Flag  # the gain follows the travel
+
+
+KIND = Kind("ageing", AgeingTable, AgeingState, Rows("piece", AgeingPiece), reading=(), own=("solve", "absorb"))
 
 
 class AgeingTables(NamedTuple):
-    """All ageing of a model: `piece` (m, 6), each block's from `first` (k + 1) on; `number` (k, 5); `turns` (k,)."""
+    """All ageing of a model: `block` (k,), the pieces of each from `first` (k + 1) on in `piece` (m,)."""
 
+    block: AgeingNumbers
     first: Counts
-    piece: Reals
-    number: Reals
-    turns: Counts
+    piece: AgeingPiece
 
 
 def tables(blocks: Sequence[Aged], about: FloatSurroundings) -> AgeingTables:
     """The tables of several blocks in floating point."""
-    rows = [pieces(one.effect) for one in blocks]
-    last = [float(each[-1, BEGIN] + 1.0 / each[-1, INVERSE_LENGTH]) for each in rows]
+    curves = [pieces(one.effect) for one in blocks]
     span = about.ends[1] - about.ends[0]
+    given = [(LEAST_GAIN, LARGEST_GAIN, each.begin[-1] + 1.0 / each.inverse_length[-1], 1.0, 2.0) for each in curves]
+    rows = about.reals(given, "travels of the ageing")
+    counts = [*map(len, curves)]
+    turns = [newton_steps(most_at_once(one.effect, span), about.roundoff) for one in blocks]
+    piece = about.reals([each.tolist() for curve in curves for each in curve], "travels of the ageing")
     return AgeingTables(
-        np.cumsum([0, *map(len, rows)]).astype(np.int64),
-        about.reals(np.concatenate([np.empty((0, 6)), *rows]), "travels of the ageing"),
-        about.reals([(1.0, 2.0, LEAST_GAIN, LARGEST_GAIN, x) for x in last], "travels of the ageing").reshape(-1, 5),
-        np.array([newton_steps(most_at_once(one.effect, span), about.roundoff) for one in blocks], dtype=np.int64),
+        AgeingNumbers.of([(*row[:3], *n, *row[3:]) for row, *n in zip(rows, counts, turns, strict=True)], rows.dtype),
+        np.cumsum([0, *counts]).astype(np.int64),
+        AgeingPiece.of(piece, piece.dtype),
     )
 
 
 def constants(t: AgeingTables) -> Iterator[Constants]:
     """The numbers of each gain."""
-    for j, turns in enumerate(map(int, t.turns)):
-        pieces = t.piece[t.first[j] : t.first[j + 1]]
-        yield Constants(KIND, t.number[j, LEAST:], (5 + 2 * turns, 1), pieces, (len(pieces), turns))
+    for row, first in zip(t.block, t.first, strict=False):
+        yield Constants(KIND, row, (5 + 2 * int(row["turns"]), 1), t.piece[first : first + row["n"]])
 
 
 class UnevenAgeing:
@@ -200,18 +231,6 @@ class UnevenAgeing:
         self.travelled = self._travel(before, drive)
 
 
-class AgeingState(NamedTuple):
-    """`block` (k, 4): travel in two parts, gain and its reciprocal; `own` (k,): whether the gain follows the travel."""
-
-    block: Reals
-    own: Counts
-
-
-def memory(t: AgeingTables, dtype: Any) -> AgeingState:
-    """Memory of all gains."""
-    return AgeingState(np.zeros((len(t.turns), 4), dtype), np.zeros(len(t.turns), np.int64))
-
-
 @jit
 def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
     """The gain at a travel; past the last piece it stays constant."""
@@ -219,55 +238,55 @@ def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
     high = t.first[j + 1]
     while high - low > 1:
         middle = (low + high) // 2
-        if travel >= t.piece[middle, BEGIN]:
+        if travel >= t.piece.begin[middle]:
             low = middle
         else:
             high = middle
-    share = (travel - t.piece[low, BEGIN]) * t.piece[low, INVERSE_LENGTH]
-    if share > t.number[j, ONE]:
-        share = t.number[j, ONE]
-    return ((t.piece[low, C3] * share + t.piece[low, C2]) * share + t.piece[low, C1]) * share + t.piece[low, C0]
+    share = (travel - t.piece.begin[low]) * t.piece.inverse_length[low]
+    if share > t.block.one[j]:
+        share = t.block.one[j]
+    return ((t.piece.c3[low] * share + t.piece.c2[low]) * share + t.piece.c1[low]) * share + t.piece.c0[low]
 
 
 @jit
 def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> bool:
     """Set the travel. Returns whether it had to be limited."""
     inside = travel
-    if inside < zero(t.number[j, ONE]):
-        inside = zero(t.number[j, ONE])
-    elif inside > t.number[j, LAST]:
-        inside = t.number[j, LAST]
-    s.block[j, HIGH] = inside
-    s.block[j, LOW] = zero(inside)
+    if inside < zero(t.block.one[j]):
+        inside = zero(t.block.one[j])
+    elif inside > t.block.last[j]:
+        inside = t.block.last[j]
+    s.high[j] = inside
+    s.low[j] = zero(inside)
     s.own[j] = 1
-    s.block[j, GAIN] = ageing_gain(t, j, inside)
-    s.block[j, INVERSE] = t.number[j, ONE] / s.block[j, GAIN]
+    s.gain[j] = ageing_gain(t, j, inside)
+    s.inverse[j] = t.block.one[j] / s.gain[j]
     return bool(inside != travel)
 
 
 @jit
 def ageing_reset(t: AgeingTables, s: AgeingState, j: int) -> None:
     """Return to the state of the parameter file: nothing has been travelled."""
-    ageing_set_travel(t, s, j, zero(t.number[j, LAST]))
+    ageing_set_travel(t, s, j, zero(t.block.last[j]))
 
 
 @jit
 def ageing_travelled(s: AgeingState, j: int) -> Any:
     """The travel."""
-    return s.block[j, HIGH]
+    return s.high[j]
 
 
 @jit
 def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
     """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
     inside = gain
-    if inside < t.number[j, LEAST]:
-        inside = t.number[j, LEAST]
-    elif inside > t.number[j, LARGEST]:
-        inside = t.number[j, LARGEST]
+    if inside < t.block.least[j]:
+        inside = t.block.least[j]
+    elif inside > t.block.largest[j]:
+        inside = t.block.largest[j]
     s.own[j] = 0
-    s.block[j, GAIN] = inside
-    s.block[j, INVERSE] = t.number[j, ONE] / inside
+    s.gain[j] = inside
+    s.inverse[j] = t.block.one[j] / inside
     return bool(inside != gain)
 
 
@@ -275,48 +294,47 @@ def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
 def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) -> None:
     """The drive has moved to v."""
     way = v - before
-    change = (way if way >= zero(way) else -way) + s.block[j, LOW]
-    high = s.block[j, HIGH]
+    change = (way if way >= zero(way) else -way) + s.low[j]
+    high = s.high[j]
     following = high + change
-    if following > t.number[j, LAST]:
-        following = t.number[j, LAST]
+    if following > t.block.last[j]:
+        following = t.block.last[j]
         change = following - high
-    s.block[j, HIGH] = following
-    s.block[j, LOW] = change - (following - high)
+    s.high[j] = following
+    s.low[j] = change - (following - high)
     if s.own[j]:
         gain = ageing_gain(t, j, following)
-        inverse = s.block[j, INVERSE]
-        for _ in range(t.turns[j]):
-            inverse = inverse * (t.number[j, TWO] - gain * inverse)
-        s.block[j, GAIN] = gain
-        s.block[j, INVERSE] = inverse
+        inverse = s.inverse[j]
+        for _ in range(t.block.turns[j]):
+            inverse = inverse * (t.block.two[j] - gain * inverse)
+        s.gain[j] = gain
+        s.inverse[j] = inverse
 
 
 @jit(inline=True)
 def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
-    return y * s.block[j, INVERSE]
+    return y * s.inverse[j]
 
 
 @jit(inline=True)
 def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
-    return s.block[j, GAIN] * x
+    return s.gain[j] * x
 
 
 ARITHMETIC = Realized(
     Verbs(
-        memory, absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move, set_gain=ageing_set,
-        set_travel=ageing_set_travel, travelled=ageing_travelled,
+        memory_of(AgeingState), absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
+        set_gain=ageing_set, set_travel=ageing_set_travel, travelled=ageing_travelled,
     ),
-    constants, tables,
+    constants, tables, kinds=(KIND,),
 )
 
 PART = ChainPart(
     "ageing", "ageing", Place.GAIN, called("ageing"), lambda effect, *_: Aged(effect),
     ARITHMETIC, late("ageing"), calls=("set_gain", "travel", "set_travel"),
-    kinds=(KIND,), problems=problems, code=("ageing",), following=UnevenAgeing,
-    longest=lambda t: float(t.number[0, LAST]),
+    problems=problems, code=("ageing",), following=UnevenAgeing, longest=lambda t: float(t.block.last[0]),
 )
 """Ageing as a part of the chain: a gain over the travel, which the caller may set."""
 

@@ -4,25 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hystgen.arithmetic.factors import LARGEST as MOST
 from hystgen.arithmetic.factors import factor, times
 from hystgen.basics.jit import jit
+from hystgen.basics.structures import Count, Factor, Flag, FourInt32, Int32, Int64, Struct, UInt8, memory_of
 from hystgen.effects.ageing import compensator as floating
-from hystgen.effects.ageing.compensator import (
-    GAIN,
-    HIGH,
-    INVERSE,
-    LAST,
-    Aged,
-    AgeingState,
-    AgeingTables,
-    ageing_travelled,
-)
-from hystgen.effects.base import Array
+from hystgen.effects.ageing.compensator import Aged, AgeingPiece, ageing_travelled
 from hystgen.effects.gains import (
     GAIN_BITS,
     LARGEST,
@@ -35,9 +26,9 @@ from hystgen.effects.gains import (
     newton_steps,
     reciprocal,
 )
-from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.kinds import Constants, Rows
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
-from hystgen.plays.slots import zero
+from hystgen.plays.slots import Counts, zero
 
 SHARE_BITS = 20
 """Fraction bits of the share of a piece; the gain changes by a hundredth along a piece, so it gets 27."""
@@ -50,46 +41,73 @@ LONGEST = 2**61
 """Most drive codes that a travel counts, 5e8 times a range in q31; beyond, the gain keeps its last value."""
 
 
-KIND = Kind(
-    "ageing", rows=Rows("piece", letters="wfbc"), counts=("n", "turns", "bits"), flags=("own",), reading=(),
-    own=("solve", "absorb"), letters="w", memory="wii",
+class FixedAgeingPiece(Struct):
+    """A piece of the gain over travel: a cubic in the share of its length."""
+
+    begin: Int64
+    share: Factor  # of the travel since `begin`, less the bits that the product leaves out
+    drop: UInt8
+    c: FourInt32
+
+
+class FixedAgeingTable(Struct):
+    """Gain over travel up to `last`."""
+
+    last: Int64
+    n: Count
+    turns: UInt8  # Newton steps for the reciprocal of a gain that has changed
+    bits: UInt8  # of a gain below a code that sets it
+
+
+class FixedAgeingState(Struct):
+    """A gain."""
+
+    high: Int64  # travel, drive codes
+    gain: Int32
+    inverse: Int32
+    own: Flag  # the gain follows the travel
+
+
+KIND = replace(
+    floating.KIND, table=FixedAgeingTable, state=FixedAgeingState, rows=Rows("piece", FixedAgeingPiece)
 )
 
 
-def constants(t: AgeingTables) -> Iterator[Constants]:
+class FixedAgeingTables(NamedTuple):
+    """All ageing of a model, as in floating point."""
+
+    block: FixedAgeingTable
+    first: Counts
+    piece: FixedAgeingPiece
+
+
+def constants(t: FixedAgeingTables) -> Iterator[Constants]:
     """The numbers of each gain."""
-    for each, number in zip(floating.constants(t), t.number, strict=True):
-        counts = (*each.counts, int(number[0]))
-        yield replace(each, kind=KIND, table=number[-1:], counts=counts, products=(8 + 2 * each.counts[1], 2))
+    for row, first in zip(t.block, t.first, strict=False):
+        yield Constants(KIND, row, (8 + 2 * int(row["turns"]), 2), t.piece[first : first + row["n"]])
 
 
-def tables(rows: Sequence[tuple[Array, int]], lsb: float, bits: int) -> AgeingTables:
+def tables(rows: Sequence[tuple[AgeingPiece, int]], lsb: float, bits: int) -> FixedAgeingTables:
     """Pieces of the gain and Newton steps of each ageing effect, for drive codes of `lsb`.
 
     `bits`: how many bits a gain has below the code that sets it. Raises OverflowError.
     """
-    piece: list[list[int]] = []
-    number: list[list[int]] = []
-    first = [0]
-    for pieces, _ in rows:
-        last = 0
-        for row in pieces.tolist():
-            length = 1.0 / row[floating.INVERSE_LENGTH] / lsb
+    piece: list[tuple[object, ...]] = []
+    block = []
+    for pieces, turns in rows:
+        last, before = 0, len(piece)
+        for begin, inverse_length, *curve in pieces.tolist():
+            length = 1.0 / inverse_length / lsb
             drop = max(0, round(length).bit_length() + 1 - (MOST.bit_length() - 1))
-            begin = round(row[floating.BEGIN] / lsb)
-            if begin + length >= LONGEST:
+            at = round(begin / lsb)
+            if at + length >= LONGEST:
                 break
-            curve = [round(c * ONE) for c in row[floating.C0 :]]
-            piece.append([begin, *factor(2.0**SHARE_BITS / length * 2.0**drop), drop, *curve])
-            last = begin + round(length)
-        number.append([bits, 0, 0, 0, last])
-        first.append(len(piece))
-    return AgeingTables(
-        np.array(first, dtype=np.int64),
-        np.array(piece, dtype=np.int64).reshape(-1, 8),
-        np.array(number, dtype=np.int64).reshape(-1, 5),
-        np.array([turns for _, turns in rows], dtype=np.int64),
-    )
+            share = factor(2.0**SHARE_BITS / length * 2.0**drop)
+            piece.append((at, share, drop, [round(c * ONE) for c in curve]))
+            last = at + round(length)
+        block.append((last, len(piece) - before, turns, bits))
+    first = np.cumsum([0, *(n for _, n, *_ in block)]).astype(np.int64)
+    return FixedAgeingTables(FixedAgeingTable.of(block), first, FixedAgeingPiece.of(piece))
 
 
 @dataclass(frozen=True)
@@ -97,7 +115,7 @@ class AgeingFormats(Coded):
     """An ageing block with its pieces of the gain and Newton steps."""
 
     one: Aged
-    pieces: Array
+    pieces: AgeingPiece
     turns: int
 
     def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
@@ -114,7 +132,7 @@ def formats(one: Aged, about: FixedSurroundings, *_: float) -> AgeingFormats:
     return AgeingFormats(one, floating.pieces(one.effect), turns)
 
 
-def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> AgeingTables:
+def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> FixedAgeingTables:
     """The tables of several blocks, by `tables`."""
     rows = [(each.pieces, each.turns) for each in blocks]
     return tables(rows, float(about.drive_lsb), GAIN_BITS - (about.code_bits - 2))
@@ -122,96 +140,94 @@ def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> AgeingTab
 
 # ---------------------------------------------------------------- ageing_fixed.c
 
-BEGIN, SHARE, DROP, C0 = 0, 1, 3, 4
-BITS = 0
-
 
 @jit
-def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
+def ageing_gain(t: FixedAgeingTables, j: int, travel: Any) -> Any:
     """The gain at a travel; past the last piece it stays constant."""
     low = t.first[j]
     high = t.first[j + 1]
     while high - low > 1:
         middle = (low + high) // 2
-        if travel >= t.piece[middle, BEGIN]:
+        if travel >= t.piece.begin[middle]:
             low = middle
         else:
             high = middle
-    share = times((travel - t.piece[low, BEGIN]) >> t.piece[low, DROP], t.piece[low, SHARE], t.piece[low, SHARE + 1])
+    on = (travel - t.piece.begin[low]) >> t.piece.drop[low]
+    share = times(on, t.piece.share.mantissa[low], t.piece.share.shift[low])
     if share > 1 << SHARE_BITS:
         share = zero(share) + (1 << SHARE_BITS)
     gain = zero(share)
-    for k in range(C0 + 3, C0 - 1, -1):
-        gain = t.piece[low, k] + ((gain * share + (1 << (SHARE_BITS - 1))) >> SHARE_BITS)
+    for k in range(3, -1, -1):
+        gain = t.piece.c[low, k] + ((gain * share + (1 << (SHARE_BITS - 1))) >> SHARE_BITS)
     return gain
 
 
 @jit
-def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> bool:
+def ageing_set_travel(t: FixedAgeingTables, s: FixedAgeingState, j: int, travel: Any) -> bool:
     """Set the travel. Returns whether it had to be limited."""
     inside = travel
     if inside < 0:
         inside = zero(travel)
-    elif inside > t.number[j, LAST]:
-        inside = t.number[j, LAST]
-    s.block[j, HIGH] = inside
+    elif inside > t.block.last[j]:
+        inside = t.block.last[j]
+    s.high[j] = inside
     s.own[j] = 1
-    s.block[j, GAIN] = ageing_gain(t, j, inside)
-    s.block[j, INVERSE] = reciprocal(s.block[j, GAIN])
+    s.gain[j] = ageing_gain(t, j, inside)
+    s.inverse[j] = reciprocal(s.gain[j])
     return bool(inside != travel)
 
 
 @jit
-def ageing_reset(t: AgeingTables, s: AgeingState, j: int) -> None:
+def ageing_reset(t: FixedAgeingTables, s: FixedAgeingState, j: int) -> None:
     """Return to the state of the parameter file: nothing has been travelled."""
-    ageing_set_travel(t, s, j, zero(t.number[j, LAST]))
+    ageing_set_travel(t, s, j, zero(t.block.last[j]))
 
 
 @jit
-def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
+def ageing_set(t: FixedAgeingTables, s: FixedAgeingState, j: int, gain: Any) -> bool:
     """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
-    given = gain << t.number[j, BITS]
+    given = gain << t.block.bits[j]
     inside = given
     if inside < LEAST:
         inside = zero(given) + LEAST
     elif inside > LARGEST:
         inside = zero(given) + LARGEST
     s.own[j] = 0
-    s.block[j, GAIN] = inside
-    s.block[j, INVERSE] = reciprocal(inside)
+    s.gain[j] = inside
+    s.inverse[j] = reciprocal(inside)
     return bool(inside != given)
 
 
 @jit
-def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) -> None:
+def ageing_move(t: FixedAgeingTables, s: FixedAgeingState, j: int, before: Any, v: Any) -> None:
     """The drive has moved to v."""
     way = v - before
-    following = s.block[j, HIGH] + (way if way >= 0 else -way)
-    if following > t.number[j, LAST]:
-        following = t.number[j, LAST]
-    s.block[j, HIGH] = following
+    following = s.high[j] + (way if way >= 0 else -way)
+    if following > t.block.last[j]:
+        following = t.block.last[j]
+    s.high[j] = following
     if s.own[j]:
         gain = ageing_gain(t, j, following)
-        s.block[j, INVERSE] = followed(gain, s.block[j, INVERSE], t.turns[j])
-        s.block[j, GAIN] = gain
+        s.inverse[j] = followed(gain, s.inverse[j], t.block.turns[j])
+        s.gain[j] = gain
 
 
 @jit
-def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def ageing_solve(t: FixedAgeingTables, s: FixedAgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
-    return times(y, s.block[j, INVERSE], GAIN_BITS)
+    return times(y, s.inverse[j], GAIN_BITS)
 
 
 @jit
-def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def ageing_absorb(t: FixedAgeingTables, s: FixedAgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
-    return times(x, s.block[j, GAIN], GAIN_BITS)
+    return times(x, s.gain[j], GAIN_BITS)
 
 
 ARITHMETIC = Realized(
     Verbs(
-        floating.memory, absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
+        memory_of(FixedAgeingState), absorb=ageing_absorb, solve=ageing_solve, reset=ageing_reset, move=ageing_move,
         set_gain=ageing_set, set_travel=ageing_set_travel, travelled=ageing_travelled,
     ),
-    constants, made, formats,
+    constants, made, formats, kinds=(KIND,),
 )

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
+from hystgen.basics.structures import Count, Real, Struct, memory_of
 from hystgen.effects.base import Array, Block, Place, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
 from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import ChainPart, Margin, One, Realized, Responses, Verbs, called, late
-from hystgen.plays.slots import Counts, Reals, zero
+from hystgen.plays.slots import Counts, zero
 
 
 def problems(effect: ExponentialCreep | LogarithmicCreep) -> Iterator[str]:
@@ -122,101 +123,122 @@ def shares(terms: Array) -> Array:
 
 # ---------------------------------------------------------------- creep.c
 
-SLOPE, INVERSE_SLOPE, REST, INVERSE_REST = 0, 1, 2, 3
-SHARE = 1
-BEFORE, AHEAD = 1, 0
-HIGH, LOW = 0, 1
+
+class CreepTerm(Struct):
+    """What a state of creep adds to the next output by inputs up to now: X += rate (share h - X)."""
+
+    rate: Real
+    share: Real
 
 
-KIND = Kind(
-    "creep", ("slope", "inverse_slope", "rest", "inverse_rest"), ("ahead",),
-    rows=Rows("term", ("rate", "share"), ("high", "low")), counts=("n",),
-)
+class CreepTable(Struct):
+    """Creep behind the plays: y = slope h + X_1 + X_2 + ..., with the X of the sample before."""
+
+    slope: Real  # change of y with h at once
+    inverse_slope: Real
+    rest: Real  # y over h at rest
+    inverse_rest: Real
+    n: Count
+
+
+class CreepTermState(Struct):
+    """A number in two parts, since it grows in steps far below its last bit."""
+
+    high: Real
+    low: Real
+
+
+class CreepState(Struct):
+    """A block."""
+
+    ahead: Real  # output of the next sample for an input of 0
+
+
+KIND = Kind("creep", CreepTable, CreepState, Rows("term", CreepTerm, CreepTermState))
 
 
 class CreepTables(NamedTuple):
-    """All creep blocks of a model: `block` (k, 4), the states of each from `first` (k + 1) on in `term` (m, 2); both
-    have more columns in fixed point."""
+    """All creep blocks of a model: `block` (k,), the states of each from `first` (k + 1) on in `term` (m,)."""
 
-    block: Reals
+    block: CreepTable
     first: Counts
-    term: Reals
+    term: CreepTerm
+
+
+class CreepMemory(NamedTuple):
+    """Memory of all creep blocks: `block` (k,), `term` (m,)."""
+
+    block: CreepState
+    term: CreepTermState
+
+
+def firsts(blocks: Sequence[CreepNumbers]) -> Counts:
+    """Where the states of each block begin, and those of the last one end."""
+    return np.cumsum([0, *(len(one.terms) for one in blocks)]).astype(np.int64)
 
 
 def tables(blocks: Sequence[CreepNumbers], reals: Callable[[Any, str], Any]) -> CreepTables:
     """The tables of several blocks in floating point; `reals`: converts named numbers to the arithmetic."""
-    rows = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in blocks]
+    given = [(one.slope, 1.0 / one.slope, one.rest, 1.0 / one.rest) for one in blocks]
+    rows = reals(given, "constants of the creep")
+    terms = reals(np.concatenate([np.empty((0, 2)), *(shares(one.terms) for one in blocks)]), "creep")
     return CreepTables(
-        reals(rows, "constants of the creep").reshape(len(rows), 4),
-        np.cumsum([0, *(len(one.terms) for one in blocks)]).astype(np.int64),
-        reals(np.concatenate([np.empty((0, 2)), *(shares(one.terms) for one in blocks)]), "creep"),
+        CreepTable.of([(*row, len(one.terms)) for row, one in zip(rows, blocks, strict=True)], rows.dtype),
+        firsts(blocks),
+        CreepTerm.of(terms, terms.dtype),
     )
 
 
 def constants(t: CreepTables) -> Iterator[Constants]:
     """The numbers of each block."""
-    for j, row in enumerate(t.block):
-        terms = t.term[t.first[j] : t.first[j + 1]]
-        yield Constants(KIND, row, (1 + 2 * len(terms), 1), terms, (len(terms),))
-
-
-class CreepState(NamedTuple):
-    """`block` (k, 2): the output at the next sample for an input of 0, or in fixed point for an unchanged input, and
-    that input; `state` (m, 2): in two parts."""
-
-    block: Reals
-    state: Reals
-
-
-def memory(t: CreepTables, dtype: Any) -> CreepState:
-    """Memory of all blocks."""
-    return CreepState(np.zeros((len(t.block), 2), dtype), np.zeros((len(t.term), 2), dtype))
+    for row, first in zip(t.block, t.first, strict=False):
+        yield Constants(KIND, row, (1 + 2 * int(row["n"]), 1), t.term[first : first + row["n"]])
 
 
 @jit
-def creep_rest(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
+def creep_rest(t: CreepTables, s: CreepMemory, j: int, x: Any) -> Any:
     """Everything has settled at the input x. Returns the output."""
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
-        settled = t.term[i, SHARE] * x
-        s.state[i, HIGH] = settled
-        s.state[i, LOW] = zero(x)
+        settled = t.term.share[i] * x
+        s.term.high[i] = settled
+        s.term.low[i] = zero(x)
         ahead = ahead + settled
-    s.block[j, AHEAD] = ahead
-    return t.block[j, REST] * x
+    s.block.ahead[j] = ahead
+    return t.block.rest[j] * x
 
 
 @jit(inline=True)
-def creep_resting(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def creep_resting(t: CreepTables, s: CreepMemory, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y once everything has settled."""
-    return y * t.block[j, INVERSE_REST]
+    return y * t.block.inverse_rest[j]
 
 
 @jit(inline=True)
-def creep_solve(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:
+def creep_solve(t: CreepTables, s: CreepMemory, j: int, y: Any) -> Any:
     """The input that gives the output y at this sample."""
-    return (y - s.block[j, AHEAD]) * t.block[j, INVERSE_SLOPE]
+    return (y - s.block.ahead[j]) * t.block.inverse_slope[j]
 
 
 @jit
-def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
+def creep_absorb(t: CreepTables, s: CreepMemory, j: int, x: Any) -> Any:
     """The input is x at this sample. Returns the output."""
-    y = s.block[j, AHEAD] + t.block[j, SLOPE] * x
+    y = s.block.ahead[j] + t.block.slope[j] * x
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
-        state = s.state[i, HIGH]
-        change = t.term[i, RATE] * (t.term[i, SHARE] * x - state) + s.state[i, LOW]
-        following = state + change
-        s.state[i, HIGH] = following
-        s.state[i, LOW] = change - (following - state)
+        high = s.term.high[i]
+        change = t.term.rate[i] * (t.term.share[i] * x - high) + s.term.low[i]
+        following = high + change
+        s.term.high[i] = following
+        s.term.low[i] = change - (following - high)
         ahead = ahead + following
-    s.block[j, AHEAD] = ahead
+    s.block.ahead[j] = ahead
     return y
 
 
 ARITHMETIC = Realized(
-    Verbs(memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
-    lambda blocks, about: tables(blocks, about.reals),
+    Verbs(memory_of(CreepMemory), creep_rest, creep_absorb, creep_resting, creep_solve), constants,
+    lambda blocks, about: tables(blocks, about.reals), kinds=(KIND,),
 )
 
 # ---------------------------------------------------------------- at steps of any length
@@ -229,7 +251,7 @@ class UnevenCreep(Block):
         self._numbers = functools.lru_cache(maxsize=64)(functools.partial(numbers, effect))
         self._tables = functools.lru_cache(maxsize=256)(self._of_steps)
         self.advance(1.0)
-        self.state = memory(self.table, np.float64)
+        self.state: CreepMemory = memory_of(CreepMemory)(self.table, np.float64)
 
     def _of_steps(self, seconds: float, later: float) -> CreepTables:
         """The `tables` of a step, whose states are advanced to the next output by the E and b0 of the next step; they
@@ -237,8 +259,8 @@ class UnevenCreep(Block):
         now, following = self._numbers(seconds), self._numbers(later)
         rate, late = following.terms[:, RATE], now.terms[:, LATE] - following.terms[:, LATE]
         found = tables([now], lambda values, _: np.array(values))
-        found.term[:] = shares(following.terms)
-        found.term[:, SHARE] += late * (1.0 - rate) / rate
+        found.term.rate[:], found.term.share[:] = shares(following.terms).T
+        found.term.share[:] += late * (1.0 - rate) / rate
         return found
 
     def advance(self, seconds: float, later: float | None = None) -> None:
@@ -256,7 +278,7 @@ PART = ChainPart(
     "creep", "creep", Place.LINEAR, called("creep"),
     lambda effect, seconds, _: numbers(effect, seconds),
     ARITHMETIC, late("creep"),
-    kinds=(KIND,), code=("creep",), uneven=UnevenCreep, no_inverse=problems,
+    code=("creep",), uneven=UnevenCreep, no_inverse=problems,
 )
 """Creep as a part of the chain."""
 

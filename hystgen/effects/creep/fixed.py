@@ -9,30 +9,79 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
+from hystgen.basics.structures import Count, Factor, Int64, Struct, UInt8, memory_of
 from hystgen.effects.creep import compensator as floating
-from hystgen.effects.creep.compensator import AHEAD, BEFORE, HIGH, CreepNumbers, CreepState, CreepTables
+from hystgen.effects.creep.compensator import CreepNumbers
 from hystgen.effects.kinds import Constants, Kind, Rows
 from hystgen.effects.part import Coded, FixedSurroundings, Realized, Sought, Verbs
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import zero
-
-KIND = Kind(
-    "creep", rows=Rows("term", letters="fffb", memory="w"), counts=("n",), letters="fffbb", memory="ww",
-)
+from hystgen.plays.slots import Counts, zero
 
 
-def constants(t: CreepTables) -> Iterator[Constants]:
+class FixedCreepTerm(Struct):
+    """A state of creep: its contribution at the next sample approaches weight times the input by `rate` in each
+    step."""
+
+    rate: Factor
+    late: Factor  # share of a change of the input that counts at once
+    weight: Factor
+    lift: UInt8  # bits of a state that the product with `late` leaves out
+
+
+class FixedCreepTable(Struct):
+    """Creep behind the plays: y = d h + X_1 + X_2 + ..."""
+
+    direct: Factor  # d
+    inverse_slope: Factor  # 1 / (change of y with h at once)
+    inverse_rest: Factor  # h over y at rest
+    bits: UInt8  # bits of the states below those of a signal,
+    drop: UInt8  # and bits that products leave out
+    n: Count
+
+
+class FixedCreepTermState(Struct):
+    """A state."""
+
+    next: Int64  # at the next sample for an unchanged input
+
+
+class FixedCreepState(Struct):
+    """A block."""
+
+    before: Int64  # input of the last sample
+    ahead: Int64  # output of the next one for the same input
+
+
+KIND = Kind("creep", FixedCreepTable, FixedCreepState, Rows("term", FixedCreepTerm, FixedCreepTermState))
+
+
+class FixedCreepTables(NamedTuple):
+    """All creep blocks of a model, as in floating point."""
+
+    block: FixedCreepTable
+    first: Counts
+    term: FixedCreepTerm
+
+
+class FixedCreepMemory(NamedTuple):
+    """Memory of all creep blocks, as in floating point."""
+
+    block: FixedCreepState
+    term: FixedCreepTermState
+
+
+def constants(t: FixedCreepTables) -> Iterator[Constants]:
     """The numbers of each block."""
-    for each in floating.constants(t):
-        yield replace(each, kind=KIND, products=(2 + 6 * len(each.rows), 2))
+    for row, first in zip(t.block, t.first, strict=False):
+        yield Constants(KIND, row, (2 + 6 * int(row["n"]), 2), t.term[first : first + row["n"]])
 
 
 def guard(effect: CreepNumbers, size: float, code: int) -> tuple[int, int]:
@@ -92,76 +141,71 @@ def formats(one: CreepNumbers, about: FixedSurroundings, given: float, _: float)
     return CreepFormats(one, *guard(one, given * 2.0**about.bits, about.bits))
 
 
-def tables(blocks: Sequence[CreepFormats], _: FixedSurroundings) -> CreepTables:
+def tables(blocks: Sequence[CreepFormats], _: FixedSurroundings) -> FixedCreepTables:
     """All creep blocks of a model."""
-    block: list[list[int]] = []
-    term: list[list[int]] = []
+    block, term = [], []
     for each in blocks:
-        bits, drop = each.bits, each.drop
-        given = (each.direct, 1.0 / each.one.slope, 1.0 / each.one.rest)
-        block.append([*(part for x in given for part in factor(x)), bits, drop])
-        for rate, _early, late, weight in each.one.terms.tolist():
+        one, bits, drop = each.one, each.bits, each.drop
+        given = (each.direct, 1.0 / one.slope, 1.0 / one.rest)
+        block.append((*map(factor, given), bits, drop, len(one.terms)))
+        for rate, _early, late, weight in one.terms.tolist():
             lift = lifted(late, bits)
-            scaled = (rate * 2.0**drop, late * 2.0 ** (bits - lift), weight)
-            term.append([*(part for x in scaled for part in factor(x)), lift])
-    first = np.cumsum([0, *(len(each.one.terms) for each in blocks)]).astype(np.int64)
-    return CreepTables(np.array(block, dtype=np.int64).reshape(-1, 8), first, np.array(term, np.int64).reshape(-1, 7))
+            term.append((*map(factor, (rate * 2.0**drop, late * 2.0 ** (bits - lift), weight)), lift))
+    firsts = floating.firsts([each.one for each in blocks])
+    return FixedCreepTables(FixedCreepTable.of(block), firsts, FixedCreepTerm.of(term))
 
 
 # ---------------------------------------------------------------- creep_fixed.c
 
-DIRECT, INVERSE_SLOPE, INVERSE_REST, BITS, DROP = 0, 2, 4, 6, 7
-RATE, LATE, WEIGHT, LIFT = 0, 2, 4, 6
-
 
 @jit
-def creep_rest(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
+def creep_rest(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: Any) -> Any:
     """Everything has settled at the input x. Returns the output."""
     total = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
-        state = times(x, t.term[i, WEIGHT], t.term[i, WEIGHT + 1]) << t.block[j, BITS]
-        s.state[i, HIGH] = state
+        state = times(x, t.term.weight.mantissa[i], t.term.weight.shift[i]) << t.block.bits[j]
+        s.term.next[i] = state
         total = total + state
-    y = times(x, t.block[j, DIRECT], t.block[j, DIRECT + 1]) + nearest(total, t.block[j, BITS])
-    s.block[j, BEFORE] = x
-    s.block[j, AHEAD] = y
+    y = times(x, t.block.direct.mantissa[j], t.block.direct.shift[j]) + nearest(total, t.block.bits[j])
+    s.block.before[j] = x
+    s.block.ahead[j] = y
     return y
 
 
 @jit
-def creep_resting(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def creep_resting(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y once everything has settled."""
-    return times(y, t.block[j, INVERSE_REST], t.block[j, INVERSE_REST + 1])
+    return times(y, t.block.inverse_rest.mantissa[j], t.block.inverse_rest.shift[j])
 
 
 @jit
-def creep_solve(t: CreepTables, s: CreepState, j: int, y: Any) -> Any:
+def creep_solve(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: Any) -> Any:
     """The input that gives the output y at this sample."""
-    change = times(y - s.block[j, AHEAD], t.block[j, INVERSE_SLOPE], t.block[j, INVERSE_SLOPE + 1])
-    return s.block[j, BEFORE] + change
+    change = times(y - s.block.ahead[j], t.block.inverse_slope.mantissa[j], t.block.inverse_slope.shift[j])
+    return s.block.before[j] + change
 
 
 @jit
-def creep_absorb(t: CreepTables, s: CreepState, j: int, x: Any) -> Any:
+def creep_absorb(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: Any) -> Any:
     """The input is x at this sample. Returns the output."""
-    change = x - s.block[j, BEFORE]
-    direct = times(x, t.block[j, DIRECT], t.block[j, DIRECT + 1])
+    change = x - s.block.before[j]
+    direct = times(x, t.block.direct.mantissa[j], t.block.direct.shift[j])
     total = zero(x)
     following = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
-        late = times(change, t.term[i, LATE], t.term[i, LATE + 1]) << t.term[i, LIFT]
-        state = s.state[i, HIGH] + late
+        late = times(change, t.term.late.mantissa[i], t.term.late.shift[i]) << t.term.lift[i]
+        state = s.term.next[i] + late
         total = total + state
-        settled = times(x, t.term[i, WEIGHT], t.term[i, WEIGHT + 1]) << t.block[j, BITS]
-        state = state + times((settled - state) >> t.block[j, DROP], t.term[i, RATE], t.term[i, RATE + 1])
-        s.state[i, HIGH] = state
+        settled = times(x, t.term.weight.mantissa[i], t.term.weight.shift[i]) << t.block.bits[j]
+        state = state + times((settled - state) >> t.block.drop[j], t.term.rate.mantissa[i], t.term.rate.shift[i])
+        s.term.next[i] = state
         following = following + state
-    s.block[j, BEFORE] = x
-    s.block[j, AHEAD] = direct + nearest(following, t.block[j, BITS])
-    return direct + nearest(total, t.block[j, BITS])
+    s.block.before[j] = x
+    s.block.ahead[j] = direct + nearest(following, t.block.bits[j])
+    return direct + nearest(total, t.block.bits[j])
 
 
 ARITHMETIC = Realized(
-    Verbs(floating.memory, creep_rest, creep_absorb, creep_resting, creep_solve), constants,
-    tables, formats,
+    Verbs(memory_of(FixedCreepMemory), creep_rest, creep_absorb, creep_resting, creep_solve), constants,
+    tables, formats, kinds=(KIND,),
 )

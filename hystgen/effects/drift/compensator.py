@@ -5,26 +5,47 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from hystgen.basics.jit import jit
+from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.part import ChainPart, FloatSurroundings, Function, Realized, Unmeasured, Verbs, called, late
-from hystgen.plays.slots import Reals, zero
+from hystgen.plays.slots import zero
 
 # ---------------------------------------------------------------- clock.c
 
 CARRY_SAMPLES = 2.0**24
 """Samples that a number of 24 bits counts exactly; both numbers together last for 2^48, nine years at 1 MHz."""
 
-KIND = Kind(
-    "clock", ("sample", "block", "carry", "rate", "half_change", "farthest"), ("high", "low", "lead"), own=(),
-)
 
-SAMPLE, BLOCK, CARRY, RATE, HALF_CHANGE, FARTHEST, ONE, MOST_AHEAD = range(8)
-HIGH, LOW, LEAD = range(3)
+class ClockTable(Struct):
+    """Drift over time: its rate, and half the change of the rate per second."""
+
+    sample: Real  # duration in s of one sample, and of `carry` of them
+    block: Real
+    carry: Real
+    rate: Real
+    half_change: Real
+    farthest: Real
+
+
+class ClockNumbers(ClockTable):
+    """The same with numbers that are not in the table in C."""
+
+    one: Real
+    most_ahead: Real  # samples by which references come ahead
+
+
+class ClockState(Struct):
+    """A clock."""
+
+    high: Real  # samples, in units of the table's carry and of one
+    low: Real
+    lead: Real  # samples by which the next reference is ahead
+
+
+KIND = Kind("clock", ClockTable, ClockState, own=())
 
 
 def numbers(effect: LinearDrift | CurvedDrift, seconds: float, farthest: float, ahead: int) -> tuple[float, ...]:
@@ -34,84 +55,80 @@ def numbers(effect: LinearDrift | CurvedDrift, seconds: float, farthest: float, 
     return seconds, block, CARRY_SAMPLES, effect.rate, 0.5 * change, farthest, 1.0, float(ahead)
 
 
-def constants(t: Reals) -> list[Constants]:
-    """The numbers of a model's clock, from tables (k, 8)."""
-    return [Constants(KIND, row[:ONE], (5, 0)) for row in t]
-
-
-def memory(t: Reals, dtype: Any) -> Reals:
-    """Memory (k, 3) of the clock of a model."""
-    return np.zeros((len(t), 3), dtype)
+def constants(t: ClockNumbers) -> list[Constants]:
+    """The numbers of a model's clock."""
+    return [Constants(KIND, row, (5, 0)) for row in t]
 
 
 @jit
-def clock_start(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  block interface
+def clock_start(t: ClockNumbers, s: ClockState, j: int) -> None:  # noqa: ARG001  block interface
     """Start the clock at the drive absorbed last."""
-    s[j, HIGH] = zero(s[j, HIGH])
-    s[j, LOW] = zero(s[j, LOW])
+    s.high[j] = zero(s.high[j])
+    s.low[j] = zero(s.low[j])
 
 
 @jit
-def clock_tick(t: Reals, s: Reals, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  block interface
+def clock_tick(t: ClockNumbers, s: ClockState, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  block interface
     """One sample later."""
-    following = s[j, LOW] + t[j, ONE]
-    if following >= t[j, CARRY]:
-        s[j, LOW] = zero(following)
-        s[j, HIGH] = s[j, HIGH] + t[j, ONE]
+    following = s.low[j] + t.one[j]
+    if following >= t.carry[j]:
+        s.low[j] = zero(following)
+        s.high[j] = s.high[j] + t.one[j]
     else:
-        s[j, LOW] = following
+        s.low[j] = following
 
 
 @jit
-def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
+def clock_drift(t: ClockNumbers, s: ClockState, j: int, ahead: Any) -> Any:
     """The drift `ahead` samples after the present one."""
-    time = s[j, HIGH] * t[j, BLOCK] + (s[j, LOW] + ahead) * t[j, SAMPLE]
-    drift = (t[j, RATE] + t[j, HALF_CHANGE] * time) * time
-    if drift > t[j, FARTHEST]:
-        return t[j, FARTHEST]
-    if drift < -t[j, FARTHEST]:
-        return -t[j, FARTHEST]
+    time = s.high[j] * t.block[j] + (s.low[j] + ahead) * t.sample[j]
+    drift = (t.rate[j] + t.half_change[j] * time) * time
+    if drift > t.farthest[j]:
+        return t.farthest[j]
+    if drift < -t.farthest[j]:
+        return -t.farthest[j]
     return drift
 
 
-def verbs(memory: Function, start: Function, tick: Function, drift: Function, one: int, most: int) -> Verbs:
-    """The verbs of a clock from its functions in an arithmetic; `one`, `most`: columns of 1 and the farthest lead."""
+def verbs(memory: Function, start: Function, tick: Function, drift: Function) -> Verbs:
+    """The verbs of a clock from its functions in an arithmetic."""
 
     @jit
-    def added(t: Reals, s: Reals, j: int) -> Any:
+    def added(t: ClockNumbers, s: ClockState, j: int) -> Any:
         """The drift now."""
-        return drift(t, s, j, zero(t[j, one]))
+        return drift(t, s, j, zero(t.one[j]))
 
     @jit
-    def lead(t: Reals, s: Reals, j: int, filled: int) -> None:
+    def lead(t: ClockNumbers, s: ClockState, j: int, filled: int) -> None:
         """A reference has arrived: the next one lies one sample further ahead, up to the preview."""
-        following = t[j, one]
+        following = t.one[j]
         if filled:
-            following = following + s[j, LEAD]
-        s[j, LEAD] = t[j, most] if following > t[j, most] else following
+            following = following + s.lead[j]
+        s.lead[j] = t.most_ahead[j] if following > t.most_ahead[j] else following
 
     @jit
-    def ahead(t: Reals, s: Reals, j: int, filled: int, moving: int) -> Any:
+    def ahead(t: ClockNumbers, s: ClockState, j: int, filled: int, moving: int) -> Any:
         """The drift by the time of the newest reference."""
-        late = s[j, LEAD] if filled else zero(t[j, one])
-        return drift(t, s, j, late + t[j, one] if moving else late)
+        late = s.lead[j] if filled else zero(t.one[j])
+        return drift(t, s, j, late + t.one[j] if moving else late)
 
     return Verbs(memory, reset=start, move=tick, added=added, lead=lead, ahead=ahead)
 
 
-def tables(effects: Sequence[LinearDrift | CurvedDrift], about: FloatSurroundings) -> Reals:
-    """The tables (k, 8) of the clock of a model."""
-    rows = [numbers(each, about.seconds, about.span, about.ahead) for each in effects]
-    found: Reals = about.reals(rows, "drift").reshape(-1, 8)
-    return found
+def tables(effects: Sequence[LinearDrift | CurvedDrift], about: FloatSurroundings) -> ClockNumbers:
+    """The numbers of the clock of a model."""
+    rows = about.reals([numbers(each, about.seconds, about.span, about.ahead) for each in effects], "drift")
+    return ClockNumbers.of(rows, rows.dtype)
 
 
-ARITHMETIC = Realized(verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants, tables)
+ARITHMETIC = Realized(
+    verbs(memory_of(ClockState), clock_start, clock_tick, clock_drift), constants, tables, kinds=(KIND,)
+)
 
 PART = ChainPart(
     "clock", "drift", Place.ADDED, called("drift"), lambda effect, *_: effect,
     ARITHMETIC, late("drift"),
-    kinds=(KIND,), code=("clock",),
+    code=("clock",),
     unmeasured=Unmeasured(
         "drift",
         "a clock that runs alone, and nothing says when it began; set_offset takes it from outside, and "

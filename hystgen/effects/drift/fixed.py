@@ -11,14 +11,13 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-import numpy as np
-
 from hystgen.basics.jit import jit
+from hystgen.basics.structures import Int64, Struct, UInt8, memory_of
 from hystgen.effects.drift import compensator as floating
 from hystgen.effects.drift.model import CurvedDrift, LinearDrift
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.part import FixedSurroundings, Realized
-from hystgen.plays.slots import Reals, zero
+from hystgen.plays.slots import zero
 
 MOST_SAMPLES = 2**44
 """Most samples that are counted: half a year at 1 MHz. A drift still in range by then stays where it is."""
@@ -26,23 +25,48 @@ MOST_SAMPLES = 2**44
 STATE_BITS = 58
 """Bits of a change per sample, without its sign: references ahead of time sum several of them."""
 
-KIND = Kind("clock", own=(), letters="wwwwb", memory="wwwww")
 
-SLOPE, CHANGE, SAMPLES, FARTHEST, BITS, ONE, MOST_AHEAD = range(7)
-WHOLE, PART, GAINED, COUNT = 0, 1, 3, 4
+class FixedClockTable(Struct):
+    """Drift over time: its change in the first sample, and the growth of that from sample to sample."""
+
+    slope: Int64
+    change: Int64
+    samples: Int64  # after which it stays constant
+    farthest: Int64
+    bits: UInt8  # bits of slope and change below those of a signal
+
+
+class FixedClockNumbers(FixedClockTable):
+    """The same with numbers that are not in the table in C."""
+
+    one: Int64
+    most_ahead: Int64  # samples by which references come ahead
+
+
+class FixedClockState(Struct):
+    """A clock."""
+
+    whole: Int64  # drift, in units of signals,
+    part: Int64  # and the fraction below, in units of the table
+    lead: Int64  # samples by which the next reference is ahead
+    gained: Int64  # growth of the change in a sample since the start
+    count: Int64  # samples since the start
+
+
+KIND = Kind("clock", FixedClockTable, FixedClockState, own=())
 
 
 @dataclass(frozen=True)
-class ClockNumbers:
-    """The table (7,) of a clock, and the largest error of its drift in signals."""
+class ClockFormats:
+    """The members of `FixedClockNumbers`, and the largest error of the drift in signals."""
 
-    table: list[int]
+    table: tuple[int, ...]
     error: float
 
 
 def numbers(
     effect: LinearDrift | CurvedDrift, step: float, signal: Fraction, farthest: float, ahead: int
-) -> ClockNumbers:
+) -> ClockFormats:
     """The constants for samples `step` seconds apart, signals of `signal` output units, and a drift of `farthest`
     signals either way. Raises OverflowError if the drift does not fit the numbers before it stays beyond that."""
     rate, change = (Fraction(x) for x in (effect.rate, getattr(effect, "change", 0.0)))
@@ -60,7 +84,7 @@ def numbers(
     scaled = round(slope * 2**bits), round(twice * 2**bits)
     reach = samples + ahead
     error = 1.0 + 0.5 * 2.0**-bits * (reach + 0.5 * float(reach) ** 2 * bool(twice))
-    return ClockNumbers([*scaled, samples, math.floor(farthest), bits, 1, ahead], error)
+    return ClockFormats((*scaled, samples, math.floor(farthest), bits, 1, ahead), error)
 
 
 def _drift(slope: float, twice: float, n: float) -> float:
@@ -81,59 +105,54 @@ def _samples(slope: float, twice: float, farthest: float) -> int:
     return high
 
 
-def constants(t: Reals) -> list[Constants]:
-    """The numbers of a model's clock, from tables (k, 7)."""
-    return [Constants(KIND, row[:ONE], (3, 0)) for row in t]
+def constants(t: FixedClockNumbers) -> list[Constants]:
+    """The numbers of a model's clock."""
+    return [Constants(KIND, row, (3, 0)) for row in t]
 
 
 # ---------------------------------------------------------------- clock_fixed.c
 
 
-def memory(t: Reals, dtype: Any) -> Reals:
-    """Memory (k, 5) of the clock of a model."""
-    return np.zeros((len(t), 5), dtype)
-
-
 @jit
-def clock_start(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  block interface
+def clock_start(t: FixedClockNumbers, s: FixedClockState, j: int) -> None:  # noqa: ARG001  block interface
     """Start the clock at the drive absorbed last."""
-    s[j, WHOLE] = zero(s[j, WHOLE])
-    s[j, PART] = s[j, WHOLE]
-    s[j, GAINED] = s[j, WHOLE]
-    s[j, COUNT] = s[j, WHOLE]
+    s.whole[j] = zero(s.whole[j])
+    s.part[j] = s.whole[j]
+    s.gained[j] = s.whole[j]
+    s.count[j] = s.whole[j]
 
 
 @jit
-def clock_tick(t: Reals, s: Reals, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  block interface
+def clock_tick(t: FixedClockNumbers, s: FixedClockState, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  block interface
     """One sample later."""
-    if s[j, COUNT] >= t[j, SAMPLES]:
+    if s.count[j] >= t.samples[j]:
         return
-    part = s[j, PART] + t[j, SLOPE] + s[j, GAINED]
-    whole = part >> t[j, BITS]
-    s[j, WHOLE] = s[j, WHOLE] + whole
-    s[j, PART] = part - (whole << t[j, BITS])
-    s[j, GAINED] = s[j, GAINED] + t[j, CHANGE]
-    s[j, COUNT] = s[j, COUNT] + 1
+    part = s.part[j] + t.slope[j] + s.gained[j]
+    whole = part >> t.bits[j]
+    s.whole[j] = s.whole[j] + whole
+    s.part[j] = part - (whole << t.bits[j])
+    s.gained[j] = s.gained[j] + t.change[j]
+    s.count[j] = s.count[j] + 1
 
 
 @jit
-def clock_drift(t: Reals, s: Reals, j: int, ahead: Any) -> Any:
+def clock_drift(t: FixedClockNumbers, s: FixedClockState, j: int, ahead: Any) -> Any:
     """The drift `ahead` samples after the present one."""
-    more = (t[j, SLOPE] + s[j, GAINED]) * ahead + t[j, CHANGE] * ((ahead * (ahead - 1)) // 2)
-    drift = s[j, WHOLE] + ((s[j, PART] + more) >> t[j, BITS])
-    if drift > t[j, FARTHEST]:
-        return t[j, FARTHEST]
-    if drift < -t[j, FARTHEST]:
-        return -t[j, FARTHEST]
+    more = (t.slope[j] + s.gained[j]) * ahead + t.change[j] * ((ahead * (ahead - 1)) // 2)
+    drift = s.whole[j] + ((s.part[j] + more) >> t.bits[j])
+    if drift > t.farthest[j]:
+        return t.farthest[j]
+    if drift < -t.farthest[j]:
+        return -t.farthest[j]
     return drift
 
 
-def formats(effect: LinearDrift | CurvedDrift, about: FixedSurroundings, *_: float) -> ClockNumbers:
+def formats(effect: LinearDrift | CurvedDrift, about: FixedSurroundings, *_: float) -> ClockFormats:
     """The clock of an effect, for references as far ahead as they may come."""
     return numbers(effect, about.seconds, about.output_lsb / 2**about.bits, float(about.farthest), about.ahead)
 
 
 ARITHMETIC = Realized(
-    floating.verbs(memory, clock_start, clock_tick, clock_drift, ONE, MOST_AHEAD), constants,
-    lambda clocks, _: np.array([one.table for one in clocks], dtype=np.int64).reshape(-1, 7), formats,
+    floating.verbs(memory_of(FixedClockState), clock_start, clock_tick, clock_drift), constants,
+    lambda clocks, _: FixedClockNumbers.of([one.table for one in clocks]), formats, kinds=(KIND,),
 )

@@ -5,18 +5,19 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
+from hystgen.basics.structures import Real, Struct, memory_of
 from hystgen.effects.base import Block, Place, decays
 from hystgen.effects.kinds import Constants, Kind
 from hystgen.effects.lag.model import Lag
 from hystgen.effects.part import ChainPart, Led, Margin, One, Realized, Responses, Verbs, called, late
-from hystgen.plays.slots import Counts, Reals, zero
+from hystgen.plays.slots import Counts, zero
 
 LONG_STEP = 2.0
 """[time constants in a step] From this step on the lag is inverted exactly. The pole of that inverse is then above
@@ -34,21 +35,25 @@ Set by: benchmarks/chosen_numbers.py branches."""
 
 @dataclass(frozen=True)
 class LagNumbers(One):
-    """Whether the inverse is `exact`, and constants: `1 - E`, then b0, b1, `1/b1`, or else theta, b1, `1/(1 - E)`."""
+    """Whether the inverse is `exact`, and constants: `1 - E`, theta, b1, `1/(1 - E)`, or else b0 and `1/b1` as `second`
+    and `inverse`."""
 
     exact: bool
-    row: tuple[float, float, float, float]
+    rate: float
+    second: float
+    late: float
+    inverse: float
 
     @property
     def lead(self) -> float:
         """Largest gain of its inverse."""
-        rate, second, late, _ = self.row
-        return (2.0 - rate) / (late - second) if self.exact else (1.0 + 2.0 * second) * (2.0 - rate) / rate
+        rate, second = self.rate, self.second
+        return (2.0 - rate) / (self.late - second) if self.exact else (1.0 + 2.0 * second) * (2.0 - rate) / rate
 
     @property
     def room(self) -> float:
         """The same gain, for intermediate results."""
-        return 2.0 / self.row[LATE if self.exact else RATE]
+        return 2.0 / (self.late if self.exact else self.rate)
 
     @property
     def misses(self) -> bool:
@@ -57,7 +62,7 @@ class LagNumbers(One):
 
     def rounding(self, size: float, u: float) -> tuple[float, float]:
         """Roundings of the output for inputs within `size`; `led` has the inverse's."""
-        return u * size * (8.0 + u / self.row[RATE]), 0.0
+        return u * size * (8.0 + u / self.rate), 0.0
 
     def led(self, error: float, drive: float, u: float, same: bool, turning: bool) -> float:
         """The error of the input for an error of the output asked for.
@@ -65,9 +70,9 @@ class LagNumbers(One):
         States that have seen the same drives pass on `goal/rate`, and the target before, which follows from earlier
         targets, `W = theta^2 e + theta (1 - theta) W`.
         """
-        rate, theta, late, _ = self.row
+        rate, theta = self.rate, self.second
         if self.exact:
-            return ((2.0 - rate) * error + 8.0 * u * drive) / (late - theta)
+            return ((2.0 - rate) * error + 8.0 * u * drive) / (self.late - self.second)
         states = u * drive * (5.0 + u / rate)
         farthest = (1.0 + 2.0 * theta) / (1.0 - theta)
         before = shifted(theta, turning) if same else farthest
@@ -76,16 +81,16 @@ class LagNumbers(One):
 
     def respond(self, z: NDArray[np.complex128], found: Responses) -> Responses:
         """The responses with this lag added to the other blocks."""
-        rate, second, late, _ = self.row
+        rate, second = self.rate, self.second
         if self.exact:
-            return found._replace(led=found.led * (1.0 - (1.0 - rate) * z) / (late + second * z))
+            return found._replace(led=found.led * (1.0 - (1.0 - rate) * z) / (self.late + second * z))
         led = found.led * (1.0 + second - second * z) * (1.0 - (1.0 - rate) * z) / rate
         return found._replace(led=led, arriving=found.arriving * (1.0 - second * second * (1.0 - z) ** 2))
 
     @property
     def fineness(self) -> float:
         """Bits of a signal in front of the plays that its lead costs, 0 for none."""
-        return 0.0 if self.exact else math.log2(4.0 / self.row[RATE])
+        return 0.0 if self.exact else math.log2(4.0 / self.rate)
 
     def asked(self, given: float, asked: float, margin: Margin) -> float:
         """Largest input that the inverse gives, for outputs within `asked` and after inputs within `given`."""
@@ -93,7 +98,7 @@ class LagNumbers(One):
 
     def sizes(self, given: float, asked: float, turning: bool) -> LagSizes:
         """Sizes of its signals."""
-        return LagSizes(self.exact, self.row[RATE], self.row[LATE], given, asked, turning)
+        return LagSizes(self.exact, self.rate, self.late, given, asked, turning)
 
 
 class LagSizes:
@@ -128,7 +133,9 @@ def numbers(effect: Lag, seconds: float, turning: bool = False, exact: bool | No
         exact = seconds >= LONG_STEP * effect.time_constant and not turning
     _, early, late = (float(x[0]) for x in decays(np.array([seconds]), effect.time_constant))
     rate = -float(np.expm1(-seconds / effect.time_constant))
-    return LagNumbers(exact, (rate, early, late, 1.0 / late) if exact else (rate, early / rate, late, 1.0 / rate))
+    return LagNumbers(exact, rate, early, late, 1.0 / late) if exact else LagNumbers(
+        exact, rate, early / rate, late, 1.0 / rate
+    )
 
 
 def shifted(theta: float, turning: bool = False) -> float:
@@ -145,100 +152,136 @@ def shifted(theta: float, turning: bool = False) -> float:
 
 # ---------------------------------------------------------------- lag.c, lag_exact.c
 
-RATE, THETA, LATE, INVERSE = 0, 1, 2, 3
-EARLY = THETA
-HIGH, LOW, WANTED, ASKED, ANSWER, EARLIER = range(6)
-REACHED, BEFORE = HIGH, LOW
-
 HALVES = 16
 """[steps] Halvings of the search for a lead. They end at most 2^-16 of the lead below it, which costs less than 2e-5 of
 the way and never overshoots; the tests of overshoot check that."""
 
 
-KIND = Kind(
-    "lag", ("rate", "theta", "late", "inverse_rate"), ("high", "low", "wanted", "asked", "answer"),
-    reading=("solve", "absorb"), own=("rest", "solve", "absorb"),
-)
-BRAKED_KIND = Kind(
-    "braked", KIND.table, (*KIND.state, "earlier"), reading=KIND.reading, own=KIND.own, like=KIND.name,
-)
-EXACT_KIND = Kind(
-    "lag_exact", ("rate", "early", "late", "inverse_late"), ("reached", "before"),
-    reading=("solve", "absorb"), own=("rest", "solve", "absorb"),
-)
+class LagTable(Struct):
+    """A lag that is led."""
+
+    rate: Real
+    theta: Real
+    late: Real
+    inverse_rate: Real
+
+
+class ExactTable(Struct):
+    """A lag that is inverted exactly."""
+
+    rate: Real
+    early: Real
+    late: Real
+    inverse_late: Real
+
+
+class LagState(Struct):
+    """A lag that is led."""
+
+    high: Real  # x, a lag on a drive that holds, in two parts
+    low: Real
+    wanted: Real  # output that the last input leads to
+    asked: Real  # output asked for,
+    answer: Real  # and the input that was to lead there
+
+
+class BrakedState(LagState):
+    """A lag behind a slew limit."""
+
+    earlier: Real  # asked for a sample before
+
+
+class ExactState(Struct):
+    """A lag that is inverted exactly."""
+
+    reached: Real
+    before: Real  # input of the last sample
+
+
+KIND = Kind("lag", LagTable, LagState, reading=("solve", "absorb"), own=("rest", "solve", "absorb"))
+BRAKED_KIND = replace(KIND, name="braked", state=BrakedState, like=KIND.name)
+EXACT_KIND = replace(KIND, name="lag_exact", table=ExactTable, state=ExactState)
 
 
 class LagTables(NamedTuple):
-    """All lags of a model: `exact` (k,), 1 where it is inverted exactly; `block` (k, 4), in fixed point (k, 8);
-    `braked`: 1 if the only one is kept from overshooting behind a slew limit."""
+    """All lags of a model: `exact` (k,), 1 where it is inverted exactly; its numbers are then in `inverted` (k,), else
+    in `led` (k,); `braked`: 1 if the only one is kept from overshooting behind a slew limit."""
 
     exact: Counts
-    block: Reals
+    led: LagTable
+    inverted: ExactTable
     braked: int
+
+
+class LagMemory(NamedTuple):
+    """Memory of all lags: of each as one that is led, and as one that is inverted exactly."""
+
+    led: BrakedState
+    inverted: ExactState
 
 
 def tables(lags: Sequence[LagNumbers], reals: Callable[[Any, str], Any], braked: int = 0) -> LagTables:
     """The tables of several lags in floating point; `reals`: converts named numbers to the arithmetic."""
+    rows = reals([(one.rate, one.second, one.late, one.inverse) for one in lags], "constants of the lag")
     return LagTables(
         np.array([int(one.exact) for one in lags], dtype=np.int64),
-        reals([one.row for one in lags], "constants of the lag").reshape(len(lags), 4),
-        braked,
+        LagTable.of(rows, rows.dtype), ExactTable.of(rows, rows.dtype), braked,
     )
 
 
 def constants(t: LagTables) -> Iterator[Constants]:
     """The numbers of each lag."""
-    for exact, row in zip(t.exact, t.block, strict=True):
-        yield Constants(EXACT_KIND if exact else BRAKED_KIND if t.braked else KIND, row, (3, 3 if exact else 2))
-
-
-def memory(t: LagTables, dtype: Any) -> Reals:
-    """Memory (k, 6) of all lags."""
-    return np.zeros((len(t.exact), 6), dtype)
+    kind = BRAKED_KIND if t.braked else KIND
+    for exact, led, inverted in zip(t.exact, t.led, t.inverted, strict=True):
+        yield Constants(EXACT_KIND, inverted, (3, 3)) if exact else Constants(kind, led, (3, 2))
 
 
 @jit
-def lag_rest(t: LagTables, s: Reals, j: int, x: Any) -> Any:
+def lag_rest(t: LagTables, s: LagMemory, j: int, x: Any) -> Any:
     """Everything has settled at the input x. Returns the output."""
-    s[j, HIGH] = x
-    s[j, LOW] = x if t.exact[j] else zero(x)
-    s[j, WANTED] = x
-    s[j, ASKED] = x
-    s[j, ANSWER] = x
-    s[j, EARLIER] = x
+    if t.exact[j]:
+        s.inverted.reached[j] = x
+        s.inverted.before[j] = x
+        return x
+    s.led.high[j] = x
+    s.led.low[j] = zero(x)
+    s.led.wanted[j] = x
+    s.led.asked[j] = x
+    s.led.answer[j] = x
+    s.led.earlier[j] = x
     return x
 
 
 @jit
-def lag_solve(t: LagTables, s: Reals, j: int, y: Any) -> Any:
+def lag_solve(t: LagTables, s: LagMemory, j: int, y: Any) -> Any:
     """The input that leads to the output y at this sample."""
-    n = t.block[j]
     if t.exact[j]:
-        reached = s[j, REACHED]
-        return (y - (reached + (n[EARLY] * s[j, BEFORE] - n[RATE] * reached))) * n[INVERSE]
-    goal = y + n[THETA] * (y - s[j, WANTED])
-    s[j, ASKED] = y
-    s[j, ANSWER] = s[j, HIGH] + (goal - s[j, HIGH]) * n[INVERSE]
-    return s[j, ANSWER]
+        reached = s.inverted.reached[j]
+        early = t.inverted.early[j] * s.inverted.before[j]
+        return (y - (reached + (early - t.inverted.rate[j] * reached))) * t.inverted.inverse_late[j]
+    goal = y + t.led.theta[j] * (y - s.led.wanted[j])
+    s.led.asked[j] = y
+    s.led.answer[j] = s.led.high[j] + (goal - s.led.high[j]) * t.led.inverse_rate[j]
+    return s.led.answer[j]
 
 
 @jit
-def lag_absorb(t: LagTables, s: Reals, j: int, x: Any) -> Any:
+def lag_absorb(t: LagTables, s: LagMemory, j: int, x: Any) -> Any:
     """The input is x at this sample. Returns the output."""
-    n = t.block[j]
-    state = s[j, HIGH]
     if t.exact[j]:
-        reached = state + ((n[EARLY] * s[j, BEFORE] + n[LATE] * x) - n[RATE] * state)
-        s[j, REACHED] = reached
-        s[j, BEFORE] = x
-        return reached
-    change = n[RATE] * (x - state) + s[j, LOW]
-    following = state + change
-    s[j, HIGH] = following
-    s[j, LOW] = change - (following - state)
-    s[j, WANTED] = s[j, ASKED] + n[LATE] * (x - s[j, ANSWER])
-    s[j, EARLIER] = s[j, ASKED]
-    return following - n[THETA] * (following - state)
+        reached = s.inverted.reached[j]
+        given = t.inverted.early[j] * s.inverted.before[j] + t.inverted.late[j] * x
+        s.inverted.reached[j] = reached + (given - t.inverted.rate[j] * reached)
+        s.inverted.before[j] = x
+        return s.inverted.reached[j]
+    high = s.led.high[j]
+    change = t.led.rate[j] * (x - high) + s.led.low[j]
+    following = high + change
+    s.led.high[j] = following
+    s.led.low[j] = change - (following - high)
+    s.led.wanted[j] = s.led.asked[j] + t.led.late[j] * (x - s.led.answer[j])
+    s.led.earlier[j] = s.led.asked[j]
+    return following - t.led.theta[j] * (following - high)
 
 
 # ---------------------------------------------------------------- lag_steady.c
@@ -247,7 +290,7 @@ def lag_absorb(t: LagTables, s: Reals, j: int, x: Any) -> Any:
 @jit
 def steady_missed(t: LagTables, way: Any) -> Any:
     """How far a model's only lag falls short of a move in its first sample."""
-    return t.block[0, THETA] * way
+    return t.led.theta[0] * way
 
 
 @jit
@@ -262,26 +305,26 @@ def steady_led(way: Any, moved: Any) -> Any:
 
 @jit
 def steady_solve(
-    t: LagTables, s: Reals, y: Any, moved: Any, rises: int, applied: Any, little: Any
+    t: LagTables, s: LagMemory, y: Any, moved: Any, rises: int, applied: Any, little: Any
 ) -> tuple[Any, Any]:
     """The input that leads a model's only lag to the output y without turning it back from the direction `rises`, and
     the move to y from the output asked for before, to which it had `moved`. A brake sees only the led part of the move,
     and the previous input's shortfall."""
-    way = y - s[0, ASKED]
-    missed = s[0, EARLIER] - s[0, WANTED]
-    s[0, WANTED] = y - steady_led(way, moved)
-    s[0, EARLIER] = s[0, WANTED]
+    way = y - s.led.asked[0]
+    missed = s.led.earlier[0] - s.led.wanted[0]
+    s.led.wanted[0] = y - steady_led(way, moved)
+    s.led.earlier[0] = s.led.wanted[0]
     v = steady_kept(t, s, lag_solve(t, s, 0, y), rises, applied, little)
-    s[0, ANSWER] = v
-    s[0, WANTED] = s[0, WANTED] - missed
+    s.led.answer[0] = v
+    s.led.wanted[0] = s.led.wanted[0] - missed
     return v, way
 
 
 @jit
-def steady_kept(t: LagTables, s: Reals, v: Any, rises: int, applied: Any, little: Any) -> Any:  # noqa: ARG001  used in fixed point
+def steady_kept(t: LagTables, s: LagMemory, v: Any, rises: int, applied: Any, little: Any) -> Any:  # noqa: ARG001  used in fixed point
     """The input v if it is ahead of x by `little` or more, in the direction `rises`. Else one with which x comes to
     rest without going back: the last one, `applied`, or one ahead of x by `little`."""
-    x = s[0, HIGH]
+    x = s.led.high[0]
     ahead, kept = (v - x, applied - x) if rises else (x - v, x - applied)
     if ahead >= little:
         return v
@@ -291,20 +334,20 @@ def steady_kept(t: LagTables, s: Reals, v: Any, rises: int, applied: Any, little
 
 
 @jit
-def steady_absorb(s: Reals, before: Any) -> None:
+def steady_absorb(s: LagMemory, before: Any) -> None:
     """The lag has followed from x = `before`. The rounding error of a sum is known exactly unless x has moved by more
     than its own size; it could then take x back, and is dropped."""
-    x = s[0, HIGH]
+    x = s.led.high[0]
     way = x - before
     if (-way if way < 0 else way) >= (-before if before < 0 else before):
-        s[0, LOW] = zero(x)
+        s.led.low[0] = zero(x)
 
 
 # ---------------------------------------------------------------- braked.c
 
 
 @jit
-def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: Any, halves: int) -> Any:
+def braked(t: LagTables, s: LagMemory, near: Any, short: Any, falling: Any, rising: Any, halves: int) -> Any:
     """The drive at which a model's only lag does not overshoot, although the drive comes back by at most `falling` or
     `rising` a step.
 
@@ -314,23 +357,23 @@ def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: 
     a drive no farther than the lag's destination never overshoots. A lead that nothing limits is right as it is: the
     drive gives way by at most its shortfalls from the answer, now and before. `halves`: of the search for m.
     """
-    n = t.block[0]
-    missed = s[0, EARLIER] - s[0, WANTED]
-    room = short + (-missed if missed < 0 else missed) * n[INVERSE]
+    missed = s.led.earlier[0] - s.led.wanted[0]
+    room = short + (-missed if missed < 0 else missed) * t.led.inverse_rate[0]
     if not room > 0:
         return near
-    move = s[0, ASKED] - s[0, EARLIER]
+    move = s.led.asked[0] - s.led.earlier[0]
     way = move
     if move > rising:
         way = rising
     elif move < -falling:
         way = -falling
-    left = (s[0, ASKED] - s[0, HIGH]) + (n[THETA] * way - way)
-    ahead = near - (s[0, HIGH] + way * n[INVERSE])
+    left = (s.led.asked[0] - s.led.high[0]) + (t.led.theta[0] * way - way)
+    ahead = near - (s.led.high[0] + way * t.led.inverse_rate[0])
     down = left < 0
     back = rising - way if down else falling + way
     size = -left if down else left
-    over = braked_over(size, size * n[INVERSE], -ahead if down else ahead, back, room, n.dtype.type(0.5), halves)
+    most, half = size * t.led.inverse_rate[0], t.led.rate.dtype.type(0.5)
+    over = braked_over(size, most, -ahead if down else ahead, back, room, half, halves)
     return near + over if down else near - over
 
 
@@ -357,15 +400,15 @@ def braked_over(size: Any, most: Any, lead: Any, back: Any, room: Any, half: Any
 
 
 @jit
-def steady_state(s: Reals) -> Any:
+def steady_state(s: LagMemory) -> Any:
     """The state of the lag."""
-    return s[0, HIGH]
+    return s.led.high[0]
 
 
 LED = Led(steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked, HALVES)
 ARITHMETIC = Realized(
-    Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
-    lambda blocks, about: tables(blocks, about.reals, about.braked),
+    Verbs(memory_of(LagMemory), lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
+    lambda blocks, about: tables(blocks, about.reals, about.braked), kinds=(KIND, EXACT_KIND, BRAKED_KIND),
 )
 
 # ---------------------------------------------------------------- at steps of any length
@@ -383,10 +426,10 @@ class UnevenLag(Block):
         self.rises: Callable[[], bool] | None = None
         self.always_led = False
         self.moved = 0.0
-        self.state = np.zeros((2, 6))
-        self.begun = self.state[0].copy()
         self._of_step = functools.lru_cache(maxsize=64)(functools.partial(_uneven, effect))
         self.advance(1.0)
+        self.state: LagMemory = memory_of(LagMemory)(self.table, np.float64)
+        self.begun = self.state.led[0].copy()
 
     def advance(self, seconds: float, later: float | None = None) -> None:
         """The numbers of this step."""
@@ -396,7 +439,7 @@ class UnevenLag(Block):
     @property
     def patience(self) -> float:
         """The share of the way to the other branch that it falls short in the first sample of a turn."""
-        return 0.0 if self.exact else float(self.table.block[0, THETA])
+        return 0.0 if self.exact else float(self.table.led.theta[0])
 
     def call(self, verb: str, x: float) -> float:
         """The result of a verb for x; `solve` may be called several times."""
@@ -406,27 +449,27 @@ class UnevenLag(Block):
             lag_rest(t, s, 0, x)
             lag_rest(t, s, 1, x)
         elif verb == "absorb":
-            self.moved = float(s[0, ASKED] - self.begun[ASKED])
+            self.moved = float(s.led.asked[0] - self.begun["asked"])
             lag_absorb(t, s, 0, x)
             x = lag_absorb(t, s, 1, x)
         elif verb == "solve":
-            s[0] = self.begun
+            s.led[0] = self.begun
             if self.exact:
                 answer = lag_solve(t, s, 1, x)
-                s[0, ASKED], s[0, ANSWER] = x, answer
+                s.led.asked[0], s.led.answer[0] = x, answer
                 return float(answer)
             if self.rises is None:
                 return float(lag_solve(t, s, 0, x))
-            return float(steady_solve(t, s, x, self.moved, int(self.rises()), s[0, HIGH], 0.0)[0])
+            return float(steady_solve(t, s, x, self.moved, int(self.rises()), s.led.high[0], 0.0)[0])
         if verb != "resting":
-            self.begun = s[0].copy()
+            self.begun = s.led[0].copy()
         return float(x)
 
     def steady(self, v: float) -> float:
         """The drive nearest to v that does not turn the lag back from its direction of arrival."""
         if self.rises is None or self.exact:
             return v
-        return float(steady_kept(self.table, self.state, v, int(self.rises()), self.state[0, HIGH], 0.0))
+        return float(steady_kept(self.table, self.state, v, int(self.rises()), self.state.led.high[0], 0.0))
 
     def braked(self, near: float, short: float, falling: float, rising: float) -> float:
         """The drive at which it does not overshoot, by `braked`."""
@@ -441,7 +484,7 @@ def _uneven(effect: Lag, seconds: float) -> tuple[bool, LagTables]:
 PART = ChainPart(
     "lag", "a lag", Place.DRIVE, called("lag", lambda effect: effect.time_constant > 0.0), numbers,
     ARITHMETIC, late("lag"),
-    kinds=(KIND, EXACT_KIND, BRAKED_KIND), code=("lag", "lag_exact"), uneven=UnevenLag,
+    code=("lag", "lag_exact"), uneven=UnevenLag,
     counted=lambda t, blocks: (blocks - int(t.exact.sum()), int(t.exact.sum())),
 )
 """A lag as a part of the chain, in front of the plays."""

@@ -10,37 +10,92 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
-from hystgen.effects.kinds import Constants, Kind
+from hystgen.basics.structures import Factor, Int64, Struct, UInt8, memory_of
+from hystgen.effects.kinds import VERBS, Constants
 from hystgen.effects.lag import compensator as floating
-from hystgen.effects.lag.compensator import HALVES, LagNumbers, LagSizes, LagTables, shifted, steady_led
+from hystgen.effects.lag.compensator import HALVES, LagNumbers, LagSizes, shifted, steady_led
 from hystgen.effects.part import Coded, FixedSurroundings, Led, Realized, Verbs
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Reals, zero
+from hystgen.plays.slots import Counts, zero
 
 EXACT_BITS = 8
 """Bits of the state of a lag that is inverted exactly, which no rounding can stall."""
 
-KIND = Kind("lag", own=("rest", "solve", "absorb"), letters="fffbb", memory="wwww")
-BRAKED_KIND = Kind("braked", own=KIND.own, letters=KIND.letters, memory=KIND.memory + "w", like=KIND.name)
-EXACT_KIND = Kind("lag_exact", own=("rest", "solve", "absorb"), letters="fffbb", memory="ww")
+class FixedLagTable(Struct):
+    """A lag that is led."""
+
+    rate: Factor
+    theta: Factor
+    inverse_rate: Factor
+    bits: UInt8  # bits of the states below those of a signal,
+    drop: UInt8  # and bits that products leave out
 
 
-def constants(t: LagTables) -> Iterator[Constants]:
-    """As in floating point."""
-    for each, exact in zip(floating.constants(t), t.exact, strict=True):
-        yield replace(each, kind=EXACT_KIND if exact else BRAKED_KIND if t.braked else KIND, products=(8, 4))
+class FixedExactTable(Struct):
+    """A lag that is inverted exactly."""
+
+    rate: Factor
+    late: Factor
+    inverse_late: Factor
+    bits: UInt8  # bits of the state below those of a signal,
+    drop: UInt8  # and bits that products leave out
 
 
-def memory(t: LagTables, dtype: Any) -> Reals:
-    """Memory (k, 5) of all lags."""
-    return np.zeros((len(t.exact), 5), dtype)
+class FixedLagState(Struct):
+    """A lag that is led."""
+
+    high: Int64  # x, a lag on a drive that holds
+    wanted: Int64  # output that the last input leads to
+    asked: Int64  # output asked for,
+    lead: Int64  # and the move that is to lead there
+
+
+class FixedBrakedState(FixedLagState):
+    """A lag behind a slew limit."""
+
+    earlier: Int64  # asked for a sample before
+
+
+class FixedExactState(Struct):
+    """A lag that is inverted exactly."""
+
+    next: Int64  # output at the next sample for an unchanged input
+    before: Int64  # input of the last sample
+
+
+KIND = replace(floating.KIND, table=FixedLagTable, state=FixedLagState, reading=VERBS)
+BRAKED_KIND = replace(KIND, name="braked", state=FixedBrakedState, like=KIND.name)
+EXACT_KIND = replace(KIND, name="lag_exact", table=FixedExactTable, state=FixedExactState)
+
+
+class FixedLagTables(NamedTuple):
+    """All lags of a model, as in floating point."""
+
+    exact: Counts
+    led: FixedLagTable
+    inverted: FixedExactTable
+    braked: int
+
+
+class FixedLagMemory(NamedTuple):
+    """Memory of all lags, as in floating point."""
+
+    led: FixedBrakedState
+    inverted: FixedExactState
+
+
+def constants(t: FixedLagTables) -> Iterator[Constants]:
+    """The numbers of each lag."""
+    kind = BRAKED_KIND if t.braked else KIND
+    for exact, led, inverted in zip(t.exact, t.led, t.inverted, strict=True):
+        yield Constants(EXACT_KIND, inverted, (8, 4)) if exact else Constants(kind, led, (8, 4))
 
 
 @dataclass(frozen=True)
@@ -55,16 +110,16 @@ class LagFormats(Coded):
     @cached_property
     def _roundings(self) -> tuple[float, float, float]:
         """Of the output, of the state in the inverse, and of the answer, in units of signals."""
-        exact, (rate, second, late, inverse) = self.one.exact, self.one.row
+        exact, rate, second, late = self.one.exact, self.one.rate, self.one.second, self.one.late
         state, scale, given = 2.0**-self.bits, 2.0**self.drop, self.sizes.given
         kept = state * (0.5 / rate + scale) + 2.0 * given * missed(rate * scale) / scale / rate
         finer = 2.0 ** (self.bits - self.drop)
-        answer = self.sizes.state * missed(inverse / finer) * finer
+        answer = self.sizes.state * missed(self.one.inverse / finer) * finer
         if exact:
             kept += (0.5 * state + 2.0 * given * missed(late * 2.0**self.bits) / 2.0**self.bits) / rate
             return kept + 0.5, kept, answer + state * scale / late + 0.5
         product = state * (0.5 + scale * second) + self.sizes.state * missed(second * scale) / scale
-        return 3.0 * kept + product + 0.5, kept + 3.0 * product, answer + state * scale * inverse + 1.0
+        return 3.0 * kept + product + 0.5, kept + 3.0 * product, answer + state * scale * self.one.inverse + 1.0
 
     @property
     def arrived(self) -> float:
@@ -74,12 +129,11 @@ class LagFormats(Coded):
     @property
     def follows(self) -> float:
         """Change of the output for a change of the input in one sample, as a share."""
-        rate, theta, *_ = self.one.row
-        return 1.0 if self.one.exact else rate * (1.0 + 2.0 * theta)
+        return 1.0 if self.one.exact else self.one.rate * (1.0 + 2.0 * self.one.second)
 
     def led(self, error: float, code: float, same: bool, turning: bool) -> float:
         """Error of the input for an error of the output asked for; `code`: rounding of the input."""
-        rate, second, late, _ = self.one.row
+        rate, second, late = self.one.rate, self.one.second, self.one.late
         _, kept, answer = self._roundings
         if not self.one.exact:  # its states have seen the same drives
             goal = shifted(second, turning) * error + (1.0 + 2.0 * second) / (1.0 - second) * kept
@@ -93,7 +147,7 @@ def formats(one: LagNumbers, about: FixedSurroundings, given: float, asked: floa
     """A lag for signals up to these sizes. Raises OverflowError where states have no room."""
     sizes = one.sizes(given, asked, about.margin.turning)
     room = STATE_BITS - math.ceil(math.log2(sizes.state))
-    wanted = EXACT_BITS if one.exact else max(math.ceil(-math.log2(one.row[floating.RATE])), 0) + GUARD
+    wanted = EXACT_BITS if one.exact else max(math.ceil(-math.log2(one.rate)), 0) + GUARD
     bits = min(wanted, room)
     if bits < (EXACT_BITS if one.exact else wanted - GUARD):
         raise OverflowError("no room")
@@ -101,114 +155,110 @@ def formats(one: LagNumbers, about: FixedSurroundings, given: float, asked: floa
     return LagFormats(one, sizes, bits, drop)
 
 
-def tables(blocks: Sequence[LagFormats], about: FixedSurroundings) -> LagTables:
+def tables(blocks: Sequence[LagFormats], about: FixedSurroundings) -> FixedLagTables:
     """All lags of a model."""
-    block: list[list[int]] = []
+    rows = []
     for each in blocks:
-        rate, second, late, inverse = each.one.row
-        bits, drop = each.bits, each.drop
-        middle = late * 2.0**bits if each.one.exact else second * 2.0**drop
-        given = (rate * 2.0**drop, middle, inverse * 2.0 ** (drop - bits))
-        block.append([*(part for x in given for part in factor(x)), bits, drop])
+        one, bits, drop = each.one, each.bits, each.drop
+        middle = one.late * 2.0**bits if one.exact else one.second * 2.0**drop
+        rows.append((*map(factor, (one.rate * 2.0**drop, middle, one.inverse * 2.0 ** (drop - bits))), bits, drop))
     exact = np.array([int(each.one.exact) for each in blocks], dtype=np.int64)
-    return LagTables(exact, np.array(block, np.int64).reshape(-1, 8), about.braked)
+    return FixedLagTables(exact, FixedLagTable.of(rows), FixedExactTable.of(rows), about.braked)
 
 
 # ---------------------------------------------------------------- lag_fixed.c, lag_exact_fixed.c
-
-RATE, SECOND, INVERSE, BITS, DROP = 0, 2, 4, 6, 7
-HIGH, WANTED, ASKED, LEAD, EARLIER = range(5)
-NEXT, BEFORE = 0, 1
 
 COARSE = 2**30 - 1
 """Largest number in the search for a lead, so that the square of a sum of two fits 64 bits."""
 
 
 @jit
-def scaled(t: LagTables, j: int, x: Any, which: int) -> Any:
+def scaled(t: FixedLagTable | FixedExactTable, j: int, x: Any, by: Factor) -> Any:
     """A number of a state's units times a factor of lag j."""
-    return times(x >> t.block[j, DROP], t.block[j, which], t.block[j, which + 1])
+    return times(x >> t.drop[j], by.mantissa[j], by.shift[j])
 
 
 @jit
-def lag_rest(t: LagTables, s: Reals, j: int, x: Any) -> Any:
+def lag_rest(t: FixedLagTables, s: FixedLagMemory, j: int, x: Any) -> Any:
     """Everything has settled at the input x. Returns the output."""
-    state = x << t.block[j, BITS]
-    s[j, HIGH] = state
     if t.exact[j]:
-        s[j, BEFORE] = x
-    else:
-        s[j, WANTED] = state
-        s[j, ASKED] = state
-        s[j, LEAD] = zero(x)
-        s[j, EARLIER] = state
+        s.inverted.next[j] = x << t.inverted.bits[j]
+        s.inverted.before[j] = x
+        return x
+    state = x << t.led.bits[j]
+    s.led.high[j] = state
+    s.led.wanted[j] = state
+    s.led.asked[j] = state
+    s.led.lead[j] = zero(x)
+    s.led.earlier[j] = state
     return x
 
 
 @jit
-def lag_solve(t: LagTables, s: Reals, j: int, y: Any) -> Any:
+def lag_solve(t: FixedLagTables, s: FixedLagMemory, j: int, y: Any) -> Any:
     """The input that leads to the output y at this sample."""
-    asked = y << t.block[j, BITS]
     if t.exact[j]:
-        return s[j, BEFORE] + scaled(t, j, asked - s[j, NEXT], INVERSE)
-    s[j, LEAD] = asked + scaled(t, j, asked - s[j, WANTED], SECOND) - s[j, HIGH]
-    s[j, ASKED] = asked
-    return nearest(s[j, HIGH], t.block[j, BITS]) + scaled(t, j, s[j, LEAD], INVERSE)
+        left = (y << t.inverted.bits[j]) - s.inverted.next[j]
+        return s.inverted.before[j] + scaled(t.inverted, j, left, t.inverted.inverse_late)
+    asked = y << t.led.bits[j]
+    s.led.lead[j] = asked + scaled(t.led, j, asked - s.led.wanted[j], t.led.theta) - s.led.high[j]
+    s.led.asked[j] = asked
+    return nearest(s.led.high[j], t.led.bits[j]) + scaled(t.led, j, s.led.lead[j], t.led.inverse_rate)
 
 
 @jit
-def lag_absorb(t: LagTables, s: Reals, j: int, x: Any) -> Any:
+def lag_absorb(t: FixedLagTables, s: FixedLagMemory, j: int, x: Any) -> Any:
     """The input is x at this sample. Returns the output."""
-    given = x << t.block[j, BITS]
     if t.exact[j]:
-        late = times(x - s[j, BEFORE], t.block[j, SECOND], t.block[j, SECOND + 1])
-        reached = s[j, NEXT] + late
-        s[j, NEXT] = reached + scaled(t, j, given - reached, RATE)
-        s[j, BEFORE] = x
-        return nearest(reached, t.block[j, BITS])
-    change = scaled(t, j, given - s[j, HIGH], RATE)
-    short = s[j, LEAD] - change
-    s[j, HIGH] = s[j, HIGH] + change
-    s[j, WANTED] = s[j, ASKED] - (short - scaled(t, j, short, SECOND))
-    s[j, LEAD] = s[j, LEAD] - scaled(t, j, change, RATE)
-    s[j, EARLIER] = s[j, ASKED]
-    return nearest(s[j, HIGH] - scaled(t, j, change, SECOND), t.block[j, BITS])
+        late = times(x - s.inverted.before[j], t.inverted.late.mantissa[j], t.inverted.late.shift[j])
+        reached = s.inverted.next[j] + late
+        given = x << t.inverted.bits[j]
+        s.inverted.next[j] = reached + scaled(t.inverted, j, given - reached, t.inverted.rate)
+        s.inverted.before[j] = x
+        return nearest(reached, t.inverted.bits[j])
+    change = scaled(t.led, j, (x << t.led.bits[j]) - s.led.high[j], t.led.rate)
+    left = s.led.lead[j] - change
+    s.led.high[j] = s.led.high[j] + change
+    s.led.wanted[j] = s.led.asked[j] - (left - scaled(t.led, j, left, t.led.theta))
+    s.led.lead[j] = s.led.lead[j] - scaled(t.led, j, change, t.led.rate)
+    s.led.earlier[j] = s.led.asked[j]
+    return nearest(s.led.high[j] - scaled(t.led, j, change, t.led.theta), t.led.bits[j])
 
 
 # ---------------------------------------------------------------- lag_steady_fixed.c
 
 
 @jit
-def steady_missed(t: LagTables, way: Any) -> Any:
+def steady_missed(t: FixedLagTables, way: Any) -> Any:
     """How far a model's only lag falls short of a move in its first sample."""
-    bits = t.block[0, BITS]
-    return nearest(scaled(t, 0, way << bits, SECOND), bits)
+    bits = t.led.bits[0]
+    return nearest(scaled(t.led, 0, way << bits, t.led.theta), bits)
 
 
 @jit
 def steady_solve(
-    t: LagTables, s: Reals, y: Any, moved: Any, rises: int, applied: Any, little: Any
+    t: FixedLagTables, s: FixedLagMemory, y: Any, moved: Any, rises: int, applied: Any, little: Any
 ) -> tuple[Any, Any]:
     """As in floating point; an input that is kept has no move."""
-    bits = t.block[0, BITS]
-    way = y - (s[0, ASKED] >> bits)
-    missed = s[0, EARLIER] - s[0, WANTED]
-    s[0, WANTED] = (y - steady_led(way, moved)) << bits
-    s[0, EARLIER] = s[0, WANTED]
+    bits = t.led.bits[0]
+    way = y - (s.led.asked[0] >> bits)
+    missed = s.led.earlier[0] - s.led.wanted[0]
+    s.led.wanted[0] = (y - steady_led(way, moved)) << bits
+    s.led.earlier[0] = s.led.wanted[0]
     led = lag_solve(t, s, 0, y)
     v = steady_kept(t, s, led, rises, applied, little)
     if v != led:
-        s[0, LEAD] = zero(v)
-    s[0, WANTED] = s[0, WANTED] - missed
+        s.led.lead[0] = zero(v)
+    s.led.wanted[0] = s.led.wanted[0] - missed
     return v, way
 
 
 @jit
-def steady_kept(t: LagTables, s: Reals, v: Any, rises: int, applied: Any, little: Any) -> Any:
+def steady_kept(t: FixedLagTables, s: FixedLagMemory, v: Any, rises: int, applied: Any, little: Any) -> Any:
     """As in floating point; `little` is at least a drive code, so that rounding to a code leaves the drive ahead."""
-    bits = t.block[0, BITS]
-    x = nearest(s[0, HIGH], bits)
-    ahead, kept = v - x, (applied << bits) - s[0, HIGH]
+    bits = t.led.bits[0]
+    x = nearest(s.led.high[0], bits)
+    ahead, kept = v - x, (applied << bits) - s.led.high[0]
     if not rises:
         ahead, kept = -ahead, -kept
     if ahead >= little:
@@ -219,7 +269,7 @@ def steady_kept(t: LagTables, s: Reals, v: Any, rises: int, applied: Any, little
 
 
 @jit
-def steady_absorb(s: Reals, before: Any) -> None:
+def steady_absorb(s: FixedLagMemory, before: Any) -> None:
     """The lag has followed; rounding loses nothing that could take it back."""
 
 
@@ -227,31 +277,33 @@ def steady_absorb(s: Reals, before: Any) -> None:
 
 
 @jit
-def braked(t: LagTables, s: Reals, near: Any, short: Any, falling: Any, rising: Any, code: Any, drop: Any) -> Any:
+def braked(
+    t: FixedLagTables, s: FixedLagMemory, near: Any, short: Any, falling: Any, rising: Any, code: Any, drop: Any
+) -> Any:
     """As in floating point; `code`: a drive code; all arguments are signals; the search drops `drop` bits."""
-    bits = t.block[0, BITS]
-    missed = s[0, EARLIER] - s[0, WANTED]
-    room = short + scaled(t, 0, -missed if missed < 0 else missed, INVERSE)
+    bits = t.led.bits[0]
+    missed = s.led.earlier[0] - s.led.wanted[0]
+    room = short + scaled(t.led, 0, -missed if missed < 0 else missed, t.led.inverse_rate)
     if room + room < code:
         return near
-    move = s[0, ASKED] - s[0, EARLIER]
+    move = s.led.asked[0] - s.led.earlier[0]
     way = move
     if move > rising << bits:
         way = rising << bits
     elif move < -falling << bits:
         way = -falling << bits
-    more = s[0, ASKED] - s[0, HIGH] + scaled(t, 0, way, SECOND) - way
+    more = s.led.asked[0] - s.led.high[0] + scaled(t.led, 0, way, t.led.theta) - way
     down = nearest(way, bits) + falling
     left = coarse(nearest(more, bits), drop)
     back = coarse(rising + falling - down if more < 0 else down, drop)
-    ahead = near - (nearest(s[0, HIGH], bits) + scaled(t, 0, way, INVERSE))
+    ahead = near - (nearest(s.led.high[0], bits) + scaled(t.led, 0, way, t.led.inverse_rate))
     lead = coarse(-ahead if left < 0 else ahead, drop)
     less = braked_over(t, -left if left < 0 else left, lead, back, coarse(room, drop), drop) << drop
     return near + less if left < 0 else near - less
 
 
 @jit
-def braked_over(t: LagTables, size: Any, lead: Any, back: Any, room: Any, drop: Any) -> Any:
+def braked_over(t: FixedLagTables, size: Any, lead: Any, back: Any, room: Any, drop: Any) -> Any:
     """As in floating point, in the coarse numbers of the search."""
     margin = back >> 1
     most = coarsely(t, size, drop) if size <= margin else size
@@ -289,13 +341,13 @@ def coarse(x: Any, drop: Any) -> Any:
 
 
 @jit
-def coarsely(t: LagTables, x: Any, drop: Any) -> Any:
+def coarsely(t: FixedLagTables, x: Any, drop: Any) -> Any:
     """`x/(1 - E)` in coarse numbers."""
-    return coarse(scaled(t, 0, x << (t.block[0, BITS] + drop), INVERSE), drop)
+    return coarse(scaled(t.led, 0, x << (t.led.bits[0] + drop), t.led.inverse_rate), drop)
 
 
 LED = Led(floating.steady_state, steady_solve, steady_kept, steady_absorb, steady_missed, braked, coarse=COARSE)
 ARITHMETIC = Realized(
-    Verbs(memory, lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
-    tables, formats,
+    Verbs(memory_of(FixedLagMemory), lag_rest, lag_absorb, solve=lag_solve, led=LED), constants,
+    tables, formats, kinds=(KIND, EXACT_KIND, BRAKED_KIND),
 )

@@ -8,18 +8,19 @@ with the motion. Only the forward operator has it: the zeros of a second-order s
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from hystgen.basics.jit import jit
+from hystgen.basics.structures import Real, Signal, Struct, memory_of
 from hystgen.effects.base import Array, Place
 from hystgen.effects.kinds import Constants, Kind
-from hystgen.effects.part import ChainPart, Margin, One, Realized, Verbs, called, late
+from hystgen.effects.part import ChainPart, FloatSurroundings, Margin, One, Realized, Verbs, called, late
 from hystgen.effects.resonance.model import Resonance
-from hystgen.plays.slots import Reals, zero
+from hystgen.plays.slots import zero
 
 MOST_SAMPLES = 2**20
 """Samples of a free oscillation that are summed one by one; the rest has one bound."""
@@ -92,55 +93,69 @@ def numbers(effect: Resonance, seconds: float) -> ModeNumbers:
 
 # ---------------------------------------------------------------- mode.c
 
-KEEP, TURN, SWING, LEAD, PUSH = range(5)
-BEFORE, OFF, RATE = range(3)
 
-KIND = Kind("mode", ("keep", "turn", "swing", "lead", "push"), ("before", "off", "rate"),
-            reading=("absorb",), own=("rest", "absorb"))
+class ModeTable(Struct):
+    """In a step a mode's two states, output less input and the rate of that, change by shares of themselves (keep,
+    swing), of each other (turn), and of a change of the input (lead, push)."""
+
+    keep: Real
+    turn: Real
+    swing: Real
+    lead: Real
+    push: Real
 
 
-def constants(t: Reals) -> Iterator[Constants]:
-    """The numbers of each mode, from tables (k, 5)."""
+class ModeState(Struct):
+    """A mode."""
+
+    before: Signal  # input of the last sample
+    off: Signal  # output less input
+    rate: Signal  # of `off`, per radian of the mode
+
+
+KIND = Kind("mode", ModeTable, ModeState, reading=("absorb",), own=("rest", "absorb"))
+
+
+def tables(modes: Sequence[ModeNumbers], about: FloatSurroundings) -> ModeTable:
+    """The tables of several modes in floating point."""
+    rows = about.reals([one.table for one in modes], "the modes")
+    return ModeTable.of(rows, rows.dtype)
+
+
+def constants(t: ModeTable) -> Iterator[Constants]:
+    """The numbers of each mode."""
     for row in t:
         yield Constants(KIND, row, (6, 0))
 
 
-def memory(t: Reals, dtype: Any) -> Reals:
-    """Memory (k, 3) of all modes."""
-    return np.zeros((len(t), 3), dtype)
-
-
 @jit
-def mode_rest(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def mode_rest(t: ModeTable, s: ModeState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """Everything has settled at the input x. Returns the output."""
-    s[j, BEFORE] = x
-    s[j, OFF] = zero(x)
-    s[j, RATE] = zero(x)
+    s.before[j] = x
+    s.off[j] = zero(x)
+    s.rate[j] = zero(x)
     return x
 
 
 @jit
-def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
+def mode_absorb(t: ModeTable, s: ModeState, j: int, x: Any) -> Any:
     """The input is x at this sample. Returns the output."""
-    change = x - s[j, BEFORE]
-    off = s[j, OFF]
-    rate = s[j, RATE]
-    s[j, OFF] = off + ((t[j, KEEP] * off + t[j, TURN] * rate) + t[j, LEAD] * change)
-    s[j, RATE] = rate + ((t[j, SWING] * rate - t[j, TURN] * off) + t[j, PUSH] * change)
-    s[j, BEFORE] = x
-    return x + s[j, OFF]
+    change = x - s.before[j]
+    off = s.off[j]
+    rate = s.rate[j]
+    s.off[j] = off + ((t.keep[j] * off + t.turn[j] * rate) + t.lead[j] * change)
+    s.rate[j] = rate + ((t.swing[j] * rate - t.turn[j] * off) + t.push[j] * change)
+    s.before[j] = x
+    return x + s.off[j]
 
 
-ARITHMETIC = Realized(
-    Verbs(memory, mode_rest, mode_absorb), constants,
-    lambda blocks, about: about.reals([one.table for one in blocks], "the modes").reshape(-1, 5),
-)
+ARITHMETIC = Realized(Verbs(memory_of(ModeState), mode_rest, mode_absorb), constants, tables, kinds=(KIND,))
 
 PART = ChainPart(
     "mode", "resonance", Place.LINEAR, called("resonance", lambda effect: effect.block is None),
     lambda effect, seconds, _: numbers(effect, seconds),
     ARITHMETIC, late("resonance"), forward=True,
-    kinds=(KIND,), code=("mode",),
+    code=("mode",),
 )
 """A mode as a part of the chain, of the forward operator alone."""
 

@@ -8,26 +8,41 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
-
-import numpy as np
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
 from hystgen.basics.jit import jit
-from hystgen.effects.kinds import Constants, Kind
+from hystgen.basics.structures import Factor, Struct, UInt8, memory_of
+from hystgen.effects.kinds import Constants
 from hystgen.effects.part import Coded, Realized, Verbs
 from hystgen.effects.resonance import compensator
-from hystgen.effects.resonance.compensator import BEFORE, OFF, RATE, ModeNumbers
+from hystgen.effects.resonance.compensator import ModeNumbers, ModeState
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Reals
 
-KIND = Kind("mode", own=("rest", "absorb"), reading=("absorb",), letters="fffffbbb", memory="www")
+Row = tuple[tuple[int, int], tuple[int, int], tuple[int, int], tuple[int, int], tuple[int, int], int, int, int]
+"""The members of a `FixedModeTable`."""
 
 
-def constants(t: Reals) -> Iterator[Constants]:
-    """The numbers of each mode, from tables (k, 13)."""
+class FixedModeTable(Struct):
+    """As in floating point; a change of the input adds `late` of it, less the change itself, and `push`."""
+
+    keep: Factor
+    turn: Factor
+    swing: Factor
+    late: Factor
+    push: Factor
+    bits: UInt8  # bits of the states below those of a signal,
+    drop: UInt8  # bits that products with states leave out,
+    lift: UInt8  # and bits that products with a change of the input leave out
+
+
+KIND = replace(compensator.KIND, table=FixedModeTable)
+
+
+def constants(t: FixedModeTable) -> Iterator[Constants]:
+    """The numbers of each mode."""
     for row in t:
         yield Constants(KIND, row, (12, 0))
 
@@ -37,7 +52,7 @@ def largest_state(one: ModeNumbers, size: float) -> float:
     return max(1.0 + one.largest, one.fastest) * size
 
 
-def row(one: ModeNumbers, size: float) -> list[int]:
+def row(one: ModeNumbers, size: float) -> Row:
     """The numbers of a mode whose inputs are signals up to `size`. Raises OverflowError where states have no room."""
     state = max(largest_state(one, size), 1.0)
     wanted = math.ceil(math.log2(max(one.off_after + one.rate_after, 1.0))) + GUARD
@@ -48,13 +63,14 @@ def row(one: ModeNumbers, size: float) -> list[int]:
     keep, turn, swing, lead, push = one.table
     late = 1.0 + lead
     lift = max(lifted(late, bits), lifted(push, bits))
-    given = (*(x * 2.0**drop for x in (keep, turn, swing)), late * 2.0 ** (bits - lift), push * 2.0 ** (bits - lift))
-    return [*(part for x in given for part in factor(x)), bits, drop, lift]
+    scale, entered = 2.0**drop, 2.0 ** (bits - lift)
+    own = factor(keep * scale), factor(turn * scale), factor(swing * scale)
+    return *own, factor(late * entered), factor(push * entered), bits, drop, lift
 
 
-def rounding(one: ModeNumbers, table: Any, size: float) -> float:
+def rounding(one: ModeNumbers, table: Row, size: float) -> float:
     """Roundings of the output in signals, for inputs up to `size` of them."""
-    bits, drop, lift = (int(x) for x in table[BITS:])
+    *_, bits, drop, lift = table
     state, most = 2.0**-bits, largest_state(one, size)
     keep, turn, swing, lead, push = one.table
 
@@ -74,7 +90,7 @@ class ModeFormats(Coded):
     """A mode by its numbers."""
 
     one: ModeNumbers
-    row: list[int]
+    row: Row
 
     def there(self, size: float, signal: float) -> float:
         """Roundings of the output for inputs within a size, with signals of this unit."""
@@ -83,33 +99,38 @@ class ModeFormats(Coded):
 
 # ---------------------------------------------------------------- mode_fixed.c
 
-KEEP, TURN, SWING, LATE, PUSH, BITS, DROP, LIFT = 0, 2, 4, 6, 8, 10, 11, 12
+
 mode_rest = compensator.mode_rest  # nothing in it is rounded
 
 
 @jit
-def scaled(t: Reals, j: int, x: Any, which: int) -> Any:
+def scaled(t: FixedModeTable, j: int, x: Any, by: Factor) -> Any:
     """A number of a state's units times a factor of mode j."""
-    return times(x >> t[j, DROP], t[j, which], t[j, which + 1])
+    return times(x >> t.drop[j], by.mantissa[j], by.shift[j])
 
 
 @jit
-def mode_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:
+def entered(t: FixedModeTable, j: int, change: Any, by: Factor) -> Any:
+    """A change of the input times a factor of mode j, in a state's units."""
+    return times(change, by.mantissa[j], by.shift[j]) << t.lift[j]
+
+
+@jit
+def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: Any) -> Any:
     """The input is x at this sample. Returns the output."""
-    change = x - s[j, BEFORE]
-    off = s[j, OFF]
-    rate = s[j, RATE]
-    late = times(change, t[j, LATE], t[j, LATE + 1]) << t[j, LIFT]
-    push = times(change, t[j, PUSH], t[j, PUSH + 1]) << t[j, LIFT]
-    turned = scaled(t, j, off, KEEP) + scaled(t, j, rate, TURN)
-    s[j, OFF] = off + (turned + (late - (change << t[j, BITS])))
-    s[j, RATE] = rate + (scaled(t, j, rate, SWING) - scaled(t, j, off, TURN) + push)
-    s[j, BEFORE] = x
-    return x + nearest(s[j, OFF], t[j, BITS])
+    change = x - s.before[j]
+    off = s.off[j]
+    rate = s.rate[j]
+    turned = scaled(t, j, off, t.keep) + scaled(t, j, rate, t.turn)
+    s.off[j] = off + (turned + (entered(t, j, change, t.late) - (change << t.bits[j])))
+    s.rate[j] = rate + (scaled(t, j, rate, t.swing) - scaled(t, j, off, t.turn) + entered(t, j, change, t.push))
+    s.before[j] = x
+    return x + nearest(s.off[j], t.bits[j])
 
 
 ARITHMETIC = Realized(
-    Verbs(compensator.memory, mode_rest, mode_absorb), constants,
-    lambda modes, _: np.array([each.row for each in modes], dtype=np.int64).reshape(-1, 13),
+    Verbs(memory_of(ModeState), mode_rest, mode_absorb), constants,
+    lambda modes, _: FixedModeTable.of([each.row for each in modes]),
     lambda one, about, given, _: ModeFormats(one, row(one, given * 2.0**about.bits)),
+    kinds=(KIND,),
 )

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hystgen.effects.base import Array
-from hystgen.effects.maps import Fitted, Map, MapErrors, MapPart, Wanted, Whole
+from hystgen.effects.maps import FittedCurve, Map, MapErrors, MapPart, Wanted, Whole
 from hystgen.effects.part import called
 from hystgen.effects.saturation.model import HardSaturation, Stops, TanhSaturation
 from hystgen.front.tanh import kernels
@@ -75,7 +75,7 @@ class Smooth(Map):
             Wanted(lambda y: float(envelope.inverse(y)), least, most, max(map(abs, ends))),
         ]
 
-    def whole_errors(self, found: MapErrors, curves: Sequence[Fitted], unit: Whole) -> MapErrors:
+    def whole_errors(self, found: MapErrors, curves: Sequence[FittedCurve], unit: Whole) -> MapErrors:
         """As for any map."""
         (onward, backward), most = curves, 1.0 - 2.0**-50
         shares = [min(max((end - self.centre) / self.level, -most), most) for end in found.ends.tolist()]

@@ -132,12 +132,12 @@ static bool hystgen_inverse_stands(const hystgen_inverse_t *self, hystgen_real_t
 #else
 /* Whether the last answer still stands for reference u; u is the last reference from now on. */
 static bool hystgen_inverse_stands(hystgen_inverse_t *self, hystgen_real_t u) {
-    if (self->repeat && u >= self->reference && u <= self->reference) {
+    if (self->repeated && u >= self->reference && u <= self->reference) {
         self->status |= self->bits;
         return true;
     }
     self->reference = u;
-    self->repeat = true;
+    self->repeated = true;
     return false;
 }
 #endif

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hystgen.basics.jit import jit
+from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
 from hystgen.effects.kinds import Constants, Kind, Rows
@@ -29,26 +29,44 @@ from hystgen.effects.part import (
     late,
 )
 from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, OwnHeat, lost_on
-from hystgen.plays.slots import Counts, Reals, zero
+from hystgen.plays.slots import Counts, zero
 
 # ---------------------------------------------------------------- gain.c
 
-PER_DEGREE, OFFSET_PER_DEGREE, REFERENCE, COLDEST, HOTTEST, LEAST, LARGEST, ONE = range(8)
-GAIN, INVERSE, OFFSET = 0, 1, 2
+
+class GainTable(Struct):
+    """Gain and offset per degree above the reference, between two temperatures."""
+
+    per_degree: Real
+    offset_per_degree: Real
+    reference: Real
+    coldest: Real
+    hottest: Real
+    least: Real
+    largest: Real
 
 
-KIND = Kind(
-    "gain",
-    ("per_degree", "offset_per_degree", "reference", "coldest", "hottest", "least", "largest"),
-    ("gain", "inverse", "offset"),
-    reading=(), own=("solve", "absorb"),
-)
+class GainNumbers(GainTable):
+    """The same with a number that is not in the table in C."""
+
+    one: Real
 
 
-def constants(t: Reals) -> Iterator[Constants]:
-    """The numbers of each gain, of tables (k, 8)."""
+class GainState(Struct):
+    """A gain with an offset behind it."""
+
+    gain: Narrow
+    inverse: Narrow
+    offset: Signal
+
+
+KIND = Kind("gain", GainTable, GainState, reading=(), own=("solve", "absorb"))
+
+
+def constants(t: GainNumbers) -> Iterator[Constants]:
+    """The numbers of each gain."""
     for row in t:
-        yield Constants(KIND, row[:ONE], (1, 1))
+        yield Constants(KIND, row, (1, 1))
 
 
 @dataclass(frozen=True)
@@ -81,13 +99,15 @@ class Warm(One):
         return (asked + margin.span) / LEAST_GAIN
 
 
-def tables(blocks: Sequence[Warm], about: FloatSurroundings) -> Any:
-    """The tables (k, 8) of several gains in floating point."""
+def tables(blocks: Sequence[Warm], about: FloatSurroundings) -> GainNumbers:
+    """The numbers of several gains in floating point."""
     effects: list[Any] = [one.effect for one in blocks]
-    return about.reals([numbers(each, about.span) for each in effects], "temperatures").reshape(-1, 8)
+    given = [(*numbers(each, about.span), LEAST_GAIN, LARGEST_GAIN, 1.0) for each in effects]
+    rows = about.reals(given, "temperatures")
+    return GainNumbers.of(rows, rows.dtype)
 
 
-def numbers(effect: LoggedThermal, span: float) -> tuple[float, ...]:
+def numbers(effect: LoggedThermal, span: float) -> tuple[float, float, float, float, float]:
     """Constants of a block behind which the output spans `span`: rates, reference, and the limits of the temperature.
 
     Beyond them the gain would leave its limits, or the offset alone would exceed the span.
@@ -103,89 +123,140 @@ def numbers(effect: LoggedThermal, span: float) -> tuple[float, ...]:
     return (
         effect.gain_per_degree, effect.offset_per_degree, effect.reference,
         effect.reference + max(down, -largest), effect.reference + min(up, largest),
-        LEAST_GAIN, LARGEST_GAIN, 1.0,
     )
 
 
-def memory(t: Reals, dtype: Any) -> Reals:
-    """Memory (k, 3) of all gains."""
-    return np.zeros((len(t), 3), dtype)
-
-
 @jit
-def gain_reset(t: Reals, s: Reals, j: int) -> None:
+def gain_reset(t: GainNumbers, s: GainState, j: int) -> None:
     """Return to the state of the parameter file: gain 1, offset 0."""
-    s[j, GAIN] = t[j, ONE]
-    s[j, INVERSE] = t[j, ONE]
-    s[j, OFFSET] = zero(t[j, ONE])
+    s.gain[j] = t.one[j]
+    s.inverse[j] = t.one[j]
+    s.offset[j] = zero(t.one[j])
 
 
 @jit
-def gain_set(t: Reals, s: Reals, j: int, gain: Any) -> bool:
+def gain_set(t: GainNumbers, s: GainState, j: int, gain: Any) -> bool:
     """Set the gain. Returns whether it had to be limited."""
     inside = gain
-    if inside < t[j, LEAST]:
-        inside = t[j, LEAST]
-    elif inside > t[j, LARGEST]:
-        inside = t[j, LARGEST]
-    s[j, GAIN] = inside
-    s[j, INVERSE] = t[j, ONE] / inside
+    if inside < t.least[j]:
+        inside = t.least[j]
+    elif inside > t.largest[j]:
+        inside = t.largest[j]
+    s.gain[j] = inside
+    s.inverse[j] = t.one[j] / inside
     return bool(inside != gain)
 
 
 @jit
-def gain_heat(t: Reals, s: Reals, j: int, temperature: Any) -> bool:
+def gain_heat(t: GainNumbers, s: GainState, j: int, temperature: Any) -> bool:
     """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
     inside = temperature
-    if inside < t[j, COLDEST]:
-        inside = t[j, COLDEST]
-    elif inside > t[j, HOTTEST]:
-        inside = t[j, HOTTEST]
-    above = inside - t[j, REFERENCE]
-    s[j, OFFSET] = t[j, OFFSET_PER_DEGREE] * above
-    limited = gain_set(t, s, j, t[j, ONE] + t[j, PER_DEGREE] * above)
+    if inside < t.coldest[j]:
+        inside = t.coldest[j]
+    elif inside > t.hottest[j]:
+        inside = t.hottest[j]
+    above = inside - t.reference[j]
+    s.offset[j] = t.offset_per_degree[j] * above
+    limited = gain_set(t, s, j, t.one[j] + t.per_degree[j] * above)
     return bool(limited or inside != temperature)
 
 
 @jit(inline=True)
-def gain_solve(t: Reals, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def gain_solve(t: GainNumbers, s: GainState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
-    return (y - s[j, OFFSET]) * s[j, INVERSE]
+    return (y - s.offset[j]) * s.inverse[j]
 
 
 @jit(inline=True)
-def gain_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def gain_absorb(t: GainNumbers, s: GainState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
-    return s[j, GAIN] * x + s[j, OFFSET]
+    return s.gain[j] * x + s.offset[j]
 
 
 # ---------------------------------------------------------------- heat.c
 
-HEAT_KIND = Kind(
-    "heat", ("rate", "per_amount", "per_degree", "offset_per_degree", "hottest"),
-    ("high", "low", "gain", "inverse", "offset"), counts=("turns",), reading=(), own=("solve", "absorb"),
-)
 
-HEAT_RATE, PER_AMOUNT, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, HEAT_ONE, HEAT_TWO = range(7)
-HIGH, LOW, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET, BEGUN, AT = range(7)
+class HeatTable(Struct):
+    """Own heat: degrees per amount of what warms, and the share lost in a step."""
+
+    rate: Real
+    per_amount: Real
+    per_degree: Real
+    offset_per_degree: Real
+    hottest: Real  # rise up to which gain and offset follow
+    turns: Count  # Newton steps for the reciprocal of a gain that has changed
+
+
+class HeatNumbers(HeatTable):
+    """The same with numbers that are not in the table in C."""
+
+    one: Real
+    two: Real
+
+
+class HeatState(Struct):
+    """A block."""
+
+    high: Real  # rise of the temperature, in two parts
+    low: Real
+    gain: Real
+    inverse: Real
+    offset: Real
+
+
+HEAT_KIND = Kind("heat", HeatTable, HeatState, reading=(), own=("solve", "absorb"))
+
+
+class FrictionPlay(Struct):
+    """A play that rubs."""
+
+    threshold: Signal
+
+
+class FrictionTable(Struct):
+    """Plays that rub, the narrowest one first."""
+
+    n: Count
+
+
+class FrictionPlayState(Struct):
+    """A play that rubs."""
+
+    at: Narrow
+
+
+class FrictionState(Struct):
+    """Plays that rub."""
+
+    begun: Flag  # they are somewhere
+
+
+FRICTION_KIND = Kind(
+    "friction", FrictionTable, FrictionState, Rows("play", FrictionPlay, FrictionPlayState), reading=(), own=()
+)
 
 FRICTION_PLAYS = 16
 """Plays that represent the continuum of rubbing plays: loops warm as with the continuum, within a 1000th of the warmest
 rise, see `coarseness`. Set by: tests/test_fixed_chain.py -k fastest_rate; with 8 plays the bound was 6.7 times the
 error there, with 16 it is 5.3 times."""
 
-HEAT_STATE = AT + FRICTION_PLAYS
-"""Numbers of a block's state."""
-
 
 class HeatTables(NamedTuple):
-    """Own heat of a model: `number` (k, 7), Newton steps `turns` (k,), thresholds of the rubbing plays (k, 16), and
-    their number `plays` (k,): 0 where the drive's square is the heat."""
+    """Own heat of a model: `block` (k,), `friction` (k,), without plays where the drive's square is the heat; the plays
+    that rub, of each block from `first` (k + 1) on in `play` (m,)."""
 
-    number: Reals
-    turns: Counts
-    threshold: Reals
-    plays: Counts
+    block: HeatNumbers
+    friction: FrictionTable
+    first: Counts
+    play: FrictionPlay
+
+
+class HeatMemory(NamedTuple):
+    """Memory of all blocks: `block` (k,), and of the plays that rub, `friction` (k,) and `play` (m,)."""
+
+    block: HeatState
+    friction: FrictionState
+    play: FrictionPlayState
 
 
 def reach(effect: HysteresisHeating, ends: tuple[float, float]) -> float:
@@ -201,9 +272,9 @@ def thresholds(effect: OwnHeat, ends: tuple[float, float]) -> list[float]:
     return [(2 * i + 1) * half for i in range(FRICTION_PLAYS)]
 
 
-def padded(rows: Sequence[Sequence[Any]]) -> NDArray[Any]:
-    """Thresholds as in `HeatTables`, padded to equal rows."""
-    return np.array([[*row, *[0] * (FRICTION_PLAYS - len(row))] for row in rows]).reshape(-1, FRICTION_PLAYS)
+def firsts(rows: Sequence[Sequence[Any]]) -> Counts:
+    """Where the thresholds of each block begin, and those of the last one end."""
+    return np.cumsum([0, *map(len, rows)]).astype(np.int64)
 
 
 def per_amount(effect: OwnHeat, ends: tuple[float, float], seconds: float) -> float:
@@ -245,7 +316,7 @@ def most_at_once(effect: OwnHeat, ends: tuple[float, float], move: float, second
 def farthest(effect: OwnHeat, ends: tuple[float, float], span: float, seconds: float) -> float:
     """Largest move of the drive within `ends` that may be repeated in every step without getting hotter than the C can
     follow. `span`: as in `heat_numbers`."""
-    hottest = heat_numbers(effect, ends, span, seconds)[HOTTEST_RISE]
+    hottest = heat_numbers(effect, ends, span, seconds)[-1]
     amount = hottest / per_amount(effect, ends, seconds) if effect.heating else math.inf
     if isinstance(effect, HysteresisHeating):
         return amount / FRICTION_PLAYS**2  # all of them follow
@@ -284,17 +355,19 @@ def coarseness(effect: OwnHeat, ends: tuple[float, float], move: float, seconds:
 
 def misjudged(effect: OwnHeat, speed: Speed, u: float, emitted: bool) -> float:
     """Error of the rise from the rubbing plays, degrees; `emitted`: against the continuum of plays."""
-    rubbing = thresholds(effect, speed.ends)
-    if not rubbing:
+    widths = thresholds(effect, speed.ends)
+    if not widths:
         return 0.0
     # each play is off by one rounding, or by three if it stays because another one does
-    amount = len(rubbing) ** 2 * 4.0 * u * (max(map(abs, speed.ends)) + rubbing[-1])
-    amount += (len(rubbing) + 3.0) * u * most_amount(effect, speed.ends, speed.step)
+    amount = len(widths) ** 2 * 4.0 * u * (max(map(abs, speed.ends)) + widths[-1])
+    amount += (len(widths) + 3.0) * u * most_amount(effect, speed.ends, speed.step)
     found = amount * per_amount(effect, speed.ends, speed.seconds)
     return found + coarseness(effect, *speed) if emitted else found
 
 
-def heat_numbers(effect: OwnHeat, ends: tuple[float, float], span: float, seconds: float) -> tuple[float, ...]:
+def heat_numbers(
+    effect: OwnHeat, ends: tuple[float, float], span: float, seconds: float
+) -> tuple[float, float, float, float, float]:
     """Constants of a block behind which the output spans `span`, at steps of `seconds`, of drives within `ends`."""
     hot = [1e6]  # degrees; where a temperature does nothing
     if effect.gain_per_degree:
@@ -304,7 +377,7 @@ def heat_numbers(effect: OwnHeat, ends: tuple[float, float], span: float, second
     loss = lost(effect, seconds)
     per = loss * per_amount(effect, ends, seconds)
     hottest = min(end for end in hot if end > 0.0)
-    return loss, per, effect.gain_per_degree, effect.offset_per_degree, hottest, 1.0, 2.0
+    return loss, per, effect.gain_per_degree, effect.offset_per_degree, hottest
 
 
 def heat_problems(effect: OwnHeat, at: Setting) -> Iterator[str]:
@@ -322,35 +395,33 @@ def heat_tables(blocks: Sequence[Warm], about: FloatSurroundings) -> HeatTables:
     """The tables of several blocks in floating point."""
     effects: list[Any] = [one.effect for one in blocks]
     ends, seconds = about.ends, about.seconds
-    rubbing = [thresholds(each, ends) for each in effects]
+    turns = [newton_steps(heat_change(each, ends, seconds), about.roundoff) for each in effects]
+    widths = [thresholds(each, ends) for each in effects]
+    rows = about.reals([(*heat_numbers(e, ends, about.span, seconds), 1.0, 2.0) for e in effects], "temperatures")
+    play = about.reals([(r,) for each in widths for r in each], "thresholds")
     return HeatTables(
-        about.reals([heat_numbers(e, ends, about.span, seconds) for e in effects], "temperatures").reshape(-1, 7),
-        np.array([newton_steps(heat_change(each, ends, seconds), about.roundoff) for each in effects], dtype=np.int64),
-        about.reals(padded(rubbing), "thresholds"),
-        np.array([len(each) for each in rubbing], dtype=np.int64),
+        HeatNumbers.of([(*row[:-2], n, *row[-2:]) for row, n in zip(rows, turns, strict=True)], rows.dtype),
+        FrictionTable.of([(len(each),) for each in widths]),
+        firsts(widths),
+        FrictionPlay.of(play, play.dtype),
     )
 
 
 def heat_constants(t: HeatTables) -> Iterator[Constants]:
     """The numbers of each block."""
-    for row, turns in zip(t.number, map(int, t.turns), strict=True):
-        yield Constants(HEAT_KIND, row[:HEAT_ONE], (7 + 2 * turns, 1), counts=(turns,))
-
-
-def heat_memory(t: HeatTables, dtype: Any) -> Reals:
-    """Memory of all blocks."""
-    return np.zeros((len(t.turns), HEAT_STATE), dtype)
+    for row in t.block:
+        yield Constants(HEAT_KIND, row, (7 + 2 * int(row["turns"]), 1))
 
 
 @jit
-def heat_reset(t: HeatTables, s: Reals, j: int) -> None:
+def heat_reset(t: HeatTables, s: HeatMemory, j: int) -> None:
     """Return to the temperature of the surroundings."""
-    s[j, HIGH] = zero(t.number[j, HEAT_ONE])
-    s[j, LOW] = zero(t.number[j, HEAT_ONE])
-    s[j, HEAT_GAIN] = t.number[j, HEAT_ONE]
-    s[j, HEAT_INVERSE] = t.number[j, HEAT_ONE]
-    s[j, HEAT_OFFSET] = zero(t.number[j, HEAT_ONE])
-    s[j, BEGUN] = zero(t.number[j, HEAT_ONE])
+    s.block.high[j] = zero(t.block.one[j])
+    s.block.low[j] = zero(t.block.one[j])
+    s.block.gain[j] = t.block.one[j]
+    s.block.inverse[j] = t.block.one[j]
+    s.block.offset[j] = zero(t.block.one[j])
+    s.friction.begun[j] = 0
 
 
 @jit
@@ -361,64 +432,59 @@ def heat_way(before: Any, v: Any) -> Any:
 
 
 @jit
-def heat_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> None:
+def heat_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> None:
     """The drive has moved to v."""
-    n = t.number[j]
-    amount = friction_move(t, s, j, before, v) if t.plays[j] else heat_way(before, v)
-    high = s[j, HIGH]
-    change = (n[PER_AMOUNT] * amount - n[HEAT_RATE] * high) + s[j, LOW]
+    amount = friction_move(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
+    high = s.block.high[j]
+    change = (t.block.per_amount[j] * amount - t.block.rate[j] * high) + s.block.low[j]
     following = high + change
-    s[j, HIGH] = following
-    s[j, LOW] = change - (following - high)
-    rise = n[HOTTEST_RISE] if following > n[HOTTEST_RISE] else following
-    gain = n[HEAT_ONE] + n[PER_RISE] * rise
-    inverse = s[j, HEAT_INVERSE]
-    for _ in range(t.turns[j]):
-        inverse = inverse * (n[HEAT_TWO] - gain * inverse)
-    s[j, HEAT_GAIN] = gain
-    s[j, HEAT_INVERSE] = inverse
-    s[j, HEAT_OFFSET] = n[OFFSET_PER_RISE] * rise
+    s.block.high[j] = following
+    s.block.low[j] = change - (following - high)
+    rise = t.block.hottest[j] if following > t.block.hottest[j] else following
+    gain = t.block.one[j] + t.block.per_degree[j] * rise
+    inverse = s.block.inverse[j]
+    for _ in range(t.block.turns[j]):
+        inverse = inverse * (t.block.two[j] - gain * inverse)
+    s.block.gain[j] = gain
+    s.block.inverse[j] = inverse
+    s.block.offset[j] = t.block.offset_per_degree[j] * rise
 
 
 @jit(inline=True)
-def heat_solve(t: HeatTables, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def heat_solve(t: HeatTables, s: HeatMemory, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
-    return (y - s[j, HEAT_OFFSET]) * s[j, HEAT_INVERSE]
+    return (y - s.block.offset[j]) * s.block.inverse[j]
 
 
 @jit(inline=True)
-def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def heat_absorb(t: HeatTables, s: HeatMemory, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
-    return s[j, HEAT_GAIN] * x + s[j, HEAT_OFFSET]
+    return s.block.gain[j] * x + s.block.offset[j]
 
 
 # ---------------------------------------------------------------- friction.c
 
-FRICTION_KIND = Kind(
-    "friction", (), (), Rows("play", ("threshold",), ("at",)), counts=("n",), flags=("begun",), reading=(), own=(),
-)
-
-
 def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
     """The rubbing plays of each block; None where none rub."""
-    for row, plays in zip(t.threshold, map(int, t.plays), strict=True):
-        yield Constants(FRICTION_KIND, (), (plays, 0), row[:plays, None], (plays,)) if plays else None
+    for row, first in zip(t.friction, t.first, strict=False):
+        n = int(row["n"])
+        yield Constants(FRICTION_KIND, row, (n, 0), t.play[first : first + n]) if n else None
 
 
 @jit
-def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
+def friction_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> Any:
     """The drive has moved to v; at first the plays rest at `before`. Returns the sum of their moves, each times its
     threshold as an odd multiple of the first. Where a play stays, wider ones do too."""
-    one = t.number[j, HEAT_ONE]
-    if not s[j, BEGUN]:
-        s[j, BEGUN] = one
-        for i in range(t.plays[j]):
-            s[j, AT + i] = before
+    one = t.block.one[j]
+    if not s.friction.begun[j]:
+        s.friction.begun[j] = 1
+        for i in range(t.first[j], t.first[j + 1]):
+            s.play.at[i] = before
     amount = zero(v)
     odd = one
-    for i in range(t.plays[j]):
-        r = t.threshold[j, i]
-        at = s[j, AT + i]
+    for i in range(t.first[j], t.first[j + 1]):
+        r = t.play.threshold[i]
+        at = s.play.at[i]
         if v - r > at:
             to = v - r
             amount = amount + odd * (to - at)
@@ -427,8 +493,8 @@ def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
             amount = amount + odd * (at - to)
         else:
             break
-        s[j, AT + i] = to
-        odd = odd + t.number[j, HEAT_TWO]
+        s.play.at[i] = to
+        odd = odd + t.block.two[j]
     return amount
 
 
@@ -473,32 +539,32 @@ class UnevenHeat:
 
 
 ARITHMETIC = Realized(
-    Verbs(memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
-    constants, tables,
+    Verbs(memory_of(GainState), absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
+    constants, tables, kinds=(KIND,),
 )
 HEAT_ARITHMETIC = Realized(
-    Verbs(heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
-    heat_constants, heat_tables, beside=friction_constants,
+    Verbs(memory_of(HeatMemory), absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
+    heat_constants, heat_tables, kinds=(HEAT_KIND, FRICTION_KIND), beside=friction_constants,
 )
 
 GAIN_PART = ChainPart(
     "gain", "a temperature", Place.GAIN, called("thermal", lambda effect: bool(effect.columns)),
     lambda effect, *_: Warm(effect), ARITHMETIC, late("thermal"), calls=("set_temperature",),
-    kinds=(KIND,), code=("gain",),
+    code=("gain",),
 )
 
 HEAT_PART = ChainPart(
     "heat", "own heat", Place.GAIN, called("thermal", lambda effect: not effect.columns),
     lambda effect, *_: Warm(effect), HEAT_ARITHMETIC,
     late("thermal", "HEAT_ARITHMETIC"),
-    kinds=(HEAT_KIND, FRICTION_KIND), problems=heat_problems, following=UnevenHeat,
+    problems=heat_problems, following=UnevenHeat,
     unmeasured=Unmeasured(
         "self_heating",
         "the drive's own heat, open loop: its temperature drifts with the room's; measure it, or have it "
         "followed by emit.compensation.compensate: [self_heating]",
         "thermal from the drive's own heat (the temperature is not measured, and drifts with the room's",
     ),
-    code=("heat", "friction"), counted=lambda t, blocks: (blocks, int(t.plays.any())),
+    code=("heat", "friction"), counted=lambda t, blocks: (blocks, int(t.friction.n.any())),
 )
 """Temperatures as parts of the chain: set by the caller, or from own heat."""
 

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
-
-import numpy as np
+from typing import Any, NamedTuple
 
 from hystgen.arithmetic.factors import MANTISSA_BITS, factor, times
 from hystgen.basics.jit import jit
+from hystgen.basics.structures import Count, Factor, Int32, Int64, Struct, UInt8, memory_of
 from hystgen.effects.gains import (
     GAIN_BITS,
     LARGEST,
@@ -23,21 +22,20 @@ from hystgen.effects.gains import (
     newton_steps,
     reciprocal,
 )
-from hystgen.effects.kinds import Constants, Kind, Rows
+from hystgen.effects.kinds import Constants
 from hystgen.effects.part import Coded, CodedGain, Coding, FixedSurroundings, Realized, Speed, Verbs
 from hystgen.effects.thermal import compensator as floating
 from hystgen.effects.thermal.compensator import (
-    AT,
-    BEGUN,
-    GAIN,
-    INVERSE,
-    OFFSET,
-    HeatTables,
+    FrictionPlay,
+    FrictionPlayState,
+    FrictionState,
+    FrictionTable,
+    GainState,
     Warm,
 )
 from hystgen.effects.thermal.model import LoggedThermal, OwnHeat
 from hystgen.plays.fixed import nearest
-from hystgen.plays.slots import Reals, zero
+from hystgen.plays.slots import Counts, zero
 
 LINEAR_ERROR = 2.0**-GAIN_BITS
 """[share of the signal] Error of a gain linear in a temperature: one product."""
@@ -49,25 +47,38 @@ TEMPERATURE_BITS = 37
 """Fraction bits of an internal temperature, so that temperatures of 512 degC are multiplied like any signal."""
 
 
-KIND = Kind("gain", reading=(), own=("solve", "absorb"), letters="ffwwwb", memory="iiw")
+Numbers = tuple[float, float, float, float, float]
+"""Constants of a block, as in `floating.numbers` and `floating.heat_numbers`."""
 
 
-def constants(t: Reals) -> Iterator[Constants]:
+class FixedGainTable(Struct):
+    """Gain and offset per degree above the reference, between two temperatures."""
+
+    per_degree: Factor
+    offset_per_degree: Factor
+    reference: Int64
+    coldest: Int64
+    hottest: Int64
+    bits: UInt8  # of a temperature below a code
+
+
+KIND = replace(floating.KIND, table=FixedGainTable)
+
+
+def constants(t: FixedGainTable) -> Iterator[Constants]:
     """The numbers of each gain."""
     yield from (Constants(KIND, row, (2, 2)) for row in t)
 
 
-def tables(rows: Sequence[tuple[float, ...]], level: float, bits: int, degrees: float) -> Reals:
+def tables(rows: Sequence[Numbers], level: float, bits: int, degrees: float) -> FixedGainTable:
     """All gains of a model, with `rows` as in `numbers`; `level`: signals per unit of the output, `bits`: how many a
     temperature has below a code; `degrees`: the largest code. Raises OverflowError."""
     found = []
     whole = 2.0**TEMPERATURE_BITS
-    for row in rows:
-        rates = (row[floating.PER_DEGREE] * ONE / whole, row[floating.OFFSET_PER_DEGREE] * level / whole)
-        ends = [row[i] for i in (floating.REFERENCE, floating.COLDEST, floating.HOTTEST)]
-        inside = [round(min(max(end, -degrees), degrees) * whole) for end in ends]
-        found.append([*(part for x in rates for part in factor(x)), *inside, bits])
-    return np.array(found, dtype=np.int64).reshape(-1, 8)
+    for per_degree, offset_per_degree, *ends in rows:
+        rates = factor(per_degree * ONE / whole), factor(offset_per_degree * level / whole)
+        found.append((*rates, *(round(min(max(end, -degrees), degrees) * whole) for end in ends), bits))
+    return FixedGainTable.of(found)
 
 
 @dataclass(frozen=True)
@@ -75,7 +86,7 @@ class GainFormats(Coded):
     """A gain by its numbers in floating point."""
 
     one: Warm
-    numbers: tuple[float, ...]
+    numbers: Numbers
 
     def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
         """The gain's properties, for inputs within a size."""
@@ -99,7 +110,7 @@ def formats(one: Warm, about: FixedSurroundings, *_: float) -> GainFormats:
     return GainFormats(one, floating.numbers(effect, about.span))
 
 
-def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> Reals:
+def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> FixedGainTable:
     """The tables of several gains, by `tables`."""
     degrees = about.code_max / 2.0**about.temperature
     return tables([each.numbers for each in blocks], about.level, TEMPERATURE_BITS - about.temperature, degrees)
@@ -107,49 +118,47 @@ def made(blocks: Sequence[GainFormats], about: FixedSurroundings) -> Reals:
 
 # ---------------------------------------------------------------- gain_fixed.c
 
-PER_DEGREE, OFFSET_PER_DEGREE, REFERENCE, COLDEST, HOTTEST, BITS = 0, 2, 4, 5, 6, 7
-
 
 @jit
-def gain_reset(t: Reals, s: Reals, j: int) -> None:  # noqa: ARG001  used in floating point
+def gain_reset(t: FixedGainTable, s: GainState, j: int) -> None:  # noqa: ARG001  used in floating point
     """Return to the state of the parameter file: gain 1, offset 0."""
-    s[j, GAIN] = ONE
-    s[j, INVERSE] = ONE
-    s[j, OFFSET] = zero(s[j, OFFSET])
+    s.gain[j] = ONE
+    s.inverse[j] = ONE
+    s.offset[j] = zero(s.offset[j])
 
 
 @jit
-def gain_heat(t: Reals, s: Reals, j: int, temperature: Any) -> bool:
+def gain_heat(t: FixedGainTable, s: GainState, j: int, temperature: Any) -> bool:
     """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
-    given = temperature << t[j, BITS]
+    given = temperature << t.bits[j]
     inside = given
-    if inside < t[j, COLDEST]:
-        inside = t[j, COLDEST]
-    elif inside > t[j, HOTTEST]:
-        inside = t[j, HOTTEST]
-    above = inside - t[j, REFERENCE]
-    s[j, OFFSET] = times(above, t[j, OFFSET_PER_DEGREE], t[j, OFFSET_PER_DEGREE + 1])
-    wanted = ONE + times(above, t[j, PER_DEGREE], t[j, PER_DEGREE + 1])
+    if inside < t.coldest[j]:
+        inside = t.coldest[j]
+    elif inside > t.hottest[j]:
+        inside = t.hottest[j]
+    above = inside - t.reference[j]
+    s.offset[j] = times(above, t.offset_per_degree.mantissa[j], t.offset_per_degree.shift[j])
+    wanted = ONE + times(above, t.per_degree.mantissa[j], t.per_degree.shift[j])
     gain = wanted
     if gain < LEAST:
         gain = zero(wanted) + LEAST
     elif gain > LARGEST:
         gain = zero(wanted) + LARGEST
-    s[j, GAIN] = gain
-    s[j, INVERSE] = reciprocal(gain)
+    s.gain[j] = gain
+    s.inverse[j] = reciprocal(gain)
     return bool(gain != wanted or inside != given)
 
 
 @jit
-def gain_solve(t: Reals, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def gain_solve(t: FixedGainTable, s: GainState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
-    return times(y - s[j, OFFSET], s[j, INVERSE], GAIN_BITS)
+    return times(y - s.offset[j], s.inverse[j], GAIN_BITS)
 
 
 @jit
-def gain_absorb(t: Reals, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def gain_absorb(t: FixedGainTable, s: GainState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
-    return times(x, s[j, GAIN], GAIN_BITS) + s[j, OFFSET]
+    return times(x, s.gain[j], GAIN_BITS) + s.offset[j]
 
 
 # ---------------------------------------------------------------- heat_fixed.c
@@ -160,25 +169,69 @@ RISE_BITS = 59
 AMOUNT_BITS = 50
 """Bits of a step's heat, and of a temperature, in a product."""
 
-HEAT_KIND = Kind(
-    "heat", counts=("turns", "coarse", "lift", "drop"), reading=(), own=("solve", "absorb"), letters="ffffw",
-    memory="wiiw",
-)
 
-RATE, PER_AMOUNT, PER_RISE, OFFSET_PER_RISE, HOTTEST_RISE, COARSE, LIFT, DROP, BITS_BELOW = 0, 2, 4, 6, 8, 9, 10, 11, 12
-RISE, HEAT_GAIN, HEAT_INVERSE, HEAT_OFFSET = range(4)
+class FixedHeatTable(Struct):
+    """Own heat: degrees gained per amount of what warms, the share lost in a step, and the rise up to which gain and
+    offset follow."""
+
+    rate: Factor
+    per_amount: Factor
+    per_degree: Factor
+    offset_per_degree: Factor
+    hottest: Int64
+    turns: Count  # Newton steps for the reciprocal of a gain that has changed
+    coarse: UInt8  # bits of an amount that its product leaves out,
+    lift: UInt8  # bits of the temperature that the same product leaves out,
+    drop: UInt8  # and bits that products of the temperature leave out
+
+
+class FixedHeatState(Struct):
+    """A block."""
+
+    rise: Int64  # of the temperature over the surroundings
+    gain: Int32
+    inverse: Int32
+    offset: Int64
+
+
+HEAT_KIND = replace(floating.HEAT_KIND, table=FixedHeatTable, state=FixedHeatState)
+
+
+class FixedFrictionTable(FrictionTable):
+    """Plays that rub, as in floating point."""
+
+    bits: UInt8  # of a play below a drive code
+
+
+FRICTION_KIND = replace(floating.FRICTION_KIND, table=FixedFrictionTable)
+
+
+class FixedHeatTables(NamedTuple):
+    """Own heat of a model, as in floating point."""
+
+    block: FixedHeatTable
+    friction: FixedFrictionTable
+    first: Counts
+    play: FrictionPlay
+
+
+class FixedHeatMemory(NamedTuple):
+    """Memory of all blocks, as in floating point."""
+
+    block: FixedHeatState
+    friction: FrictionState
+    play: FrictionPlayState
 
 
 @dataclass(frozen=True)
 class Heat(Coded):
-    """Own heat in fixed point: its table, thresholds of the rubbing plays, and the largest error of the temperature
-    against the same recursion without rounding, degrees."""
+    """Own heat in fixed point: its table, thresholds of the rubbing plays and their bits below a drive code, and the
+    largest error of the temperature against the same recursion without rounding, degrees."""
 
-    table: tuple[int, ...]
+    table: tuple[object, ...]
     thresholds: tuple[int, ...]
+    bits: int
     error: float
-    turns: int = 0
-    """Newton steps"""
     one: Warm | None = None
 
     def gain(self, size: float, speed: Speed, at: Coding) -> CodedGain:
@@ -193,11 +246,12 @@ class Heat(Coded):
 
 
 def heat(
-    numbers: tuple[float, ...], thresholds: Sequence[float], largest: int, lsb: float, level: float, code_bits: int
+    numbers: Numbers, turns: int, thresholds: Sequence[float], largest: int, lsb: float, level: float, code_bits: int
 ) -> Heat:
-    """Own heat from `numbers` as in `heat_numbers`, `thresholds` as in the function of that name, drives up to
-    `largest` codes of `lsb` and `code_bits` bits, and `level` signals a unit of the output. Raises OverflowError."""
-    rate, per_amount, per_degree, offset_per_degree, hottest, *_ = numbers
+    """Own heat from `numbers` as in `heat_numbers`, Newton steps, `thresholds` as in the function of that name, drives
+    up to `largest` codes of `lsb` and `code_bits` bits, and `level` signals a unit of the output. Raises
+    OverflowError."""
+    rate, per_amount, per_degree, offset_per_degree, hottest = numbers
     if thresholds:
         bits = STATE_BITS - code_bits  # of a play below a drive code
         unit_of_drive = lsb / 2.0**bits
@@ -215,48 +269,46 @@ def heat(
     heating = per_code * 2.0**coarse / unit
     lift = max(0, math.frexp(heating)[1] - 9)
     products = (rate * 2.0**drop, heating / 2.0**lift, per_degree * kept * ONE, offset_per_degree * kept * level)
-    factors = [part for x in products for part in factor(x)]
     rounding = unit * (2.0**lift + 1.0) + per_code * (0.5 * 2.0**coarse * (coarse > 0) + astray)
     error = rounding / rate + 2.0 * kept + min(warmest, hottest) * 2.0**-29
     hot = min(round(hottest / kept), 1 << AMOUNT_BITS)
-    return Heat((*factors, hot, coarse, lift, drop, bits), tuple(rows), error)
+    return Heat((*map(factor, products), hot, turns, coarse, lift, drop), tuple(rows), bits, error)
 
 
 def heat_formats(one: Warm, about: FixedSurroundings, *_: float) -> Heat:
     """Own heat of a block."""
     effect: Any = one.effect
     numbers = floating.heat_numbers(effect, about.ends, about.span, about.seconds)
-    rubbing = floating.thresholds(effect, about.ends)
+    widths = floating.thresholds(effect, about.ends)
     turns = newton_steps(floating.heat_change(effect, about.ends, about.seconds), 2.0**-GAIN_BITS)
-    found = heat(numbers, rubbing, about.drive, float(about.drive_lsb), about.level, about.code_bits)
-    return replace(found, turns=turns, one=one)
+    found = heat(numbers, turns, widths, about.drive, float(about.drive_lsb), about.level, about.code_bits)
+    return replace(found, one=one)
 
 
-def heat_tables(rows: Sequence[Heat], about: FixedSurroundings) -> HeatTables:  # noqa: ARG001  block interface
+def heat_tables(rows: Sequence[Heat]) -> FixedHeatTables:
     """The tables of several blocks."""
-    return HeatTables(
-        np.array([one.table for one in rows], dtype=np.int64).reshape(-1, BITS_BELOW + 1),
-        np.array([one.turns for one in rows], dtype=np.int64),
-        np.array(floating.padded([one.thresholds for one in rows]), dtype=np.int64),
-        np.array([len(one.thresholds) for one in rows], dtype=np.int64),
+    return FixedHeatTables(
+        FixedHeatTable.of([one.table for one in rows]),
+        FixedFrictionTable.of([(len(one.thresholds), one.bits) for one in rows]),
+        floating.firsts([one.thresholds for one in rows]),
+        FrictionPlay.of([(r,) for one in rows for r in one.thresholds]),
     )
 
 
-def heat_constants(t: HeatTables) -> Iterator[Constants]:
+def heat_constants(t: FixedHeatTables) -> Iterator[Constants]:
     """The numbers of each block."""
-    for row, turns in zip(t.number, map(int, t.turns), strict=True):
-        counts = (turns, *map(int, row[COARSE:BITS_BELOW]))
-        yield Constants(HEAT_KIND, row[:COARSE], (12 + 2 * turns, 2), counts=counts)
+    for row in t.block:
+        yield Constants(HEAT_KIND, row, (12 + 2 * int(row["turns"]), 2))
 
 
 @jit
-def heat_reset(t: HeatTables, s: Reals, j: int) -> None:  # noqa: ARG001  used in floating point
+def heat_reset(t: FixedHeatTables, s: FixedHeatMemory, j: int) -> None:  # noqa: ARG001  used in floating point
     """Return to the temperature of the surroundings."""
-    s[j, RISE] = zero(s[j, RISE])
-    s[j, HEAT_GAIN] = ONE
-    s[j, HEAT_INVERSE] = ONE
-    s[j, HEAT_OFFSET] = zero(s[j, RISE])
-    s[j, BEGUN] = zero(s[j, RISE])
+    s.block.rise[j] = zero(s.block.rise[j])
+    s.block.gain[j] = ONE
+    s.block.inverse[j] = ONE
+    s.block.offset[j] = zero(s.block.rise[j])
+    s.friction.begun[j] = 0
 
 
 @jit
@@ -267,34 +319,35 @@ def heat_way(before: Any, v: Any) -> Any:
 
 
 @jit
-def heat_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> None:
+def heat_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: Any, v: Any) -> None:
     """The drive has moved to v."""
-    n = t.number[j]
-    amount = friction_move(t, s, j, before, v) if t.plays[j] else heat_way(before, v)
-    warmer = times(nearest(amount, n[COARSE]), n[PER_AMOUNT], n[PER_AMOUNT + 1]) << n[LIFT]
-    s[j, RISE] = s[j, RISE] + (warmer - times(s[j, RISE] >> n[DROP], n[RATE], n[RATE + 1]))
-    warm = s[j, RISE] >> n[DROP]
-    rise = n[HOTTEST_RISE] if warm > n[HOTTEST_RISE] else warm
-    gain = ONE + times(rise, n[PER_RISE], n[PER_RISE + 1])
+    n = t.block
+    amount = friction_move(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
+    warmer = times(nearest(amount, n.coarse[j]), n.per_amount.mantissa[j], n.per_amount.shift[j]) << n.lift[j]
+    lost = times(s.block.rise[j] >> n.drop[j], n.rate.mantissa[j], n.rate.shift[j])
+    s.block.rise[j] = s.block.rise[j] + (warmer - lost)
+    warm = s.block.rise[j] >> n.drop[j]
+    rise = n.hottest[j] if warm > n.hottest[j] else warm
+    gain = ONE + times(rise, n.per_degree.mantissa[j], n.per_degree.shift[j])
     if gain < LEAST:
         gain = zero(gain) + LEAST
     elif gain > LARGEST:
         gain = zero(gain) + LARGEST
-    s[j, HEAT_OFFSET] = times(rise, n[OFFSET_PER_RISE], n[OFFSET_PER_RISE + 1])
-    s[j, HEAT_INVERSE] = followed(gain, s[j, HEAT_INVERSE], t.turns[j])
-    s[j, HEAT_GAIN] = gain
+    s.block.offset[j] = times(rise, n.offset_per_degree.mantissa[j], n.offset_per_degree.shift[j])
+    s.block.inverse[j] = followed(gain, s.block.inverse[j], n.turns[j])
+    s.block.gain[j] = gain
 
 
 @jit
-def heat_solve(t: HeatTables, s: Reals, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def heat_solve(t: FixedHeatTables, s: FixedHeatMemory, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
     """The input that gives the output y."""
-    return times(y - s[j, HEAT_OFFSET], s[j, HEAT_INVERSE], GAIN_BITS)
+    return times(y - s.block.offset[j], s.block.inverse[j], GAIN_BITS)
 
 
 @jit
-def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def heat_absorb(t: FixedHeatTables, s: FixedHeatMemory, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
     """The output for the input x."""
-    return times(x, s[j, HEAT_GAIN], GAIN_BITS) + s[j, HEAT_OFFSET]
+    return times(x, s.block.gain[j], GAIN_BITS) + s.block.offset[j]
 
 
 # ---------------------------------------------------------------- friction_fixed.c
@@ -302,49 +355,45 @@ def heat_absorb(t: HeatTables, s: Reals, j: int, x: Any) -> Any:  # noqa: ARG001
 STATE_BITS = 31
 """Bits of a rubbing play, without its sign: a drive has 15 or 31 of them with it."""
 
-FRICTION_KIND = Kind(
-    "friction", (), (), Rows("play", letters="w", memory="i"), counts=("n", "bits"), flags=("begun",),
-    reading=(), own=(),
-)
-
-
-def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
+def friction_constants(t: FixedHeatTables) -> Iterator[Constants | None]:
     """The rubbing plays of each block; None where none rub."""
-    for row, plays, numbers in zip(t.threshold, map(int, t.plays), t.number, strict=True):
-        counts = (plays, int(numbers[BITS_BELOW]))
-        yield Constants(FRICTION_KIND, (), (2 * plays, 0), row[:plays, None], counts) if plays else None
+    for row, first in zip(t.friction, t.first, strict=False):
+        n = int(row["n"])
+        yield Constants(FRICTION_KIND, row, (2 * n, 0), t.play[first : first + n]) if n else None
 
 
 @jit
-def friction_move(t: HeatTables, s: Reals, j: int, before: Any, v: Any) -> Any:
+def friction_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: Any, v: Any) -> Any:
     """As in floating point."""
-    bits = t.number[j, BITS_BELOW]
-    if not s[j, BEGUN]:
-        s[j, BEGUN] = 1
-        for i in range(t.plays[j]):
-            s[j, AT + i] = before << bits
+    bits = t.friction.bits[j]
+    if not s.friction.begun[j]:
+        s.friction.begun[j] = 1
+        for i in range(t.first[j], t.first[j + 1]):
+            s.play.at[i] = before << bits
     x = v << bits
     amount = zero(x)
-    for i in range(t.plays[j]):
-        r = t.threshold[j, i]
-        at = s[j, AT + i]
+    odd = 1
+    for i in range(t.first[j], t.first[j + 1]):
+        r = t.play.threshold[i]
+        at = s.play.at[i]
         if x - r > at:
             to = x - r
-            amount = amount + (2 * i + 1) * (to - at)
+            amount = amount + odd * (to - at)
         elif x + r < at:
             to = x + r
-            amount = amount + (2 * i + 1) * (at - to)
+            amount = amount + odd * (at - to)
         else:
             break
-        s[j, AT + i] = to
+        s.play.at[i] = to
+        odd += 2
     return amount
 
 
 ARITHMETIC = Realized(
-    Verbs(floating.memory, absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
-    constants, made, formats,
+    Verbs(memory_of(GainState), absorb=gain_absorb, solve=gain_solve, reset=gain_reset, set_temperature=gain_heat),
+    constants, made, formats, kinds=(KIND,),
 )
 HEAT_ARITHMETIC = Realized(
-    Verbs(floating.heat_memory, absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
-    heat_constants, heat_tables, heat_formats, beside=friction_constants,
+    Verbs(memory_of(FixedHeatMemory), absorb=heat_absorb, solve=heat_solve, reset=heat_reset, move=heat_move),
+    heat_constants, lambda rows, _: heat_tables(rows), heat_formats, (HEAT_KIND, FRICTION_KIND), friction_constants,
 )

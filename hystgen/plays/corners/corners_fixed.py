@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hystgen.basics.jit import jit
-from hystgen.plays.corners.corners_float import DEPTH, INPUT, LEVEL, NEXT, OUTPUT, RISING, K
+from hystgen.basics.structures import Count, Flag, Int32, Int64, Struct
+from hystgen.plays.corners.corners_float import PlaceState
 from hystgen.plays.fixed import FixedPlayTables, divide_by_slope
-from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN, Counts, Reals
+from hystgen.plays.slots import MARGIN, OFFSET, PLAY_MAX, PLAY_MIN, Reals, StepState
 
 INPUT_MOST = 2**31 - 1  # inputs of the plays, in their least steps, are an int32_t in C
 
@@ -21,62 +22,62 @@ FAR = 1 << 62
 """Beyond every sum of plays: those have fewer than 62 bits."""
 
 
-class FixedMemory(NamedTuple):
-    """One instance in fixed point: plain arrays of int64, however narrow they are in C."""
+class FixedCorner(Struct):
+    """A turning point. It holds the plays of its block: those above the plays of the next corner, up to play `top`."""
 
-    real: Reals
-    counts: Counts
-    output: Reals  # (n): for each corner, like the next three
-    input: Reals
-    top: Counts
-    rose: Counts
+    output: Int64  # at the turning point, which C has in two parts
+    input: Int32
+    top: Count
+    rose: Flag  # whether a rising move ended here, or a falling one
+
+
+class FixedMemory(NamedTuple):
+    """One instance in fixed point, as in floating point."""
+
+    here: PlaceState
+    undo: PlaceState
+    step: StepState
+    corner: FixedCorner  # (n)
 
 
 def new_fixed_memory(plays: int, dtype: Any = np.int64) -> FixedMemory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
-    corners = max(plays, 1)
-    return FixedMemory(
-        real=np.zeros(LEVEL + 1, dtype),
-        counts=np.zeros(16, np.int64),
-        output=np.zeros(corners, dtype),
-        input=np.zeros(corners, dtype),
-        top=np.zeros(corners, np.int64),
-        rose=np.zeros(corners, np.int64),
-    )
+    here, undo = PlaceState.zeros(1, dtype), PlaceState.zeros(1, dtype)
+    return FixedMemory(here, undo, StepState.zeros(1, dtype), FixedCorner.zeros(max(plays, 1), dtype))
 
 
 @jit(inline=True)
 def along(m: FixedMemory, x: Any) -> Any:
     """x as seen along the present move: a falling move is a rising one with all signs changed."""
-    return x if m.counts[RISING] else -x
+    return x if m.here.rising[0] else -x
 
 
 @jit
 def leave_corner(m: FixedMemory) -> None:
     """Leave a corner here."""
-    c = m.counts[DEPTH]
-    m.output[c] = m.real[OUTPUT]
-    m.input[c] = m.real[INPUT]
-    m.top[c] = m.counts[K]
-    m.rose[c] = m.counts[RISING]
-    m.counts[DEPTH] += 1
+    c = m.here.depth[0]
+    m.corner.output[c] = m.here.output[0]
+    m.corner.input[c] = m.here.input[0]
+    m.corner.top[c] = m.here.k[0]
+    m.corner.rose[c] = m.here.rising[0]
+    m.here.depth[0] += 1
 
 
 @jit
 def begins(t: FixedPlayTables, m: FixedMemory, c: int, k: int, by_output: bool) -> Any:
     """Where play k of a corner's block begins to follow, along the present move."""
     if by_output:
-        return along(m, m.output[c]) + (0 if m.rose[c] == m.counts[RISING] else t.reach[k])
-    return along(m, m.input[c]) + (0 if m.rose[c] == m.counts[RISING] else t.way[k])
+        return along(m, m.corner.output[c]) + (0 if m.corner.rose[c] == m.here.rising[0] else t.reach[k])
+    return along(m, m.corner.input[c]) + (0 if m.corner.rose[c] == m.here.rising[0] else t.way[k])
 
 
 @jit
 def turn_back(m: FixedMemory) -> None:
     """Turn back: a corner stays where plays have followed."""
-    if m.counts[K] > 0:
+    if m.here.k[0] > 0:
         leave_corner(m)
-        m.counts[K] = 0
-    m.counts[RISING] = 1 - m.counts[RISING]
+        m.here.k[0] = 0
+    m.here.rising[0] = 1 - m.here.rising[0]
 
 
 @jit
@@ -84,22 +85,22 @@ def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
     """The last kink before `to`, an output or input along the move: where another play begins to follow, or here."""
     c = -1
     low = 0
-    left = m.counts[DEPTH]
-    k = m.counts[K]
+    left = m.here.depth[0]
+    k = m.here.k[0]
     while low < left:
         middle = (low + left) // 2
-        if to >= begins(t, m, middle, m.top[middle], by_output):
+        if to >= begins(t, m, middle, m.corner.top[middle], by_output):
             left = middle
         else:
             low = middle + 1
-    if left < m.counts[DEPTH]:
+    if left < m.here.depth[0]:
         c = left
-        k = m.top[c]
-    if left > 0 and m.rose[left - 1] != m.counts[RISING]:
+        k = m.corner.top[c]
+    if left > 0 and m.corner.rose[left - 1] != m.here.rising[0]:
         top = left - 1
         on = to - begins(t, m, top, 0, by_output)
         before = k
-        last = m.top[top] - 1
+        last = m.corner.top[top] - 1
         while k < last:
             middle = (k + last) // 2 + 1
             if on >= (t.reach[middle] if by_output else t.way[middle]):
@@ -108,14 +109,14 @@ def find(t: FixedPlayTables, m: FixedMemory, to: Any, by_output: bool) -> Kink:
                 last = middle - 1
         c = top if k > before else c
     if c < 0:
-        return along(m, m.real[OUTPUT]), along(m, m.real[INPUT]), k, left
+        return along(m, m.here.output[0]), along(m, m.here.input[0]), k, left
     return begins(t, m, c, k, True), begins(t, m, c, k, False), k, left
 
 
 @jit
 def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
     """The same for any move to an input. May turn back, but moves nothing."""
-    if along(m, to - m.real[INPUT]) < 0:
+    if along(m, to - m.here.input[0]) < 0:
         turn_back(m)
     return find(t, m, along(m, to), False)
 
@@ -123,10 +124,10 @@ def find_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> Kink:
 @jit
 def go_on(m: FixedMemory, kink: Kink, to: Any, moved: Any) -> None:
     """Move the plays to an input short of the next kink; `moved` is the output since the last one."""
-    m.real[OUTPUT] = along(m, kink[0] + moved)
-    m.real[INPUT] = to
-    m.counts[K] = kink[2]
-    m.counts[DEPTH] = kink[3]
+    m.here.output[0] = along(m, kink[0] + moved)
+    m.here.input[0] = to
+    m.here.k[0] = kink[2]
+    m.here.depth[0] = kink[3]
 
 
 @jit
@@ -147,8 +148,8 @@ def move_to_input(t: FixedPlayTables, m: FixedMemory, to: Any) -> None:
 def next_input(t: FixedPlayTables, m: FixedMemory) -> Any:
     """Input at which another play begins to follow the present move, or the largest input."""
     x = INPUT_MOST
-    if m.counts[DEPTH] > 0:
-        following = begins(t, m, m.counts[DEPTH] - 1, m.counts[K] + 1, False)
+    if m.here.depth[0] > 0:
+        following = begins(t, m, m.here.depth[0] - 1, m.here.k[0] + 1, False)
         x = following if following < x else x
     return along(m, x)
 
@@ -156,21 +157,21 @@ def next_input(t: FixedPlayTables, m: FixedMemory) -> Any:
 @jit(inline=True)
 def plays_step(t: FixedPlayTables, m: FixedMemory, to: Any) -> Any:
     """The sum of the plays at the next input."""
-    at = m.real[INPUT]
-    if at < to < m.real[NEXT] if m.counts[RISING] else m.real[NEXT] < to < at:
-        m.real[OUTPUT] += t.slope[m.counts[K] + 1] * (to - at)
-        m.real[INPUT] = to
+    at = m.here.input[0]
+    if at < to < m.step.next[0] if m.here.rising[0] else m.step.next[0] < to < at:
+        m.here.output[0] += t.slope[m.here.k[0] + 1] * (to - at)
+        m.here.input[0] = to
     elif to != at:
         move_to_input(t, m, to)
-        m.real[NEXT] = next_input(t, m)
-    return m.real[OUTPUT]
+        m.step.next[0] = next_input(t, m)
+    return m.here.output[0]
 
 
 @jit
 def solved(t: FixedPlayTables, m: FixedMemory, kink: Kink, to: Any) -> Any:
     """The input, at most a little outside the range, that gives `to`, an output beyond a kink along the move."""
     x = kink[1] + divide_by_slope(t, to - kink[0], kink[2] + 1)
-    most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.counts[RISING] else t.limits[MARGIN] - t.limits[PLAY_MIN]
+    most = t.limits[PLAY_MAX] + t.limits[MARGIN] if m.here.rising[0] else t.limits[MARGIN] - t.limits[PLAY_MIN]
     return along(m, most if x > most else x)
 
 
@@ -180,12 +181,12 @@ def solve(t: FixedPlayTables, m: FixedMemory, output: Any, following: Any) -> tu
 
     May turn back, but moves nothing. The same plays are known to follow up to the output `following`, along the move.
     """
-    if along(m, output - m.real[OUTPUT]) < 0:
+    if along(m, output - m.here.output[0]) < 0:
         turn_back(m)
         following = -FAR
     to = along(m, output)
     if to < following:
-        kink = (along(m, m.real[OUTPUT]), along(m, m.real[INPUT]), m.counts[K], m.counts[DEPTH])
+        kink = (along(m, m.here.output[0]), along(m, m.here.input[0]), m.here.k[0], m.here.depth[0])
     else:
         kink = find(t, m, to, True)
     return solved(t, m, kink, to), kink
@@ -216,16 +217,16 @@ def start(t: FixedPlayTables, m: FixedMemory, play: Reals) -> None:
     """Start memory: a value for each play, or one for all. Each play is a block of its own, left by a move to where it
     begins to follow."""
     aside = t.limits[OFFSET]
-    m.counts[DEPTH] = 0
+    m.here.depth[0] = 0
     for k in range(len(t.threshold) - 1, 0, -1):
         w = play[k if len(play) > 1 else 0]
-        m.counts[K] = k
-        m.counts[RISING] = 1 if w + t.threshold[k] <= INPUT_MOST else 0
-        m.real[INPUT] = w + along(m, t.threshold[k])
-        m.real[OUTPUT] = aside + w * t.slope[k + 1] + along(m, t.start_level[k])
+        m.here.k[0] = k
+        m.here.rising[0] = 1 if w + t.threshold[k] <= INPUT_MOST else 0
+        m.here.input[0] = w + along(m, t.threshold[k])
+        m.here.output[0] = aside + w * t.slope[k + 1] + along(m, t.start_level[k])
         leave_corner(m)
         aside = aside + w * (t.slope[k + 1] - t.slope[k])
-    m.counts[K] = 0
-    m.counts[RISING] = 1
-    m.real[INPUT] = play[0]
-    m.real[OUTPUT] = aside + play[0] * t.slope[1]
+    m.here.k[0] = 0
+    m.here.rising[0] = 1
+    m.here.input[0] = play[0]
+    m.here.output[0] = aside + play[0] * t.slope[1]

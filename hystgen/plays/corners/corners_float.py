@@ -4,22 +4,20 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from hystgen.basics.jit import jit
-from hystgen.plays.slots import Counts, Reals
+from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct, TwoReals
+from hystgen.plays.slots import Reals, StepState
 
-# places in `Memory.real`: the plays, then the operator's own numbers
-(INPUT, OUTPUT, NEXT, CAP, BEHIND, FROM, BASE, BEGIN, START, GAIN, SIGN, UNDO_INPUT, UNDO_OUTPUT, BEFORE, RETURNED,
- DRIVE, UNDO_DRIVE, REFERENCE, LEVEL) = range(19)  # fmt: skip  (CAP .. SIGN: in floating point)
-# and in `Memory.counts`
-(K, DEPTH, RISING, LIMITED, UNDO_K, UNDO_DEPTH, UNDO_RISING, STEPPED, COMMITTED, REPEAT, BITS, STATUS,
- ASCENDING, UNDO_ASCENDING, ON, SOUGHT) = range(16)  # fmt: skip  (ON: in fixed point; SOUGHT: with effects)
-# `here` and `undo` of the operators in C: the indices of their first numbers in `Memory.real` and `Memory.counts`
-HERE, UNDO = (INPUT, K), (UNDO_INPUT, UNDO_K)
 BOTTOM = 2  # `rose` of the bottom, which is opposite to both directions
-# places in `Curve.constant`
-MOST, ZERO, HALF, ONE = range(4)
+
+
+class Literals(Struct):
+    """Numbers that are literals in C."""
+
+    most: Real  # largest number of the type
+    zero: Real
+    half: Real
+    one: Real
 
 
 class Curve(NamedTuple):
@@ -32,7 +30,7 @@ class Curve(NamedTuple):
     limit: Reals  # (2): of the output
     inside: Reals  # (2): outputs up to here stay within the limit whatever rounding does
     range: Reals  # (2): of the input
-    constant: Reals  # MOST, ZERO, HALF, ONE
+    literal: Literals
 
 
 class Start(NamedTuple):
@@ -45,78 +43,106 @@ class Start(NamedTuple):
     top: int  # plays from here on cannot move within the range
 
 
-class Memory(NamedTuple):
-    """One instance: plain arrays."""
+class PlaceState(Struct):
+    """Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others."""
 
-    real: Reals
-    counts: Counts
-    output: Reals  # (n + 1): for each corner, like the next three
-    passed: Reals  # (n + 1, 2): input at which a falling and a rising move have passed it, along the move
-    top: Counts
-    rose: Counts
+    input: Real  # of the play sum (forward: drive, inverse: output)
+    output: Real
+    k: Count
+    depth: Count
+    rising: Flag  # direction of the present move
+
+
+class PlaysState(Struct):
+    """The line that the next outputs of the play sum lie on."""
+
+    next: Real  # input up to which the same plays follow and nothing is limited
+    cap: Real  # input up to which the same corner counts and nothing is limited
+    behind: Real  # while no play follows: the same as `next`, on the other side
+    from_input: Real  # input and output that the top corner's block counts from
+    from_output: Real
+    begin: Real  # output = start + (input - begin) gain
+    start: Real
+    gain: Real
+    sign: Real  # 1 for rising, -1 for falling
+    limited: Flag  # the output is a limit and the input may lie beyond what gives it
+
+
+class Corner(Struct):
+    """A turning point. It holds the plays of its block: those above the plays of the next corner, up to play `top`."""
+
+    output: Real  # at the turning point
+    passed: TwoReals  # input at which a falling and a rising move have passed it, along the move
+    top: Count
+    rose: SmallCount  # direction of the move that ended here, or `BOTTOM`
+
+
+class Memory(NamedTuple):
+    """One instance; `undo`: where the plays were before the last step."""
+
+    here: PlaceState
+    undo: PlaceState
+    plays: PlaysState
+    step: StepState
+    corner: Corner  # (n + 1)
 
 
 def new_memory(plays: int, dtype: Any) -> Memory:
     """Memory for one instance of a model with that many plays beside play 0; `init` gives it its values."""
-    return Memory(
-        real=np.zeros(LEVEL + 1, dtype),
-        counts=np.zeros(16, np.int64),
-        output=np.zeros(plays + 1, dtype),
-        passed=np.zeros((plays + 1, 2), dtype),
-        top=np.zeros(plays + 1, np.int64),
-        rose=np.zeros(plays + 1, np.int64),
-    )
+    here, undo = PlaceState.zeros(1, dtype), PlaceState.zeros(1, dtype)
+    return Memory(here, undo, PlaysState.zeros(1, dtype), StepState.zeros(1, dtype), Corner.zeros(plays + 1, dtype))
 
 
 @jit
-def copy_place(m: Any, to: tuple[int, int], source: tuple[int, int]) -> None:
-    """Field by field, HERE or UNDO: input and output; k, depth and rising."""
-    for i in range(2):
-        m.real[to[0] + i] = m.real[source[0] + i]
-    for i in range(3):
-        m.counts[to[1] + i] = m.counts[source[1] + i]
+def copy_place(to: PlaceState, source: PlaceState) -> None:
+    """Copy a place field by field."""
+    to.input[0] = source.input[0]
+    to.output[0] = source.output[0]
+    to.k[0] = source.k[0]
+    to.depth[0] = source.depth[0]
+    to.rising[0] = source.rising[0]
 
 
 @jit(inline=True)
 def along(m: Memory, x: Any) -> Any:
     """x as seen along the present move: a falling move is a rising one with all signs changed."""
-    return m.real[SIGN] * x
+    return m.plays.sign[0] * x
 
 
 @jit(inline=True)
 def forget_line(t: Curve, m: Memory) -> None:
     """Forget the line of the last outputs: the next sample searches."""
-    m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
-    m.real[NEXT] = m.real[INPUT]
-    m.real[CAP] = m.real[INPUT]
-    m.real[BEHIND] = m.real[INPUT]
+    m.plays.sign[0] = t.literal.one[0] if m.here.rising[0] else -t.literal.one[0]
+    m.plays.next[0] = m.here.input[0]
+    m.plays.cap[0] = m.here.input[0]
+    m.plays.behind[0] = m.here.input[0]
 
 
 @jit
 def leave_corner(t: Curve, m: Memory) -> None:
     """Leave a corner here. A block whose last play follows only beyond the limit is never passed."""
-    rising = m.counts[RISING]
-    k = m.counts[K]
-    c = m.counts[DEPTH]
-    x = along(m, m.real[INPUT])
-    room = t.limit[1 - rising] + along(m, m.real[OUTPUT])
-    m.output[c] = m.real[OUTPUT]
-    m.passed[c, rising] = x
-    m.passed[c, 1 - rising] = t.constant[MOST] if t.reach[k] > room else t.way[k] - x
-    m.top[c] = k
-    m.rose[c] = rising
-    m.counts[DEPTH] += 1
+    rising = m.here.rising[0]
+    k = m.here.k[0]
+    c = m.here.depth[0]
+    x = along(m, m.here.input[0])
+    room = t.limit[1 - rising] + along(m, m.here.output[0])
+    m.corner.output[c] = m.here.output[0]
+    m.corner.passed[c, rising] = x
+    m.corner.passed[c, 1 - rising] = t.literal.most[0] if t.reach[k] > room else t.way[k] - x
+    m.corner.top[c] = k
+    m.corner.rose[c] = rising
+    m.here.depth[0] += 1
 
 
 @jit
 def turn_back(t: Curve, m: Memory) -> None:
     """Turn back: a corner stays where plays have followed."""
-    if m.counts[K] > 0:
+    if m.here.k[0] > 0:
         leave_corner(t, m)
-        m.counts[K] = 0
-    m.counts[RISING] = 1 - m.counts[RISING]
-    m.counts[LIMITED] = 0
-    m.real[SIGN] = -m.real[SIGN]
+        m.here.k[0] = 0
+    m.here.rising[0] = 1 - m.here.rising[0]
+    m.plays.limited[0] = 0
+    m.plays.sign[0] = -m.plays.sign[0]
 
 
 @jit
@@ -135,69 +161,69 @@ def find_segment(step: Reals, k: int, end: int, way: Any) -> int:
 @jit
 def stop_in_block(t: Curve, m: Memory, output: Any, to: Any) -> None:
     """End the move in the top corner's block: where the sum is `output`, or at `to` if that comes first."""
-    c = m.counts[DEPTH] - 1
-    rising = m.counts[RISING]
-    reach = along(m, output - m.output[c])
-    x = m.passed[c, rising]
-    k = m.counts[K]
-    if m.rose[c] != rising:
-        k = find_segment(t.reach, k, m.top[c], reach)
+    c = m.here.depth[0] - 1
+    rising = m.here.rising[0]
+    reach = along(m, output - m.corner.output[c])
+    x = m.corner.passed[c, rising]
+    k = m.here.k[0]
+    if m.corner.rose[c] != rising:
+        k = find_segment(t.reach, k, m.corner.top[c], reach)
         reach = reach - t.reach[k]
-        x = t.way[k] - m.passed[c, 1 - rising]
+        x = t.way[k] - m.corner.passed[c, 1 - rising]
     x = x + reach * t.slope[k]
-    m.real[INPUT] = along(m, x) if x < along(m, to) else to
-    m.real[OUTPUT] = output
-    m.counts[K] = k
+    m.here.input[0] = along(m, x) if x < along(m, to) else to
+    m.here.output[0] = output
+    m.here.k[0] = k
     forget_line(t, m)
 
 
 @jit
 def move_to_output(t: Curve, m: Memory, output: Any) -> None:
     """Move the plays to where their sum is `output`, up to rounding."""
-    if along(m, output) < along(m, m.real[OUTPUT]):
+    if along(m, output) < along(m, m.here.output[0]):
         turn_back(t, m)
-    rising = m.counts[RISING]
+    rising = m.here.rising[0]
     kept = 0
-    while m.counts[DEPTH] - kept > 1:
-        middle = (kept + m.counts[DEPTH]) // 2
-        reach = t.constant[ZERO] if m.rose[middle] == rising else t.reach[m.top[middle]]
-        if along(m, output - m.output[middle]) >= reach:
-            m.counts[DEPTH] = middle
-            m.counts[K] = m.top[middle]
+    while m.here.depth[0] - kept > 1:
+        middle = (kept + m.here.depth[0]) // 2
+        reach = t.literal.zero[0] if m.corner.rose[middle] == rising else t.reach[m.corner.top[middle]]
+        if along(m, output - m.corner.output[middle]) >= reach:
+            m.here.depth[0] = middle
+            m.here.k[0] = m.corner.top[middle]
         else:
             kept = middle
-    m.counts[LIMITED] = 0
-    stop_in_block(t, m, output, along(m, t.constant[MOST]))
+    m.plays.limited[0] = 0
+    stop_in_block(t, m, output, along(m, t.literal.most[0]))
 
 
 @jit
 def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
     """Move the plays to any input. False where the limit comes first, for the caller to stop them there."""
-    if along(m, to) < along(m, m.real[INPUT]):
+    if along(m, to) < along(m, m.here.input[0]):
         turn_back(t, m)
     x = along(m, to)
-    rising = m.counts[RISING]
-    passed = m.counts[DEPTH] - 1
-    if passed > 0 and x >= m.passed[passed, rising]:
+    rising = m.here.rising[0]
+    passed = m.here.depth[0] - 1
+    if passed > 0 and x >= m.corner.passed[passed, rising]:
         kept = 0
         while passed - kept > 1:
             middle = (kept + passed) // 2
-            if x >= m.passed[middle, rising]:
+            if x >= m.corner.passed[middle, rising]:
                 passed = middle
             else:
                 kept = middle
-        m.counts[K] = m.top[passed]
-        m.counts[DEPTH] = passed
-    c = m.counts[DEPTH] - 1
-    k = m.counts[K]
-    cap = m.passed[c, rising]
+        m.here.k[0] = m.corner.top[passed]
+        m.here.depth[0] = passed
+    c = m.here.depth[0] - 1
+    k = m.here.k[0]
+    cap = m.corner.passed[c, rising]
     after = cap
     begin = cap
-    y = along(m, m.output[c])
-    m.real[BEHIND] = to
-    if m.rose[c] != rising:
-        top = m.top[c]
-        origin = m.passed[c, 1 - rising]
+    y = along(m, m.corner.output[c])
+    m.plays.behind[0] = to
+    if m.corner.rose[c] != rising:
+        top = m.corner.top[c]
+        origin = m.corner.passed[c, 1 - rising]
         room = t.inside[rising] - y
         k = find_segment(t.way, k, top, x + origin)
         begin = t.way[k] - origin
@@ -205,88 +231,88 @@ def move_to_input(t: Curve, m: Memory, to: Any) -> bool:
         after = t.way[k + 1] - origin
         if t.reach[top] > room:
             cap = begin + (room - t.reach[k]) * t.slope[k]
-        m.real[FROM] = -along(m, origin)
-        m.real[BASE] = m.output[c]
+        m.plays.from_input[0] = -along(m, origin)
+        m.plays.from_output[0] = m.corner.output[c]
         if k == 0 and origin <= t.range[1 - rising]:
-            m.real[BEHIND] = m.real[FROM]
-    m.real[BEGIN] = along(m, begin)
-    m.real[START] = along(m, y)
-    m.real[GAIN] = t.gain[k]
-    output = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
+            m.plays.behind[0] = m.plays.from_input[0]
+    m.plays.begin[0] = along(m, begin)
+    m.plays.start[0] = along(m, y)
+    m.plays.gain[0] = t.gain[k]
+    output = m.plays.start[0] + (to - m.plays.begin[0]) * m.plays.gain[0]
     if along(m, output) > t.limit[rising]:
         return False
-    if along(m, output) < along(m, m.real[OUTPUT]):
+    if along(m, output) < along(m, m.here.output[0]):
         cap = x
     else:
-        m.real[OUTPUT] = output
+        m.here.output[0] = output
     cap = t.range[rising] if t.range[rising] < cap else cap
-    m.real[CAP] = along(m, cap)
-    m.real[NEXT] = along(m, after if after < cap else cap)
-    m.counts[K] = k
-    m.real[INPUT] = to
+    m.plays.cap[0] = along(m, cap)
+    m.plays.next[0] = along(m, after if after < cap else cap)
+    m.here.k[0] = k
+    m.here.input[0] = to
     return True
 
 
 @jit
 def move_in_block(t: Curve, m: Memory, to: Any) -> bool:
     """Move on to an input short of CAP: more plays of the block follow. False if a search would be faster."""
-    way = along(m, to - m.real[FROM])
-    k = m.counts[K] + 1
-    many = m.counts[K] + 8
+    way = along(m, to - m.plays.from_input[0])
+    k = m.here.k[0] + 1
+    many = m.here.k[0] + 8
     while k < many and way > t.way[k + 1]:
         k += 1
-    m.real[BEGIN] = m.real[FROM] + along(m, t.way[k])
-    m.real[START] = m.real[BASE] + along(m, t.reach[k])
-    m.real[GAIN] = t.gain[k]
-    output = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
-    if k == many or along(m, output - m.real[OUTPUT]) < t.constant[ZERO]:
+    m.plays.begin[0] = m.plays.from_input[0] + along(m, t.way[k])
+    m.plays.start[0] = m.plays.from_output[0] + along(m, t.reach[k])
+    m.plays.gain[0] = t.gain[k]
+    output = m.plays.start[0] + (to - m.plays.begin[0]) * m.plays.gain[0]
+    if k == many or along(m, output - m.here.output[0]) < t.literal.zero[0]:
         return False
-    after = m.real[FROM] + along(m, t.way[k + 1])
-    m.real[NEXT] = after if along(m, after - m.real[CAP]) < t.constant[ZERO] else m.real[CAP]
-    m.counts[K] = k
-    m.real[INPUT] = to
-    m.real[OUTPUT] = output
+    after = m.plays.from_input[0] + along(m, t.way[k + 1])
+    m.plays.next[0] = after if along(m, after - m.plays.cap[0]) < t.literal.zero[0] else m.plays.cap[0]
+    m.here.k[0] = k
+    m.here.input[0] = to
+    m.here.output[0] = output
     return True
 
 
 @jit(inline=True)
 def plays_step(t: Curve, m: Memory, to: Any) -> Any:
     """The sum of the plays at the next input; a NaN moves nothing."""
-    rising = m.counts[RISING]
-    at = m.real[INPUT]
+    rising = m.here.rising[0]
+    at = m.here.input[0]
     on = to > at if rising else to < at
-    most = m.real[NEXT] if on else at
-    least = at if on or m.counts[K] > 0 else m.real[BEHIND]
+    most = m.plays.next[0] if on else at
+    least = at if on or m.here.k[0] > 0 else m.plays.behind[0]
     if least < to < most if rising else most < to < least:
-        m.real[INPUT] = to
-        m.real[OUTPUT] = m.real[START] + (to - m.real[BEGIN]) * m.real[GAIN]
-        return m.real[OUTPUT]
-    if on and (to < m.real[CAP] if rising else to > m.real[CAP]) and move_in_block(t, m, to):
-        return m.real[OUTPUT]
-    if to < m.real[INPUT] or to > m.real[INPUT]:
+        m.here.input[0] = to
+        m.here.output[0] = m.plays.start[0] + (to - m.plays.begin[0]) * m.plays.gain[0]
+        return m.here.output[0]
+    if on and (to < m.plays.cap[0] if rising else to > m.plays.cap[0]) and move_in_block(t, m, to):
+        return m.here.output[0]
+    if to < m.here.input[0] or to > m.here.input[0]:
         move_to_input(t, m, to)
-    return m.real[OUTPUT]
+    return m.here.output[0]
 
 
 @jit
 def start(t: Curve, m: Memory, s: Start) -> None:
     """Start memory. Each play is a block of its own."""
-    m.output[0] = s.bottom[0]
-    m.passed[0, 0] = s.bottom[1]
-    m.passed[0, 1] = s.bottom[2]
-    m.top[0] = s.top
-    m.rose[0] = BOTTOM
-    m.counts[DEPTH] = 1
+    m.corner.output[0] = s.bottom[0]
+    m.corner.passed[0, 0] = s.bottom[1]
+    m.corner.passed[0, 1] = s.bottom[2]
+    m.corner.top[0] = s.top
+    m.corner.rose[0] = BOTTOM
+    m.here.depth[0] = 1
     for k in range(s.top - 1, 0, -1):
         center = s.center[s.step * k]
-        m.counts[K] = k
-        m.counts[RISING] = 1 if k <= s.risen else 0
-        m.real[SIGN] = t.constant[ONE] if m.counts[RISING] else -t.constant[ONE]
-        m.real[INPUT] = center[0] + along(m, t.way[k] * t.constant[HALF])
-        m.real[OUTPUT] = center[1] + along(m, t.reach[k] * t.constant[HALF])
+        m.here.k[0] = k
+        m.here.rising[0] = 1 if k <= s.risen else 0
+        m.plays.sign[0] = t.literal.one[0] if m.here.rising[0] else -t.literal.one[0]
+        m.here.input[0] = center[0] + along(m, t.way[k] * t.literal.half[0])
+        m.here.output[0] = center[1] + along(m, t.reach[k] * t.literal.half[0])
         leave_corner(t, m)
-    m.counts[K] = 0
-    m.counts[RISING] = 1
-    m.real[INPUT] = s.center[0, 0]
-    m.real[OUTPUT] = s.center[0, 1]
+    m.here.k[0] = 0
+    m.here.rising[0] = 1
+    m.here.input[0] = s.center[0, 0]
+    m.here.output[0] = s.center[0, 1]
     forget_line(t, m)

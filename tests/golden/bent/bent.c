@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 d2e718108ae948a72b2ecdced8330457d2430efbe3ca6f8d5ec5c71a9a8782c4, without this line
+ * Text: sha256 0cb93cf10b4b6b65d627aeaa5c3b5ee8d0c857e3d5a8474551143cda96a4596c, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -244,12 +244,12 @@ static bent_real_t bent_inverse_held(const bent_inverse_t *self) {
 
 /* Whether the last answer still stands for reference u; u is the last reference from now on. */
 static bool bent_inverse_stands(bent_inverse_t *self, bent_real_t u) {
-    if (self->repeat && u >= self->reference && u <= self->reference) {
+    if (self->repeated && u >= self->reference && u <= self->reference) {
         self->status |= self->bits;
         return true;
     }
     self->reference = u;
-    self->repeat = true;
+    self->repeated = true;
     return false;
 }
 
@@ -315,7 +315,7 @@ static void bent_inverse_begin(bent_inverse_t *self, bent_real_t drive) {
     self->answer = drive;
     self->reference = 0;
     self->has_pending = false;
-    self->repeat = false;
+    self->repeated = false;
     self->stepped = false;
     self->bits = 0;
     self->drive = drive;
@@ -412,7 +412,7 @@ void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied) {
     if (inside < applied || inside > applied) {
         self->status |= BENT_STATUS_INPUT_CLAMPED;
     }
-    self->repeat = false;
+    self->repeated = false;
     self->pending = inside;
     self->has_pending = true;
 }

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 904d60c0dc62ea98ad88808153205273af5035a34262826b611fccad54aa6c08, without this line
+ * Text: sha256 391f50dd7f8e37ae376501dfd2b5337918932fcff20ab1d96d631234f94a9b92, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -103,7 +103,7 @@ typedef struct {
     bent_real_t reference; /* of the last step */
     bent_real_t answer;    /* drive returned last */
     bool has_pending;
-    bool repeat;       /* the last answer still stands for `reference` */
+    bool repeated;     /* the last answer still stands for `reference` */
     bool stepped;      /* a step has answered */
     unsigned int bits; /* of the last step */
     unsigned int status;

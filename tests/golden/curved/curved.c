@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 db147d1ae515e7b980bbf0ab211b76fccb9dd0d301a426c7b9ac1d8467212d84, without this line
+ * Text: sha256 6d660fa50d3d3c1c8e3e238441650c5a1134f7d2611bda462c75f9165d8cb615, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -498,11 +498,11 @@ CURVED_APART void curved_inverse_keep(curved_inverse_t *self) {
    commit      the committed drive   the committed drive   is solved for */
 curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u) {
     curved_inverse_keep(self);
-    if (!self->repeat || u != self->reference) {
+    if (!self->repeated || u != self->reference) {
         const curved_real_t level = curved_inverse_clamp(u);
         const int64_t output = (int64_t)level * ((int64_t)1 << CURVED_FRACTION);
         self->reference = u;
-        self->repeat = true;
+        self->repeated = true;
         self->bits = level != u ? CURVED_STATUS_INPUT_CLAMPED : 0u;
         const int64_t w = curved_solve(&curved_model_curve, &self->here, self->corner, output,
             self->next, &self->kink);
@@ -529,7 +529,7 @@ void curved_inverse_commit(curved_inverse_t *self, curved_real_t applied) {
     }
     curved_copy_place(&self->here, &self->undo);
     self->drive = self->undo_drive;
-    self->repeat = false;
+    self->repeated = false;
     self->next = -CURVED_FAR;
     curved_move_to_input(&curved_model_curve, &self->here, self->corner, &self->kink,
         curved_inverse_arrive(self, v));
@@ -543,7 +543,7 @@ static void curved_inverse_begin(curved_inverse_t *self, bool reset) {
     self->drive = (curved_real_t)first->drive;
     curved_inverse_keep(self);
     self->reference = 0;
-    self->repeat = false;
+    self->repeated = false;
     self->next = -CURVED_FAR;
     self->bits = 0;
     self->status = 0;

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 7a04c0472262eb8b683f98ec7ddbd76e8b4f5b89acfabd6c71853d18f71fedad, without this line
+ * Text: sha256 af832ff15b059a842bffb255f1147e2c5fde06120d21055284c618bbde7ca8b7, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -115,7 +115,7 @@ typedef struct {
     curved_real_t drive; /* where the plays are */
     curved_real_t undo_drive;
     curved_real_t reference; /* of the last step */
-    bool repeat;             /* the last answer still stands for `reference` */
+    bool repeated;           /* the last answer still stands for `reference` */
     bool limited;            /* no drive gives it; here rather than on the stack */
     uint_least8_t bits;      /* status of that answer */
     unsigned int status;

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 fd6ba101d4af5112d1bfae20bf1d41841b56db35d8d886004d0d7006dccd4843, without this line
+ * Text: sha256 13d3d7c61a159df2ba90cb1f20a99c61171880b5a6a24314d389f6b150fbfdfd, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -224,9 +224,9 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
         if (t->segment[c->top].reach > room) { /* gains fall, so the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
         }
-        m->from = -plain_along(m, from);
-        m->base = c->output;
-        m->behind = k == 0 && from <= t->range[other] ? m->from : input; /* the same line back */
+        m->from_input = -plain_along(m, from);
+        m->from_output = c->output;
+        m->behind = k == 0 && from <= t->range[other] ? m->from_input : input; /* same line back */
     }
     m->begin = plain_along(m, begin);
     m->start = plain_along(m, start);
@@ -251,21 +251,21 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
 
 /* Moves on, short of `cap`: more plays of the block follow. False if a search would be faster. */
 PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, plain_real_t input) {
-    const plain_real_t way = plain_along(m, input - m->from);
+    const plain_real_t way = plain_along(m, input - m->from_input);
     unsigned int k = m->here.k;
     const unsigned int many = k + 8u; /* from there on bisection is faster */
     do {
         ++k;
     } while (k < many && way > t->segment[k + 1u].way);
     const plain_segment_t *s = &t->segment[k];
-    m->begin = m->from + plain_along(m, s->way);
-    m->start = m->base + plain_along(m, s->reach);
+    m->begin = m->from_input + plain_along(m, s->way);
+    m->start = m->from_output + plain_along(m, s->reach);
     m->gain = s->gain;
     const plain_real_t output = m->start + (input - m->begin) * m->gain;
     if (k == many || plain_along(m, output - m->here.output) < 0) {
         return false;
     }
-    const plain_real_t next = m->from + plain_along(m, s[1].way);
+    const plain_real_t next = m->from_input + plain_along(m, s[1].way);
     m->next = plain_along(m, next - m->cap) < 0 ? next : m->cap;
     m->here.k = (uint_least16_t)k;
     m->here.input = input;

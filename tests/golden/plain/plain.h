@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 4b57b0028c14b525311cd46c52ea8b8b3d4105abfde12c088767269f57e7e1a2, without this line
+ * Text: sha256 5d5535c784e7ea7bc719030a60b1015c7fb728e0a6597633008d7f4d0c41a795, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -114,11 +114,11 @@ typedef struct {
 /* The place of the play sum, and the line that its next outputs lie on. */
 typedef struct {
     plain_place_t here;
-    plain_real_t next;   /* input up to which the same plays follow and nothing is limited */
-    plain_real_t cap;    /* input up to which the same corner counts and nothing is limited */
-    plain_real_t behind; /* while no play follows: the same as `next`, on the other side */
-    plain_real_t from;   /* input and output that the top corner's block counts from */
-    plain_real_t base;
+    plain_real_t next;       /* input up to which the same plays follow and nothing is limited */
+    plain_real_t cap;        /* input up to which the same corner counts and nothing is limited */
+    plain_real_t behind;     /* while no play follows: the same as `next`, on the other side */
+    plain_real_t from_input; /* input and output that the top corner's block counts from */
+    plain_real_t from_output;
     plain_real_t begin; /* output = start + (input - begin) gain */
     plain_real_t start;
     plain_real_t gain;

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 6b5c564c2d0c0e6b502f066968286548783c13cb75bbf4a43a13093119702afe, without this line
+ * Text: sha256 0fc7d9696ca9dc613bb1158e7042a44ee45044ea379180a20a45be4746169857, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -122,12 +122,14 @@ typedef struct {
 /* The place of the play sum, and the line that its next outputs lie on. */
 typedef struct {
     two_branches_place_t here;
-    two_branches_real_t next; /* input up to which the same plays follow and nothing is limited */
+    /* input up to which the same plays follow and nothing is limited */
+    two_branches_real_t next;
     /* input up to which the same corner counts and nothing is limited */
     two_branches_real_t cap;
-    two_branches_real_t behind; /* while no play follows: the same as `next`, on the other side */
-    two_branches_real_t from;   /* input and output that the top corner's block counts from */
-    two_branches_real_t base;
+    /* while no play follows: the same as `next`, on the other side */
+    two_branches_real_t behind;
+    two_branches_real_t from_input; /* input and output that the top corner's block counts from */
+    two_branches_real_t from_output;
     two_branches_real_t begin; /* output = start + (input - begin) gain */
     two_branches_real_t start;
     two_branches_real_t gain;
@@ -149,7 +151,7 @@ typedef struct {
     bool undo_ascending;
     bool stepped;      /* a step has answered */
     bool committed;    /* a drive was committed since */
-    bool repeat;       /* the last answer still stands for `reference` */
+    bool repeated;     /* the last answer still stands for `reference` */
     bool limited;      /* no drive gives it; here rather than on the stack */
     unsigned int bits; /* status of that answer */
     unsigned int status;
@@ -618,9 +620,9 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
         if (t->segment[c->top].reach > room) { /* gains fall, so the limit lies here or beyond */
             cap = begin + (room - s->reach) * s->slope;
         }
-        m->from = -two_branches_along(m, from);
-        m->base = c->output;
-        m->behind = k == 0 && from <= t->range[other] ? m->from : input; /* the same line back */
+        m->from_input = -two_branches_along(m, from);
+        m->from_output = c->output;
+        m->behind = k == 0 && from <= t->range[other] ? m->from_input : input; /* same line back */
     }
     m->begin = two_branches_along(m, begin);
     m->start = two_branches_along(m, start);
@@ -647,21 +649,21 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
 /* Moves on, short of `cap`: more plays of the block follow. False if a search would be faster. */
 TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t,
         two_branches_plays_t *m, two_branches_real_t input) {
-    const two_branches_real_t way = two_branches_along(m, input - m->from);
+    const two_branches_real_t way = two_branches_along(m, input - m->from_input);
     unsigned int k = m->here.k;
     const unsigned int many = k + 8u; /* from there on bisection is faster */
     do {
         ++k;
     } while (k < many && way > t->segment[k + 1u].way);
     const two_branches_segment_t *s = &t->segment[k];
-    m->begin = m->from + two_branches_along(m, s->way);
-    m->start = m->base + two_branches_along(m, s->reach);
+    m->begin = m->from_input + two_branches_along(m, s->way);
+    m->start = m->from_output + two_branches_along(m, s->reach);
     m->gain = s->gain;
     const two_branches_real_t output = m->start + (input - m->begin) * m->gain;
     if (k == many || two_branches_along(m, output - m->here.output) < 0) {
         return false;
     }
-    const two_branches_real_t next = m->from + two_branches_along(m, s[1].way);
+    const two_branches_real_t next = m->from_input + two_branches_along(m, s[1].way);
     m->next = two_branches_along(m, next - m->cap) < 0 ? next : m->cap;
     m->here.k = (uint_least16_t)k;
     m->here.input = input;
@@ -871,7 +873,7 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
         return two_branches_inverse_hold(self);
     }
     two_branches_inverse_keep(self);
-    if (!self->repeat || u < self->reference || u > self->reference) {
+    if (!self->repeated || u < self->reference || u > self->reference) {
         two_branches_real_t level = u;
         if (u < TWO_BRANCHES_OUTPUT_MIN) {
             level = TWO_BRANCHES_OUTPUT_MIN;
@@ -894,7 +896,7 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
             two_branches_inverse_set_drive(self, inside);
         }
         self->last = level;
-        self->repeat = true;
+        self->repeated = true;
     }
     self->stepped = true;
     self->committed = false;
@@ -915,7 +917,7 @@ void two_branches_inverse_commit(two_branches_inverse_t *self, two_branches_real
         self->returned = self->drive;
     }
     self->committed = true;
-    self->repeat = false;
+    self->repeated = false;
     two_branches_inverse_replace(self, v);
 }
 
@@ -933,7 +935,7 @@ TWO_BRANCHES_APART void two_branches_inverse_begin(two_branches_inverse_t *self,
     self->reference = 0;
     self->stepped = false;
     self->committed = false;
-    self->repeat = false;
+    self->repeated = false;
     self->bits = 0;
     self->status = 0;
 }

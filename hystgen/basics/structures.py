@@ -1,0 +1,117 @@
+"""Structures of named numbers, declared once: the arrays of the bit reference, and the structs of the C.
+
+    class LagState(Struct):
+        high: Real  # comments say what a number is, as in C
+        low: Real
+
+`LagState.zeros(3, np.float32)` is the memory of three lags, one structured array. `s.high[1]` is a number of the second
+one, in Python and in compiled code, where numba takes such an array as it is.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterable, Mapping
+from typing import Annotated, Any, Self, TypeAlias, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+Numbers: TypeAlias = NDArray[Any]
+
+Real: TypeAlias = Annotated[Numbers, "real_t"]
+Flag: TypeAlias = Annotated[Numbers, "bool"]
+Int64: TypeAlias = Annotated[Numbers, "int64_t"]
+Int32: TypeAlias = Annotated[Numbers, "int32_t"]
+UInt32: TypeAlias = Annotated[Numbers, "uint32_t"]
+UInt8: TypeAlias = Annotated[Numbers, "uint8_t"]
+Signal: TypeAlias = Annotated[Numbers, "signal_t"]  # a real in floating point, int64_t in fixed point
+Narrow: TypeAlias = Annotated[Numbers, "narrow_t"]  # a real in floating point, int32_t in fixed point
+Number: TypeAlias = Annotated[Numbers, "number_t"]
+Count: TypeAlias = Annotated[Numbers, "uint_least16_t"]
+SmallCount: TypeAlias = Annotated[Numbers, "uint_least8_t"]
+TwoReals: TypeAlias = Annotated[Numbers, "real_t", 2]
+FourInt32: TypeAlias = Annotated[Numbers, "int32_t", 4]
+
+
+class Struct(np.ndarray[Any, np.dtype[Any]]):
+    """Structures of one kind, an array of them; each member is an array of numbers or structures.
+
+    A `Real`, `Signal` or `Narrow` has the type of the arithmetic. Others are int64 here, however narrow they are in C.
+    """
+
+    def __array_finalize__(self, _: object) -> None:
+        """Give a new array its members as attributes."""
+        if self.dtype.names:
+            plain = self.view(np.ndarray)
+            for name, (kind, _length) in self.members().items():
+                setattr(self, name, plain[name].view(kind) if isinstance(kind, type) else plain[name])
+
+    def __setstate__(self, state: Any) -> None:
+        """Unpickle, which fills an array that had no members yet."""
+        super().__setstate__(state)
+        self.__array_finalize__(None)
+
+    @classmethod
+    @functools.cache
+    def members(cls) -> Mapping[str, tuple[type[Struct] | str, int]]:
+        """Members by name, in order: a structure or the type in C without prefix, and the length of an array or 0."""
+        found: dict[str, tuple[type[Struct] | str, int]] = {}
+        for name, hint in get_type_hints(cls, include_extras=True).items():
+            if get_origin(hint) is Annotated:
+                kind, *length = get_args(hint)[1:]
+                found[name] = kind, sum(length)
+            elif isinstance(hint, type) and issubclass(hint, Struct):
+                found[name] = hint, 0
+        return found
+
+    @classmethod
+    @functools.cache
+    def layout(cls, real: np.dtype[np.generic]) -> np.dtype[np.void]:
+        """The structured type of numpy in an arithmetic with numbers of type `real`."""
+        taken = [name for name in cls.members() if hasattr(np.ndarray, name)]
+        assert not taken, f"{cls.__name__}: arrays have attributes {taken}"
+        fields: list[Any] = []
+        for name, (kind, length) in cls.members().items():
+            number = real if kind in ("real_t", "signal_t", "narrow_t") else np.int64
+            number = kind.layout(real) if isinstance(kind, type) else np.dtype(number)
+            fields.append((name, number, (length,)) if length else (name, number))
+        return np.dtype(fields)
+
+    @classmethod
+    def zeros(cls, count: int, real: DTypeLike = np.int64) -> Self:
+        """As many structures, with all numbers 0."""
+        return np.zeros(count, cls.layout(np.dtype(real))).view(cls)
+
+    @classmethod
+    def of(cls, rows: Iterable[Any], real: DTypeLike = np.int64) -> Self:
+        """A structure for each row, whose entries are its members in order; a structure in it is a tuple."""
+        return np.array([tuple(row) for row in rows], cls.layout(np.dtype(real))).view(cls)
+
+
+class Factor(Struct):
+    """A real factor, mantissa / 2^shift."""
+
+    mantissa: Int32
+    shift: UInt8
+
+
+def declared(name: str, members: Iterable[str], word: Any) -> type[Struct]:
+    """A structure with these members, all of one type, such as `Real`."""
+    return type(name, (Struct,), {"__annotations__": dict.fromkeys(members, word)})
+
+
+def memory_of(kind: type[Any]) -> Callable[[Any, DTypeLike], Any]:
+    """Makes the memory of blocks, all 0, for their tables and the type of `Real`.
+
+    `kind`: a structure, one for each entry of the tables; or a NamedTuple of structures, each of them one for each
+    entry of the tables' field of that name.
+    """
+
+    def memory(t: Any, real: DTypeLike) -> Any:
+        if issubclass(kind, Struct):
+            return kind.zeros(len(t), real)
+        fields = get_type_hints(kind).items()
+        return kind(*(each.zeros(len(getattr(t, name)), real) for name, each in fields))
+
+    return memory
