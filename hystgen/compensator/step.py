@@ -99,7 +99,7 @@ def plays_of(front_forward: Function, front_inverse: Function, output: Function)
         s.step.answer[0] = s.step.last[0]
 
     @jit
-    def init(t: Tables | FixedTables, s: State, inverse: bool) -> None:
+    def init(t: Tables | FixedTables, s: State, inverse: int) -> None:
         """Set the start memory of the parameter file."""
         if len(t.start) == 1:
             loop_rest(s, t.start[0])
@@ -108,7 +108,7 @@ def plays_of(front_forward: Function, front_inverse: Function, output: Function)
         begin(t, s, 2 * inverse)
 
     @jit
-    def reset(t: Tables | FixedTables, s: State, inverse: bool) -> None:
+    def reset(t: Tables | FixedTables, s: State, inverse: int) -> None:
         """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
         loop_rest(s, t.limits[ZERO])
         begin(t, s, 2 * inverse + 1)
@@ -168,8 +168,7 @@ class Hooks(NamedTuple):
 
     plays: Function  # the memory of the step itself
     finite: Function
-    forward_absorb: Function
-    inverse_absorb: Function
+    absorb: Function
     shown: Function  # the present output, and status bits
     unread: Function  # note a reference that is not finite
     held: Function  # the drive for it
@@ -230,7 +229,7 @@ def no_other(t: Any, s: Any, call: int, x: Any) -> Any:  # noqa: ARG001  the sam
 
 def operations_of(inverse: bool, init: Function, reset: Function, visit: Function, hooks: Hooks) -> Operations:
     """The operations of one operator on a chain: step, commit, hold, clamp and status are the same for every chain."""
-    plays, finite, forward_absorb, inverse_absorb, shown, unread, held, stands, sought, other = hooks
+    plays, finite, absorb, shown, unread, held, stands, sought, other = hooks
 
     @jit(inline=True)
     def forward_step(t: Any, s: Any, v: Any) -> Any:
@@ -242,7 +241,7 @@ def operations_of(inverse: bool, init: Function, reset: Function, visit: Functio
         inside = clamp_drive(t, v)
         if inside != v:
             m.step.status[0] |= INPUT_CLAMPED
-        forward_absorb(t, s, inside)
+        absorb(t, s, inside)
         m.step.answer[0], bits = shown(t, s)
         m.step.status[0] |= bits
         return m.step.answer[0]
@@ -252,7 +251,7 @@ def operations_of(inverse: bool, init: Function, reset: Function, visit: Functio
         """Absorb the pending drive."""
         m = plays(s)
         if m.step.has_pending[0]:
-            inverse_absorb(t, s, m.step.pending[0])
+            absorb(t, s, m.step.pending[0])
             m.step.has_pending[0] = 0
 
     @jit
@@ -350,7 +349,7 @@ def made_of(
         s.step.bits[0] = 0
         return inverse_drive(t, s, level, inverse_solve(t, s, level))
 
-    hooks = Hooks(itself, finite, absorb, absorb, output, unread, held, stands, sought, no_other)
+    hooks = Hooks(itself, finite, absorb, output, unread, held, stands, sought, no_other)
 
     def operator(inverse: bool) -> Operations:
         """The operations of one operator."""

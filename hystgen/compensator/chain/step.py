@@ -412,11 +412,6 @@ def made_of(
         absorb(t, s, v, reached)
 
     @jit(inline=True)
-    def inverse_absorb(t: ChainTables, s: ChainState, v: Any) -> None:
-        """Absorb drive v."""
-        absorb(t, s, v, v)
-
-    @jit(inline=True)
     def plays_in(s: ChainState) -> State:
         """The memory of the step itself."""
         return s.plays
@@ -537,72 +532,72 @@ def made_of(
         elif travel_set(t, s, travel):
             s.plays.step.status[0] |= LIMITED_SETTING
 
-    def operator(inverse: bool) -> Operations:
-        """The operations of one operator."""
-        seen = inverse_absorb if inverse else forward_absorb
+    @jit
+    def init(t: ChainTables, s: ChainState) -> None:
+        """Set the start memory of the parameter file, and its settings."""
+        settings_reset(t, s)
+        plays_init(t.plays, s.plays, s.own.inverse[0])
+        start(t, s, 0)
+        begin(t, s)
+        if not s.own.inverse[0]:
+            s.plays.step.answer[0] = expected(t, s)
 
-        @jit
-        def init(t: ChainTables, s: ChainState) -> None:
-            """Set the start memory of the parameter file, and its settings."""
-            settings_reset(t, s)
-            plays_init(t.plays, s.plays, inverse)
-            start(t, s, 0)
-            begin(t, s)
-            if not inverse:
-                s.plays.step.answer[0] = expected(t, s)
+    @jit
+    def reset(t: ChainTables, s: ChainState) -> None:
+        """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
+        plays_reset(t.plays, s.plays, s.own.inverse[0])
+        start(t, s, 1)
+        begin(t, s)
+        if not s.own.inverse[0]:
+            s.plays.step.answer[0] = expected(t, s)
 
-        @jit
-        def reset(t: ChainTables, s: ChainState) -> None:
-            """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
-            plays_reset(t.plays, s.plays, inverse)
-            start(t, s, 1)
-            begin(t, s)
-            if not inverse:
-                s.plays.step.answer[0] = expected(t, s)
+    @jit
+    def seen(t: ChainTables, s: ChainState, v: Any) -> None:
+        """Absorb drive v in either operator."""
+        if s.own.inverse[0]:
+            absorb(t, s, v, v)
+        else:
+            forward_absorb(t, s, v)
 
-        @jit
-        def settle(t: ChainTables, s: ChainState, v: Any) -> None:
-            """Bring everything to rest at drive v; the plays move there as in any step."""
-            if not finite(t, v):
-                s.plays.step.status[0] |= HELD
-                return
-            inside = clamp_drive(t, v) + t.limits[ZERO]  # no drive is -0
-            if inside != v:
-                s.plays.step.status[0] |= INPUT_CLAMPED
-            if s.own.moving[0]:
-                travelled(t, s, inside)
-            s.own.moving[0] = 0
-            seen(t, s, inside)
+    @jit
+    def settle(t: ChainTables, s: ChainState, v: Any) -> None:
+        """Bring everything to rest at drive v; the plays move there as in any step."""
+        if not finite(t, v):
+            s.plays.step.status[0] |= HELD
+            return
+        inside = clamp_drive(t, v) + t.limits[ZERO]  # no drive is -0
+        if inside != v:
+            s.plays.step.status[0] |= INPUT_CLAMPED
+        if s.own.moving[0]:
+            travelled(t, s, inside)
+        s.own.moving[0] = 0
+        seen(t, s, inside)
 
-        @jit
-        def other(t: ChainTables, s: ChainState, call: int, x: Any) -> Any:
-            """Run a call that only models with effects have. Returns its answer, or 0."""
-            if call == OP_PUSH:
-                inverse_push(t, s, x)
-            elif call == OP_SETTLE:
-                if s.plays.step.has_pending[0]:
-                    absorb(t, s, s.plays.step.pending[0], s.plays.step.pending[0])
-                    s.plays.step.has_pending[0] = 0
-                settle(t, s, x)
-            elif call == OP_OFFSET:
-                set_offset(t, s, level_signal(t, x))
-            elif call == OP_TEMPERATURE:
-                set_temperature(t, s, x)
-            elif call == OP_GAIN:
-                set_gain(t, s, x)
-            elif call == OP_TRAVEL:
-                set_travel(t, s, entered_travel(t, x))
-            elif call == OP_TRAVELLED:
-                return travelled_by(s.blocks[AGED], 0)
-            elif call == OP_CORRECT:
-                correct(t, s, x, t.number.share[0])
-            elif call == OP_EXPECTED:
-                return expected(t, s)
-            return t.limits[ZERO]
+    @jit
+    def other(t: ChainTables, s: ChainState, call: int, x: Any) -> Any:
+        """Run a call that only models with effects have. Returns its answer, or 0."""
+        if call == OP_PUSH:
+            inverse_push(t, s, x)
+        elif call == OP_SETTLE:
+            if s.plays.step.has_pending[0]:
+                absorb(t, s, s.plays.step.pending[0], s.plays.step.pending[0])
+                s.plays.step.has_pending[0] = 0
+            settle(t, s, x)
+        elif call == OP_OFFSET:
+            set_offset(t, s, level_signal(t, x))
+        elif call == OP_TEMPERATURE:
+            set_temperature(t, s, x)
+        elif call == OP_GAIN:
+            set_gain(t, s, x)
+        elif call == OP_TRAVEL:
+            set_travel(t, s, entered_travel(t, x))
+        elif call == OP_TRAVELLED:
+            return travelled_by(s.blocks[AGED], 0)
+        elif call == OP_CORRECT:
+            correct(t, s, x, t.number.share[0])
+        elif call == OP_EXPECTED:
+            return expected(t, s)
+        return t.limits[ZERO]
 
-        hooks = Hooks(
-            plays_in, finite, forward_absorb, inverse_absorb, shown, unread, inverse_held, stands, inverse_sought, other
-        )
-        return operations_of(inverse, init, reset, seen, hooks)
-
-    return operator(False), operator(True)
+    hooks = Hooks(plays_in, finite, seen, shown, unread, inverse_held, stands, inverse_sought, other)
+    return operations_of(False, init, reset, seen, hooks), operations_of(True, init, reset, seen, hooks)
