@@ -11,7 +11,8 @@
 
 #include "kernels.h"
 
-/* An effect of the user's own has this header alone: opened as it is, it finds its product here. */
+/* A user's own effect includes this header alone, and finds its product here when opened in an
+   editor. */
 #if !defined(HYSTGEN_CONFIGURED) && !defined(HYSTGEN_FIXED)
 #include "arithmetic/product.c"
 #endif

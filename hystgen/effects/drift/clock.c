@@ -1,8 +1,7 @@
 /* Drift over the time since the clock was started. In floating point samples are counted: `low`
-   counts exactly up to `carry`, 2^24; `high` counts how often it got there. In fixed point the
-   drift is a sum of the change in each sample, as a whole part in units of signals and a fraction
-   below. Called by the functions that emission writes for a chain, see compensator/chain/model.h.
-   */
+   counts exactly up to `carry`, 2^24; `high` counts the carries. In fixed point the drift is a sum
+   of the change in each sample, as a whole part in units of signals and a fraction below. Called by
+   the functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 
 #ifdef HYSTGEN_FIXED
