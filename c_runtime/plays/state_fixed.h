@@ -30,8 +30,7 @@ typedef struct {
 
 #ifdef HYSTGEN_REAL_IS_SHORT
 /* A turning point, which holds the plays of its block: those above the plays of the next corner, up
- * to play `top`.
- */
+   to play `top`. */
 typedef struct {
     int32_t high; /* output at the turning point: high 2^16 + low */
     int32_t input;
@@ -41,8 +40,7 @@ typedef struct {
 } hystgen_corner_t;
 #else
 /* A turning point, which holds the plays of its block: those above the plays of the next corner, up
- * to play `top`.
- */
+   to play `top`. */
 typedef struct {
     int32_t high; /* output at the turning point: high 2^32 + low */
     int32_t input;

@@ -32,9 +32,9 @@ typedef struct {
 /* The place of the play sum, and the straight line of its next outputs. */
 typedef struct {
     hystgen_place_t here;
-    hystgen_real_t next;   /* input up to which the same plays follow and nothing is limited */
-    hystgen_real_t cap;    /* input up to which the same corner applies and nothing is limited */
-    hystgen_real_t behind; /* while no play follows: the same as `next`, on the other side */
+    hystgen_real_t next;       /* input up to which the same plays follow within the limits */
+    hystgen_real_t cap;        /* input up to which the same corner applies within the limits */
+    hystgen_real_t behind;     /* while no play follows: the same as `next`, on the other side */
     hystgen_real_t from_input; /* origin of the top corner's block: input and output */
     hystgen_real_t from_output;
     hystgen_real_t begin; /* output = start + (input - begin) gain */

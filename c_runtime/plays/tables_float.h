@@ -17,7 +17,7 @@ typedef struct {
 typedef struct {
     const hystgen_segment_t *segment; /* plays 0 .. n, and one that never follows */
     hystgen_real_t limit[2];          /* of the output */
-    hystgen_real_t inside[2]; /* outputs up to this stay within the limit despite rounding */
+    hystgen_real_t inside[2]; /* outputs up to these stay within the limit despite rounding */
     hystgen_real_t range[2];  /* of the input */
 } hystgen_curve_t;
 

@@ -24,8 +24,7 @@ void hystgen_operator_set_travel(hystgen_operator_t *self, hystgen_travel_t trav
 #ifdef HYSTGEN_INVERSE
 /* The displacement that the model expects from the last applied drive. */
 hystgen_real_t hystgen_inverse_expected(const hystgen_inverse_t *self);
-/* Trims the offset by a share, 0 to 1, of the measured minus the expected displacement.
- */
+/* Trims the offset by a share, 0 to 1, of the measured minus the expected displacement. */
 void hystgen_inverse_correct(hystgen_inverse_t *self, hystgen_real_t measured,
                              hystgen_real_t share);
 #endif

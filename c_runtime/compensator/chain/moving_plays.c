@@ -120,8 +120,7 @@ static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
     return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
 }
 
-/* Sum of the plays after their input has moved to w, or with all of them at rest there; increases
-   with w. */
+/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
 HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self,
                                                          hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;

@@ -88,7 +88,7 @@ typedef struct {
 typedef struct {
     int64_t begin;
     hystgen_factor_t
-        share; /* of the travel since `begin`, less the bits that the product leaves out */
+        share; /* of the travel since `begin`, minus the bits that the product leaves out */
     uint8_t drop;
     int32_t c[4];
 } hystgen_ageing_piece_t;
@@ -163,8 +163,9 @@ typedef struct {
     hystgen_bend_curve_t inverse;
 } hystgen_bend_t;
 
-/* A piece of the yield of a nonlinear dashpot: its first stretch, the left shift that scales its
-   length to 2^31, and the coefficients of its cubic, without their lowest `lift` bits. */
+/* A piece of the yield of a nonlinear dashpot: the stretch at which it begins, the left shift that
+   scales its length to 2^31, and the coefficients of its cubic, without their lowest `lift`
+   bits. */
 typedef struct {
     uint32_t begin;
     int32_t c[4];

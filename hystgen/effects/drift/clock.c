@@ -12,7 +12,7 @@ static void hystgen_clock_start(hystgen_clock_t *self) {
     self->count = 0;
 }
 
-/* One sample later. */
+/* Advances by one sample. */
 static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *self) {
     if (self->count < t->samples) {
         const int64_t part = self->part + t->slope + self->gained;
@@ -43,7 +43,7 @@ static void hystgen_clock_start(hystgen_clock_t *self) {
     self->low = 0;
 }
 
-/* One sample later. */
+/* Advances by one sample. */
 static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *self) {
     const hystgen_real_t next = self->low + 1;
     const bool full = next >= t->carry;

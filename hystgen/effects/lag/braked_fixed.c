@@ -119,7 +119,8 @@ HYSTGEN_APART int32_t hystgen_braked_most(const hystgen_lag_table_t *t,
     return most;
 }
 
-/* Cut of the lead: its excess over the largest lead, limited to `room`. */
+/* Cut of the lead: its excess over the largest lead that still comes back in time, limited to
+   `room`. */
 static int32_t hystgen_braked_over(const hystgen_lag_table_t *t, const hystgen_brake_t *brake) {
     const int32_t over = brake->lead - hystgen_braked_most(t, brake);
     if (over > brake->room) {

@@ -1,10 +1,9 @@
-/* A drive that stands still while the reference does. Each drive before a lag corrects the rounding
+/* A drive that stands still while the reference does. Each drive into a lag corrects the rounding
    of the previous drive, and creep responds to this too: at rest the drive alternates by a code.
    After HYSTGEN_QUIET equal references, with drives no farther than HYSTGEN_DITHER from the drive
    needed at rest, the last drive is kept until it is farther off. The requested output of the drive
-   side is then within twice HYSTGEN_DITHER of the present one; a larger difference is a jump of the
-   reference. Called by the functions that emission writes for a chain, see
-   compensator/chain/model.h. */
+   side is then within twice HYSTGEN_DITHER of the present one; a larger difference is a jump.
+   Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_QUIET_C
 #define HYSTGEN_LAG_QUIET_C
 #include "compensator/chain/model.h"

@@ -13,7 +13,7 @@
 #endif
 
 #ifdef HYSTGEN_FIXED
-/* The rest value of play i: at most the difference of their thresholds away from the previous play,
+/* The rest value of play i, no farther from that of play i - 1 than their thresholds differ,
    despite rounding. */
 static hystgen_play_t hystgen_limited_rest(const hystgen_play_t *play, unsigned int i,
                                            int64_t rest) {

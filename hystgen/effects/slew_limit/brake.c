@@ -1,4 +1,4 @@
-/* Rate-limited drives before a lag, which must not overshoot. Called by chain_calls.c. */
+/* Rate-limited drives into a lag, which must not overshoot. Called by chain_calls.c. */
 #ifndef HYSTGEN_CONFIGURED
 #define HYSTGEN_HAS_SLEW_LIMIT
 #define HYSTGEN_HAS_BRAKED_LAG

@@ -1,6 +1,6 @@
 /* Drives with or without a rate limit. The rounding remainder of a rate-limited drive, and in
-   floating point that of the rate, is stored with the drive: rounding errors do not add up over
-   steps, and a step may be smaller than the drive's last bit. Called by chain.c and
+   floating point that of the rate, is stored with the drive, so that rounding errors do not add up
+   over steps, and a step may be smaller than the drive's last bit. Called by chain.c and
    chain_calls.c. */
 #ifndef HYSTGEN_SLEW_LIMIT_SLEWED_C
 #define HYSTGEN_SLEW_LIMIT_SLEWED_C
