@@ -11,8 +11,7 @@
 
 #include "kernels.h"
 
-/* A user's own effect includes this header alone, and finds its product here when opened in an
-   editor. */
+/* A user's own effect includes this header alone: an editor finds its product here. */
 #if !defined(HYSTGEN_CONFIGURED) && !defined(HYSTGEN_FIXED)
 #include "arithmetic/product.c"
 #endif

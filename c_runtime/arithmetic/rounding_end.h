@@ -1,5 +1,4 @@
-/* In floating point, after all code of a single header: restores the settings of the user's
-   code. */
+/* In floating point, after all code of a single header: restores the user's settings. */
 
 #if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT DEFAULT

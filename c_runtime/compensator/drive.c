@@ -31,7 +31,7 @@ static hystgen_play_t hystgen_operator_arrive(hystgen_operator_t *self, hystgen_
 }
 
 #ifndef HYSTGEN_HAS_FRONT
-/* The drive for an input w of the plays. */
+/* Drive for an input w of the plays. */
 static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_real_t level,
                                              hystgen_reach_t w) {
     (void)self;
@@ -53,9 +53,9 @@ static inline bool hystgen_turns(hystgen_signal_t back, hystgen_signal_t way) {
 }
 #endif
 
-/* The drive for an input w of the plays, on the branch of the drive's own move. Stays on the
-   present branch, moving on or holding, and turns only if holding costs more than the turn. Sets a
-   status bit if no drive reaches w. */
+/* Drive for an input w of the plays, on the branch of its own move. Stays on the present branch,
+   moving on or holding, and turns only if holding costs more than the turn. Sets a status bit if no
+   drive reaches w. */
 HYSTGEN_APART_BUT_IN_FLOAT_LOOP hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self,
                                                                       hystgen_real_t level,
                                                                       hystgen_reach_t w) {
@@ -92,8 +92,8 @@ static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t 
     return self->ascending == ascending;
 }
 
-/* The drive for an input w of the plays, on the branch of the drive's own move. Tries the branch of
-   the reference's move, then the other one; if neither fits, the drive holds. Sets `limited` if no
+/* Drive for an input w of the plays, on the branch of its own move. Tries the branch of the
+   reference's move, then the other one; if neither fits, the drive holds. Sets `limited` if no
    drive reaches w. */
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
                                                                       hystgen_real_t level,
@@ -119,7 +119,7 @@ HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hyst
     return v;
 }
 #else
-/* The drive for an input w of the plays, or the nearest possible one. */
+/* Drive for an input w of the plays, or the nearest possible one. */
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
                                                                       hystgen_real_t level,
                                                                       hystgen_reach_t w,
@@ -130,7 +130,7 @@ HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hyst
 }
 #endif
 
-/* The drive for an input w of the plays; the reference is already limited. */
+/* Drive for an input w of the plays; the reference is already limited. */
 static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_real_t level,
                                              hystgen_reach_t w) {
     bool limited = false;

@@ -36,8 +36,7 @@ HYSTGEN_APART void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t 
     here->depth = (uint_least16_t)(here->depth + 1u);
 }
 
-/* Input or output, along the move, at which the play of segment s in a corner's block begins to
-   follow. */
+/* Input or output, along the move, at which a segment of a corner's block begins. */
 static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_corner_t *c,
                                      const hystgen_segment_t *s, bool by_output) {
     const int64_t output = (int64_t)c->high * HYSTGEN_HIGH_STEP + (int64_t)c->low;
@@ -110,8 +109,7 @@ static inline void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t 
     hystgen_find(t, here, corner, kink, false);
 }
 
-/* Moves the plays to an input short of the next kink; `moved` is the output gained since the last
-   kink. */
+/* Moves the plays to an input short of the next kink; `moved`: output gained since the last one. */
 static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to,
                           int64_t moved) {
     here->output = hystgen_along(here, kink->output + moved);
@@ -147,8 +145,7 @@ static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_
     return (int32_t)hystgen_along(here, x);
 }
 
-/* The sum of the plays at the next input; `next` is the input at which another play begins to
-   follow. */
+/* Sum of the plays at the next input; `next`: input at which another play begins to follow. */
 HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here,
                                        hystgen_corner_t *corner, hystgen_kink_t *kink,
                                        int32_t *next, int32_t to) {
@@ -225,7 +222,7 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
 }
 
 /* Start memory: a value for each play (step 1), or one for all (step 0). Each play is a block of
-   its own; its corner is the point at which it begins to follow. */
+   its own, with a corner where it begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here,
                                   hystgen_corner_t *corner, const int32_t *play,
                                   unsigned int step) {

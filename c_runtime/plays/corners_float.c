@@ -33,8 +33,7 @@ HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m) {
     m->behind = m->here.input;
 }
 
-/* Leaves a corner at the present place. A block whose last play follows only beyond the output
-   limit is never passed. */
+/* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
 HYSTGEN_APART void hystgen_leave_corner(const hystgen_curve_t *t, hystgen_plays_t *m,
                                         hystgen_corner_t *corner) {
     const hystgen_segment_t *s = &t->segment[m->here.k];
@@ -61,8 +60,7 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m,
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k always
-   does. */
+/* Last of segments k .. end - 1 that begins before x, a way or a reach; segment k always does. */
 static inline unsigned int hystgen_find_segment(const hystgen_segment_t *segment, unsigned int k,
                                                 unsigned int end, hystgen_real_t x, bool by_reach) {
     unsigned int middle = (k + end) / 2;
@@ -76,8 +74,7 @@ static inline unsigned int hystgen_find_segment(const hystgen_segment_t *segment
     return k;
 }
 
-/* Ends the move in the top corner's block, at the sum `output` or at `input`, whichever comes
-   first. */
+/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever is first. */
 HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           const hystgen_corner_t *corner, hystgen_real_t output,
                                           hystgen_real_t input) {
@@ -119,8 +116,7 @@ HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_pla
     hystgen_stop_in_block(t, m, corner, output, hystgen_along(m, HYSTGEN_REAL_MAX));
 }
 
-/* Moves the plays to any input. False if the output limit comes first; the caller then stops at the
-   limit. */
+/* Moves the plays to any input. False if the limit comes first; the caller then stops there. */
 HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           hystgen_corner_t *corner, hystgen_real_t input) {
     if (hystgen_along(m, input) < hystgen_along(m, m->here.input)) {
@@ -235,8 +231,7 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
     return m->here.output;
 }
 
-/* Start memory. Each play is a block of its own; its corner is the point at which it begins to
-   follow. */
+/* Start memory. Each play is a block of its own, with a corner where it begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m,
                                   hystgen_corner_t *corner, const hystgen_start_t *start) {
     unsigned int k;

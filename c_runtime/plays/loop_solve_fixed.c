@@ -3,8 +3,7 @@
 #include "arithmetic/fixed.h"
 #include "hystgen_runtime.h"
 
-/* Input of the plays at which their sum has moved by d from its value at w, limited to `least` ..
-   `most`. */
+/* Input of the plays at which their sum has moved on by d from w, within `least` .. `most`. */
 static hystgen_reach_t hystgen_input_further(const hystgen_tables_t *t, hystgen_reach_t w,
                                              hystgen_sum_t d, unsigned int k, bool rising) {
     const hystgen_sum_t step = hystgen_divide_by_slope(d, t->reciprocal[k], t->shift[k]);

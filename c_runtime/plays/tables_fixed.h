@@ -8,8 +8,7 @@
 #define HYSTGEN_LARGEST 2147483647     /* the largest input of the plays */
 #define HYSTGEN_MOST_PLAYS 0x7fffu     /* the largest index of a play that a corner can store */
 
-/* Segment k begins at this distance from a turning point, where play k begins to follow; the curve
-   is straight up to the next segment. */
+/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
 typedef struct {
     int64_t reach;       /* of the output: 2 z_k */
     uint32_t way;        /* of the input: 2 r_k */

@@ -3,8 +3,7 @@
 #ifndef HYSTGEN_TABLES_FLOAT_H
 #define HYSTGEN_TABLES_FLOAT_H
 
-/* Segment k begins at this distance from a turning point, where play k begins to follow; the curve
-   is straight up to the next segment. */
+/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
 typedef struct {
     hystgen_real_t way;   /* of the input: 2 r_k in the forward operator, 2 z_k in the inverse */
     hystgen_real_t reach; /* of the output: 2 z_k in the forward operator, 2 r_k in the inverse */

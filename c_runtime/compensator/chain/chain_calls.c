@@ -49,8 +49,7 @@ HYSTGEN_APART_IN_FIXED_CHAIN hystgen_signal_t hystgen_inverse_wanted(hystgen_inv
                         : hystgen_inverse_output_side_resting(self, y);
 }
 
-/* The drive for an input w of the plays, at which their sum is h; the reference is already
-   limited. */
+/* Drive for an input w of the plays, at which their sum is h; the reference is already limited. */
 HYSTGEN_APART_IN_FIXED_CHAIN hystgen_reach_t hystgen_inverse_sought(hystgen_inverse_t *self,
                                                                     hystgen_real_t level,
                                                                     hystgen_signal_t h,
@@ -74,8 +73,7 @@ static hystgen_real_t hystgen_inverse_limited(hystgen_inverse_t *self, hystgen_r
     return inside;
 }
 
-/* The next drive, for reference u; the memory is up to date. `bits` is the status of the
-   reference. */
+/* The next drive, for reference u; the memory is up to date. `bits`: status of the reference. */
 HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_next(hystgen_inverse_t *self,
                                                            hystgen_real_t u) {
     hystgen_real_t level = u;

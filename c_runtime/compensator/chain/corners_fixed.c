@@ -43,8 +43,7 @@ static hystgen_signal_t hystgen_operator_started(const hystgen_operator_t *self)
     return hystgen_level(self->here.output);
 }
 
-/* Moves the plays to an input between the kink and the next one. False if the input lies
-   elsewhere. */
+/* Moves the plays to an input between the kink and the next one. False for any other input. */
 HYSTGEN_APART bool hystgen_operator_move_on(hystgen_operator_t *self, hystgen_play_t w) {
     const int64_t moved = hystgen_gained(&hystgen_model_curve, &self->here, &self->kink, w);
     if (moved < 0 || self->kink.output + moved > self->next) {

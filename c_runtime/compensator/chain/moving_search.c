@@ -47,9 +47,8 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *sel
     return hystgen_inverse_nearer(self, low, sum);
 }
 #else
-/* Sum of the plays at the middle of the search interval, which becomes one of its ends. The state
-   of the search is in memory, where it needs half as much stack as registers saved across a
-   call. */
+/* Sum of the plays at the middle of the search interval, which becomes one of its ends. A search in
+   memory needs half as much stack as registers saved across a call. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_halve(const hystgen_inverse_t *self,
                                                    hystgen_search_t *search) {
     const hystgen_real_t sum = hystgen_inverse_sum(self, search->middle);

@@ -25,8 +25,7 @@ static inline void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_
     (void)w;
 }
 #elif defined(HYSTGEN_HAS_CORNERS)
-/* Finds the kink from which a solution w is refined: the last one before w. Plays that begin to
-   follow only at w are left out. */
+/* Finds the kink from which a solution w is refined, without plays that begin to follow at w. */
 HYSTGEN_APART void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_reach_t w) {
     const int64_t x = hystgen_along(&self->here, w);
     if (x > hystgen_along(&self->here, self->here.input)) {

@@ -98,8 +98,7 @@ static inline hystgen_sum_t hystgen_share_of(hystgen_sum_t x, const hystgen_fact
     return hystgen_short_times(x, share);
 }
 
-/* A play of threshold r after its input has moved to w. The distance between play and input fits 32
-   bits. */
+/* A play of threshold r after its input has moved to w. Their distance fits 32 bits. */
 static inline hystgen_play_t hystgen_drawn(hystgen_play_t play, hystgen_play_t w, hystgen_sum_t r) {
     const uint32_t way = (uint32_t)(w > play ? (hystgen_sum_t)w - play : (hystgen_sum_t)play - w);
     if ((hystgen_sum_t)way <= r) {

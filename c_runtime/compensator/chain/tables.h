@@ -6,8 +6,7 @@
 #ifndef HYSTGEN_CHAIN_TABLES_H
 #define HYSTGEN_CHAIN_TABLES_H
 
-/* A state X of creep, the contribution of inputs so far to the next output: X += rate (share h -
-   X). */
+/* Creep state X, the contribution of past inputs to the next output: X += rate (share h - X). */
 typedef struct {
     hystgen_real_t rate;
     hystgen_real_t share;

@@ -127,8 +127,7 @@ typedef struct {
     uint8_t bits; /* of a play below a drive code */
 } hystgen_friction_table_t;
 
-/* Drift over time: its change in the first sample, and the growth of this change from sample to
-   sample. */
+/* Drift over time: its change in the first sample, and the growth of this change per sample. */
 typedef struct {
     int64_t slope;
     int64_t change;
@@ -163,9 +162,8 @@ typedef struct {
     hystgen_bend_curve_t inverse;
 } hystgen_bend_t;
 
-/* A piece of the yield of a nonlinear dashpot: the stretch at which it begins, the left shift that
-   scales its length to 2^31, and the coefficients of its cubic, without their lowest `lift`
-   bits. */
+/* A piece of the yield of a nonlinear dashpot: its start, the left shift that scales its length to
+   2^31, and the coefficients of its cubic, without their lowest `lift` bits. */
 typedef struct {
     uint32_t begin;
     int32_t c[4];

@@ -1,8 +1,7 @@
 /* Creep as a block of the chain, in fixed point. A state holds its contribution at the next sample
-   for an unchanged input; part of an input change takes effect at once, so that the block is
-   exactly invertible. States have bits below those of a signal, so that the slowest one does not
-   stall. Called by the functions that emission writes for a chain, see
-   compensator/chain/model.h. */
+   for an unchanged input; part of an input change takes effect at once: the block is exactly
+   invertible. Bits below those of a signal keep the slowest state from stalling. Called by the
+   functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "arithmetic/fixed.h"
 #include "compensator/chain/model.h"
 #include "arithmetic/factors.c"

@@ -28,10 +28,9 @@ static hystgen_real_t hystgen_braked_absorb(const hystgen_lag_table_t *t, hystge
     return hystgen_lag_absorb(t, &self->lag, v);
 }
 
-/* Excess of `lead` over the largest lead that still comes back in time, limited to `room`. The lag
-   is to gain `size`; a lead of `most` would gain this distance in one step. With a lead m that
-   shrinks by `back` in a step, the lag gains at most (m + back/2)^2 / (2 back most) of `size` until
-   the lead is gone. */
+/* Excess of `lead` over the largest lead that comes back in time, limited to `room`. The lag is to
+   gain `size`; a lead of `most` gains this in one step. With a lead m that shrinks by `back` in a
+   step, the lag gains at most (m + back/2)^2 / (2 back most) of `size` until the lead is gone. */
 static hystgen_real_t hystgen_braked_over(hystgen_real_t size, hystgen_real_t most,
                                           hystgen_real_t lead, hystgen_real_t back,
                                           hystgen_real_t room) {

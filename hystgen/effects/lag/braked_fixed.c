@@ -43,8 +43,7 @@ static int32_t hystgen_braked_coarse(int64_t x) {
     return coarse < -HYSTGEN_BRAKED_MOST ? -HYSTGEN_BRAKED_MOST : (int32_t)coarse;
 }
 
-/* The lead, in units of signals, with which the lag moves by x, in units of its state, in a step:
-   x/(1 - E). */
+/* Lead, a signal, with which the lag moves by x, in units of its state, in a step: x/(1 - E). */
 HYSTGEN_APART int64_t hystgen_braked_led(const hystgen_lag_table_t *t, int64_t x) {
     return hystgen_lag_scaled(t, x, &t->inverse_rate);
 }
@@ -65,9 +64,8 @@ HYSTGEN_APART bool hystgen_braked_room(const hystgen_lag_table_t *t, const hystg
     return room + room >= (int64_t)1 << HYSTGEN_DRIVE_BITS;
 }
 
-/* Move of the lag's target in this step, in units of its state, limited to the rate of the drive.
-   Sets the distance that the lag is to gain beyond this move, and the decrease of its lead in a
-   step. */
+/* Move of the lag's target in this step, in units of its state, limited to the drive's rate. Sets
+   the distance that the lag is to gain beyond this move, and the decrease of its lead in a step. */
 HYSTGEN_APART int64_t hystgen_braked_along(const hystgen_lag_table_t *t,
                                            const hystgen_braked_t *self, hystgen_brake_t *brake) {
     const int64_t rising = (int64_t)HYSTGEN_SLEW_RISING * ((int64_t)1 << HYSTGEN_DRIVE_BITS);
@@ -119,8 +117,7 @@ HYSTGEN_APART int32_t hystgen_braked_most(const hystgen_lag_table_t *t,
     return most;
 }
 
-/* Cut of the lead: its excess over the largest lead that still comes back in time, limited to
-   `room`. */
+/* Cut of the lead: its excess over the largest that comes back in time, limited to `room`. */
 static int32_t hystgen_braked_over(const hystgen_lag_table_t *t, const hystgen_brake_t *brake) {
     const int32_t over = brake->lead - hystgen_braked_most(t, brake);
     if (over > brake->room) {

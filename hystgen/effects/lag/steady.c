@@ -1,7 +1,6 @@
 /* A lag before a memoryless part of two branches, which has to arrive from the side of its branch:
-   x moves in one direction as long as drives lie ahead of x, and so does the output, which lies
-   between two values of x. Called by the functions that emission writes for a chain, see
-   compensator/chain/model.h. */
+   x moves in one direction while drives lie ahead, and so does the output, between two values of x.
+   Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_STEADY_C
 #define HYSTGEN_LAG_STEADY_C
 #include "compensator/chain/model.h"

@@ -50,9 +50,8 @@ HYSTGEN_APART hystgen_sum_t hystgen_relaxing_follow(hystgen_play_t *play, hystge
     return sum;
 }
 
-/* Input of the plays at which their sum is `sum`. No viscous play is stretched with the input at
-   the rest value of play 1; from there on the plays are solved like plain ones, with smaller
-   slopes. */
+/* Input of the plays at which their sum is `sum`. No viscous play is stretched at the rest value of
+   play 1; from there on they are solved like plain ones, with smaller slopes. */
 static hystgen_reach_t hystgen_relaxing_input(hystgen_play_t *play, hystgen_sum_t sum) {
     play[0] = play[1];
     return hystgen_loop_solve(&hystgen_relaxing_tables, play, sum);

@@ -20,9 +20,8 @@ static hystgen_reach_t hystgen_inverse_braked(const hystgen_inverse_t *self, hys
 }
 
 #if defined(HYSTGEN_HAS_QUIET_DRIVE)
-/* The drive nearest to v that the amplifier reaches in one step, or the drive from which the lag
-   after the amplifier does not overshoot, unless the drive stands still; v itself in the first
-   step. */
+/* Drive nearest to v that the amplifier reaches in one step, or, unless the drive stands still,
+   from which the lag after the amplifier does not overshoot; v itself in the first step. */
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
                                                               hystgen_reach_t v) {
     if (!self->moving) {
@@ -45,8 +44,8 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_kept(const hystgen_invers
         hystgen_drive_signal(self->applied), HYSTGEN_DITHER));
 }
 
-/* The drive nearest to v that the amplifier reaches in one step, or the drive from which the lag
-   after the amplifier neither overshoots nor leaves its branch; v itself in the first step. */
+/* Drive nearest to v that the amplifier reaches in one step, or from which the lag after the
+   amplifier neither overshoots nor leaves its branch; v itself in the first step. */
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
                                                               hystgen_reach_t v) {
     if (!self->moving) {
@@ -59,8 +58,8 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t 
     return self->reached.drive;
 }
 #else
-/* The drive nearest to v that the amplifier reaches in one step, or the drive from which the lag
-   after the amplifier does not overshoot; v itself in the first step. */
+/* Drive nearest to v that the amplifier reaches in one step, or from which the lag after the
+   amplifier does not overshoot; v itself in the first step. */
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
                                                               hystgen_reach_t v) {
     if (!self->moving) {

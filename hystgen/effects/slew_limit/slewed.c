@@ -1,15 +1,13 @@
-/* Drives with or without a rate limit. The rounding remainder of a rate-limited drive, and in
-   floating point that of the rate, is stored with the drive, so that rounding errors do not add up
-   over steps, and a step may be smaller than the drive's last bit. Called by chain.c and
-   chain_calls.c. */
+/* Drives with or without a rate limit. The rounding remainder of a limited drive, and in floating
+   point that of the rate, is stored too: rounding errors do not add up over steps, and a step may
+   be smaller than the drive's last bit. Called by chain.c and chain_calls.c. */
 #ifndef HYSTGEN_SLEW_LIMIT_SLEWED_C
 #define HYSTGEN_SLEW_LIMIT_SLEWED_C
 #include "compensator/chain/model.h"
 
 #ifdef HYSTGEN_HAS_SLEW_LIMIT
 #ifdef HYSTGEN_FIXED
-/* Bits of a rounding remainder below a code: the sum of two remainders and one half fits 32
-   bits. */
+/* Bits of a rounding remainder below a code: two remainders and one half fit 32 bits. */
 #define HYSTGEN_REST_BITS 30
 
 /* One step of `move`, whose rounding remainder is `more`. */
@@ -50,7 +48,7 @@ HYSTGEN_APART_IN_FIXED void hystgen_ramp_towards(hystgen_ramp_t *ramp, hystgen_r
     ramp->rest = 0;
 }
 
-/* The drive nearest to v that the amplifier reaches in one step; v itself in the first step. */
+/* Drive nearest to v that the amplifier reaches in one step; v itself in the first step. */
 static hystgen_reach_t hystgen_forward_slewed(hystgen_forward_t *self, hystgen_reach_t v) {
     if (self->moving) {
         hystgen_ramp_towards(&self->reached, v);
@@ -75,8 +73,7 @@ static void hystgen_inverse_ramp(hystgen_inverse_t *self, hystgen_play_t rest, h
     hystgen_ramp_towards(&self->reached, v);
 }
 
-/* The last returned drive again, or the drive nearest to it that the amplifier reaches in one
-   step. */
+/* Last returned drive again, or the nearest that the amplifier reaches in one step. */
 HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_held(hystgen_inverse_t *self) {
     const hystgen_real_t last = self->stepped ? self->answer : self->applied;
     if (!self->moving) {
@@ -90,7 +87,7 @@ HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_held(hystgen_inverse_t *se
 }
 
 #ifndef HYSTGEN_HAS_BRAKED_LAG
-/* The drive nearest to v that the amplifier reaches in one step; v itself in the first step. */
+/* Drive nearest to v that the amplifier reaches in one step; v itself in the first step. */
 static hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self, hystgen_reach_t v) {
     if (!self->moving) {
         return v;
@@ -113,12 +110,12 @@ static hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self, hystgen_r
 }
 
 #ifdef HYSTGEN_CHAIN
-/* The last returned drive again. */
+/* Last returned drive again. */
 static hystgen_real_t hystgen_inverse_held(const hystgen_inverse_t *self) {
     return self->stepped ? self->answer : self->applied;
 }
 #else
-/* The last returned drive again. */
+/* Last returned drive again. */
 static hystgen_real_t hystgen_inverse_held(const hystgen_inverse_t *self) {
     return self->stepped ? self->answer : self->drive;
 }
@@ -133,8 +130,7 @@ static bool hystgen_inverse_stands(const hystgen_inverse_t *self, hystgen_real_t
     return false;
 }
 #else
-/* Whether the last returned drive is still valid for reference u. Stores u as the last
-   reference. */
+/* Whether the last returned drive is still valid for u, which becomes the last reference. */
 static bool hystgen_inverse_stands(hystgen_inverse_t *self, hystgen_real_t u) {
     if (self->repeated && u >= self->reference && u <= self->reference) {
         self->status |= self->bits;

@@ -18,9 +18,8 @@ static void hystgen_friction_begin(const hystgen_friction_table_t *t, hystgen_fr
     self->begun = true;
 }
 
-/* The drive has moved from `before` to v. Returns the sum of the distances moved by the plays, each
-   times the odd ratio of its threshold to the first one. If a play stays, so do those with larger
-   thresholds. */
+/* The drive has moved from `before` to v. Returns the sum of the plays' moves, each times the odd
+   ratio of its threshold to the first. If a play stays, so do those with larger thresholds. */
 HYSTGEN_APART int64_t hystgen_friction_move(const hystgen_friction_table_t *t,
                                             hystgen_friction_t *self,
                                             hystgen_friction_state_t *state, hystgen_real_t before,
@@ -64,9 +63,8 @@ static void hystgen_friction_begin(const hystgen_friction_table_t *t, hystgen_fr
     self->begun = true;
 }
 
-/* The drive has moved from `before` to v. Returns the sum of the distances moved by the plays, each
-   times the odd ratio of its threshold to the first one. If a play stays, so do those with larger
-   thresholds. */
+/* The drive has moved from `before` to v. Returns the sum of the plays' moves, each times the odd
+   ratio of its threshold to the first. If a play stays, so do those with larger thresholds. */
 static hystgen_real_t hystgen_friction_move(const hystgen_friction_table_t *t,
                                             hystgen_friction_t *self,
                                             hystgen_friction_state_t *state, hystgen_real_t before,

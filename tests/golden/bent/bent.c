@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 5e51d135ffaa77d314001037690fce818c21a3fe5d2400ebda29bfde4af7d49b, without this line
+ * Text: sha256 6bd5db20c5b621e110f979c42b13b93fb83762d89e81dbd655bffdf38046a2a5, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -237,13 +237,12 @@ static bent_real_t bent_inverse_arrive(bent_inverse_t *self, bent_real_t v) {
     return bent_front_forward(v);
 }
 
-/* The last returned drive again. */
+/* Last returned drive again. */
 static bent_real_t bent_inverse_held(const bent_inverse_t *self) {
     return self->stepped ? self->answer : self->drive;
 }
 
-/* Whether the last returned drive is still valid for reference u. Stores u as the last
-   reference. */
+/* Whether the last returned drive is still valid for u, which becomes the last reference. */
 static bool bent_inverse_stands(bent_inverse_t *self, bent_real_t u) {
     if (self->repeated && u >= self->reference && u <= self->reference) {
         self->status |= self->bits;
@@ -377,8 +376,7 @@ static bent_real_t bent_inverse_limited(bent_inverse_t *self, bent_real_t v) {
     return inside;
 }
 
-/* The next drive, for reference u; the memory is up to date. `bits` is the status of the
-   reference. */
+/* The next drive, for reference u; the memory is up to date. `bits`: status of the reference. */
 static inline bent_real_t bent_inverse_next(bent_inverse_t *self, bent_real_t u) {
     bent_real_t level = u;
     unsigned int bits = 0;

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 6689e24310606dff2071a66da900b924eb8433f9c535301b13caba8cc028fcbc, without this line
+ * Text: sha256 e9353afcabc0eca79ab55d749756364fb90b5393468e4d5e5ba014bcca25a501, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -22,8 +22,7 @@
    way: distance of the input from a turning point.
    reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
-   segment: the straight piece of output over input between the points where one play and the next
-       begin to follow.
+   segment: a straight piece of output over input, up to where the next play begins to follow.
    kink: a point along the move where another play begins to follow.
 */
 
@@ -37,8 +36,7 @@
 #define CURVED_LARGEST 2147483647     /* the largest input of the plays */
 #define CURVED_MOST_PLAYS 0x7fffu     /* the largest index of a play that a corner can store */
 
-/* Segment k begins at this distance from a turning point, where play k begins to follow; the curve
-   is straight up to the next segment. */
+/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
 typedef struct {
     int64_t reach;       /* of the output: 2 z_k */
     uint32_t way;        /* of the input: 2 r_k */
@@ -135,8 +133,7 @@ CURVED_APART void curved_leave_corner(curved_place_t *here, curved_corner_t *cor
     here->depth = (uint_least16_t)(here->depth + 1u);
 }
 
-/* Input or output, along the move, at which the play of segment s in a corner's block begins to
-   follow. */
+/* Input or output, along the move, at which a segment of a corner's block begins. */
 static inline int64_t curved_begins(const curved_place_t *here, const curved_corner_t *c,
         const curved_segment_t *s, bool by_output) {
     const int64_t output = (int64_t)c->high * CURVED_HIGH_STEP + (int64_t)c->low;
@@ -208,8 +205,7 @@ static inline void curved_find_input(const curved_curve_t *t, curved_place_t *he
     curved_find(t, here, corner, kink, false);
 }
 
-/* Moves the plays to an input short of the next kink; `moved` is the output gained since the last
-   kink. */
+/* Moves the plays to an input short of the next kink; `moved`: output gained since the last one. */
 static void curved_go_on(curved_place_t *here, const curved_kink_t *kink, int32_t to,
         int64_t moved) {
     here->output = curved_along(here, kink->output + moved);
@@ -289,7 +285,7 @@ static int64_t curved_move_to_solution(const curved_curve_t *t, curved_place_t *
 }
 
 /* Start memory: a value for each play (step 1), or one for all (step 0). Each play is a block of
-   its own; its corner is the point at which it begins to follow. */
+   its own, with a corner where it begins to follow. */
 CURVED_APART void curved_start(const curved_curve_t *t, curved_place_t *here,
         curved_corner_t *corner, const int32_t *play, unsigned int step) {
     int64_t aside = t->offset; /* output of the plays above play k, with the offset */

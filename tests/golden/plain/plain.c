@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 a087dc26baa4c8fb6a45114a733b39e1b605c927da0a860147b12b1772c0b27b, without this line
+ * Text: sha256 2742a14fc651931f511e519956db148cb0ab80ccd73ee33c21977a74161ce7c2, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -22,8 +22,7 @@
    way: distance of the input from a turning point.
    reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
-   segment: the straight piece of output over input between the points where one play and the next
-       begin to follow.
+   segment: a straight piece of output over input, up to where the next play begins to follow.
    pass: the input at which a move has taken a whole block along: the corner is passed, and
        forgotten.
 */
@@ -49,8 +48,7 @@
 #define PLAIN_APART static
 #endif
 
-/* Segment k begins at this distance from a turning point, where play k begins to follow; the curve
-   is straight up to the next segment. */
+/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
 typedef struct {
     plain_real_t way;   /* of the input: 2 r_k in the forward operator, 2 z_k in the inverse */
     plain_real_t reach; /* of the output: 2 z_k in the forward operator, 2 r_k in the inverse */
@@ -105,8 +103,7 @@ static void plain_forget_line(plain_plays_t *m) {
     m->behind = m->here.input;
 }
 
-/* Leaves a corner at the present place. A block whose last play follows only beyond the output
-   limit is never passed. */
+/* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
 PLAIN_APART void plain_leave_corner(const plain_curve_t *t, plain_plays_t *m,
         plain_corner_t *corner) {
     const plain_segment_t *s = &t->segment[m->here.k];
@@ -132,8 +129,7 @@ static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corn
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k always
-   does. */
+/* Last of segments k .. end - 1 that begins before x, a way or a reach; segment k always does. */
 static inline unsigned int plain_find_segment(const plain_segment_t *segment, unsigned int k,
         unsigned int end, plain_real_t x, bool by_reach) {
     unsigned int middle = (k + end) / 2;
@@ -147,8 +143,7 @@ static inline unsigned int plain_find_segment(const plain_segment_t *segment, un
     return k;
 }
 
-/* Ends the move in the top corner's block, at the sum `output` or at `input`, whichever comes
-   first. */
+/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever is first. */
 PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
         const plain_corner_t *corner, plain_real_t output, plain_real_t input) {
     const plain_corner_t *c = &corner[m->here.depth - 1u];
@@ -189,8 +184,7 @@ PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
     plain_stop_in_block(t, m, corner, output, plain_along(m, FLT_MAX));
 }
 
-/* Moves the plays to any input. False if the output limit comes first; the caller then stops at the
-   limit. */
+/* Moves the plays to any input. False if the limit comes first; the caller then stops there. */
 PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
         plain_corner_t *corner, plain_real_t input) {
     if (plain_along(m, input) < plain_along(m, m->here.input)) {
@@ -279,8 +273,7 @@ PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, p
     return true;
 }
 
-/* Start memory. Each play is a block of its own; its corner is the point at which it begins to
-   follow. */
+/* Start memory. Each play is a block of its own, with a corner where it begins to follow. */
 PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m, plain_corner_t *corner,
         const plain_start_t *start) {
     unsigned int k;

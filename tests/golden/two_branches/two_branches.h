@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 7c407f07fec2a704a3fb50eb795f445f69121e969bb3923e4922b59a1a6c12d3, without this line
+ * Text: sha256 2c225961073d536754227b72466133cd5682b692ee1d6be5cfe5e5815d2bc728, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -236,8 +236,7 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
    way: distance of the input from a turning point.
    reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
-   segment: the straight piece of output over input between the points where one play and the next
-       begin to follow.
+   segment: a straight piece of output over input, up to where the next play begins to follow.
    pass: the input at which a move has taken a whole block along: the corner is passed, and
        forgotten.
 */
@@ -268,8 +267,7 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #define TWO_BRANCHES_APART static
 #endif
 
-/* Segment k begins at this distance from a turning point, where play k begins to follow; the curve
-   is straight up to the next segment. */
+/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
 typedef struct {
     /* of the input: 2 r_k in the forward operator, 2 z_k in the inverse */
     two_branches_real_t way;
@@ -498,8 +496,7 @@ static void two_branches_forget_line(two_branches_plays_t *m) {
     m->behind = m->here.input;
 }
 
-/* Leaves a corner at the present place. A block whose last play follows only beyond the output
-   limit is never passed. */
+/* Leaves a corner here. A block whose last play follows only beyond the limit is never passed. */
 TWO_BRANCHES_APART void two_branches_leave_corner(const two_branches_curve_t *t,
         two_branches_plays_t *m, two_branches_corner_t *corner) {
     const two_branches_segment_t *s = &t->segment[m->here.k];
@@ -526,8 +523,7 @@ static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_p
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k always
-   does. */
+/* Last of segments k .. end - 1 that begins before x, a way or a reach; segment k always does. */
 static inline unsigned int two_branches_find_segment(const two_branches_segment_t *segment,
         unsigned int k, unsigned int end, two_branches_real_t x, bool by_reach) {
     unsigned int middle = (k + end) / 2;
@@ -541,8 +537,7 @@ static inline unsigned int two_branches_find_segment(const two_branches_segment_
     return k;
 }
 
-/* Ends the move in the top corner's block, at the sum `output` or at `input`, whichever comes
-   first. */
+/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever is first. */
 TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t,
         two_branches_plays_t *m, const two_branches_corner_t *corner, two_branches_real_t output,
         two_branches_real_t input) {
@@ -584,8 +579,7 @@ TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *
     two_branches_stop_in_block(t, m, corner, output, two_branches_along(m, FLT_MAX));
 }
 
-/* Moves the plays to any input. False if the output limit comes first; the caller then stops at the
-   limit. */
+/* Moves the plays to any input. False if the limit comes first; the caller then stops there. */
 TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t,
         two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t input) {
     if (two_branches_along(m, input) < two_branches_along(m, m->here.input)) {
@@ -701,8 +695,7 @@ static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t
     return m->here.output;
 }
 
-/* Start memory. Each play is a block of its own; its corner is the point at which it begins to
-   follow. */
+/* Start memory. Each play is a block of its own, with a corner where it begins to follow. */
 TWO_BRANCHES_APART void two_branches_start(const two_branches_curve_t *t, two_branches_plays_t *m,
         two_branches_corner_t *corner, const two_branches_start_t *start) {
     unsigned int k;
@@ -793,8 +786,8 @@ static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_br
     return self->ascending == ascending;
 }
 
-/* The drive for an input w of the plays, on the branch of the drive's own move. Tries the branch of
-   the reference's move, then the other one; if neither fits, the drive holds. Sets `limited` if no
+/* Drive for an input w of the plays, on the branch of its own move. Tries the branch of the
+   reference's move, then the other one; if neither fits, the drive holds. Sets `limited` if no
    drive reaches w. */
 TWO_BRANCHES_APART two_branches_real_t
         two_branches_inverse_choose(const two_branches_inverse_t *self, two_branches_real_t level,
