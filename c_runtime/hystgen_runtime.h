@@ -11,7 +11,7 @@
 
 #include "kernels.h"
 
-/* An effect of the user's own has this header alone: opened as it is, it finds its product here. */
+/* A user's own effect includes this header alone: an editor finds its product here. */
 #if !defined(HYSTGEN_CONFIGURED) && !defined(HYSTGEN_FIXED)
 #include "arithmetic/product.c"
 #endif

@@ -1,4 +1,4 @@
-/* The functions that a shared run time offers to models. */
+/* Functions that a shared run time provides to models. */
 #ifdef HYSTGEN_FIXED
 #include "plays/tables_fixed.h"
 #else

@@ -1,4 +1,4 @@
-/* How code has to be built. Whole in every emitted file. */
+/* Checks of the build settings. Copied whole into every emitted file. */
 #include <float.h>
 
 #ifdef HYSTGEN_FIXED
@@ -6,7 +6,7 @@
 #error "hystgen: right shifts of negative numbers have to keep the sign here"
 #endif
 #else
-/* What floating-point code requires of a build. */
+/* Build settings that floating-point code requires. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
 #error "hystgen: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
 #endif

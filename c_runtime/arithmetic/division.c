@@ -1,14 +1,14 @@
-/* Long products and quotients without a library call: the input that an output needs is that output
-   over a slope. Called by the plays of both engines in fixed point. */
+/* Long products and quotients without library calls: an output is divided by a slope to give an
+   input. Called by the plays of both engines in fixed point. */
 #include "arithmetic/fixed.h"
 #include "hystgen_runtime.h"
 
-/* Bits of a word and of half of one, and the lower half. */
+/* Bits of a word and of half a word, and the mask of the lower half. */
 #define HYSTGEN_WORD 32u
 #define HYSTGEN_HALF_WORD 16u
 #define HYSTGEN_LOW_HALF 0xffffu
 
-/* a times b; by half words, without a library call, on cores without a long multiplication. */
+/* a times b; cores without a long multiplication use half words instead of a library call. */
 HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b) {
 #if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)
     const uint32_t low = (a & HYSTGEN_LOW_HALF) * (b & HYSTGEN_LOW_HALF);

@@ -1,5 +1,5 @@
-/* The first include of a file for fixed point alone, so that it compiles as it is opened: in q31.
- */
+/* First include of a file for fixed point alone, so that the file compiles (in q31) when opened in
+   an editor. */
 #ifndef HYSTGEN_FIXED
 #define HYSTGEN_FIXED
 #endif

@@ -10,9 +10,9 @@
 #include "arithmetic/build.h"
 #include "arithmetic/soft_float.h"
 
-/* Types of a model's numbers: in floating point all the same, in fixed point integers as wide as
-   they have to be. play: inputs of the plays; reach: where plays start to follow; sum: outputs
-   before they are rounded; low: the lower part of a sum that a corner keeps. */
+/* Types of a model's numbers: all the same in floating point, integers as wide as necessary in
+   fixed point. play: inputs of the plays; reach: inputs at which plays start to follow; sum:
+   outputs before rounding; low: the lower part of the sum stored in a corner. */
 #if defined(HYSTGEN_FIXED)
 #ifdef HYSTGEN_REAL_IS_SHORT
 typedef int32_t hystgen_reach_t;
@@ -40,10 +40,10 @@ typedef hystgen_real_t hystgen_reach_t;
 typedef hystgen_real_t hystgen_sum_t;
 #endif
 
-/* In a model with effects, signal: between its blocks, in fixed point wider than codes; fine: a
-   drive in front of its plays, in fixed point with bits below a code; travel: the distance that the
-   drive has covered. Without effects, and in floating point, all of them have the caller's type,
-   but signals of engine loop are sums of its plays. */
+/* In a model with effects, signal: a value between blocks, in fixed point wider than a code; fine:
+   the output of the drive side, in fixed point with bits below a code; travel: the distance covered
+   by the drive. Without effects, and in floating point, all of them have the caller's type, except
+   that signals of engine loop are sums of its plays. */
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
 typedef hystgen_sum_t hystgen_signal_t;
 typedef hystgen_play_t hystgen_fine_t;
@@ -62,8 +62,8 @@ typedef hystgen_real_t hystgen_number_t;
 #define hystgen_clamp_fine hystgen_clamp_drive
 #endif
 
-/* Storage classes of functions in emitted files: kernels are static where a model has its own copy;
-   some are kept from being inlined there, to need less stack. */
+/* Storage classes of functions in emitted files: a model's own copies of kernels are static; some
+   of them are not inlined, to need less stack. */
 #include "arithmetic/storage.h"
 #define HYSTGEN_API
 #define HYSTGEN_KERNEL

@@ -1,5 +1,5 @@
-/* The product of effects that are written once for every arithmetic: a user's own, and those of the
-   catalogue with a part.c. Called by the C files of those effects. */
+/* The product for effects written once for every arithmetic: a user's own, and those in the
+   catalogue with a part.c. Called by the C files of these effects. */
 #ifndef HYSTGEN_ARITHMETIC_PRODUCT_C
 #define HYSTGEN_ARITHMETIC_PRODUCT_C
 #ifdef HYSTGEN_FIXED

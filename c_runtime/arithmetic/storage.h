@@ -1,4 +1,4 @@
-/* Functions that compilers do not inline, in order to need less of the stack. */
+/* Functions that compilers must not inline, to need less stack. */
 
 #if defined(__GNUC__)
 #define HYSTGEN_APART __attribute__((noinline)) static /* has several callers, or rarely runs */
@@ -7,7 +7,7 @@
 #endif
 
 #ifdef HYSTGEN_CHAIN
-/* A step is no part of a reset, and loops over plays go one by one: both need less of the stack. */
+/* Step is not inlined into reset, and loops over plays are not unrolled: both save stack. */
 #if defined(__GNUC__)
 #define HYSTGEN_ALONE __attribute__((noinline))
 #else

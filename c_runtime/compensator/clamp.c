@@ -1,4 +1,4 @@
-/* Drives and references within their ranges. Called by every operator. */
+/* Limits drives and references to their ranges. Called by every operator. */
 #ifndef HYSTGEN_CLAMP_C
 #define HYSTGEN_CLAMP_C
 #include "compensator/model.h"
@@ -14,8 +14,7 @@ static hystgen_real_t hystgen_inverse_clamp(hystgen_reach_t u) {
 }
 
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
-/* A signal in front of the plays of a model with effects, limited to what the drive's range gives.
- */
+/* Output of the drive side in a model with effects, limited to that of the drive range. */
 static hystgen_fine_t hystgen_clamp_fine(hystgen_reach_t a) {
     if (a < HYSTGEN_FINE_MIN) {
         return (hystgen_fine_t)HYSTGEN_FINE_MIN;

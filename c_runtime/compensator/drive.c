@@ -1,12 +1,12 @@
-/* Between drives and inputs of the plays: with a memoryless part of one branch or two, and without
-   one. Called by the operators. */
+/* Conversion between drives and inputs of the plays, with a memoryless part of one or two branches
+   or without one. Called by the operators. */
 #ifndef HYSTGEN_DRIVE_C
 #define HYSTGEN_DRIVE_C
 #include "compensator/model.h"
 #include "front/front.c"
 #include "compensator/clamp.c"
 
-/* The actuator is at drive v. */
+/* The actuator has moved to drive v. */
 static void hystgen_operator_set_drive(hystgen_operator_t *self, hystgen_fine_t v) {
 #ifdef HYSTGEN_HAS_TWO_BRANCHES
     if (v > self->drive) { /* the direction of the move picks the branch */
@@ -18,7 +18,7 @@ static void hystgen_operator_set_drive(hystgen_operator_t *self, hystgen_fine_t 
     self->drive = v;
 }
 
-/* The actuator is at drive v. Returns the input of the plays. */
+/* The actuator has moved to drive v. Returns the input of the plays. */
 static hystgen_play_t hystgen_operator_arrive(hystgen_operator_t *self, hystgen_fine_t v) {
     hystgen_operator_set_drive(self, v);
 #ifdef HYSTGEN_HAS_TWO_BRANCHES
@@ -31,7 +31,7 @@ static hystgen_play_t hystgen_operator_arrive(hystgen_operator_t *self, hystgen_
 }
 
 #ifndef HYSTGEN_HAS_FRONT
-/* The drive that gives w. */
+/* Drive for an input w of the plays. */
 static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_real_t level,
                                              hystgen_reach_t w) {
     (void)self;
@@ -40,22 +40,22 @@ static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_re
 }
 #elif defined(HYSTGEN_CHAIN) && defined(HYSTGEN_HAS_TWO_BRANCHES)
 #ifdef HYSTGEN_HAS_STEADY_LAG
-/* Whether a drive that should go back by `back` goes to the other branch, `way` from there: only if
-   holding misses more than what the lag misses of that way in the first sample of a turn. */
+/* Whether a drive that should go back by `back` changes to the other branch, at the distance `way`:
+   only if the error of holding exceeds that of the lag over `way` in the first sample of a turn. */
 static inline bool hystgen_turns(hystgen_signal_t back, hystgen_signal_t way) {
     return back - HYSTGEN_HOLD > hystgen_inverse_missed(way < 0 ? -way : way);
 }
 #else
-/* Whether a drive that should go back by `back` goes to the other branch. */
+/* Whether a drive that should go back by `back` changes to the other branch. */
 static inline bool hystgen_turns(hystgen_signal_t back, hystgen_signal_t way) {
     (void)way;
     return back > HYSTGEN_HOLD;
 }
 #endif
 
-/* The drive that gives w on the branch of its own move. Stays on the branch that it is on, where it
-   moves on or holds, and turns only for more than that is worth. Sets a status bit if no drive
-   gives w. */
+/* Drive for an input w of the plays, on the branch of its own move. Stays on the present branch,
+   moving on or holding, and turns only if holding costs more than the turn. Sets a status bit if no
+   drive reaches w. */
 HYSTGEN_APART_BUT_IN_FLOAT_LOOP hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self,
                                                                       hystgen_real_t level,
                                                                       hystgen_reach_t w) {
@@ -92,8 +92,9 @@ static bool hystgen_inverse_fits(const hystgen_inverse_t *self, hystgen_reach_t 
     return self->ascending == ascending;
 }
 
-/* The drive that gives w on the branch of its own move. Tries the branch of the reference's move,
-   then the other one; if neither fits, the drive holds. Sets `limited` if no drive gives w. */
+/* Drive for an input w of the plays, on the branch of its own move. Tries the branch of the
+   reference's move, then the other one; if neither fits, the drive holds. Sets `limited` if no
+   drive reaches w. */
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
                                                                       hystgen_real_t level,
                                                                       hystgen_reach_t w,
@@ -108,7 +109,7 @@ HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hyst
     if (!hystgen_inverse_fits(self, v, up)) {
         const hystgen_reach_t back = (hystgen_reach_t)hystgen_clamp_fine(v) - self->drive;
         if (up == self->ascending && back >= -HYSTGEN_HOLD && back <= HYSTGEN_HOLD) {
-            /* it moves back only by rounding */
+            /* the drive moves back only by rounding */
             v = self->drive;
         } else {
             v = hystgen_front_inverse(w, !up, limited);
@@ -118,7 +119,7 @@ HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hyst
     return v;
 }
 #else
-/* The drive that gives w, or the nearest that there is. */
+/* Drive for an input w of the plays, or the nearest possible one. */
 HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hystgen_inverse_t *self,
                                                                       hystgen_real_t level,
                                                                       hystgen_reach_t w,
@@ -129,7 +130,7 @@ HYSTGEN_APART_IN_FLOAT_CORNERS hystgen_reach_t hystgen_inverse_choose(const hyst
 }
 #endif
 
-/* The drive that gives w, for a reference that is already limited. */
+/* Drive for an input w of the plays; the reference is already limited. */
 static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_real_t level,
                                              hystgen_reach_t w) {
     bool limited = false;

@@ -1,10 +1,10 @@
-/* What emission writes for each model, in front of the operators: constants, tables and, for a
-   memoryless part in floating point, functions. Here is that of a small model, so that a file
-   compiles as it is opened in an editor. With HYSTGEN_CONFIGURED a real model comes instead.
+/* Text that emission writes for each model, before the operators: constants, tables and, for a
+   memoryless part in floating point, functions. Those below belong to a small model, so that each
+   file compiles when opened in an editor. With HYSTGEN_CONFIGURED a real model replaces them.
 
    A function whose name begins with hystgen_operator_ is the same in the forward and in the inverse
-   operator: emission writes it for each of them. Here the operator is the inverse, or the forward
-   one with HYSTGEN_FORWARD. */
+   operator: emission writes a copy for each. In an editor the operator is the inverse, or the
+   forward one with HYSTGEN_FORWARD. */
 #ifndef HYSTGEN_MODEL_H
 #define HYSTGEN_MODEL_H
 #if !defined(HYSTGEN_CONFIGURED) && !defined(HYSTGEN_HAS_CORNERS) && !defined(HYSTGEN_CHAIN)

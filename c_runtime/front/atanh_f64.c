@@ -74,7 +74,7 @@ HYSTGEN_API hystgen_real_t hystgen_atanh(hystgen_real_t x) {
     const hystgen_real_t u = 1.0 - a;
     const uint_least64_t two = (uint_least64_t)1u << 54;
     const uint_least64_t whole = (uint_least64_t)(u * 9007199254740992.0);
-    uint_least64_t m = whole << 1; /* to be brought to 2^53 .. 2^54 - 1 */
+    uint_least64_t m = whole << 1; /* shifted to 2^53 .. 2^54 - 1 below */
     unsigned int k = 1u;
     for (step = 32u; step > 0u; step >>= 1) {
         if (m < two >> step) {

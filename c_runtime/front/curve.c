@@ -12,8 +12,8 @@ HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits) {
 }
 
 /* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece:
-   where the pieces begin, the left shifts that stretch them to 2^31, and their coefficients from
-   degree 0. */
+   the arguments are the beginnings of the pieces, the left shifts that scale their lengths to 2^31,
+   and their coefficients from degree 0. */
 HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
                                   const int32_t *coefficient, unsigned int pieces,
                                   unsigned int degree, int32_t x) {
@@ -41,7 +41,7 @@ HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
 }
 
 /* Drive code for an input w of the plays outside the image of the drive range: the end of the
-   range, and one code more if w is off by more than rounding. Sets `limited` if no envelope gives
+   range, and one code more if w is off by more than rounding. Sets `limited` if no envelope reaches
    w. */
 HYSTGEN_API hystgen_reach_t hystgen_beyond(const hystgen_ends_t *e, hystgen_reach_t w,
                                            int32_t drive_min, int32_t drive_max, bool *limited) {

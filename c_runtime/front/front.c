@@ -18,7 +18,7 @@ HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascend
         hystgen_front_descending_coefficient, HYSTGEN_FRONT_DESCENDING_PIECES, HYSTGEN_DEGREE, v);
 }
 
-/* v = G^-1[w] on one branch, or at its end for w beyond it. */
+/* v = G^-1[w] on one branch, or the end of the branch for w beyond it. */
 HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool ascending,
                                                     bool *limited) {
     const hystgen_ends_t *ends =
@@ -48,7 +48,7 @@ HYSTGEN_APART hystgen_play_t hystgen_front_forward(hystgen_fine_t v, bool ascend
                                          HYSTGEN_DEGREE, v);
 }
 
-/* v = G^-1[w], or at an end of G for w beyond it. */
+/* v = G^-1[w], or an end of G for w beyond it. */
 HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool ascending,
                                                     bool *limited) {
     const hystgen_ends_t *ends = &hystgen_back_ends;

@@ -16,7 +16,7 @@ HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *
     to->rising = from->rising;
 }
 
-/* The direction of a move that rises, or falls. */
+/* The direction of a rising or falling move. */
 static inline hystgen_direction_t hystgen_direction(bool rising) {
     return rising ? HYSTGEN_RISING : HYSTGEN_FALLING;
 }
@@ -36,7 +36,7 @@ HYSTGEN_APART void hystgen_leave_corner(hystgen_place_t *here, hystgen_corner_t 
     here->depth = (uint_least16_t)(here->depth + 1u);
 }
 
-/* Where the play of a segment of a corner's block begins to follow, along the move. */
+/* Input or output, along the move, at which a segment of a corner's block begins. */
 static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_corner_t *c,
                                      const hystgen_segment_t *s, bool by_output) {
     const int64_t output = (int64_t)c->high * HYSTGEN_HIGH_STEP + (int64_t)c->low;
@@ -45,7 +45,7 @@ static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_
     return held + (c->rose == here->rising ? 0 : whole);
 }
 
-/* A corner stays where plays have followed. */
+/* Turns the move back, and leaves a corner if plays have followed. */
 HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *corner) {
     if (here->k > 0) {
         hystgen_leave_corner(here, corner);
@@ -54,8 +54,8 @@ HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *co
     here->rising = !here->rising;
 }
 
-/* The last kink before an output or input along the move, which kink->output gives: where another
-   play begins to follow, or here. */
+/* Finds the last kink before an output or input along the move, passed in kink->output: the point
+   where another play begins to follow, or the present point. */
 HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t *here,
                                 const hystgen_corner_t *corner, hystgen_kink_t *kink,
                                 bool by_output) {
@@ -99,7 +99,7 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     }
 }
 
-/* The same for any move to an input. May turn back, but moves nothing. */
+/* The same for a move to any input. May turn the move back, but moves no play. */
 static inline void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here,
                                       hystgen_corner_t *corner, int32_t to, hystgen_kink_t *kink) {
     if (here->rising ? to < here->input : to > here->input) {
@@ -109,7 +109,7 @@ static inline void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t 
     hystgen_find(t, here, corner, kink, false);
 }
 
-/* Moves the plays to an input short of the next kink; `moved` is the output since the last one. */
+/* Moves the plays to an input short of the next kink; `moved`: output gained since the last one. */
 static void hystgen_go_on(hystgen_place_t *here, const hystgen_kink_t *kink, int32_t to,
                           int64_t moved) {
     here->output = hystgen_along(here, kink->output + moved);
@@ -145,7 +145,7 @@ static int32_t hystgen_next_input(const hystgen_curve_t *t, const hystgen_place_
     return (int32_t)hystgen_along(here, x);
 }
 
-/* The sum of the plays at the next input; `next` is where another play begins to follow. */
+/* Sum of the plays at the next input; `next`: input at which another play begins to follow. */
 HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t *here,
                                        hystgen_corner_t *corner, hystgen_kink_t *kink,
                                        int32_t *next, int32_t to) {
@@ -163,7 +163,7 @@ HYSTGEN_API int64_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_place_t
     return here->output;
 }
 
-/* The input that gives `to`, an output beyond a kink along the move; at most a little outside the
+/* Input for the output `to`, which lies beyond a kink along the move; at most slightly out of
    range. */
 HYSTGEN_APART int64_t hystgen_solved(const hystgen_curve_t *t, const hystgen_place_t *here,
                                      const hystgen_kink_t *kink, int64_t to) {
@@ -174,9 +174,9 @@ HYSTGEN_APART int64_t hystgen_solved(const hystgen_curve_t *t, const hystgen_pla
     return hystgen_along(here, x > most ? most : x);
 }
 
-/* The input that gives `output`, at most a little outside the range, and the kink it is counted
-   from. May turn back, but moves nothing. The same plays are known to follow up to the output
-   `next`, along the move. */
+/* Input for `output`, at most slightly out of range, and the last kink before this input. May turn
+   the move back, but moves no play. Up to the output `next`, along the move, the same plays are
+   known to follow. */
 HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here,
                                   hystgen_corner_t *corner, int64_t output, int64_t next,
                                   hystgen_kink_t *kink) {
@@ -205,14 +205,14 @@ static int64_t hystgen_next_output(const hystgen_curve_t *t, const hystgen_place
                : HYSTGEN_FAR;
 }
 
-/* Moves the plays to an input near the one that was solved for from a kink. Returns the output,
-   along the move, at which another play begins to follow. */
+/* Moves the plays to an input near the solution found from a kink. Returns the output, along the
+   move, at which another play begins to follow. */
 HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_place_t *here,
                                              hystgen_corner_t *corner, hystgen_kink_t *kink,
                                              int32_t to) {
     int64_t next = hystgen_next_output(t, here, corner, kink);
     int64_t moved = hystgen_gained(t, here, kink, to);
-    if (moved < 0 || kink->output + moved > next) { /* by rounding, or it was limited */
+    if (moved < 0 || kink->output + moved > next) { /* by rounding, or the input was limited */
         hystgen_find_input(t, here, corner, to, kink);
         next = hystgen_next_output(t, here, corner, kink);
         moved = hystgen_gained(t, here, kink, to);
@@ -222,7 +222,7 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
 }
 
 /* Start memory: a value for each play (step 1), or one for all (step 0). Each play is a block of
-   its own, left by a move to where it begins to follow. */
+   its own, with a corner where it begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here,
                                   hystgen_corner_t *corner, const int32_t *play,
                                   unsigned int step) {

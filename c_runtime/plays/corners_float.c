@@ -1,6 +1,6 @@
-/* The plays of engine corners in floating point: a stack of turning points, and the line that the
-   next outputs lie on. Called by the operators in compensator/corners and by chain/corners_float.c.
-   */
+/* The plays of engine corners in floating point: a stack of turning points, and the straight line
+   of the next outputs. Called by the operators in compensator/corners and by
+   chain/corners_float.c. */
 #include "hystgen_runtime.h"
 
 HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from) {
@@ -11,7 +11,7 @@ HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *
     to->rising = from->rising;
 }
 
-/* The direction of a move that rises, or falls. */
+/* The direction of a rising or falling move. */
 static inline hystgen_direction_t hystgen_direction(bool rising) {
     return rising ? HYSTGEN_RISING : HYSTGEN_FALLING;
 }
@@ -25,7 +25,7 @@ static inline hystgen_real_t hystgen_along(const hystgen_plays_t *m, hystgen_rea
 #endif
 }
 
-/* Forgets the line of the last outputs: the next sample searches. */
+/* Discards the line of the last outputs, so that the next sample searches. */
 HYSTGEN_API void hystgen_forget_line(hystgen_plays_t *m) {
     m->sign = (hystgen_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
@@ -60,7 +60,7 @@ static void hystgen_turn_back(const hystgen_curve_t *t, hystgen_plays_t *m,
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k does. */
+/* Last of segments k .. end - 1 that begins before x, a way or a reach; segment k always does. */
 static inline unsigned int hystgen_find_segment(const hystgen_segment_t *segment, unsigned int k,
                                                 unsigned int end, hystgen_real_t x, bool by_reach) {
     unsigned int middle = (k + end) / 2;
@@ -74,7 +74,7 @@ static inline unsigned int hystgen_find_segment(const hystgen_segment_t *segment
     return k;
 }
 
-/* Ends the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
+/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever is first. */
 HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           const hystgen_corner_t *corner, hystgen_real_t output,
                                           hystgen_real_t input) {
@@ -95,7 +95,7 @@ HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_play
     hystgen_forget_line(m);
 }
 
-/* Moves the plays to where their sum is `output`, up to rounding. */
+/* Moves the plays to the sum `output`, up to rounding. */
 HYSTGEN_KERNEL void hystgen_move_to_output(const hystgen_curve_t *t, hystgen_plays_t *m,
                                            hystgen_corner_t *corner, hystgen_real_t output) {
     if (hystgen_along(m, output) < hystgen_along(m, m->here.output)) {
@@ -145,7 +145,7 @@ HYSTGEN_KERNEL bool hystgen_move_to_input(const hystgen_curve_t *t, hystgen_play
     hystgen_real_t start = hystgen_along(m, c->output);
     unsigned int k = m->here.k;
     m->behind = input;
-    if (c->rose != on) { /* plays follow one by one, and not all of the block at the corner */
+    if (c->rose != on) { /* plays follow one by one, not the whole block at the corner */
         const hystgen_real_t from = c->pass[other];
         const hystgen_real_t room = t->inside[on] - start;
         k = hystgen_find_segment(t->segment, k, c->top, x + from, false);
@@ -231,7 +231,7 @@ HYSTGEN_API hystgen_real_t hystgen_plays_step(const hystgen_curve_t *t, hystgen_
     return m->here.output;
 }
 
-/* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
+/* Start memory. Each play is a block of its own, with a corner where it begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_plays_t *m,
                                   hystgen_corner_t *corner, const hystgen_start_t *start) {
     unsigned int k;

@@ -3,7 +3,7 @@
 #include "hystgen_runtime.h"
 
 /* The textbook engine: every sample visits every play. Stores go through volatile where a compiler
-   would otherwise call memset or memcpy, which a freestanding target need not have. */
+   would otherwise call memset or memcpy, which a freestanding target may lack. */
 HYSTGEN_API void hystgen_loop_rest(const hystgen_tables_t *t, hystgen_play_t *play,
                                    hystgen_play_t w) {
     volatile hystgen_play_t *entry = play;

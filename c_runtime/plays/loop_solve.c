@@ -2,11 +2,11 @@
    engine loop. */
 #include "hystgen_runtime.h"
 
-/* The input of the plays that gives `output`; now they give `here`. Assumes first that every play
-   follows, then drops the largest thresholds one by one until the solution reaches the last play
-   that is left. The answer must not pass the input at which the play dropped last would follow: a
-   rounding error of `output` is divided by the slope before that input, which may be small, and
-   must not run on along the steeper slope behind it. */
+/* Input of the plays at which their sum is `output`; the present sum is `here`. Assumes first that
+   every play follows, then drops the largest thresholds one by one until the last remaining play
+   follows at the solution. The solution must not pass the input at which the play dropped last
+   would follow: a rounding error of `output` is divided by the slope before this input, which may
+   be small, and must not extend into the steeper slope beyond it. */
 HYSTGEN_API hystgen_real_t hystgen_loop_solve(const hystgen_tables_t *t, const hystgen_real_t *play,
                                               hystgen_real_t here, hystgen_real_t output) {
     const bool rising = output >= here;

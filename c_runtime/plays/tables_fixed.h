@@ -6,10 +6,9 @@
 
 #define HYSTGEN_FAR ((int64_t)1 << 62) /* beyond every output */
 #define HYSTGEN_LARGEST 2147483647     /* the largest input of the plays */
-#define HYSTGEN_MOST_PLAYS 0x7fffu     /* the largest number of plays that a corner can name */
+#define HYSTGEN_MOST_PLAYS 0x7fffu     /* the largest index of a play that a corner can store */
 
-/* Play k begins to follow this far from a turning point; the curve is straight from there to where
-   the next play does. */
+/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
 typedef struct {
     int64_t reach;       /* of the output: 2 z_k */
     uint32_t way;        /* of the input: 2 r_k */
@@ -22,11 +21,11 @@ typedef struct {
 typedef struct {
     const hystgen_segment_t *segment; /* plays 0 .. n, and one that never follows */
     int64_t offset;                   /* part of every output */
-    int64_t range[2]; /* inputs at the end of falling moves, sign changed, and of rising ones */
-    uint_least16_t n; /* plays without play 0 */
+    int64_t range[2]; /* limits of the input in falling moves, sign changed, and in rising ones */
+    uint_least16_t n; /* number of plays, not counting play 0 */
 } hystgen_curve_t;
 
-/* The drive that a start memory stands for, within its range. */
+/* The drive of a start memory, within the drive range. */
 typedef struct {
     int32_t drive;
     bool ascending;
@@ -34,23 +33,23 @@ typedef struct {
 
 /* Play operators of engine loop; n + 1 thresholds and weights, n + 2 sums. */
 typedef struct {
-    const hystgen_play_t *threshold; /* r_0 = 0 .. r_n, in least steps of the input of the plays */
+    const hystgen_play_t *threshold; /* r_0 = 0 .. r_n, in the smallest steps of the plays' input */
     const int32_t *weight;           /* p_0 .. p_n, fractions of an output code per such step */
     const int32_t *slope;            /* slope[k] = p_0 + ... + p_(k-1) */
     const uint32_t *reciprocal;      /* 2^(32 + shift[k]) / slope[k]; entry 0 is not used */
     const uint8_t *shift;
-    hystgen_reach_t least; /* inputs of the plays to look for lie between these */
+    hystgen_reach_t least; /* limits of the input that a solution may have */
     hystgen_reach_t most;
-    uint_least16_t n; /* plays without r_0 */
+    uint_least16_t n; /* number of plays, not counting r_0 */
 } hystgen_tables_t;
 
 /* Ends of one branch of the inverse from the input of the plays to the drive. */
 typedef struct {
-    int64_t envelope_least; /* inputs of the plays that an envelope can give */
+    int64_t envelope_least; /* limits of the input of the plays that an envelope can reach */
     int64_t envelope_most;
-    hystgen_reach_t least; /* up to here an input outside first .. last is off by rounding only */
+    hystgen_reach_t least; /* inputs outside first .. last but within these: off by rounding only */
     hystgen_reach_t most;
-    int32_t first; /* inputs of the plays that the drive range gives */
+    int32_t first; /* inputs of the plays at the ends of the drive range */
     int32_t last;
 } hystgen_ends_t;
 

@@ -1,5 +1,5 @@
-/* The catalogue in C, for an editor: functions of effects that a file asks for by what it defines
-   in front of this. Emission lists them by `SOURCES` of each effect. */
+/* The catalogue in C, for an editor: functions of the effects that a file selects by macros defined
+   before this header. Emission takes them from the `SOURCES` of each effect. */
 #ifdef HYSTGEN_ASKS_LIMITS
 #include "effects/delay/forward.c"
 #include "effects/slew_limit/slewed.c"

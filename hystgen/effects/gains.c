@@ -1,4 +1,4 @@
-/* Gains behind the plays and their reciprocals, in fixed point. Called by effects with a gain. */
+/* Gains after the plays and their reciprocals, in fixed point. Called by effects with a gain. */
 #ifndef HYSTGEN_GAINS_C
 #define HYSTGEN_GAINS_C
 #include "arithmetic/fixed.h"
@@ -27,7 +27,7 @@ static int32_t hystgen_gain_reciprocal(int32_t gain) {
     return (int32_t)((((int64_t)1 << 2u * HYSTGEN_GAIN_BITS) + gain / 2) / gain);
 }
 
-/* The same for a gain that has changed, by Newton steps from the reciprocal before. */
+/* The same for a gain that has changed, by Newton steps from the previous reciprocal. */
 static int32_t hystgen_gain_followed(int32_t gain, int32_t before, unsigned int turns) {
     const int64_t half = (int64_t)1 << (HYSTGEN_GAIN_BITS - 1u);
     int64_t inverse = before;

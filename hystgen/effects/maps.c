@@ -1,6 +1,6 @@
-/* Maps of the output, in fixed point: piecewise polynomials for one and its inverse, or stops,
-   beyond which the output continues with another slope. Called by the functions that emission
-   writes for a chain, see compensator/chain/model.h. */
+/* Maps of the output and their inverses, in fixed point: piecewise polynomials, or stops, beyond
+   which the output continues with another slope. Called by the functions that emission writes for a
+   chain, see compensator/chain/model.h. */
 #include "arithmetic/fixed.h"
 #include "compensator/chain/model.h"
 #include "arithmetic/factors.c"
@@ -32,7 +32,7 @@ static int64_t hystgen_bend_inverse(const hystgen_bend_t *t, int64_t y, bool *li
     return hystgen_bend(&t->inverse, y, limited);
 }
 
-/* x between the stops, and a slope of f beyond them. */
+/* x between the stops; beyond them the slope is f. */
 static int64_t hystgen_stops_beyond(const hystgen_stops_t *t, int64_t x,
                                     const hystgen_factor_t *f) {
     int64_t inside;

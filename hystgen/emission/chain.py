@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 NUMBERS = {
     "OUTPUT_OFFSET": "part of every displacement",
-    "FARTHEST_OFFSET": "largest that can be set beside it",
+    "FARTHEST_OFFSET": "largest additional offset that can be set",
     "SLEW_RISING": "largest move of the drive in a step",
     "SLEW_FALLING": "",
-    "SLEW_RISING_REST": "and what rounding took from that",
+    "SLEW_RISING_REST": "and its rounding remainder",
     "SLEW_FALLING_REST": "",
 }
 """Macros for members of `ChainTables.number`."""
@@ -194,8 +194,8 @@ def effects(
     tables = [table for block in largest for table in block.tables(writer)]
     numbers = {name: t.number[name.lower()][0] for name in NUMBERS}
     constants = [(name, operand(value), NUMBERS[name]) for name, value in numbers.items()]
-    constants += [("LEAD", operand(row["most_ahead"]), "samples that references come ahead") for row in t.of("clock")]
-    constants.append(("WAITING", f"{t.of('wait').samples}u", "samples of the drive that wait"))
+    constants += [("LEAD", operand(row["most_ahead"]), "samples that references are ahead") for row in t.of("clock")]
+    constants.append(("WAITING", f"{t.of('wait').samples}u", "samples of the drive in the delay"))
     if t.of("wait").samples:
         waited, share = form.waited(t, writer)
         tables += waited * ("forward" in operators)
@@ -204,7 +204,7 @@ def effects(
         tables.append(form.tap(t, writer))
     constants += [
         ("QUIET", f"{t.quiet}u", "equal references after which the drive stands still"),
-        ("DITHER", operand(t.number.dither[0]), "signal by which a drive at rest goes to and fro"),
+        ("DITHER", operand(t.number.dither[0]), "signal by which a drive at rest alternates"),
         ("TAPS", f"{len(t.tap)}u", "samples of the reference that are summed"),
         *form.effects(t),
     ]
@@ -242,7 +242,7 @@ def alone(operators: Sequence[str], plays: int, form: Form) -> Glue:
 
 
 _PLAYS = "play 0 is the input of the plays"
-_KEPT = "; behind them what each has lost"
+_KEPT = "; after them the rounding remainder of each"
 _LAST = "the same, limited: the next reference moves up or down from here"
 
 
@@ -250,20 +250,20 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
     """The memory of one operator, field by field."""
     inverse, taps = op == "inverse", t.taps
     waiting = 0 if inverse else t.waiting
-    arrived = Field("fine_t", "drive", "what arrived of it in front of the plays")
+    arrived = Field("fine_t", "drive", "last output of the drive side")
     answer = "drive" if inverse else "displacement" if t.effects else "output"
     length = "" if kept else "HYSTGEN_N_PLAYS + 1"
-    searched = [Field("bool", "sought", "a solution has been found since the plays followed")] * inverse
+    searched = [Field("bool", "sought", "a solution was found since the plays last followed")] * inverse
     return [
         *[Field("real_t", "pending", "drive sent but not yet part of the memory")] * inverse,
-        Field("real_t", "applied", "drive seen last"),
+        Field("real_t", "applied", "last applied drive"),
         *[Field("ramp_t", "reached", "drive at a limited rate")] * t.slew,
-        arrived if t.effects else Field("real_t", "drive", "seen last"),
+        arrived if t.effects else Field("real_t", "drive", "last applied drive"),
         *[Field("real_t", "reference", "of the last step"), Field("real_t", "last", _LAST)] * inverse,
         Field("signal_t", "level", "sum of the plays"),
-        Field("signal_t", "output", "what the output side made of it"),
-        Field("real_t", "answer", f"{answer} returned last"),
-        Field("signal_t", "offset", "set beside that of the model"),
+        Field("signal_t", "output", "last output of the output side"),
+        Field("real_t", "answer", f"last returned {answer}"),
+        Field("signal_t", "offset", "set in addition to that of the model"),
         *(field for block in blocks for field in block.fields),
         *[Field("quiet_t", "quiet")] * (inverse and t.quiet),
         *[Field("steady_t", "steady")] * (inverse and t.turning),
@@ -273,15 +273,15 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
         Field("bool", "moving", "a drive was applied"),
         *[
             Field("bool", "has_pending"),
-            Field("bool", "repeated", "the last answer still stands for `reference`"),
-            Field("bool", "stepped", "a step has answered"),
-            Field("bool", "filled", "there are references"),
+            Field("bool", "repeated", "the last returned drive is still valid for `reference`"),
+            Field("bool", "stepped", "a step has returned a drive"),
+            Field("bool", "filled", "the line holds references"),
             Field("unsigned int", "bits", "of the last step"),
         ] * inverse,
         Field("unsigned int", "status"),
         *([*searched, *t.form.corners(inverse, plays)] if t.corners
           else [Field("play_t", "play", _PLAYS + _KEPT * (kept > 0), plays + 1 + kept, length)]),
-        *[Field("signal_t", "bent", "what each contributes", plays + 1)] * moving,
+        *[Field("signal_t", "bent", "contribution of each play", plays + 1)] * moving,
     ]
 
 

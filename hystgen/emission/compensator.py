@@ -301,17 +301,17 @@ def macros(numbers: Tables | FixedTables) -> list[Macro]:
     ends = numbers.limits
     return [
         ("OFFSET", operand(ends[slots.OFFSET]), "part of every output"),
-        ("START", operand(numbers.start[0]), "what each play holds after init"),
+        ("START", operand(numbers.start[0]), "value of each play after init"),
         *(
             (f"{op}_{call}_{what}", value, comment)
             for op, first in (("FORWARD", 0), ("INVERSE", 2))
             for call, j in (("INIT", first), ("RESET", first + 1))
             for what, value, comment in (
-                ("DRIVE", operand(numbers.applied[j]), "that the plays stand for then"),
-                ("ASCENDING", truth(numbers.ascending[j]), "and the direction it came from"),
+                ("DRIVE", operand(numbers.applied[j]), "drive of the start memory"),
+                ("ASCENDING", truth(numbers.ascending[j]), "and the direction of its last move"),
             )
         ),
-        ("HOLD", operand(ends[slots.HOLD]), "a drive that is stepped back by no more is held"),
+        ("HOLD", operand(ends[slots.HOLD]), "largest step back for which the drive is held instead"),
     ]
 
 

@@ -153,17 +153,17 @@ class Fixed(Form):
             arrays.append(writer.rows("yield_t", "yields", rows, len(rows)))
             arrays.append(writer.line("factor_t", "standing_share", _factor(plays.seen)))
             numbers += [
-                ("YIELDS", f"{len(rows)}u", "pieces of what a dashpot yields"),
+                ("YIELDS", f"{len(rows)}u", "pieces of the yield of a dashpot"),
                 ("YIELD_BITS", f"{plays.yield_bits}u", "of a yield below a step of the plays' input"),
-                ("STRETCH", operand(plays.stretch), "of a play, up to which there are any"),
+                ("STRETCH", operand(plays.stretch), "of a play, at the end of the last piece"),
             ]
         if plays.bends != moving.STRAIGHT:
             arrays += _bumps(plays, writer)
             numbers += [
-                ("BUMP_END", operand(plays.bump.domain[0, 1]), "largest input of what a bent play adds"),
+                ("BUMP_END", operand(plays.bump.domain[0, 1]), "largest argument of the curve of a bent play"),
                 ("BUMP_DEGREE", f"{plays.bump.coefficient.shape[1] - 1}u", ""),
                 ("BUMP_LIFT", f"{plays.bump.scaled[0, 1]}u", "bits that its polynomials leave out"),
-                ("BUMP_BITS", f"{plays.bump_bits}u", "and those of it below a step of the plays' input"),
+                ("BUMP_BITS", f"{plays.bump_bits}u", "bits of its values below a step of the plays' input"),
             ]
         return arrays, numbers
 
@@ -172,15 +172,15 @@ class Fixed(Form):
         number = t.number
         low, high = t.plays.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1]
         return [
-            ("FINE_MIN", operand(low), "what the ends of the drive's range are in front of the plays"),
+            ("FINE_MIN", operand(low), "ends of the drive range at the output of the drive side"),
             ("FINE_MAX", operand(high), ""),
-            ("LEAST_CODE", operand(number.least_code[0]), "between which a drive is kept before it is limited"),
+            ("LEAST_CODE", operand(number.least_code[0]), "limits of a drive before the drive range applies"),
             ("MOST_CODE", operand(number.most_code[0]), ""),
-            ("DRIVE_BITS", f"{number.drive_bits[0]}u", "bits of a signal in front of the plays below a drive code"),
+            ("DRIVE_BITS", f"{number.drive_bits[0]}u", "bits of a signal of the drive side below a drive code"),
             ("ARRIVING_BITS", f"{number.arriving_bits[0]}u", "and below an input of the plays"),
-            ("LEVEL_BITS", f"{number.level_bits[0]}u", "bits of a signal behind the plays below an output code"),
-            ("LEVEL_DROP", f"{number.level_drop[0]}u", "and those that a sum of the plays has beyond that"),
-            ("LARGEST_LEVEL", operand(number.largest_level[0]), "sum that is asked of the plays"),
+            ("LEVEL_BITS", f"{number.level_bits[0]}u", "bits of a signal of the output side below an output code"),
+            ("LEVEL_DROP", f"{number.level_drop[0]}u", "and further bits of a sum of the plays"),
+            ("LARGEST_LEVEL", operand(number.largest_level[0]), "largest sum of the plays to solve for"),
             ("SHARE_BITS", f"{number.share_bits[0]}u", "bits of a mantissa below a code"),
             ("BRAKED_DROP", f"{number.braked_drop[0]}u", "bits of a signal beyond those of a search for a lead"),
         ]
@@ -213,7 +213,7 @@ class Fixed(Form):
         return [
             Field("place_t", "here"),
             Field("signal_t", "next", "output, along the move, at which another play begins to follow"),
-            Field("kink_t", "kink", "of the present step; here rather than on the stack"),
+            Field("kink_t", "kink", "of the present step; kept here rather than on the stack"),
             Field("corner_t", "corner", "", max(plays, 1)),
         ]
 

@@ -102,17 +102,17 @@ class Floating(Form):
         if plays.scanned:
             columns = [("share", list(plays.share)), ("inverse", list(plays.inverse))]
             return [writer.columns("real_t", "relaxing", columns)], [
-                ("LATE", operand(plays.first[1]), "of a stretch, what a play gains at the end of a step"),
-                ("KEPT", operand(plays.second[1]), "and on the way to the next"),
+                ("LATE", operand(plays.first[1]), "share of its stretch that a play gains by the end of a step"),
+                ("KEPT", operand(plays.second[1]), "and on the way to the next step"),
             ]
         numbers = (
             ("SCALE", moving.SCALE, "largest threshold"), ("INVERSE_SCALE", moving.INVERSE_SCALE, ""),
-            ("CENTRE", moving.MIDDLE, "of the loops that count more or less"),
+            ("CENTRE", moving.MIDDLE, "of the loops with another weight"),
             ("INVERSE_WIDTH", moving.INVERSE_WIDTH, ""), ("BUMP", moving.BUMP, "how much, times the width"),
             ("TANH_CENTRE", moving.TANH_CENTRE, "so that a play at 0 contributes nothing"),
             ("LEAST_INPUT", moving.LEAST_INPUT, "of the plays, for a search"),
             ("LARGEST_INPUT", moving.LARGEST_INPUT, ""),
-            ("STANDING_SHARE", moving.SEEN, "share of a step's way at which the input counts as standing still"),
+            ("STANDING_SHARE", moving.SEEN, "share of a step after which the input is taken as standing still"),
         )
         names = {moving.RELAXING: ("late", "kept"), moving.DILATED: ("wider",)}.get(plays.moves, ())
         arrays = [
@@ -129,7 +129,7 @@ class Floating(Form):
             *((name, operand(plays.number[place]), comment) for name, place, comment in numbers),
             ("TERMS", f"{plays.curve.shape[1]}u", "of a polynomial"),
             ("HALVES", f"{plays.halves}u", "steps of the search"),
-            ("YIELDS", f"{len(plays.yields)}u", "pieces of what a dashpot yields"),
+            ("YIELDS", f"{len(plays.yields)}u", "pieces of the yield of a dashpot"),
         ]
 
     def reference_temperature(self, t: ChainTables) -> float:
@@ -140,10 +140,10 @@ class Floating(Form):
         return writer.array("real_t", "tap", list(t.tap))
 
     def waited(self, t: ChainTables, writer: Writer) -> tuple[list[Table], list[Macro]]:
-        return [], [("WAITED", operand(t.of("wait").share[0]), "part of the step after the oldest that is over")]
+        return [], [("WAITED", operand(t.of("wait").share[0]), "elapsed part of the step after the oldest sample")]
 
     def corners(self, inverse: bool, plays: int) -> list[Field]:
-        undo = [Field("place_t", "undo", "where the plays were before the solution")] * inverse
+        undo = [Field("place_t", "undo", "place of the plays before the solution")] * inverse
         return [Field("plays_t", "plays"), *undo, Field("corner_t", "corner", "", plays + 1)]
 
 

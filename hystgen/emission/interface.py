@@ -225,7 +225,7 @@ def typedefs(one: Compensator) -> list[str]:
         f"/* Codes: a drive code is {names.NAME}_DRIVE_LSB{units.behind('drive')}, an output code "
         f"{names.NAME}_OUTPUT_LSB{units.behind('output')} */"
     )
-    words = "/* Inputs of the plays, where plays start to follow, and outputs before they are rounded */"
+    words = "/* Inputs of the plays, inputs at which plays start to follow, and outputs before rounding */"
     own = [words, *(f"typedef {kind} {names.name}_{each};" for each, kind in types.items())]
     return [codes, real, *(own if names.rt == names.name else [])]
 
@@ -453,24 +453,24 @@ WORDS = (
     ("play", r"\bplays?\b",
      "holds its value until its input is a threshold away, and then follows at that distance"),
     ("move", _CORNERS,
-     "what the input does from one turning point to the next: it rises, or it falls. Lengths are taken along the move, "
+     "the rise or the fall of the input from one turning point to the next. Lengths are taken along the move, "
      "so that a falling one is a rising one with all signs changed"),
     ("corner", _CORNERS,
-     "a turning point that some plays still hold their values from; corners are a stack, the newest one on top"),
+     "a turning point from which some plays still hold their values; corners are a stack, the newest one on top"),
     ("block", _CORNERS,
      "the plays that one corner holds: those with larger thresholds than the corner above it has, up to its `top`"),
-    ("way", _CORNERS, "how far the input has gone from a turning point"),
+    ("way", _CORNERS, "distance of the input from a turning point"),
     ("reach", _CORNERS,
-     "how far the output has gone from there; a reach_t also holds inputs and drives beyond every code"),
-    ("segment", _CORNERS, "the curve of output over input from where one more play follows to where the next does"),
+     "distance of the output from a turning point; a reach_t also holds inputs and drives beyond every code"),
+    ("segment", _CORNERS, "a straight piece of output over input, up to where the next play begins to follow"),
     ("pass", r"\bpass\[",
      "the input at which a move has taken a whole block along: the corner is passed, and forgotten"),
-    ("kink", r"\bkink\b", "a place along the move where another play begins to follow"),
+    ("kink", r"\bkink\b", "a point along the move where another play begins to follow"),
     ("effect", r"_(?:creep|lag|gain|mode|heat|ageing|clock)_\w*table",
      "a block of the chain from drive to displacement. rest: it has settled at an input; absorb: one sample passes "
-     "through it; solve: the input that gives an output now; resting: the one that gives it at rest"),
+     "through it; solve: the input for an output now; resting: the input for an output at rest"),
     ("pending", r"\bpending\b",
-     "the drive answered last: part of the memory only when the next call absorbs it, or the drive committed in its "
+     "the last returned drive: part of the memory only when the next call absorbs it, or the drive committed in its "
      "place"),
 )
 """Each word, a pattern found in texts that use it, and its meaning."""

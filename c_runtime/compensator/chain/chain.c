@@ -1,22 +1,22 @@
 /* Operators of engine loop and of every model with effects: a chain of blocks from drive to
-   displacement, which has the plays alone in a model without effects. An applied drive passes
-   forwards through all of them, a reference backwards, so that the memory holds only what the
-   actuator has seen. The model's own functions call its blocks:
+   displacement; without effects it is the plays alone. Applied drives pass forwards through all
+   blocks, references backwards, so that the memory depends only on drives that the actuator has
+   seen. The model's own functions call its blocks:
 
    waited, slewed   delay and slew limit; only the forward operator has the delay, since references
                     of the inverse come ahead of time
-   drive_side       lag: in front of the memoryless part and the plays
-   output_side      creep, ageing, heat, gain: behind the plays; the forward operator also has the
+   drive_side       lag: before the memoryless part and the plays
+   output_side      creep, ageing, heat, gain: after the plays; the forward operator also has the
                     modes of the stage here
    displaced        saturation, offsets and drift, at the very end
 
    rest: everything has settled at an input; absorb: one sample; solve: the input that gives an
    output.
 
-   moving   false  no drive has been applied yet: the first one finds everything at rest there
+   moving   false  no drive has been applied yet: everything is at rest at the first one
             true   every block has seen the previous sample
-   A step leaves its answer pending. The next step or settle absorbs it, or the drive committed in
-   its place.
+   A step leaves the returned drive pending. The next step or settle absorbs this drive, or the one
+   committed in its place.
 
    Signals between the blocks have a type of their own; signals.c converts. */
 #ifndef HYSTGEN_CHAIN_CHAIN_C
@@ -37,7 +37,7 @@
 #endif
 #endif
 
-/* Drive v has passed through the drive side and moved the plays. */
+/* Passes drive v through the drive side and moves the plays. */
 static inline void hystgen_operator_played(hystgen_operator_t *self, hystgen_real_t v) {
 #ifdef HYSTGEN_FORWARD
     const hystgen_reach_t late = hystgen_forward_waited(self, v);
@@ -54,7 +54,7 @@ static inline void hystgen_operator_played(hystgen_operator_t *self, hystgen_rea
     hystgen_operator_follow(self, hystgen_operator_arrive(self, hystgen_arriving(a)));
 }
 
-/* The plays have moved: their sum passes through the output side. */
+/* Passes the sum of the plays through the output side. */
 HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_operator_passed_on(hystgen_operator_t *self) {
     self->output = self->moving ? hystgen_operator_output_side_absorb(self, self->level)
                                 : hystgen_operator_output_side_rest(self, self->level);
@@ -91,14 +91,14 @@ static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_re
 }
 #endif
 
-/* The displacement now. */
+/* The present displacement. */
 static hystgen_real_t hystgen_operator_shown(const hystgen_operator_t *self) {
     unsigned int status = 0; /* not reported: this is no step */
     return hystgen_output_code(hystgen_operator_displaced(self, hystgen_operator_output(self)),
                                &status);
 }
 
-/* The part common to init and reset, once the plays are set: they rest at this drive. */
+/* The part common to init and reset, after the plays are set: everything rests at this drive. */
 HYSTGEN_APART_IN_CHAIN void hystgen_operator_begin(hystgen_operator_t *self, hystgen_real_t drive,
                                                    bool ascending) {
     const hystgen_signal_t x = hystgen_drive_signal(drive);

@@ -23,14 +23,14 @@ HYSTGEN_ALONE hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hys
     return answer;
 }
 #else
-/* A reference that is no number: the newest one stands once more. */
+/* A reference that is not finite: repeats the newest one. */
 static void hystgen_inverse_unread(hystgen_inverse_t *self) {
     self->status |= HYSTGEN_STATUS_HELD;
     hystgen_inverse_repeat(self);
 }
 
-/* Takes the next reference, which lies within its range. Returns the output that the output side
-   has to reach at this sample. */
+/* Takes the next reference, which lies within its range. Returns the target of the output side at
+   this sample. */
 HYSTGEN_APART_IN_FIXED_CHAIN hystgen_signal_t hystgen_inverse_put(hystgen_inverse_t *self,
                                                                   hystgen_real_t level) {
     bool limited = false;
@@ -42,15 +42,14 @@ HYSTGEN_APART_IN_FIXED_CHAIN hystgen_signal_t hystgen_inverse_put(hystgen_invers
     return hystgen_inverse_ahead(self, wanted);
 }
 
-/* The sum of the plays with which the output side gives y; the memory is up to date. */
+/* Sum of the plays for the output y of the output side; the memory is up to date. */
 HYSTGEN_APART_IN_FIXED_CHAIN hystgen_signal_t hystgen_inverse_wanted(hystgen_inverse_t *self,
                                                                      hystgen_signal_t y) {
     return self->moving ? hystgen_inverse_output_side_solve(self, y)
                         : hystgen_inverse_output_side_resting(self, y);
 }
 
-/* The drive that leads to an input w of the plays, at which their sum is h, for a reference that is
-   already limited. */
+/* Drive for an input w of the plays, at which their sum is h; the reference is already limited. */
 HYSTGEN_APART_IN_FIXED_CHAIN hystgen_reach_t hystgen_inverse_sought(hystgen_inverse_t *self,
                                                                     hystgen_real_t level,
                                                                     hystgen_signal_t h,
@@ -74,7 +73,7 @@ static hystgen_real_t hystgen_inverse_limited(hystgen_inverse_t *self, hystgen_r
     return inside;
 }
 
-/* The next drive, for reference u; the memory is up to date. `bits` is its status so far. */
+/* The next drive, for reference u; the memory is up to date. `bits`: status of the reference. */
 HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_next(hystgen_inverse_t *self,
                                                            hystgen_real_t u) {
     hystgen_real_t level = u;

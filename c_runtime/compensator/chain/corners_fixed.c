@@ -1,8 +1,7 @@
-/* Operators of a model with effects: plays of engine corners in fixed point, which give the same
-   bits as those of engine loop. Up to the output `next`, along the move, plays go on from the kink
-   that was found last; the inverse has found it when it solved for their input. A search is called
-   with as little of the stack in use as there can be. Called by chain.c, chain_calls.c and
-   chain_start.c. */
+/* Operators of a model with effects: plays of engine corners in fixed point, with the same bits as
+   those of engine loop. Up to the output `next`, along the move, plays continue from the last kink
+   found, which the inverse finds when it solves for their input. Searches are called with the least
+   possible stack in use. Called by chain.c, chain_calls.c and chain_start.c. */
 #ifndef HYSTGEN_CHAIN_CORNERS_FIXED_C
 #define HYSTGEN_CHAIN_CORNERS_FIXED_C
 #include "arithmetic/fixed.h"
@@ -14,7 +13,7 @@
 #include "compensator/chain/refined_input.c"
 #include "compensator/chain/signals.c"
 
-/* Nothing is known of the plays but where they are. */
+/* Discards all results of searches: only the place of the plays is known. */
 static void hystgen_operator_plays_begin(hystgen_operator_t *self) {
     self->kink.output = 0;
     self->kink.input = 0;
@@ -26,14 +25,14 @@ static void hystgen_operator_plays_begin(hystgen_operator_t *self) {
 #endif
 }
 
-/* All plays hold their start values. */
+/* Sets all plays to their start values. */
 static void hystgen_operator_plays_init(hystgen_operator_t *self) {
     hystgen_start(&hystgen_model_curve, &self->here, self->corner, hystgen_model_start,
                   HYSTGEN_START_STEP);
     hystgen_operator_plays_begin(self);
 }
 
-/* All plays are 0. */
+/* Sets all plays to 0. */
 static void hystgen_operator_plays_reset(hystgen_operator_t *self) {
     hystgen_start(&hystgen_model_curve, &self->here, self->corner, hystgen_model_zero, 0);
     hystgen_operator_plays_begin(self);
@@ -44,7 +43,7 @@ static hystgen_signal_t hystgen_operator_started(const hystgen_operator_t *self)
     return hystgen_level(self->here.output);
 }
 
-/* Moves the plays to an input between the kink and the next one. False if it lies elsewhere. */
+/* Moves the plays to an input between the kink and the next one. False for any other input. */
 HYSTGEN_APART bool hystgen_operator_move_on(hystgen_operator_t *self, hystgen_play_t w) {
     const int64_t moved = hystgen_gained(&hystgen_model_curve, &self->here, &self->kink, w);
     if (moved < 0 || self->kink.output + moved > self->next) {
@@ -54,13 +53,13 @@ HYSTGEN_APART bool hystgen_operator_move_on(hystgen_operator_t *self, hystgen_pl
     return true;
 }
 
-/* The same to any input between this kink and its next one, once it has been found. */
+/* The same for a kink just found; finds the next one first. */
 HYSTGEN_APART bool hystgen_operator_moved(hystgen_operator_t *self, hystgen_play_t w) {
     self->next = hystgen_next_output(&hystgen_model_curve, &self->here, self->corner, &self->kink);
     return hystgen_operator_move_on(self, w);
 }
 
-/* The plays follow their input w to another sum. */
+/* The plays follow their input w. Updates their sum. */
 HYSTGEN_APART_IN_FIXED void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
 #ifdef HYSTGEN_FORWARD
     const bool turns = self->here.rising ? w < self->here.input : w > self->here.input;

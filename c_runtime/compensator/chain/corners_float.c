@@ -1,6 +1,6 @@
 /* Operators of a model with effects: plays of engine corners in floating point. The inverse moves
-   its plays to the solution; where another drive is applied than leads there, it takes that back.
-   Called by chain.c, chain_calls.c and chain_start.c. */
+   its plays to the solution, and undoes this move if another drive is applied. Called by chain.c,
+   chain_calls.c and chain_start.c. */
 #ifndef HYSTGEN_CHAIN_CORNERS_FLOAT_C
 #define HYSTGEN_CHAIN_CORNERS_FLOAT_C
 #ifndef HYSTGEN_CONFIGURED
@@ -8,7 +8,7 @@
 #endif
 #include "compensator/chain/model.h"
 
-/* All plays hold their start values. */
+/* Sets all plays to their start values. */
 static void hystgen_operator_plays_init(hystgen_operator_t *self) {
     hystgen_start(&hystgen_operator_curve, &self->plays, self->corner, &hystgen_operator_start[0]);
 #ifdef HYSTGEN_INVERSE
@@ -16,7 +16,7 @@ static void hystgen_operator_plays_init(hystgen_operator_t *self) {
 #endif
 }
 
-/* All plays are 0. */
+/* Sets all plays to 0. */
 static void hystgen_operator_plays_reset(hystgen_operator_t *self) {
     hystgen_start(&hystgen_operator_curve, &self->plays, self->corner, &hystgen_operator_start[1]);
 #ifdef HYSTGEN_INVERSE
@@ -30,7 +30,7 @@ static hystgen_signal_t hystgen_operator_started(const hystgen_operator_t *self)
     return self->plays.here.output;
 }
 
-/* The plays follow their input w to another sum. */
+/* The plays follow their input w. Updates their sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     if (w < self->plays.here.input || w > self->plays.here.input) {
         (void)hystgen_plays_step(&hystgen_operator_curve, &self->plays, self->corner, w);
@@ -38,12 +38,12 @@ static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) 
     self->level = hystgen_operator_started(self);
 }
 #else
-/* Sum of the plays: the curve of the inverse leads from there to their input. */
+/* Sum of the plays, which is the input of the inverse curve. */
 static hystgen_signal_t hystgen_operator_started(const hystgen_operator_t *self) {
     return self->plays.here.input;
 }
 
-/* The plays follow their input w to another sum. */
+/* The plays follow their input w. Updates their sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     hystgen_plays_t *m = &self->plays;
     if (self->sought && (w < m->here.output || w > m->here.output)) {

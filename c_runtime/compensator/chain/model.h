@@ -1,6 +1,6 @@
-/* What emission writes for each model with effects in addition: numbers, tables, the types of its
-   instances, and the functions that call its blocks. Here are those of a model that has every
-   effect, so that a file compiles as it is opened in an editor; see compensator/model.h. */
+/* Additional text that emission writes for each model with effects: numbers, tables, the types of
+   its instances, and the functions that call its blocks. Those below belong to a model with every
+   effect, so that each file compiles when opened in an editor; see compensator/model.h. */
 #ifndef HYSTGEN_CHAIN_MODEL_H
 #define HYSTGEN_CHAIN_MODEL_H
 #if !defined(HYSTGEN_CHAIN) && !defined(HYSTGEN_CONFIGURED)
@@ -143,7 +143,7 @@ typedef struct {
 typedef hystgen_operator_t hystgen_forward_t;
 typedef hystgen_operator_t hystgen_inverse_t;
 
-/* Blocks in front of the plays, and behind them. */
+/* Blocks before the plays, and after them. */
 hystgen_signal_t hystgen_operator_drive_side_rest(hystgen_operator_t *self, hystgen_signal_t v);
 hystgen_signal_t hystgen_operator_drive_side_absorb(hystgen_operator_t *self, hystgen_signal_t v);
 hystgen_signal_t hystgen_inverse_drive_side_solve(hystgen_inverse_t *self, hystgen_signal_t a);
@@ -152,16 +152,16 @@ hystgen_signal_t hystgen_operator_output_side_rest(hystgen_operator_t *self, hys
 hystgen_signal_t hystgen_operator_output_side_absorb(hystgen_operator_t *self, hystgen_signal_t h);
 hystgen_signal_t hystgen_inverse_output_side_solve(hystgen_inverse_t *self, hystgen_signal_t y);
 hystgen_signal_t hystgen_inverse_output_side_resting(hystgen_inverse_t *self, hystgen_signal_t y);
-/* Sum of the plays, and what the output side has given last. */
+/* Sum of the plays, and the last output of the output side. */
 hystgen_signal_t hystgen_operator_level(const hystgen_operator_t *self);
 hystgen_signal_t hystgen_operator_output(const hystgen_operator_t *self);
-/* Between the output of the chain and the displacement, and the line of references. */
+/* Conversion between the output of the chain and the displacement, and the line of references. */
 hystgen_signal_t hystgen_operator_displaced(const hystgen_operator_t *self, hystgen_signal_t y);
 hystgen_signal_t hystgen_inverse_undisplaced(hystgen_inverse_t *self, hystgen_signal_t u,
                                              bool *limited);
 hystgen_signal_t hystgen_inverse_ahead(hystgen_inverse_t *self, hystgen_signal_t y);
 void hystgen_inverse_repeat(hystgen_inverse_t *self);
-/* What is set from outside, and what follows the drive's way. */
+/* Settings from outside, and the state that follows the travel of the drive. */
 void hystgen_operator_settings_init(hystgen_operator_t *self);
 void hystgen_operator_travelled(hystgen_operator_t *self, hystgen_real_t v);
 void hystgen_operator_clock_start(hystgen_operator_t *self);

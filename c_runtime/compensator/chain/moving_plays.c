@@ -1,6 +1,6 @@
-/* Operators of a model with effects: plays that an effect moves or bends in its own way. The state
-   of play i is the value at which it would come to rest (`play`) and what it contributes there
-   (`bent`). Called by chain.c and moving_search.c. */
+/* Operators of a model with effects: plays moved or bent by an effect. The state of play i is the
+   value at which the play would come to rest (`play`) and its contribution at this value (`bent`).
+   Called by chain.c and moving_search.c. */
 #ifndef HYSTGEN_CHAIN_MOVING_PLAYS_C
 #define HYSTGEN_CHAIN_MOVING_PLAYS_C
 #include "compensator/chain/model.h"
@@ -9,14 +9,13 @@
 #include "effects/catalogue.h"
 
 #ifdef HYSTGEN_HAS_MOVES_APART
-/* Play i after the input of the plays has gone to w, apart from what it contributes there, to need
-   less of the stack. */
+/* Play i after the input of the plays has moved to w. Not inlined, to need less stack. */
 HYSTGEN_APART hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
                                              hystgen_play_t w) {
     return hystgen_moved(i, play, w);
 }
 #else
-/* Play i after the input of the plays has gone to w. */
+/* Play i after the input of the plays has moved to w. */
 static inline hystgen_play_t hystgen_reached(unsigned int i, const hystgen_play_t *play,
                                              hystgen_play_t w) {
     return hystgen_moved(i, play, w);
@@ -30,7 +29,7 @@ static hystgen_play_t hystgen_resting(unsigned int i, const hystgen_play_t *play
 }
 
 #ifndef HYSTGEN_HAS_DASHPOT_PLAYS
-/* Play i moves while the input of the plays goes to w. */
+/* Play i moves while the input of the plays moves to w. */
 static void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t w) {
     play[i] = hystgen_reached(i, play, w);
 }
@@ -42,13 +41,13 @@ static void hystgen_put(unsigned int i, hystgen_play_t *play, hystgen_play_t z) 
 #endif
 
 #ifdef HYSTGEN_HAS_BENT_PLAYS
-/* What play i contributes at z; where the play rests, `bent` holds it. */
+/* Contribution of play i at z; `bent` holds the contribution at the play's rest value. */
 static hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
                                          const hystgen_sum_t *bent, hystgen_play_t z) {
     return z >= play[i] && z <= play[i] ? bent[i] : hystgen_bent(i, z);
 }
 #else
-/* What play i contributes at z, whether it rests there or not. */
+/* Contribution of play i at z: z itself. */
 static inline hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_play_t *play,
                                                 const hystgen_sum_t *bent, hystgen_play_t z) {
     (void)i;
@@ -59,21 +58,21 @@ static inline hystgen_sum_t hystgen_contributed(unsigned int i, const hystgen_pl
 #endif
 
 #if defined(HYSTGEN_HAS_BUMP) && !defined(HYSTGEN_FIXED)
-/* What play i contributes once the input of the plays has gone to w, apart from their sum, to need
-   less of the stack. */
+/* Contribution of play i after the input of the plays has moved to w. Not inlined, to need less
+   stack. */
 HYSTGEN_APART hystgen_sum_t hystgen_value(unsigned int i, const hystgen_play_t *play,
                                           const hystgen_sum_t *bent, hystgen_play_t w) {
     return hystgen_contributed(i, play, bent, hystgen_reached(i, play, w));
 }
 #else
-/* What play i contributes once the input of the plays has gone to w. */
+/* Contribution of play i after the input of the plays has moved to w. */
 static inline hystgen_sum_t hystgen_value(unsigned int i, const hystgen_play_t *play,
                                           const hystgen_sum_t *bent, hystgen_play_t w) {
     return hystgen_contributed(i, play, bent, hystgen_reached(i, play, w));
 }
 #endif
 
-/* The plays move while their input goes to w. Returns their sum. */
+/* The plays move while their input moves to w. Returns their sum. */
 HYSTGEN_APART hystgen_sum_t hystgen_moved_follow(hystgen_play_t *play, hystgen_sum_t *bent,
                                                  hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;
@@ -106,7 +105,7 @@ HYSTGEN_APART hystgen_sum_t hystgen_moved_rest(hystgen_play_t *play, hystgen_sum
     return sum;
 }
 
-/* The plays follow their input w to another sum. */
+/* The plays follow their input w. Updates their sum. */
 static void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     if (self->moving) {
         self->level = hystgen_level(hystgen_moved_follow(self->play, self->bent, w));
@@ -121,7 +120,7 @@ static hystgen_signal_t hystgen_operator_started(hystgen_operator_t *self) {
     return hystgen_level(hystgen_moved_rest(self->play, self->bent, self->play[0]));
 }
 
-/* What the plays give once their input has gone to w, or rests there. It rises with w. */
+/* Sum of the plays after their input has moved to w, or at rest at w; increases with w. */
 HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_inverse_sum(const hystgen_inverse_t *self,
                                                          hystgen_play_t w) {
     hystgen_sum_t sum = (hystgen_sum_t)hystgen_model_tables.weight[0] * w;

@@ -1,5 +1,5 @@
-/* Operators of a model with effects: the input of moving or bent plays at which their sum is given,
-   by bisection. Called by chain_calls.c. */
+/* Operators of a model with effects: the input of moving or bent plays for a given sum, by
+   bisection. Called by chain_calls.c. */
 #include "compensator/chain/model.h"
 #ifndef HYSTGEN_CONFIGURED
 #include "compensator/chain/moving_plays.c"
@@ -7,8 +7,8 @@
 #include "compensator/chain/signals.c"
 
 #ifdef HYSTGEN_FIXED
-/* Which of `low` and the input beside it is nearer to where the sum of the plays is `sum`; one
-   beyond them where they are the farthest and not far enough. */
+/* The input `low` or the one above it, whichever gives the sum of the plays nearer to `sum`; one
+   input beyond if `sum` is out of reach. */
 HYSTGEN_APART hystgen_reach_t hystgen_inverse_nearer(const hystgen_inverse_t *self,
                                                      hystgen_play_t low, hystgen_sum_t sum) {
     const hystgen_sum_t above = sum - hystgen_inverse_sum(self, low);
@@ -25,8 +25,8 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_nearer(const hystgen_inverse_t *se
     return (hystgen_reach_t)low + (above > below ? 1 : 0);
 }
 
-/* Input of the plays at which their sum is h, by halves between where it is and the farthest: the
-   nearer of two neighbours, the lower one of which is `low` while they are `size` apart. */
+/* Input of the plays at which their sum is h, by bisection between the present input and the
+   farthest: the nearer of two neighbours. The interval begins at `low` and is `size` long. */
 HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *self,
                                                     hystgen_signal_t h) {
     const hystgen_sum_t sum = hystgen_asked(h);
@@ -47,8 +47,8 @@ HYSTGEN_APART hystgen_reach_t hystgen_inverse_input(const hystgen_inverse_t *sel
     return hystgen_inverse_nearer(self, low, sum);
 }
 #else
-/* The sum of the plays in the middle of a search, which becomes one of its ends. What a search
-   knows is in memory, where it takes half of what a register takes that is kept over a call. */
+/* Sum of the plays at the middle of the search interval, which becomes one of its ends. A search in
+   memory needs half as much stack as registers saved across a call. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_halve(const hystgen_inverse_t *self,
                                                    hystgen_search_t *search) {
     const hystgen_real_t sum = hystgen_inverse_sum(self, search->middle);

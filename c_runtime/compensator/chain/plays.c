@@ -10,7 +10,7 @@ static hystgen_signal_t hystgen_operator_started(const hystgen_operator_t *self)
     return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
 }
 
-/* The plays follow their input w to another sum. */
+/* The plays follow their input w. Updates their sum. */
 HYSTGEN_APART_IN_FIXED_CHAIN void hystgen_operator_follow(hystgen_operator_t *self,
                                                           hystgen_play_t w) {
     hystgen_loop_absorb(&hystgen_model_tables, self->play, w);

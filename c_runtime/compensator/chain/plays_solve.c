@@ -4,8 +4,8 @@
 #include "compensator/chain/model.h"
 #include "compensator/chain/signals.c"
 
-/* Input of the plays at which their sum is h. The plays are summed up again where their present
-   sum is not kept, as without effects, or lacks bits, as in fixed point, whose kernel does that. */
+/* Input of the plays at which their sum is h. The plays are summed again if their present sum is
+   not stored, as without effects, or lacks bits, as in fixed point, where the kernel sums them. */
 static inline hystgen_reach_t hystgen_input_of(const hystgen_play_t *play, hystgen_signal_t level,
                                                hystgen_signal_t h) {
 #if defined(HYSTGEN_CHAIN) && !defined(HYSTGEN_FIXED)

@@ -1,6 +1,6 @@
 /* Operators of engine loop and of every model with effects: bits of the plays' input below a drive
-   code, for which the inverse of some models refines a solution. The inverse of a lag would amplify
-   the rounding to a code into noise. Called by chain_calls.c and, for engine corners,
+   code. The inverse of some models refines its solution to these bits, since the inverse of a lag
+   would amplify the rounding to a code into noise. Called by chain_calls.c and, for engine corners,
    corners_fixed.c. */
 #ifndef HYSTGEN_CHAIN_REFINED_INPUT_C
 #define HYSTGEN_CHAIN_REFINED_INPUT_C
@@ -25,7 +25,7 @@ static inline void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_
     (void)w;
 }
 #elif defined(HYSTGEN_HAS_CORNERS)
-/* The kink before a solution w, which it refines: plays that begin to follow at w do not count. */
+/* Finds the kink from which a solution w is refined, without plays that begin to follow at w. */
 HYSTGEN_APART void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_reach_t w) {
     const int64_t x = hystgen_along(&self->here, w);
     if (x > hystgen_along(&self->here, self->here.input)) {
@@ -34,8 +34,8 @@ HYSTGEN_APART void hystgen_inverse_kink_before(hystgen_inverse_t *self, hystgen_
     }
 }
 
-/* The input of the plays that gives their sum h, with HYSTGEN_ARRIVING_BITS more bits than w, the
-   nearest one without them: the remainder of h at w, divided by the slope there. */
+/* Input of the plays at which their sum is h, with HYSTGEN_ARRIVING_BITS more bits than w, the
+   nearest input without them: adds the remainder of h at w, divided by the slope at w. */
 HYSTGEN_APART hystgen_signal_t hystgen_inverse_refined(const hystgen_inverse_t *self,
                                                        hystgen_signal_t h, hystgen_reach_t w,
                                                        hystgen_reach_t a) {
@@ -58,8 +58,8 @@ HYSTGEN_APART hystgen_signal_t hystgen_inverse_refined(const hystgen_inverse_t *
     return whole + hystgen_along(here, left < 0 ? -more : more);
 }
 #else
-/* The input of the plays that gives their sum h, with HYSTGEN_ARRIVING_BITS more bits than w, the
-   nearest one without them: the remainder of h at w, divided by the slope. */
+/* Input of the plays at which their sum is h, with HYSTGEN_ARRIVING_BITS more bits than w, the
+   nearest input without them: adds the remainder of h at w, divided by the slope. */
 static hystgen_signal_t hystgen_inverse_refined(const hystgen_inverse_t *self, hystgen_signal_t h,
                                                 hystgen_reach_t w, hystgen_reach_t a) {
     const hystgen_tables_t *t = &hystgen_model_tables;

@@ -1,7 +1,7 @@
 /* Operators of engine loop and of every model with effects: signals between blocks. In floating
-   point they have the type of drives. In fixed point they have bits below those of codes; without
-   effects drives are codes on their way to the plays, and sums of the plays have HYSTGEN_FRACTION
-   bits below an output code. Called by chain.c, chain_calls.c and the plays. */
+   point they have the type of drives. In fixed point they have bits below a code; without effects,
+   drives remain codes up to the plays, and sums of the plays have HYSTGEN_FRACTION bits below an
+   output code. Called by chain.c, chain_calls.c and the plays. */
 #ifndef HYSTGEN_CHAIN_SIGNALS_C
 #define HYSTGEN_CHAIN_SIGNALS_C
 #include "compensator/chain/model.h"
@@ -33,7 +33,7 @@ static inline hystgen_real_t hystgen_applied_drive(hystgen_real_t v) {
 }
 
 #ifdef HYSTGEN_CHAIN
-/* A signal in front of the plays, in units of their input. */
+/* The output of the drive side, in units of the plays' input. */
 static inline hystgen_fine_t hystgen_arriving(hystgen_signal_t a) {
     return (hystgen_fine_t)hystgen_nearest(a, HYSTGEN_ARRIVING_BITS);
 }
@@ -75,12 +75,12 @@ static hystgen_signal_t hystgen_shared(hystgen_real_t share, hystgen_signal_t x)
     return hystgen_times(x, &f);
 }
 
-/* A sum of the plays, which has bits below those of a signal, as a signal. */
+/* A sum of the plays, which has more low-order bits than a signal, as a signal. */
 static inline hystgen_signal_t hystgen_level(hystgen_sum_t sum) {
     return hystgen_nearest(sum, HYSTGEN_LEVEL_DROP);
 }
 
-/* The sum of the plays that a signal asks for, limited to what they can give. */
+/* The sum of the plays for a signal, limited to the largest possible sum. */
 static inline hystgen_sum_t hystgen_asked(hystgen_signal_t h) {
     hystgen_signal_t inside;
     if (h > HYSTGEN_LARGEST_LEVEL) {
@@ -93,12 +93,12 @@ static inline hystgen_sum_t hystgen_asked(hystgen_signal_t h) {
     return inside * ((hystgen_sum_t)1 << HYSTGEN_LEVEL_DROP);
 }
 
-/* A constant share of a way of the plays' input. */
+/* A constant share of a move of the plays' input. */
 static inline hystgen_sum_t hystgen_share_of(hystgen_sum_t x, const hystgen_factor_t *share) {
     return hystgen_short_times(x, share);
 }
 
-/* A play of threshold r once its input has gone to w. The way between the two fits 32 bits. */
+/* A play of threshold r after its input has moved to w. Their distance fits 32 bits. */
 static inline hystgen_play_t hystgen_drawn(hystgen_play_t play, hystgen_play_t w, hystgen_sum_t r) {
     const uint32_t way = (uint32_t)(w > play ? (hystgen_sum_t)w - play : (hystgen_sum_t)play - w);
     if ((hystgen_sum_t)way <= r) {
@@ -171,7 +171,7 @@ static inline hystgen_signal_t hystgen_shared(hystgen_real_t share, hystgen_sign
     return share * x;
 }
 
-/* A sum of the plays as a signal, and the sum of the plays that a signal asks for. */
+/* A sum of the plays as a signal, and the sum of the plays for a signal. */
 static inline hystgen_signal_t hystgen_level(hystgen_sum_t sum) {
     return sum;
 }
@@ -180,12 +180,12 @@ static inline hystgen_sum_t hystgen_asked(hystgen_signal_t h) {
     return h;
 }
 
-/* A constant share of a way of the plays' input. */
+/* A constant share of a move of the plays' input. */
 static inline hystgen_sum_t hystgen_share_of(hystgen_sum_t x, const hystgen_real_t *share) {
     return *share * x;
 }
 
-/* A play of threshold r once its input has gone to w. */
+/* A play of threshold r after its input has moved to w. */
 static inline hystgen_play_t hystgen_drawn(hystgen_play_t play, hystgen_play_t w, hystgen_sum_t r) {
     const hystgen_play_t low = w - r;
     const hystgen_play_t high = w + r;

@@ -6,13 +6,13 @@
 #ifndef HYSTGEN_CHAIN_STATE_H
 #define HYSTGEN_CHAIN_STATE_H
 
-/* A drive on its way at a limited rate: as it is sent, and what rounding took from it. */
+/* A rate-limited drive: the value sent, and its rounding remainder. */
 typedef struct {
     hystgen_reach_t drive;
     hystgen_play_t rest;
 } hystgen_ramp_t;
 
-/* A number in two parts, since it grows in steps far below its last bit. */
+/* A number in two parts, since its steps may be far below the last bit. */
 typedef struct {
     hystgen_real_t high;
     hystgen_real_t low;
@@ -23,22 +23,22 @@ typedef struct {
 } hystgen_creep_t;
 
 typedef struct {
-    hystgen_real_t high; /* x, a lag on a drive that holds, in two parts */
+    hystgen_real_t high; /* x, the response to a zero-order-hold drive, in two parts */
     hystgen_real_t low;
-    hystgen_real_t wanted; /* output that the last input leads to */
-    hystgen_real_t asked;  /* output asked for, */
-    hystgen_real_t answer; /* and the input that was to lead there */
+    hystgen_real_t wanted; /* output for the last input */
+    hystgen_real_t asked;  /* requested output, */
+    hystgen_real_t answer; /* and the input solved for it */
 } hystgen_lag_t;
 
 typedef struct {
     hystgen_lag_t lag;
-    hystgen_real_t earlier; /* asked for a sample before */
+    hystgen_real_t earlier; /* output requested one sample before */
 } hystgen_braked_t;
 
 typedef struct {
-    hystgen_real_t way;   /* of what the lag is led to, in this sample, */
-    hystgen_real_t moved; /* and in the one before */
-    bool rises;           /* it arrives from below */
+    hystgen_real_t way;   /* move of the lag's target in this sample, */
+    hystgen_real_t moved; /* and in the previous one */
+    bool rises;           /* the lag arrives from below */
 } hystgen_steady_t;
 
 typedef struct {
@@ -47,14 +47,14 @@ typedef struct {
 } hystgen_lag_exact_t;
 
 typedef struct {
-    hystgen_real_t arrived; /* in front of the plays */
+    hystgen_real_t arrived; /* last output of the drive side */
     hystgen_real_t reference;
-    uint32_t equal; /* references in a row, up to one more than a drive waits for to stand still */
+    uint32_t equal; /* equal references in a row, at most one more than needed to stand still */
 } hystgen_quiet_t;
 
 typedef struct {
     hystgen_real_t before; /* input of the last sample */
-    hystgen_real_t off;    /* output less input */
+    hystgen_real_t off;    /* output minus input */
     hystgen_real_t rate;   /* of `off`, per radian of the mode */
 } hystgen_mode_t;
 
@@ -81,20 +81,20 @@ typedef struct {
 } hystgen_heat_t;
 
 typedef struct {
-    hystgen_real_t at; /* a play that rubs */
+    hystgen_real_t at; /* value of a friction play */
 } hystgen_friction_state_t;
 
 typedef struct {
-    bool begun; /* the plays that rub are somewhere */
+    bool begun; /* the friction plays have values */
 } hystgen_friction_t;
 
 typedef struct {
-    hystgen_real_t high; /* samples, in units of the table's carry and of one */
+    hystgen_real_t high; /* samples counted: multiples of the table's carry, and the rest */
     hystgen_real_t low;
     hystgen_real_t lead; /* samples by which the next reference is ahead */
 } hystgen_clock_t;
 
-/* A search for an input of the plays between two others, at which they have a sum. */
+/* A search between two inputs of the plays for the one at which their sum is `sum`. */
 typedef struct {
     hystgen_real_t low;
     hystgen_real_t high;

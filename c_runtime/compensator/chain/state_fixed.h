@@ -7,7 +7,7 @@
 #ifndef HYSTGEN_CHAIN_STATE_FIXED_H
 #define HYSTGEN_CHAIN_STATE_FIXED_H
 
-/* A drive on its way at a limited rate: as it is sent, and what rounding took from it. */
+/* A rate-limited drive: the value sent, and its rounding remainder. */
 typedef struct {
     hystgen_reach_t drive;
     hystgen_play_t rest;
@@ -23,29 +23,29 @@ typedef struct {
 } hystgen_creep_t;
 
 typedef struct {
-    int64_t high;   /* x, a lag on a drive that holds */
-    int64_t wanted; /* output that the last input leads to */
-    int64_t asked;  /* output asked for, */
-    int64_t lead;   /* and the move that is to lead there */
+    int64_t high;   /* x, the response to a zero-order-hold drive */
+    int64_t wanted; /* output for the last input */
+    int64_t asked;  /* requested output, */
+    int64_t lead;   /* and the move of x solved for it */
 } hystgen_lag_t;
 
 typedef struct {
     hystgen_lag_t lag;
-    int64_t earlier; /* asked for a sample before */
+    int64_t earlier; /* output requested one sample before */
 } hystgen_braked_t;
 
-/* How a lead is to shrink, in numbers to search with. */
+/* Numbers of the search for a lead, with fewer bits than signals. */
 typedef struct {
-    int32_t left; /* that the lag is to gain beyond its target's way */
-    int32_t back; /* by which the lead shrinks in a step */
-    int32_t lead; /* as it would be */
-    int32_t room; /* by which it may shrink at once */
+    int32_t left; /* distance that the lag is to gain beyond its target's move */
+    int32_t back; /* decrease of the lead in a step */
+    int32_t lead; /* lead before a cut */
+    int32_t room; /* largest cut of the lead */
 } hystgen_brake_t;
 
 typedef struct {
-    int64_t way;   /* of what the lag is led to, in this sample, */
-    int64_t moved; /* and in the one before */
-    bool rises;    /* it arrives from below */
+    int64_t way;   /* move of the lag's target in this sample, */
+    int64_t moved; /* and in the previous one */
+    bool rises;    /* the lag arrives from below */
 } hystgen_steady_t;
 
 typedef struct {
@@ -54,14 +54,14 @@ typedef struct {
 } hystgen_lag_exact_t;
 
 typedef struct {
-    int64_t arrived; /* in front of the plays */
+    int64_t arrived; /* last output of the drive side */
     int64_t reference;
-    uint32_t equal; /* references in a row, up to one more than a drive waits for to stand still */
+    uint32_t equal; /* equal references in a row, at most one more than needed to stand still */
 } hystgen_quiet_t;
 
 typedef struct {
     int64_t before; /* input of the last sample */
-    int64_t off;    /* output less input */
+    int64_t off;    /* output minus input */
     int64_t rate;   /* of `off`, per radian of the mode */
 } hystgen_mode_t;
 
@@ -86,11 +86,11 @@ typedef struct {
 } hystgen_heat_t;
 
 typedef struct {
-    int32_t at; /* a play that rubs */
+    int32_t at; /* value of a friction play */
 } hystgen_friction_state_t;
 
 typedef struct {
-    bool begun; /* the plays that rub are somewhere */
+    bool begun; /* the friction plays have values */
 } hystgen_friction_t;
 
 typedef struct {

@@ -6,23 +6,23 @@
 #ifndef HYSTGEN_CHAIN_TABLES_H
 #define HYSTGEN_CHAIN_TABLES_H
 
-/* What a state of creep adds to the next output by inputs up to now: X += rate (share h - X). */
+/* Creep state X, the contribution of past inputs to the next output: X += rate (share h - X). */
 typedef struct {
     hystgen_real_t rate;
     hystgen_real_t share;
 } hystgen_creep_term_t;
 
-/* Creep behind the plays: y = slope h + X_1 + X_2 + ..., with the X of the sample before. */
+/* Creep after the plays: y = slope h + X_1 + X_2 + ..., with the X of the previous sample. */
 typedef struct {
     const hystgen_creep_term_t *term;
-    hystgen_real_t slope; /* change of y with h at once */
+    hystgen_real_t slope; /* immediate change of y with h */
     hystgen_real_t inverse_slope;
     hystgen_real_t rest; /* y over h at rest */
     hystgen_real_t inverse_rest;
     uint_least16_t n;
 } hystgen_creep_table_t;
 
-/* Lag in front of the plays: x += rate (v - x); the output lies theta of that step behind x. */
+/* Lag before the plays: x += rate (v - x); the output lies theta of that step behind x. */
 typedef struct {
     hystgen_real_t rate;
     hystgen_real_t theta;
@@ -30,7 +30,7 @@ typedef struct {
     hystgen_real_t inverse_rate;
 } hystgen_lag_table_t;
 
-/* Lag that is shorter than half a step: a += early v_before + late v - rate a. */
+/* Lag shorter than half a step: a += early v_before + late v - rate a. */
 typedef struct {
     hystgen_real_t rate;
     hystgen_real_t early;
@@ -38,9 +38,9 @@ typedef struct {
     hystgen_real_t inverse_late;
 } hystgen_lag_exact_table_t;
 
-/* Mode of the stage: in a step its two states, output less input and the rate of that, change by
-   shares of themselves (keep, swing), of each other (turn), and of a change of the input (lead,
-   push). */
+/* Mode of the stage: in a step its two states, output minus input and the rate of this difference,
+   change by shares of themselves (keep, swing), of each other (turn), and of a change of the input
+   (lead, push). */
 typedef struct {
     hystgen_real_t keep;
     hystgen_real_t turn;
@@ -70,7 +70,7 @@ typedef struct {
     hystgen_real_t c3;
 } hystgen_ageing_piece_t;
 
-/* Gain over travel up to `last`; one set from outside lies between `least` and `largest`. */
+/* Gain over travel up to `last`; a gain set from outside lies between `least` and `largest`. */
 typedef struct {
     const hystgen_ageing_piece_t *piece;
     hystgen_real_t least;
@@ -80,7 +80,7 @@ typedef struct {
     uint_least8_t turns; /* Newton steps for the reciprocal of a gain that has changed */
 } hystgen_ageing_table_t;
 
-/* Own heat: degrees per amount of what warms, and the share lost in a step. */
+/* Self-heating: degrees per amount of heating, and the share lost in a step. */
 typedef struct {
     hystgen_real_t rate;
     hystgen_real_t per_amount;
@@ -90,7 +90,7 @@ typedef struct {
     uint_least16_t turns;   /* Newton steps for the reciprocal of a gain that has changed */
 } hystgen_heat_table_t;
 
-/* Plays that rub, the narrowest one first. */
+/* Friction plays, the smallest threshold first. */
 typedef struct {
     hystgen_real_t threshold;
 } hystgen_friction_play_t;

@@ -13,8 +13,8 @@ typedef struct {
     uint8_t shift;
 } hystgen_factor_t;
 
-/* A factor of a block of the user's own, and the bits that a product leaves out of its argument and
-   of its result. */
+/* A factor of a user's own block, and the low-order bits that a product omits from its argument and
+   from its result. */
 typedef struct {
     hystgen_factor_t factor;
     uint8_t drop;
@@ -25,23 +25,23 @@ typedef struct {
    in each step. */
 typedef struct {
     hystgen_factor_t rate;
-    hystgen_factor_t late; /* share of a change of the input that counts at once */
+    hystgen_factor_t late; /* share of an input change that takes effect at once */
     hystgen_factor_t weight;
     uint8_t lift; /* bits of a state that the product with `late` leaves out */
 } hystgen_creep_term_t;
 
-/* Creep behind the plays: y = d h + X_1 + X_2 + ... */
+/* Creep after the plays: y = d h + X_1 + X_2 + ... */
 typedef struct {
     const hystgen_creep_term_t *term;
     hystgen_factor_t direct;        /* d */
-    hystgen_factor_t inverse_slope; /* 1 / (change of y with h at once) */
+    hystgen_factor_t inverse_slope; /* 1 / (immediate change of y with h) */
     hystgen_factor_t inverse_rest;  /* h over y at rest */
     uint8_t bits;                   /* bits of the states below those of a signal, */
     uint8_t drop;                   /* and bits that products leave out */
     uint_least16_t n;
 } hystgen_creep_table_t;
 
-/* Lag in front of the plays: x += rate (v - x); the output lies theta of that step behind x. */
+/* Lag before the plays: x += rate (v - x); the output lies theta of that step behind x. */
 typedef struct {
     hystgen_factor_t rate;
     hystgen_factor_t theta;
@@ -50,8 +50,8 @@ typedef struct {
     uint8_t drop; /* and bits that products leave out */
 } hystgen_lag_table_t;
 
-/* Lag that is shorter than half a step: the output follows a move by `late` at once, and approaches
-   the input by `rate` in the next step. */
+/* Lag shorter than half a step: the output follows a move by `late` at once, and approaches the
+   input by `rate` in the next step. */
 typedef struct {
     hystgen_factor_t rate;
     hystgen_factor_t late;
@@ -60,9 +60,9 @@ typedef struct {
     uint8_t drop; /* and bits that products leave out */
 } hystgen_lag_exact_table_t;
 
-/* Mode of the stage: in a step its two states, output less input and the rate of that, change by
-   shares of themselves (keep, swing), of each other (turn), and of a change of the input (late,
-   less the change itself, and push). */
+/* Mode of the stage: in a step its two states, output minus input and the rate of this difference,
+   change by shares of themselves (keep, swing), of each other (turn), and of a change of the input
+   (late, minus the change itself, and push). */
 typedef struct {
     hystgen_factor_t keep;
     hystgen_factor_t turn;
@@ -88,7 +88,7 @@ typedef struct {
 typedef struct {
     int64_t begin;
     hystgen_factor_t
-        share; /* of the travel since `begin`, less the bits that the product leaves out */
+        share; /* of the travel since `begin`, minus the bits that the product leaves out */
     uint8_t drop;
     int32_t c[4];
 } hystgen_ageing_piece_t;
@@ -102,7 +102,7 @@ typedef struct {
     uint8_t bits;  /* of a gain below a code that sets it */
 } hystgen_ageing_table_t;
 
-/* Own heat: degrees gained per amount of what warms, the share lost in a step, and the rise up to
+/* Self-heating: degrees gained per amount of heating, the share lost in a step, and the rise up to
    which gain and offset follow. */
 typedef struct {
     hystgen_factor_t rate;
@@ -116,7 +116,7 @@ typedef struct {
     uint8_t drop;         /* and bits that products of the temperature leave out */
 } hystgen_heat_table_t;
 
-/* Plays that rub, the narrowest one first. */
+/* Friction plays, the smallest threshold first. */
 typedef struct {
     int64_t threshold;
 } hystgen_friction_play_t;
@@ -127,11 +127,11 @@ typedef struct {
     uint8_t bits; /* of a play below a drive code */
 } hystgen_friction_table_t;
 
-/* Drift over time: its change in the first sample, and the growth of that from sample to sample. */
+/* Drift over time: its change in the first sample, and the growth of this change per sample. */
 typedef struct {
     int64_t slope;
     int64_t change;
-    int64_t samples; /* after which it stays constant */
+    int64_t samples; /* after which the drift is constant */
     int64_t farthest;
     uint8_t bits; /* bits of slope and change below those of a signal */
 } hystgen_clock_table_t;
@@ -149,7 +149,7 @@ typedef struct {
     uint8_t lift; /* and bits that a value leaves out */
 } hystgen_bend_curve_t;
 
-/* What a bent play adds to itself, in pieces of a curve like those. */
+/* Contribution of a bent play beyond its value, as a piecewise polynomial of the same form. */
 typedef struct {
     const int32_t *knot;
     const uint8_t *scale;
@@ -162,8 +162,8 @@ typedef struct {
     hystgen_bend_curve_t inverse;
 } hystgen_bend_t;
 
-/* A piece of the yield of a nonlinear dashpot: where it begins, the left shift that stretches it to
-   2^31, and the coefficients of a cubic along it, which leave out `lift` bits. */
+/* A piece of the yield of a nonlinear dashpot: its start, the left shift that scales its length to
+   2^31, and the coefficients of its cubic, without their lowest `lift` bits. */
 typedef struct {
     uint32_t begin;
     int32_t c[4];

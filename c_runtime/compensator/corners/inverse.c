@@ -6,7 +6,7 @@
 #include "compensator/clamp.c"
 
 #ifdef HYSTGEN_INVERSE
-/* Any sample but a usual one. */
+/* Any sample that needs a search. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
     const hystgen_curve_t *t = &hystgen_operator_curve;
     hystgen_plays_t *m = &self->plays;
@@ -18,7 +18,7 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
                                                                : HYSTGEN_STATUS_HELD;
         x = (u < HYSTGEN_OUTPUT_MIN ? HYSTGEN_OUTPUT_MIN : HYSTGEN_OUTPUT_MAX) - HYSTGEN_OFFSET;
     }
-    if (bits == HYSTGEN_STATUS_HELD) { /* not finite: repeat the last answer */
+    if (bits == HYSTGEN_STATUS_HELD) { /* not finite: repeat the last returned drive */
         if (self->stepped && self->committed) {
             hystgen_move_to_output(t, m, self->corner, self->returned);
         }
@@ -38,15 +38,15 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     return m->here.output;
 }
 
-/* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
-   applied drive in its place. While `limited` is set, references beyond `input` have the same
-   answer, a limit of the drive.
+/* One sample. The memory takes the returned drive as applied at once; a commit undoes the step and
+   applies the committed drive instead. While `limited` is set, references beyond `input` return the
+   same drive, a limit of its range.
 
-   stepped  committed  the memory is at     a commit replaces    a NaN answers, and leaves there
+   stepped  committed  memory at            commit replaces      NaN returns, and sets memory to
    no       no         the start drive      nothing              the start drive
    no       yes        the committed drive  the committed drive  the committed drive
-   yes      no         the last answer      the last answer      the last answer
-   yes      yes        the committed drive  the committed drive  the last answer, `returned` */
+   yes      no         the returned drive   the returned drive   the returned drive
+   yes      yes        the committed drive  the committed drive  the returned drive, `returned` */
 hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u) {
     hystgen_plays_t *m = &self->plays;
     const hystgen_real_t x = u - HYSTGEN_OFFSET;

@@ -9,13 +9,13 @@
 
 #ifdef HYSTGEN_INVERSE
 #ifdef HYSTGEN_HAS_FINE_PLAYS
-/* What an input move `way` leaves of an output move `on`; the input is finer than codes. */
+/* Remainder of an output move `on` after an input move `way`; the input is finer than a code. */
 static inline int64_t hystgen_inverse_left(int64_t on, uint32_t slope, uint32_t way) {
     return on - (int64_t)hystgen_wide(slope, way);
 }
 #else
-/* What an input move `way` leaves of an output move `on`. The input moves in whole drive codes, to
-   the nearest one: the remainder is below one code's worth, which 32 bits hold. */
+/* Remainder of an output move `on` after an input move `way`. The input moves by whole drive codes,
+   to the nearest one: the remainder is less than the output of one code, which fits 32 bits. */
 static inline int64_t hystgen_inverse_left(int64_t on, uint32_t slope, uint32_t way) {
     const uint32_t left = (uint32_t)on - slope * way;
     const uint32_t sign = 0x80000000u;
@@ -28,14 +28,14 @@ static inline int32_t hystgen_inverse_along(const hystgen_inverse_t *self, int32
     return self->here.rising ? u : ~u;
 }
 
-/* No step is usual before another search, which begins here. */
+/* No step is usual until another search, which starts from the present place. */
 static void hystgen_inverse_stay(hystgen_inverse_t *self) {
     self->next = -HYSTGEN_LARGEST - 1;
     self->usual = false;
 }
 
-/* Steps are usual up to the next kink or limit, less rounding, but not below the least reference.
- */
+/* Steps are usual up to the next kink or limit, minus a margin for rounding, but not below the
+   smallest reference. */
 HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t next) {
     const hystgen_place_t *here = &self->here;
     const int32_t most =
@@ -53,7 +53,7 @@ HYSTGEN_APART void hystgen_inverse_look_ahead(hystgen_inverse_t *self, int64_t n
     }
 }
 
-/* Any sample but a usual one. */
+/* Any sample that needs a search. */
 HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hystgen_real_t u) {
     hystgen_copy_place(&self->undo, &self->here);
     self->usual = false;
@@ -82,13 +82,13 @@ HYSTGEN_APART hystgen_real_t hystgen_inverse_search(hystgen_inverse_t *self, hys
     return (hystgen_real_t)hystgen_front_inverse(self->here.input);
 }
 
-/* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
-   applied drive in its place.
+/* One sample. The memory takes the returned drive as applied at once; a commit undoes the step and
+   applies the committed drive instead.
 
-   last call   the memory is at      a commit replaces     the same reference again
-   init        the start memory      nothing               is solved for
-   step        the last answer       the last answer       has the same answer
-   commit      the committed drive   the committed drive   is solved for */
+   last call   memory at             commit replaces       the same reference again
+   init        the start memory      nothing               is solved
+   step        the returned drive    the returned drive    returns the same drive
+   commit      the committed drive   the committed drive   is solved again */
 hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u) {
     hystgen_place_t *here = &self->here;
     const int64_t output = (int64_t)u * ((int64_t)1 << HYSTGEN_FRACTION);

@@ -7,14 +7,14 @@
 #include "compensator/drive.c"
 
 #ifdef HYSTGEN_INVERSE
-/* Keeps the place for a commit to go back to. */
+/* Saves the place that a commit returns to. */
 static void hystgen_inverse_keep(hystgen_inverse_t *self) {
     hystgen_copy_place(&self->undo, &self->plays.here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
 
-/* Undoes the last step: the actuator has gone to v instead. */
+/* Undoes the last step: the actuator has moved to v instead. */
 HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real_t v) {
     hystgen_copy_place(&self->plays.here, &self->undo);
     hystgen_forget_line(&self->plays);
@@ -26,7 +26,7 @@ HYSTGEN_APART void hystgen_inverse_replace(hystgen_inverse_t *self, hystgen_real
     }
 }
 
-/* A sample that is not finite: repeat the last answer. */
+/* A sample that is not finite: repeats the last returned drive. */
 static hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self) {
     hystgen_inverse_keep(self);
     hystgen_inverse_replace(self, self->stepped && self->committed ? self->returned : self->drive);
@@ -36,14 +36,14 @@ static hystgen_real_t hystgen_inverse_hold(hystgen_inverse_t *self) {
     return self->drive;
 }
 
-/* One sample. The memory takes the answer as applied at once; a commit, a limit or a drive that
-   holds undoes the step and puts the applied drive in its place.
+/* One sample. The memory takes the returned drive as applied at once; a commit, a limit or a held
+   drive undoes the step and applies the actual drive instead.
 
-   stepped  committed  the memory is at     a commit replaces    a NaN answers, and leaves there
+   stepped  committed  memory at            commit replaces      NaN returns, and sets memory to
    no       no         the start drive      nothing              the start drive
    no       yes        the committed drive  the committed drive  the committed drive
-   yes      no         the last answer      the last answer      the last answer
-   yes      yes        the committed drive  the committed drive  the last answer, `returned` */
+   yes      no         the returned drive   the returned drive   the returned drive
+   yes      yes        the committed drive  the committed drive  the returned drive, `returned` */
 hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u) {
     if (!(u >= -HYSTGEN_REAL_MAX && u <= HYSTGEN_REAL_MAX)) {
         return hystgen_inverse_hold(self);
@@ -65,7 +65,7 @@ hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u)
         const bool clamped = inside < v || inside > v;
         self->bits |= self->limited ? HYSTGEN_STATUS_DOMAIN : 0u;
         if (clamped || (inside <= self->drive && inside >= self->drive)) {
-            /* this drive does not give w: the plays are elsewhere */
+            /* the plays do not reach w with this drive */
             self->bits |= clamped ? HYSTGEN_STATUS_OUTPUT_CLAMPED : 0u;
             hystgen_inverse_replace(self, inside);
         } else {

@@ -9,20 +9,20 @@
 #include "compensator/code.c"
 
 #ifdef HYSTGEN_INVERSE
-/* Keeps the place for a commit to go back to. */
+/* Saves the place that a commit returns to. */
 HYSTGEN_APART void hystgen_inverse_keep(hystgen_inverse_t *self) {
     hystgen_copy_place(&self->undo, &self->here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
 
-/* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
-   applied drive in its place.
+/* One sample. The memory takes the returned drive as applied at once; a commit undoes the step and
+   applies the committed drive instead.
 
-   last call   the memory is at      a commit replaces     the same reference again
-   init        the start memory      nothing               is solved for
-   step        the last answer       the last answer       has the same answer
-   commit      the committed drive   the committed drive   is solved for */
+   last call   memory at             commit replaces       the same reference again
+   init        the start memory      nothing               is solved
+   step        the returned drive    the returned drive    returns the same drive
+   commit      the committed drive   the committed drive   is solved again */
 hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u) {
     hystgen_inverse_keep(self);
     if (!self->repeated || u != self->reference) {

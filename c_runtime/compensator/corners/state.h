@@ -1,5 +1,5 @@
-/* The memory of operators of engine corners without effects. Emission leaves out fields that no
-   function of a model names. Needed by the operators beside it. */
+/* The memory of operators of engine corners without effects. Emission omits fields that no function
+   of a model uses. Needed by the operators in this folder. */
 #ifndef HYSTGEN_CONFIGURED
 #define HYSTGEN_HAS_CORNERS
 #endif
@@ -11,7 +11,7 @@
 typedef struct {
 #ifdef HYSTGEN_FIXED
     hystgen_place_t here;
-    int32_t next; /* input of the plays at which another one begins to follow */
+    int32_t next; /* input at which another play begins to follow */
 #else
     hystgen_plays_t plays;
 #endif
@@ -19,7 +19,7 @@ typedef struct {
     bool ascending;       /* direction of the drive's last move */
     unsigned int status;
 #ifdef HYSTGEN_FIXED
-    hystgen_kink_t kink; /* of the present step; here rather than on the stack */
+    hystgen_kink_t kink; /* of the present step; kept here rather than on the stack */
 #endif
     hystgen_corner_t corner[HYSTGEN_CORNERS];
 } hystgen_forward_t;
@@ -32,9 +32,9 @@ typedef struct {
     int64_t next; /* output, along the present move, at which another play begins to follow */
 #else
     hystgen_plays_t plays;
-    hystgen_place_t undo; /* where the plays were before the last step */
+    hystgen_place_t undo; /* place of the plays before the last step */
 #endif
-    hystgen_real_t drive; /* where the plays are */
+    hystgen_real_t drive; /* present drive */
     hystgen_real_t undo_drive;
 #ifndef HYSTGEN_FIXED
     hystgen_real_t returned; /* by the last step, if another drive was committed since */
@@ -44,20 +44,20 @@ typedef struct {
     bool ascending;           /* direction of the drive's last move */
     bool undo_ascending;
 #ifndef HYSTGEN_FIXED
-    bool stepped;   /* a step has answered */
+    bool stepped;   /* a step has returned a drive */
     bool committed; /* a drive was committed since */
 #endif
-    bool repeated; /* the last answer still stands for `reference` */
-    bool limited;  /* no drive gives it; here rather than on the stack */
+    bool repeated; /* the last returned drive is still valid for `reference` */
+    bool limited;  /* no drive reaches `reference`; kept here rather than on the stack */
 #ifdef HYSTGEN_FIXED
-    uint_least8_t bits; /* status of that answer */
+    uint_least8_t bits; /* status of the last returned drive */
 #else
-    unsigned int bits; /* status of that answer */
+    unsigned int bits; /* status of the last returned drive */
 #endif
     unsigned int status;
 #ifdef HYSTGEN_FIXED
-    hystgen_place_t undo; /* where the plays were before the last step */
-    hystgen_kink_t kink;  /* of the present step; here rather than on the stack */
+    hystgen_place_t undo; /* place of the plays before the last step */
+    hystgen_kink_t kink;  /* of the present step; kept here rather than on the stack */
 #endif
     hystgen_corner_t corner[HYSTGEN_CORNERS];
 } hystgen_inverse_t;
@@ -66,15 +66,15 @@ typedef struct {
 typedef struct {
     hystgen_place_t here;
     hystgen_real_t drive;
-    int32_t before; /* input of the plays before the last step, if that was a usual one */
-    int32_t next;   /* reference, along the present move, short of which steps are usual */
+    int32_t before;           /* input of the plays before the last step, if usual */
+    int32_t next;             /* reference, along the present move, below which steps are usual */
     hystgen_real_t reference; /* of the last step */
     bool usual;               /* in the last step the same plays followed */
-    bool repeated;            /* the last answer still stands for `reference` */
-    uint_least8_t bits;       /* status of that answer */
+    bool repeated;            /* the last returned drive is still valid for `reference` */
+    uint_least8_t bits;       /* status of the last returned drive */
     unsigned int status;
-    hystgen_place_t undo; /* where the plays were before the last step, if not a usual one */
-    hystgen_kink_t kink;  /* of the present step; here rather than on the stack */
+    hystgen_place_t undo; /* place of the plays before the last step, if not a usual one */
+    hystgen_kink_t kink;  /* of the present step; kept here rather than on the stack */
     hystgen_corner_t corner[HYSTGEN_CORNERS];
 } hystgen_inverse_t;
 #else
@@ -82,10 +82,10 @@ typedef struct {
 typedef struct {
     hystgen_plays_t plays;
     hystgen_real_t drive;
-    hystgen_place_t undo;    /* where the plays were before the last step, if not along a line */
-    hystgen_real_t before;   /* input before such a step, else the present one */
+    hystgen_place_t undo;    /* place of the plays before the last step, if not along a line */
+    hystgen_real_t before;   /* input before a step along a line, else the present input */
     hystgen_real_t returned; /* by the last step, if another drive was committed since */
-    bool stepped;            /* a step has answered */
+    bool stepped;            /* a step has returned a drive */
     bool committed;          /* a drive was committed since */
     unsigned int status;
     hystgen_corner_t corner[HYSTGEN_CORNERS];

@@ -69,7 +69,7 @@ static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_
         change = next - high;
     }
     self->high = next;
-    self->low = change - (next - high); /* what rounding took from the sum */
+    self->low = change - (next - high); /* rounding remainder of the sum */
     if (self->own) {
         unsigned int i;
         self->gain = hystgen_ageing_gain(t, next);
@@ -79,7 +79,7 @@ static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_
     }
 }
 
-/* The input that gives the output y. */
+/* The input for the output y. */
 static hystgen_real_t hystgen_ageing_solve(const hystgen_ageing_t *self, hystgen_real_t y) {
     return y * self->inverse;
 }

@@ -71,7 +71,7 @@ static void hystgen_ageing_move(const hystgen_ageing_table_t *t, hystgen_ageing_
     }
 }
 
-/* The input that gives the output y. */
+/* The input for the output y. */
 static int64_t hystgen_ageing_solve(const hystgen_ageing_t *self, int64_t y) {
     return hystgen_gain_times(y, self->inverse);
 }

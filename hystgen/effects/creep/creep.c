@@ -1,6 +1,6 @@
 /* Creep as a block of the chain. Part of each state follows a move at once, so that the block is
-   exactly invertible; a state holds what it adds to the next output for an input of 0 there.
-   `ahead` is the sum of them. Called by the functions that emission writes for a chain, see
+   exactly invertible; a state holds its contribution to the next output for an input of 0. `ahead`
+   is the sum of the states. Called by the functions that emission writes for a chain, see
    compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 
@@ -19,12 +19,12 @@ static hystgen_real_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen
     return t->rest * x;
 }
 
-/* The input that gives the output y once everything has settled. */
+/* The input for the settled output y. */
 static hystgen_real_t hystgen_creep_resting(const hystgen_creep_table_t *t, hystgen_real_t y) {
     return y * t->inverse_rest;
 }
 
-/* The input that gives the output y at this sample. */
+/* The input for the output y at this sample. */
 static hystgen_real_t hystgen_creep_solve(const hystgen_creep_table_t *t,
                                           const hystgen_creep_t *self, hystgen_real_t y) {
     return (y - self->ahead) * t->inverse_slope;
@@ -42,7 +42,7 @@ static hystgen_real_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystg
             t->term[i].rate * (t->term[i].share * x - high) + state[i].low;
         const hystgen_real_t next = high + change;
         state[i].high = next;
-        state[i].low = change - (next - high); /* what rounding took from the sum */
+        state[i].low = change - (next - high); /* rounding remainder of the sum */
         ahead = ahead + next;
     }
     self->ahead = ahead;

@@ -1,7 +1,7 @@
 /* Creep as a block of the chain, in fixed point. A state holds its contribution at the next sample
-   if the input stays; part of a change of the input counts at once, so that the block is exactly
-   invertible. States have bits below those of a signal, so that the slowest one does not stall.
-   Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
+   for an unchanged input; part of an input change takes effect at once: the block is exactly
+   invertible. Bits below those of a signal keep the slowest state from stalling. Called by the
+   functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "arithmetic/fixed.h"
 #include "compensator/chain/model.h"
 #include "arithmetic/factors.c"
@@ -20,18 +20,18 @@ HYSTGEN_APART int64_t hystgen_creep_rest(const hystgen_creep_table_t *t, hystgen
     return self->ahead;
 }
 
-/* The input that gives the output y once everything has settled. */
+/* The input for the settled output y. */
 static int64_t hystgen_creep_resting(const hystgen_creep_table_t *t, int64_t y) {
     return hystgen_times(y, &t->inverse_rest);
 }
 
-/* The input that gives the output y at this sample. */
+/* The input for the output y at this sample. */
 static int64_t hystgen_creep_solve(const hystgen_creep_table_t *t, const hystgen_creep_t *self,
                                    int64_t y) {
     return self->before + hystgen_times(y - self->ahead, &t->inverse_slope);
 }
 
-/* The states go on to the next sample; `ahead` is their sum at this one. Returns the output. */
+/* Advances the states to the next sample; `ahead` is their sum at this one. Returns the output. */
 HYSTGEN_APART int64_t hystgen_creep_next(const hystgen_creep_table_t *t, hystgen_creep_t *self,
                                          hystgen_creep_state_t *state) {
     int64_t next = 0;
@@ -50,7 +50,7 @@ HYSTGEN_APART int64_t hystgen_creep_next(const hystgen_creep_table_t *t, hystgen
 }
 
 /* The input is x at this sample. Returns the output. Two short functions, the first of which ends
-   with the second, keep less on the stack than a long one. */
+   with a call of the second, need less stack than a long one. */
 HYSTGEN_APART int64_t hystgen_creep_absorb(const hystgen_creep_table_t *t, hystgen_creep_t *self,
                                            hystgen_creep_state_t *state, int64_t x) {
     const int64_t change = x - self->before;

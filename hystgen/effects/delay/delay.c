@@ -8,7 +8,7 @@
 
 /* The drive has always been v. */
 static void hystgen_delay_rest(hystgen_real_t *sample, unsigned int *oldest, hystgen_real_t v) {
-    volatile hystgen_real_t *entry = sample; /* no call of memset, which a target need not have */
+    volatile hystgen_real_t *entry = sample; /* no call of memset, which a target may lack */
     unsigned int i;
     for (i = 0; i < HYSTGEN_WAITING; ++i) {
         entry[i] = v;
@@ -16,7 +16,7 @@ static void hystgen_delay_rest(hystgen_real_t *sample, unsigned int *oldest, hys
     *oldest = 0;
 }
 
-/* The place after that of the oldest sample. */
+/* The index after that of the oldest sample. */
 static unsigned int hystgen_delay_next(unsigned int oldest) {
     return oldest + 1u < HYSTGEN_WAITING ? oldest + 1u : 0;
 }
@@ -35,7 +35,7 @@ static hystgen_reach_t hystgen_delayed(const hystgen_real_t *sample, unsigned in
     return v + (hystgen_reach_t)hystgen_times(change, &hystgen_waited);
 }
 #else
-/* The delayed drive: the oldest sample and HYSTGEN_WAITED of the step to the next one. */
+/* The delayed drive: the oldest sample plus HYSTGEN_WAITED of the step to the next one. */
 static hystgen_reach_t hystgen_delayed(const hystgen_real_t *sample, unsigned int oldest) {
     const hystgen_real_t v = sample[oldest];
     return v + HYSTGEN_WAITED * (sample[hystgen_delay_next(oldest)] - v);

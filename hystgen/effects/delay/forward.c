@@ -1,4 +1,4 @@
-/* The delay of the forward operator, or none; the inverse is given its references ahead of time
+/* The delay of the forward operator, or none; the inverse gets its references ahead of time
    instead. Called by chain.c. */
 #ifndef HYSTGEN_DELAY_FORWARD_C
 #define HYSTGEN_DELAY_FORWARD_C

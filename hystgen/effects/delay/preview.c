@@ -6,7 +6,7 @@
 #endif
 
 /* Appends a sample; the first one fills the line. Stores go through volatile where a compiler would
-   otherwise call memmove, which a freestanding target need not have. */
+   otherwise call memmove, which a freestanding target may lack. */
 static void hystgen_preview_put(hystgen_signal_t *line, bool *filled, hystgen_signal_t x) {
     volatile hystgen_signal_t *entry = line;
     unsigned int i;

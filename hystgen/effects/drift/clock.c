@@ -1,8 +1,7 @@
 /* Drift over the time since the clock was started. In floating point samples are counted: `low`
-   counts exactly up to `carry`, 2^24; `high` counts how often it got there. In fixed point the
-   drift is a sum of the change in each sample, as a whole part in units of signals and a fraction
-   below. Called by the functions that emission writes for a chain, see compensator/chain/model.h.
-   */
+   counts exactly up to `carry`, 2^24; `high` counts the carries. In fixed point the drift is a sum
+   of the change in each sample, as a whole part in units of signals and a fraction below. Called by
+   the functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 
 #ifdef HYSTGEN_FIXED
@@ -13,7 +12,7 @@ static void hystgen_clock_start(hystgen_clock_t *self) {
     self->count = 0;
 }
 
-/* One sample later. */
+/* Advances by one sample. */
 static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *self) {
     if (self->count < t->samples) {
         const int64_t part = self->part + t->slope + self->gained;
@@ -44,7 +43,7 @@ static void hystgen_clock_start(hystgen_clock_t *self) {
     self->low = 0;
 }
 
-/* One sample later. */
+/* Advances by one sample. */
 static void hystgen_clock_tick(const hystgen_clock_table_t *t, hystgen_clock_t *self) {
     const hystgen_real_t next = self->low + 1;
     const bool full = next >= t->carry;

@@ -1,12 +1,12 @@
-/* A lag behind a slew limit. A drive that is far ahead of the lag takes its time to come back, so
-   that its lead has to shrink before the lag arrives. Called by slew_limit/brake.c and by the
-   functions that emission writes for a chain. */
+/* A lag after a slew limit. A drive far ahead of the lag takes time to come back, so that its lead
+   has to shrink before the lag arrives. Called by slew_limit/brake.c and by the functions that
+   emission writes for a chain. */
 #ifndef HYSTGEN_LAG_BRAKED_C
 #define HYSTGEN_LAG_BRAKED_C
 #include "compensator/chain/model.h"
 #include "effects/lag/lag.c"
 
-/* Steps of the search for a lead, which end within 2^-16 of it. */
+/* Bisection steps of the search for a lead, which end within 2^-16 of the interval. */
 #define HYSTGEN_BRAKED_HALVES 16u
 
 /* Everything has settled at the input v. Returns the output. */
@@ -15,7 +15,7 @@ static hystgen_real_t hystgen_braked_rest(hystgen_braked_t *self, hystgen_real_t
     return hystgen_lag_rest(&self->lag, v);
 }
 
-/* The input that leads to the output y at this sample. */
+/* The input for the output y at this sample. */
 static hystgen_real_t hystgen_braked_solve(const hystgen_lag_table_t *t, hystgen_braked_t *self,
                                            hystgen_real_t y) {
     return hystgen_lag_solve(t, &self->lag, y);
@@ -28,9 +28,9 @@ static hystgen_real_t hystgen_braked_absorb(const hystgen_lag_table_t *t, hystge
     return hystgen_lag_absorb(t, &self->lag, v);
 }
 
-/* By how much `lead` exceeds the largest lead that still comes back in time, limited to `room`. The
-   lag is to gain `size`; `most` would gain it in this step. With a lead m, which shrinks by `back`
-   in a step, it gains at most (m + back/2)^2 / (2 back most) of `size` until the lead is gone. */
+/* Excess of `lead` over the largest lead that comes back in time, limited to `room`. The lag is to
+   gain `size`; a lead of `most` gains this in one step. With a lead m that shrinks by `back` in a
+   step, the lag gains at most (m + back/2)^2 / (2 back most) of `size` until the lead is gone. */
 static hystgen_real_t hystgen_braked_over(hystgen_real_t size, hystgen_real_t most,
                                           hystgen_real_t lead, hystgen_real_t back,
                                           hystgen_real_t room) {
@@ -61,9 +61,9 @@ static hystgen_real_t hystgen_braked_over(hystgen_real_t size, hystgen_real_t mo
 }
 
 /* The drive from which the lag does not overshoot. `near` is the reachable drive nearest to the
-   answer, `beyond` the distance between the two. The lead is cut by no more than the drive falls
-   short of the answer now and fell short before. A target that moves by `way` in a step needs a
-   lead of way/(1 - E). */
+   solution, `beyond` the distance between these drives. The lead is cut at most by the present and
+   the previous shortfall of the drive. A target moving by `way` in a step needs a lead of way/(1 -
+   E). */
 HYSTGEN_APART hystgen_real_t hystgen_braked_drive(const hystgen_lag_table_t *t,
                                                   const hystgen_braked_t *self, hystgen_real_t near,
                                                   hystgen_real_t beyond) {

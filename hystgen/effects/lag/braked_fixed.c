@@ -1,16 +1,16 @@
-/* A lag behind a slew limit, in fixed point. A drive that is far ahead of the lag takes its time to
-   come back, so that its lead has to shrink before the lag arrives. Called by slew_limit/brake.c
-   and by the functions that emission writes for a chain. */
+/* A lag after a slew limit, in fixed point. A drive far ahead of the lag takes time to come back,
+   so that its lead has to shrink before the lag arrives. Called by slew_limit/brake.c and by the
+   functions that emission writes for a chain. */
 #ifndef HYSTGEN_LAG_BRAKED_FIXED_C
 #define HYSTGEN_LAG_BRAKED_FIXED_C
 #include "arithmetic/fixed.h"
 #include "compensator/chain/model.h"
 #include "effects/lag/lag_fixed.c"
 
-/* Steps of the search for a lead, which end within 2^-16 of it. */
+/* Bisection steps of the search for a lead, which end within 2^-16 of the interval. */
 #define HYSTGEN_BRAKED_HALVES 16u
 
-/* Largest of the numbers that a lead is searched with: the square of a sum of two fits 64 bits. */
+/* Largest number in the search for a lead: the square of a sum of two fits 64 bits. */
 #define HYSTGEN_BRAKED_MOST (((int32_t)1 << 30) - 1)
 
 /* Everything has settled at the input v. Returns the output. */
@@ -21,7 +21,7 @@ static int64_t hystgen_braked_rest(const hystgen_lag_table_t *t, hystgen_braked_
     return output;
 }
 
-/* The input that leads to the output y at this sample. */
+/* The input for the output y at this sample. */
 static int64_t hystgen_braked_solve(const hystgen_lag_table_t *t, hystgen_braked_t *self,
                                     int64_t y) {
     return hystgen_lag_solve(t, &self->lag, y);
@@ -34,7 +34,7 @@ static int64_t hystgen_braked_absorb(const hystgen_lag_table_t *t, hystgen_brake
     return hystgen_lag_absorb(t, &self->lag, v);
 }
 
-/* A signal as a number to search with, which has fewer bits. */
+/* A signal as a number of the search, which has fewer bits. */
 static int32_t hystgen_braked_coarse(int64_t x) {
     const int64_t coarse = x >> HYSTGEN_BRAKED_DROP;
     if (coarse > HYSTGEN_BRAKED_MOST) {
@@ -43,19 +43,19 @@ static int32_t hystgen_braked_coarse(int64_t x) {
     return coarse < -HYSTGEN_BRAKED_MOST ? -HYSTGEN_BRAKED_MOST : (int32_t)coarse;
 }
 
-/* The lead, a signal, with which the lag goes on by x, a state, in a step: x/(1 - E). */
+/* Lead, a signal, with which the lag moves by x, in units of its state, in a step: x/(1 - E). */
 HYSTGEN_APART int64_t hystgen_braked_led(const hystgen_lag_table_t *t, int64_t x) {
     return hystgen_lag_scaled(t, x, &t->inverse_rate);
 }
 
-/* The same for numbers to search with. */
+/* The same for numbers of the search. */
 static int32_t hystgen_braked_coarsely(const hystgen_lag_table_t *t, int32_t x) {
     const int64_t state = (int64_t)x * ((int64_t)1 << (t->bits + HYSTGEN_BRAKED_DROP));
     return hystgen_braked_coarse(hystgen_braked_led(t, state));
 }
 
-/* Sets the most by which the lead is cut: what the drive falls short of the answer now, and before.
-   Returns whether that is half a code or more; no drive has less. */
+/* Sets the largest cut of the lead: the present and the previous shortfall of the drive. Returns
+   whether this cut is half a code or more; less would not change a drive. */
 HYSTGEN_APART bool hystgen_braked_room(const hystgen_lag_table_t *t, const hystgen_braked_t *self,
                                        hystgen_brake_t *brake, int64_t beyond) {
     const int64_t missed = self->earlier - self->lag.wanted;
@@ -64,8 +64,8 @@ HYSTGEN_APART bool hystgen_braked_room(const hystgen_lag_table_t *t, const hystg
     return room + room >= (int64_t)1 << HYSTGEN_DRIVE_BITS;
 }
 
-/* How far its target moves the lag in this step, a state, by no more than the drive reaches; sets
-   what the lag is to gain beyond that, and what its lead may shrink in a step. */
+/* Move of the lag's target in this step, in units of its state, limited to the drive's rate. Sets
+   the distance that the lag is to gain beyond this move, and the decrease of its lead in a step. */
 HYSTGEN_APART int64_t hystgen_braked_along(const hystgen_lag_table_t *t,
                                            const hystgen_braked_t *self, hystgen_brake_t *brake) {
     const int64_t rising = (int64_t)HYSTGEN_SLEW_RISING * ((int64_t)1 << HYSTGEN_DRIVE_BITS);
@@ -83,8 +83,8 @@ HYSTGEN_APART int64_t hystgen_braked_along(const hystgen_lag_table_t *t,
     return way;
 }
 
-/* The largest lead m, up to `lead`, with which the lag gains no more than `size` until it is there:
-   (m + back/2)^2 / (2 way), where `way` is back/(1 - E). */
+/* The largest lead m, up to `lead`, with which the lag gains no more than `size` until the lead is
+   gone: (m + back/2)^2 / (2 way), where `way` is back/(1 - E). */
 HYSTGEN_APART int32_t hystgen_braked_lead(int32_t size, int32_t lead, int32_t margin, int32_t way) {
     const int64_t limit = (int64_t)2 * size * way;
     int32_t low = size;
@@ -117,7 +117,7 @@ HYSTGEN_APART int32_t hystgen_braked_most(const hystgen_lag_table_t *t,
     return most;
 }
 
-/* By how much the lead is cut: what it exceeds that by, within the room. */
+/* Cut of the lead: its excess over the largest that comes back in time, limited to `room`. */
 static int32_t hystgen_braked_over(const hystgen_lag_table_t *t, const hystgen_brake_t *brake) {
     const int32_t over = brake->lead - hystgen_braked_most(t, brake);
     if (over > brake->room) {
@@ -127,8 +127,8 @@ static int32_t hystgen_braked_over(const hystgen_lag_table_t *t, const hystgen_b
 }
 
 /* The drive from which the lag does not overshoot. `near` is the reachable drive nearest to the
-   answer, `beyond` the distance between the two. The lead is cut by no more than the drive falls
-   short of the answer now and fell short before. */
+   solution, `beyond` the distance between these drives. The lead is cut at most by the present and
+   the previous shortfall of the drive. */
 static int64_t hystgen_braked_drive(const hystgen_lag_table_t *t, const hystgen_braked_t *self,
                                     int64_t near, int64_t beyond) {
     hystgen_brake_t brake;

@@ -1,5 +1,5 @@
-/* A lag of at most half a step as a block of the chain: its inverse fades within a few samples. In
-   fixed point the state is the output at the next sample if the input stays. Called by the
+/* A lag of at most half a step as a block of the chain: its inverse decays within a few samples. In
+   fixed point the state is the output at the next sample for an unchanged input. Called by the
    functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 #ifdef HYSTGEN_FIXED
@@ -15,7 +15,7 @@ static int64_t hystgen_lag_exact_rest(const hystgen_lag_exact_table_t *t, hystge
     return v;
 }
 
-/* The input that leads to the output y at this sample. */
+/* The input for the output y at this sample. */
 static int64_t hystgen_lag_exact_solve(const hystgen_lag_exact_table_t *t,
                                        const hystgen_lag_exact_t *self, int64_t y) {
     const int64_t more = y * ((int64_t)1 << t->bits) - self->next;
@@ -39,7 +39,7 @@ static hystgen_real_t hystgen_lag_exact_rest(hystgen_lag_exact_t *self, hystgen_
     return v;
 }
 
-/* The input that leads to the output y at this sample. */
+/* The input for the output y at this sample. */
 static hystgen_real_t hystgen_lag_exact_solve(const hystgen_lag_exact_table_t *t,
                                               const hystgen_lag_exact_t *self, hystgen_real_t y) {
     const hystgen_real_t ahead =

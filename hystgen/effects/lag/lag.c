@@ -1,7 +1,8 @@
-/* A lag as a block of the chain. The inverse of a lag on a drive that is straight between samples
-   rings; that of x, a lag on a drive that holds, does not. The output is x less theta of its last
-   step, so x is led beyond the output asked for by theta of the output's step: exact on ramps.
-   Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
+/* A lag as a block of the chain. The inverse of a lag whose drive is interpolated between samples
+   rings; the inverse of x, the response to a zero-order-hold drive, does not. The output is x minus
+   theta of its last step, so x is led beyond the requested output by theta of the output's step:
+   exact on ramps. Called by the functions that emission writes for a chain, see
+   compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_LAG_C
 #define HYSTGEN_LAG_LAG_C
 #include "compensator/chain/model.h"
@@ -16,7 +17,7 @@ static hystgen_real_t hystgen_lag_rest(hystgen_lag_t *self, hystgen_real_t v) {
     return v;
 }
 
-/* The input that leads to the output y at this sample. */
+/* The input for the output y at this sample. */
 static hystgen_real_t hystgen_lag_solve(const hystgen_lag_table_t *t, hystgen_lag_t *self,
                                         hystgen_real_t y) {
     const hystgen_real_t goal = y + t->theta * (y - self->wanted);
@@ -32,7 +33,7 @@ static hystgen_real_t hystgen_lag_absorb(const hystgen_lag_table_t *t, hystgen_l
     const hystgen_real_t change = t->rate * (v - high) + self->low;
     const hystgen_real_t next = high + change;
     self->high = next;
-    self->low = change - (next - high); /* what rounding took from the sum */
+    self->low = change - (next - high); /* rounding remainder of the sum */
     self->wanted = self->asked + t->late * (v - self->answer);
     return next - t->theta * (next - high);
 }

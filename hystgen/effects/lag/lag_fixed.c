@@ -1,6 +1,6 @@
-/* A lag as a block of the chain, in fixed point: x, a lag on a drive that holds, is led beyond the
-   output asked for by theta of the output's step, as in floating point. `lead` is the move that x
-   was to make, so that the effect of an input other than the answer is known. Called by the
+/* A lag as a block of the chain, in fixed point: x, the response to a zero-order-hold drive, is led
+   beyond the requested output by theta of the output's step, as in floating point. `lead` is the
+   requested move of x, which gives the effect of an input other than the solution. Called by the
    functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_LAG_FIXED_C
 #define HYSTGEN_LAG_LAG_FIXED_C
@@ -23,7 +23,7 @@ static int64_t hystgen_lag_rest(const hystgen_lag_table_t *t, hystgen_lag_t *sel
     return v;
 }
 
-/* The input that leads to the output y at this sample. */
+/* The input for the output y at this sample. */
 static int64_t hystgen_lag_solve(const hystgen_lag_table_t *t, hystgen_lag_t *self, int64_t y) {
     const int64_t asked = y * ((int64_t)1 << t->bits);
     self->lead = asked + hystgen_lag_scaled(t, asked - self->wanted, &t->theta) - self->high;

@@ -1,22 +1,22 @@
-/* A drive that stands still while the reference does. The drive in front of a lag makes up for the
-   rounding of the one before, and creep notices that too: at rest it goes to and fro by a code.
-   After HYSTGEN_QUIET equal references, with drives no farther than HYSTGEN_DITHER from what stands
-   in front of the plays in the end, the last one is kept until it is that far off. What is sought
-   in front of the plays is then within twice that of what has arrived; beyond, it has jumped.
+/* A drive that stands still while the reference does. Each drive into a lag corrects the rounding
+   of the previous drive, and creep responds to this too: at rest the drive alternates by a code.
+   After HYSTGEN_QUIET equal references, with drives no farther than HYSTGEN_DITHER from the drive
+   needed at rest, the last drive is kept until it is farther off. The requested output of the drive
+   side is then within twice HYSTGEN_DITHER of the present one; a larger difference is a jump.
    Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_QUIET_C
 #define HYSTGEN_LAG_QUIET_C
 #include "compensator/chain/model.h"
 #include "compensator/chain/drive_signal.c"
 
-/* Everything has settled with a in front of the plays. */
+/* Everything has settled at the output a of the drive side. */
 static void hystgen_quiet_rest(hystgen_quiet_t *self, hystgen_signal_t a) {
     self->arrived = a;
     self->reference = 0;
     self->equal = 0;
 }
 
-/* Counts references that are equal to the next one, u. */
+/* Counts consecutive references equal to the next one, u. */
 static void hystgen_quiet_count(hystgen_quiet_t *self, hystgen_signal_t u) {
     if (u < self->reference || u > self->reference) {
         self->reference = u;
@@ -32,7 +32,7 @@ static bool hystgen_quiet_still(const hystgen_quiet_t *self) {
     return self->equal >= HYSTGEN_QUIET;
 }
 
-/* The drive for a in front of the plays: v, which leads there, or one that stands still. */
+/* The drive for the output a of the drive side: v, the solution, or one that stands still. */
 static hystgen_signal_t hystgen_quiet_drive(hystgen_quiet_t *self, hystgen_signal_t a,
                                             hystgen_signal_t v, hystgen_real_t applied) {
     const bool kept = self->equal > HYSTGEN_QUIET;

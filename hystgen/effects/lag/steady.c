@@ -1,5 +1,5 @@
-/* A lag in front of two branches, which has to arrive from the side of its branch: x moves in one
-   direction as long as drives lie ahead of it, and the output between two values of x with it.
+/* A lag before a memoryless part of two branches, which has to arrive from the side of its branch:
+   x moves in one direction while drives lie ahead, and so does the output, between two values of x.
    Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_STEADY_C
 #define HYSTGEN_LAG_STEADY_C
@@ -13,12 +13,12 @@ static void hystgen_steady_rest(hystgen_steady_t *self) {
     self->rises = true;
 }
 
-/* What the lag misses of a way in its first sample. */
+/* The part of a move that the lag misses in its first sample. */
 static hystgen_real_t hystgen_steady_missed(const hystgen_lag_table_t *t, hystgen_real_t way) {
     return t->theta * way;
 }
 
-/* The part of a target's move that is led, twice the move before at most. */
+/* The part of a target's move that is led, at most twice the previous move. */
 static hystgen_real_t hystgen_steady_led(hystgen_real_t way, hystgen_real_t moved) {
     const hystgen_real_t twice = moved + moved;
     const hystgen_real_t least = twice < 0 ? twice : 0;
@@ -32,8 +32,8 @@ static hystgen_real_t hystgen_steady_led(hystgen_real_t way, hystgen_real_t move
     return way;
 }
 
-/* The input v if it is ahead of x by `little` or more. Else one with which x comes to rest without
-   going back: the last one, `applied`, or one ahead of x by `little`. */
+/* The input v if ahead of x by `little` or more. Otherwise an input with which x comes to rest
+   without going back: the last input, `applied`, or the input ahead of x by `little`. */
 static hystgen_real_t hystgen_steady_kept(const hystgen_steady_t *self,
                                           const hystgen_lag_table_t *t, const hystgen_lag_t *lag,
                                           hystgen_real_t v, hystgen_real_t applied,
@@ -51,7 +51,7 @@ static hystgen_real_t hystgen_steady_kept(const hystgen_steady_t *self,
     return rises ? x + little : x - little;
 }
 
-/* The input that leads to the output y without taking x back from the direction `rises`. */
+/* The input for the output y that does not take x back from the direction `rises`. */
 static hystgen_real_t hystgen_steady_solve(hystgen_steady_t *self, const hystgen_lag_table_t *t,
                                            hystgen_lag_t *lag, hystgen_real_t y, bool rises,
                                            hystgen_real_t applied, hystgen_real_t little) {
@@ -62,8 +62,8 @@ static hystgen_real_t hystgen_steady_solve(hystgen_steady_t *self, const hystgen
     return lag->answer;
 }
 
-/* The same of a lag behind a brake, which sees the part of the target's move that is led, and what
-   the input before was short of. */
+/* The same for a lag after a brake, which takes the led part of the target's move and the shortfall
+   of the previous input into account. */
 static hystgen_real_t hystgen_steady_braked(hystgen_steady_t *self, const hystgen_lag_table_t *t,
                                             hystgen_braked_t *braked, hystgen_real_t y, bool rises,
                                             hystgen_real_t applied, hystgen_real_t little) {
@@ -74,8 +74,8 @@ static hystgen_real_t hystgen_steady_braked(hystgen_steady_t *self, const hystge
     return v;
 }
 
-/* The lag has followed from x = `before`. What rounding took from the sum is known exactly unless x
-   has moved by its own size or more, and could then take x back. */
+/* The lag has followed from x = `before`. The rounding remainder of the sum is exact unless x has
+   moved by its own size or more; it could then take x back and is dropped. */
 static void hystgen_steady_absorb(hystgen_steady_t *self, hystgen_lag_t *lag,
                                   hystgen_real_t before) {
     const hystgen_real_t way = lag->high - before;

@@ -1,6 +1,6 @@
-/* A lag in front of two branches in fixed point, as in floating point. `little` is at least a drive
-   code, so that a drive is still ahead of x once it is rounded to one. Called by the functions that
-   emission writes for a chain, see compensator/chain/model.h. */
+/* A lag before a memoryless part of two branches in fixed point, as in floating point. `little` is
+   at least a drive code, so that a drive is still ahead of x after rounding to a code. Called by
+   the functions that emission writes for a chain, see compensator/chain/model.h. */
 #ifndef HYSTGEN_LAG_STEADY_FIXED_C
 #define HYSTGEN_LAG_STEADY_FIXED_C
 #include "arithmetic/fixed.h"
@@ -14,13 +14,13 @@ static void hystgen_steady_rest(hystgen_steady_t *self) {
     self->rises = true;
 }
 
-/* What the lag misses of a way in its first sample. */
+/* The part of a move that the lag misses in its first sample. */
 static int64_t hystgen_steady_missed(const hystgen_lag_table_t *t, int64_t way) {
     return hystgen_nearest(hystgen_lag_scaled(t, way * ((int64_t)1 << t->bits), &t->theta),
                            t->bits);
 }
 
-/* The part of a target's move that is led, twice the move before at most. */
+/* The part of a target's move that is led, at most twice the previous move. */
 static int64_t hystgen_steady_led(int64_t way, int64_t moved) {
     const int64_t twice = moved + moved;
     const int64_t least = twice < 0 ? twice : 0;
@@ -34,8 +34,8 @@ static int64_t hystgen_steady_led(int64_t way, int64_t moved) {
     return way;
 }
 
-/* The input v if it is ahead of x by `little` or more. Else one with which x comes to rest without
-   going back: the last one, `applied`, or one ahead of x by `little`. */
+/* The input v if ahead of x by `little` or more. Otherwise an input with which x comes to rest
+   without going back: the last input, `applied`, or the input ahead of x by `little`. */
 static int64_t hystgen_steady_kept(const hystgen_steady_t *self, const hystgen_lag_table_t *t,
                                    const hystgen_lag_t *lag, int64_t v, int64_t applied,
                                    int64_t little) {
@@ -52,7 +52,7 @@ static int64_t hystgen_steady_kept(const hystgen_steady_t *self, const hystgen_l
     return rises ? x + little : x - little;
 }
 
-/* The input that leads to the output y without taking x back from the direction `rises`. */
+/* The input for the output y that does not take x back from the direction `rises`. */
 static int64_t hystgen_steady_solve(hystgen_steady_t *self, const hystgen_lag_table_t *t,
                                     hystgen_lag_t *lag, int64_t y, bool rises, int64_t applied,
                                     int64_t little) {
@@ -63,13 +63,13 @@ static int64_t hystgen_steady_solve(hystgen_steady_t *self, const hystgen_lag_ta
     const int64_t led = hystgen_lag_solve(t, lag, y);
     const int64_t v = hystgen_steady_kept(self, t, lag, led, applied, little);
     if (v < led || v > led) {
-        lag->lead = 0; /* it leads nowhere */
+        lag->lead = 0; /* v is not the solution: no move is requested */
     }
     return v;
 }
 
-/* The same of a lag behind a brake, which sees the part of the target's move that is led, and what
-   the input before was short of. */
+/* The same for a lag after a brake, which takes the led part of the target's move and the shortfall
+   of the previous input into account. */
 static int64_t hystgen_steady_braked(hystgen_steady_t *self, const hystgen_lag_table_t *t,
                                      hystgen_braked_t *braked, int64_t y, bool rises,
                                      int64_t applied, int64_t little) {
@@ -83,7 +83,7 @@ static int64_t hystgen_steady_braked(hystgen_steady_t *self, const hystgen_lag_t
 /* The lag has followed. */
 static void hystgen_steady_absorb(hystgen_steady_t *self, const hystgen_lag_t *lag,
                                   int64_t before) {
-    (void)lag; /* its sum is exact */
+    (void)lag; /* no rounding remainder: the sum is exact */
     (void)before;
     self->moved = self->way;
     self->way = 0;

@@ -1,18 +1,18 @@
-/* What a play contributes at a position: itself, or bent by a bump or by a polynomial. Called by
-   chain/moving_plays.c and by relaxing plays. */
+/* The contribution of a play at a value: the value itself, or bent by a bump or by a polynomial.
+   Called by chain/moving_plays.c and by relaxing plays. */
 #ifndef HYSTGEN_NONCONGRUENT_BENT_C
 #define HYSTGEN_NONCONGRUENT_BENT_C
 #include "compensator/chain/model.h"
 
 #ifndef HYSTGEN_HAS_BENT_PLAYS
-/* What play i contributes at z: itself. */
+/* Contribution of play i at z: z itself. */
 static inline hystgen_sum_t hystgen_bent(unsigned int i, hystgen_play_t z) {
     (void)i;
     return z;
 }
 #elif defined(HYSTGEN_FIXED)
-/* What a play bent by curve c contributes at z, in fixed point: z and the value of the curve.
-   Beyond where plays can be a curve stays at its end. */
+/* Contribution at z of a play bent by curve c, in fixed point: z plus the value of the curve.
+   Beyond the range of the plays a curve keeps its end value. */
 HYSTGEN_APART int64_t hystgen_bent_by(const hystgen_bump_t *c, int32_t z) {
     int32_t inside;
     if (z < -HYSTGEN_BUMP_END) {
@@ -27,19 +27,19 @@ HYSTGEN_APART int64_t hystgen_bent_by(const hystgen_bump_t *c, int32_t z) {
     return z + hystgen_nearest(value * ((int64_t)1 << HYSTGEN_BUMP_LIFT), HYSTGEN_BUMP_BITS);
 }
 
-/* What play i contributes at z; several plays may have a curve in common. */
+/* Contribution of play i at z; several plays may share a curve. */
 HYSTGEN_APART int64_t hystgen_bent(unsigned int i, int32_t z) {
     const uint16_t curve = hystgen_bump_of[i];
     return hystgen_bent_by(&hystgen_bump[curve], z);
 }
 #elif defined(HYSTGEN_HAS_BUMP)
-/* What play i contributes at z: more or less than z around a centre. Play 0 is the input itself. */
+/* Contribution of play i at z: more or less than z around a centre. Play 0 is the input itself. */
 HYSTGEN_APART hystgen_real_t hystgen_bent(unsigned int i, hystgen_real_t z) {
     const hystgen_real_t x = (z - HYSTGEN_CENTRE) * HYSTGEN_INVERSE_WIDTH;
     return i == 0 ? z : z + HYSTGEN_BUMP * (hystgen_tanh(x) + HYSTGEN_TANH_CENTRE);
 }
 #else
-/* What play i contributes at z: a polynomial for each play. Play 0 is the input itself. */
+/* Contribution of play i at z: a polynomial for each play. Play 0 is the input itself. */
 static hystgen_real_t hystgen_bent(unsigned int i, hystgen_real_t z) {
     const hystgen_real_t x = z * HYSTGEN_INVERSE_SCALE;
     hystgen_real_t sum = 0;

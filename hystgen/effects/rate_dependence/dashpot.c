@@ -1,18 +1,18 @@
-/* Plays with a nonlinear dashpot. In a step the input counts as if it stood still part of the way;
-   a table (hystgen_yield) gives what a play gains of its stretch in that time. A second row behind
-   the plays holds what rounding took from each, so that none stops short of where it creeps to.
-   Called by compensator/chain/moving_plays.c. */
+/* Plays with a nonlinear dashpot. During a step the input is taken as standing still at a point of
+   its move; a table (hystgen_yield) gives the part of its stretch that a play gains in this time. A
+   second row after the plays holds the rounding remainder of each play, so that none stops short of
+   its rest value. Called by compensator/chain/moving_plays.c. */
 #ifndef HYSTGEN_RATE_DEPENDENCE_DASHPOT_C
 #define HYSTGEN_RATE_DEPENDENCE_DASHPOT_C
 #include "compensator/chain/model.h"
 #include "effects/rate_dependence/yield.c"
 
-/* Where the input counts as standing still while it goes to w. */
+/* The input taken as standing still during the move to w. */
 static inline hystgen_play_t hystgen_standing(const hystgen_play_t *play, hystgen_play_t w) {
     return (hystgen_play_t)(play[0] + hystgen_standing_way((hystgen_sum_t)w - play[0]));
 }
 
-/* How far play i moves, as a yield, while the input of the plays stands still there. */
+/* The move of play i, as a yield, with the input of the plays standing still. */
 HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_change(unsigned int i, const hystgen_play_t *play,
                                                     hystgen_play_t standing) {
     const hystgen_sum_t x = (hystgen_sum_t)standing - play[i];
@@ -25,25 +25,25 @@ HYSTGEN_APART_IN_FIXED hystgen_sum_t hystgen_change(unsigned int i, const hystge
     return lost;
 }
 
-/* Play i once it has moved by a yield. */
+/* Play i after a move by a yield. */
 static inline hystgen_play_t hystgen_gone(unsigned int i, const hystgen_play_t *play,
                                           hystgen_sum_t yield) {
     return (hystgen_play_t)(play[i] + hystgen_moved_by(yield));
 }
 
-/* Play i once the input of the plays has gone to w. */
+/* Play i after the input of the plays has moved to w. */
 static inline hystgen_play_t hystgen_moved(unsigned int i, const hystgen_play_t *play,
                                            hystgen_play_t w) {
     return hystgen_gone(i, play, hystgen_change(i, play, hystgen_standing(play, w)));
 }
 
-/* Where the plays are is where they rest, since they only creep on in the next steps. */
+/* The present values of the plays are their rest values: plays creep on only in the next steps. */
 static inline void hystgen_relax(hystgen_play_t *play, hystgen_sum_t *bent) {
     (void)play;
     (void)bent;
 }
 
-/* Play i moves while the input of the plays goes to w. */
+/* Play i moves while the input of the plays moves to w. */
 HYSTGEN_APART_IN_FLOAT void hystgen_move(unsigned int i, hystgen_play_t *play, hystgen_play_t w) {
     const hystgen_sum_t yield = hystgen_change(i, play, hystgen_standing(play, w));
     const hystgen_play_t z = hystgen_gone(i, play, yield);

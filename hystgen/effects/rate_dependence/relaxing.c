@@ -1,9 +1,9 @@
-/* Viscous plays with one time constant. The state of a play is where it would come to rest
-   (`play`). At the end of a step its input w has stretched it by what lies beyond the threshold;
-   the play gains a share of that. Exact while it slides or rests; contact that begins or ends
-   within a step counts from the first touch. In fixed point a play stops where its stretch would
-   gain less than half a step of the plays' input in a sample. The first move finds the plays at
-   rest, as it finds plain ones. Called by chain.c and chain_calls.c. */
+/* Viscous plays with one time constant. The state of a play is its rest value (`play`). At the end
+   of a step its input w has stretched the play by the excess over the threshold; the play gains a
+   share of this stretch. Exact while the play slides or rests; contact that begins or ends within a
+   step counts from the first touch. In fixed point a play stops where its stretch would gain less
+   than half a step of the plays' input in a sample. Before the first move the plays are at rest,
+   like plain ones. Called by chain.c and chain_calls.c. */
 #include "compensator/chain/model.h"
 #include "compensator/chain/plays_solve.c"
 #include "effects/rate_dependence/stretch.c"
@@ -13,8 +13,8 @@
 #endif
 
 #ifdef HYSTGEN_FIXED
-/* Where play i rests: at most as far from the play before as their thresholds are from each other,
-   in spite of rounding. */
+/* The rest value of play i, no farther from that of play i - 1 than their thresholds differ,
+   despite rounding. */
 static hystgen_play_t hystgen_limited_rest(const hystgen_play_t *play, unsigned int i,
                                            int64_t rest) {
     const hystgen_tables_t *t = &hystgen_model_tables;
@@ -50,8 +50,8 @@ HYSTGEN_APART hystgen_sum_t hystgen_relaxing_follow(hystgen_play_t *play, hystge
     return sum;
 }
 
-/* Input of the plays at which their sum is `sum`. No viscous play is stretched with the input where
-   play 1 rests; from there on they are solved for like plain ones, with smaller slopes. */
+/* Input of the plays at which their sum is `sum`. No viscous play is stretched at the rest value of
+   play 1; from there on they are solved like plain ones, with smaller slopes. */
 static hystgen_reach_t hystgen_relaxing_input(hystgen_play_t *play, hystgen_sum_t sum) {
     play[0] = play[1];
     return hystgen_loop_solve(&hystgen_relaxing_tables, play, sum);
@@ -71,8 +71,8 @@ static hystgen_real_t hystgen_relaxing_follow(hystgen_real_t *play, hystgen_real
     return sum;
 }
 
-/* Input of the plays at which their sum is h: first without any stretched play, then with those
-   that are stretched on the way there, in the order of their thresholds. */
+/* Input of the plays at which their sum is h: first without any stretched play, then with the plays
+   stretched on the way to w, in the order of their thresholds. */
 static hystgen_real_t hystgen_relaxing_input(const hystgen_real_t *play, hystgen_real_t h) {
     hystgen_real_t rest = 0;
     unsigned int i;
@@ -103,7 +103,7 @@ static hystgen_signal_t hystgen_operator_started(const hystgen_operator_t *self)
     return hystgen_level(hystgen_loop_output(&hystgen_model_tables, self->play));
 }
 
-/* The plays follow their input w to another sum. */
+/* The plays follow their input w. Updates their sum. */
 HYSTGEN_APART_IN_FIXED void hystgen_operator_follow(hystgen_operator_t *self, hystgen_play_t w) {
     if (self->moving) {
         self->level = hystgen_level(hystgen_relaxing_follow(self->play, w));

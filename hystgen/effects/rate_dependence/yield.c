@@ -1,5 +1,5 @@
-/* What a play with a nonlinear dashpot gains of its stretch in a step, as a table. Called by
-   dashpot.c. */
+/* The part of its stretch that a play with a nonlinear dashpot gains in a step, as a table. Called
+   by dashpot.c. */
 #ifndef HYSTGEN_RATE_DEPENDENCE_YIELD_C
 #define HYSTGEN_RATE_DEPENDENCE_YIELD_C
 #include "compensator/chain/model.h"
@@ -42,7 +42,7 @@ static int64_t hystgen_yield(int64_t x) {
     return y > hystgen_yield_of(whole) ? hystgen_yield_of(whole) : y;
 }
 
-/* How far into the step `way` the input counts as standing still. */
+/* The part of a step `way` after which the input is taken as standing still. */
 static inline int64_t hystgen_standing_way(int64_t way) {
     return hystgen_short_times(way, &hystgen_standing_share);
 }
@@ -63,7 +63,7 @@ static hystgen_real_t hystgen_yield(hystgen_real_t x) {
     return ((c[4] * on + c[3]) * on + c[2]) * on + c[1];
 }
 
-/* How far into the step `way` the input counts as standing still. */
+/* The part of a step `way` after which the input is taken as standing still. */
 static inline hystgen_real_t hystgen_standing_way(hystgen_real_t way) {
     return way * HYSTGEN_STANDING_SHARE;
 }

@@ -1,6 +1,6 @@
-/* A mode as a block of the forward operator. Its states, the output less the input and the rate of
-   that, turn into each other and decay; in fixed point they have bits below those of a signal.
-   Called by the functions that emission writes for a chain, see compensator/chain/model.h. */
+/* A mode as a block of the forward operator. Its states, output minus input and the rate of this,
+   turn into each other and decay; in fixed point they have bits below those of a signal. Called by
+   the functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 #ifdef HYSTGEN_FIXED
 #include "arithmetic/factors.c"

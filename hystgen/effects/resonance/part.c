@@ -14,7 +14,7 @@ typedef struct {
 
 typedef struct {
     hystgen_signal_t before; /* input of the last sample */
-    hystgen_signal_t off;    /* how far the output lies off the input */
+    hystgen_signal_t off;    /* output minus input */
     hystgen_signal_t rate;
 } hystgen_resonance_part_t;
 
@@ -28,14 +28,14 @@ static hystgen_signal_t hystgen_resonance_part_rest(const hystgen_resonance_part
     return x;
 }
 
-/* The input of the settled output y. */
+/* The input for the settled output y. */
 static hystgen_signal_t hystgen_resonance_part_resting(const hystgen_resonance_part_table_t *t,
                                                        hystgen_signal_t y) {
     (void)t;
     return y;
 }
 
-/* The input that gives the output y at this sample. */
+/* The input for the output y at this sample. */
 static hystgen_signal_t hystgen_resonance_part_solve(const hystgen_resonance_part_table_t *t,
                                                      const hystgen_resonance_part_t *self,
                                                      hystgen_signal_t y) {

@@ -1,4 +1,4 @@
-/* Drives at a limited rate in front of a lag, which must not overshoot. Called by chain_calls.c. */
+/* Rate-limited drives into a lag, which must not overshoot. Called by chain_calls.c. */
 #ifndef HYSTGEN_CONFIGURED
 #define HYSTGEN_HAS_SLEW_LIMIT
 #define HYSTGEN_HAS_BRAKED_LAG
@@ -10,8 +10,8 @@
 #define HYSTGEN_ASKS_LED
 #include "effects/catalogue.h"
 
-/* The drive from which the lag behind the amplifier does not overshoot on its way to the answer v,
-   of which `near` is the nearest that the amplifier reaches. */
+/* The drive from which the lag after the amplifier does not overshoot on its way to the solution v;
+   `near` is the drive nearest to v that the amplifier reaches. */
 static hystgen_reach_t hystgen_inverse_braked(const hystgen_inverse_t *self, hystgen_reach_t v,
                                               hystgen_reach_t near) {
     return hystgen_drive_code(
@@ -20,8 +20,8 @@ static hystgen_reach_t hystgen_inverse_braked(const hystgen_inverse_t *self, hys
 }
 
 #if defined(HYSTGEN_HAS_QUIET_DRIVE)
-/* The drive nearest to v that the amplifier reaches in one step, or from which the lag behind it
-   does not overshoot unless the drive stands still; v itself in the first one. */
+/* Drive nearest to v that the amplifier reaches in one step, or, unless the drive stands still,
+   from which the lag after the amplifier does not overshoot; v itself in the first step. */
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
                                                               hystgen_reach_t v) {
     if (!self->moving) {
@@ -44,8 +44,8 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_kept(const hystgen_invers
         hystgen_drive_signal(self->applied), HYSTGEN_DITHER));
 }
 
-/* The drive nearest to v that the amplifier reaches in one step, or from which the lag behind it
-   neither overshoots nor leaves its branch; v itself in the first one. */
+/* Drive nearest to v that the amplifier reaches in one step, or from which the lag after the
+   amplifier neither overshoots nor leaves its branch; v itself in the first step. */
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
                                                               hystgen_reach_t v) {
     if (!self->moving) {
@@ -58,8 +58,8 @@ HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t 
     return self->reached.drive;
 }
 #else
-/* The drive nearest to v that the amplifier reaches in one step, or from which the lag behind it
-   does not overshoot; v itself in the first one. */
+/* Drive nearest to v that the amplifier reaches in one step, or from which the lag after the
+   amplifier does not overshoot; v itself in the first step. */
 HYSTGEN_APART_IN_FIXED hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self,
                                                               hystgen_reach_t v) {
     if (!self->moving) {

@@ -1,16 +1,16 @@
-/* Drives at a limited rate, or at any rate. What rounding takes from such a drive, and in floating
-   point from the rate, is kept beside it: no number of steps adds it up, and a step may be smaller
-   than the drive's last bit. Called by chain.c and chain_calls.c. */
+/* Drives with or without a rate limit. The rounding remainder of a limited drive, and in floating
+   point that of the rate, is stored too: rounding errors do not add up over steps, and a step may
+   be smaller than the drive's last bit. Called by chain.c and chain_calls.c. */
 #ifndef HYSTGEN_SLEW_LIMIT_SLEWED_C
 #define HYSTGEN_SLEW_LIMIT_SLEWED_C
 #include "compensator/chain/model.h"
 
 #ifdef HYSTGEN_HAS_SLEW_LIMIT
 #ifdef HYSTGEN_FIXED
-/* Bits below a code of what is kept: the sum of two and a half fits 32 bits. */
+/* Bits of a rounding remainder below a code: two remainders and one half fit 32 bits. */
 #define HYSTGEN_REST_BITS 30
 
-/* One step of `move`, from which rounding took `more`. */
+/* One step of `move`, whose rounding remainder is `more`. */
 static void hystgen_ramp_on(hystgen_ramp_t *ramp, hystgen_reach_t move, hystgen_play_t more) {
     const hystgen_play_t left = ramp->rest + more;
     const hystgen_play_t whole =
@@ -19,7 +19,7 @@ static void hystgen_ramp_on(hystgen_ramp_t *ramp, hystgen_reach_t move, hystgen_
     ramp->rest = left - whole * ((hystgen_play_t)1 << HYSTGEN_REST_BITS);
 }
 #else
-/* One step of `move`, from which rounding took `more`. */
+/* One step of `move`, whose rounding remainder is `more`. */
 static void hystgen_ramp_on(hystgen_ramp_t *ramp, hystgen_reach_t move, hystgen_play_t more) {
     const hystgen_reach_t before = ramp->drive;
     const hystgen_reach_t next = before + move;
@@ -31,7 +31,7 @@ static void hystgen_ramp_on(hystgen_ramp_t *ramp, hystgen_reach_t move, hystgen_
 }
 #endif
 
-/* Takes the ramp to v, or as near to it as the amplifier gets in one step. */
+/* Moves the ramp to v, or as near to v as the amplifier gets in one step. */
 HYSTGEN_APART_IN_FIXED void hystgen_ramp_towards(hystgen_ramp_t *ramp, hystgen_reach_t v) {
     if (v > ramp->drive || (v >= ramp->drive && ramp->rest < 0)) {
         hystgen_ramp_on(ramp, HYSTGEN_SLEW_RISING, HYSTGEN_SLEW_RISING_REST);
@@ -48,7 +48,7 @@ HYSTGEN_APART_IN_FIXED void hystgen_ramp_towards(hystgen_ramp_t *ramp, hystgen_r
     ramp->rest = 0;
 }
 
-/* The drive nearest to v that the amplifier reaches in one step; v itself in the first one. */
+/* Drive nearest to v that the amplifier reaches in one step; v itself in the first step. */
 static hystgen_reach_t hystgen_forward_slewed(hystgen_forward_t *self, hystgen_reach_t v) {
     if (self->moving) {
         hystgen_ramp_towards(&self->reached, v);
@@ -59,21 +59,21 @@ static hystgen_reach_t hystgen_forward_slewed(hystgen_forward_t *self, hystgen_r
     return self->reached.drive;
 }
 
-/* What rounding has left of the drive applied last: that is where the answer led to, unless another
-   one was applied. */
+/* Rounding remainder of the last applied drive: that of the last returned drive, or 0 if another
+   drive was applied. */
 static hystgen_play_t hystgen_inverse_left(const hystgen_inverse_t *self) {
     const bool other = self->applied < self->reached.drive || self->applied > self->reached.drive;
     return other ? 0 : self->reached.rest;
 }
 
-/* Takes the ramp from the drive applied last, of which rounding has left `rest`, towards v. */
+/* Moves the ramp from the last applied drive, whose rounding remainder is `rest`, towards v. */
 static void hystgen_inverse_ramp(hystgen_inverse_t *self, hystgen_play_t rest, hystgen_reach_t v) {
     self->reached.drive = self->applied;
     self->reached.rest = rest;
     hystgen_ramp_towards(&self->reached, v);
 }
 
-/* The last answer once more, or the drive nearest to it that the amplifier reaches in one step. */
+/* Last returned drive again, or the nearest that the amplifier reaches in one step. */
 HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_held(hystgen_inverse_t *self) {
     const hystgen_real_t last = self->stepped ? self->answer : self->applied;
     if (!self->moving) {
@@ -87,7 +87,7 @@ HYSTGEN_APART_IN_FIXED hystgen_real_t hystgen_inverse_held(hystgen_inverse_t *se
 }
 
 #ifndef HYSTGEN_HAS_BRAKED_LAG
-/* The drive nearest to v that the amplifier reaches in one step; v itself in the first one. */
+/* Drive nearest to v that the amplifier reaches in one step; v itself in the first step. */
 static hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self, hystgen_reach_t v) {
     if (!self->moving) {
         return v;
@@ -110,12 +110,12 @@ static hystgen_reach_t hystgen_inverse_slewed(hystgen_inverse_t *self, hystgen_r
 }
 
 #ifdef HYSTGEN_CHAIN
-/* The last answer once more. */
+/* Last returned drive again. */
 static hystgen_real_t hystgen_inverse_held(const hystgen_inverse_t *self) {
     return self->stepped ? self->answer : self->applied;
 }
 #else
-/* The last answer once more. */
+/* Last returned drive again. */
 static hystgen_real_t hystgen_inverse_held(const hystgen_inverse_t *self) {
     return self->stepped ? self->answer : self->drive;
 }
@@ -123,14 +123,14 @@ static hystgen_real_t hystgen_inverse_held(const hystgen_inverse_t *self) {
 #endif
 
 #ifdef HYSTGEN_CHAIN
-/* Every reference is answered anew: time has passed for the effects. */
+/* Every reference is solved anew: time has passed for the effects. */
 static bool hystgen_inverse_stands(const hystgen_inverse_t *self, hystgen_real_t u) {
     (void)self;
     (void)u;
     return false;
 }
 #else
-/* Whether the last answer still stands for reference u; u is the last reference from now on. */
+/* Whether the last returned drive is still valid for u, which becomes the last reference. */
 static bool hystgen_inverse_stands(hystgen_inverse_t *self, hystgen_real_t u) {
     if (self->repeated && u >= self->reference && u <= self->reference) {
         self->status |= self->bits;

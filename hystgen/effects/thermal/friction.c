@@ -1,6 +1,6 @@
-/* Heat of loops: a few plays stand for all that rub on each other. In fixed point they have as many
-   bits below a drive code as fit. Called by the functions that emission writes for a chain, see
-   compensator/chain/model.h. */
+/* Heat of hysteresis loops: a few plays represent all internal friction. In fixed point these have
+   as many bits below a drive code as fit. Called by the functions that emission writes for a chain,
+   see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 
 #ifdef HYSTGEN_FIXED
@@ -8,7 +8,7 @@ static void hystgen_friction_init(hystgen_friction_t *self) {
     self->begun = false;
 }
 
-/* At first the plays rest where the drive is. */
+/* The plays start at rest at the drive. */
 static void hystgen_friction_begin(const hystgen_friction_table_t *t, hystgen_friction_t *self,
                                    hystgen_friction_state_t *state, hystgen_real_t v) {
     unsigned int i;
@@ -18,8 +18,8 @@ static void hystgen_friction_begin(const hystgen_friction_table_t *t, hystgen_fr
     self->begun = true;
 }
 
-/* The drive has moved from `before` to v. Returns the sum of the ways of the plays, each times the
-   odd number that its threshold is of the first one. Where a play stays, wider ones do. */
+/* The drive has moved from `before` to v. Returns the sum of the plays' moves, each times the odd
+   ratio of its threshold to the first. If a play stays, so do those with larger thresholds. */
 HYSTGEN_APART int64_t hystgen_friction_move(const hystgen_friction_table_t *t,
                                             hystgen_friction_t *self,
                                             hystgen_friction_state_t *state, hystgen_real_t before,
@@ -53,7 +53,7 @@ static void hystgen_friction_init(hystgen_friction_t *self) {
     self->begun = false;
 }
 
-/* At first the plays rest where the drive is. */
+/* The plays start at rest at the drive. */
 static void hystgen_friction_begin(const hystgen_friction_table_t *t, hystgen_friction_t *self,
                                    hystgen_friction_state_t *state, hystgen_real_t v) {
     unsigned int i;
@@ -63,8 +63,8 @@ static void hystgen_friction_begin(const hystgen_friction_table_t *t, hystgen_fr
     self->begun = true;
 }
 
-/* The drive has moved from `before` to v. Returns the sum of the ways of the plays, each times the
-   odd number that its threshold is of the first one. Where a play stays, wider ones do. */
+/* The drive has moved from `before` to v. Returns the sum of the plays' moves, each times the odd
+   ratio of its threshold to the first. If a play stays, so do those with larger thresholds. */
 static hystgen_real_t hystgen_friction_move(const hystgen_friction_table_t *t,
                                             hystgen_friction_t *self,
                                             hystgen_friction_state_t *state, hystgen_real_t before,

@@ -1,4 +1,4 @@
-/* Gain and offset behind the plays, set from outside. Called by the functions that emission writes
+/* Gain and offset after the plays, set from outside. Called by the functions that emission writes
    for a chain, see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 
@@ -41,7 +41,7 @@ static bool hystgen_gain_heat(const hystgen_gain_table_t *t, hystgen_gain_t *sel
            inside > temperature;
 }
 
-/* The input that gives the output y. */
+/* The input for the output y. */
 static hystgen_real_t hystgen_gain_solve(const hystgen_gain_t *self, hystgen_real_t y) {
     return (y - self->offset) * self->inverse;
 }

@@ -1,4 +1,4 @@
-/* Gain and offset behind the plays, set from outside, in fixed point. Called by the functions that
+/* Gain and offset after the plays, set from outside, in fixed point. Called by the functions that
    emission writes for a chain, see compensator/chain/model.h. */
 #include "effects/gains.c"
 
@@ -28,7 +28,7 @@ static bool hystgen_gain_heat(const hystgen_gain_table_t *t, hystgen_gain_t *sel
     return self->gain != wanted || inside != given;
 }
 
-/* The input that gives the output y. */
+/* The input for the output y. */
 static int64_t hystgen_gain_solve(const hystgen_gain_t *self, int64_t y) {
     return hystgen_gain_times(y - self->offset, self->inverse);
 }

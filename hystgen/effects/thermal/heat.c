@@ -1,5 +1,5 @@
-/* Gain and offset by the actuator's own heat, which follows from the applied drives. In fixed point
-   the temperature has as many bits as fit in 64, so that a slow one does not stall. Called by the
+/* Gain and offset from self-heating, which follows from the applied drives. In fixed point the
+   temperature has as many bits as fit in 64, so that a slow one does not stall. Called by the
    functions that emission writes for a chain, see compensator/chain/model.h. */
 #include "compensator/chain/model.h"
 #ifdef HYSTGEN_FIXED
@@ -15,19 +15,19 @@ static void hystgen_heat_init(hystgen_heat_t *self) {
     self->offset = 0;
 }
 
-/* The square of a drive, with its sign. */
+/* The signed square of a drive. */
 static int64_t hystgen_heat_square(hystgen_real_t v) {
     const int64_t square = (int64_t)v * v;
     return v >= 0 ? square : -square;
 }
 
-/* How far the square of the drive, with its sign, has moved. */
+/* Distance moved by the signed square of the drive. */
 static int64_t hystgen_heat_way(hystgen_real_t before, hystgen_real_t v) {
     const int64_t way = hystgen_heat_square(v) - hystgen_heat_square(before);
     return way >= 0 ? way : -way;
 }
 
-/* The drive has moved, by an amount of what warms. */
+/* Updates the temperature, gain and offset by the heating of a move of the drive. */
 HYSTGEN_APART void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *self,
                                      int64_t amount) {
     const int64_t size = hystgen_nearest(amount, t->coarse);
@@ -40,7 +40,7 @@ HYSTGEN_APART void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat
     self->inverse = hystgen_gain_followed(self->gain, self->inverse, t->turns);
 }
 
-/* The input that gives the output y. */
+/* The input for the output y. */
 static int64_t hystgen_heat_solve(const hystgen_heat_t *self, int64_t y) {
     return hystgen_gain_times(y - self->offset, self->inverse);
 }
@@ -58,7 +58,7 @@ static void hystgen_heat_init(hystgen_heat_t *self) {
     self->offset = 0;
 }
 
-/* How far the square of the drive, with its sign, has moved. */
+/* Distance moved by the signed square of the drive. */
 static hystgen_real_t hystgen_heat_way(hystgen_real_t before, hystgen_real_t v) {
     const hystgen_real_t to = v >= 0 ? v * v : -(v * v);
     const hystgen_real_t from = before >= 0 ? before * before : -(before * before);
@@ -66,8 +66,8 @@ static hystgen_real_t hystgen_heat_way(hystgen_real_t before, hystgen_real_t v) 
     return way >= 0 ? way : -way;
 }
 
-/* The drive has moved, by an amount of what warms. Newton steps update the reciprocal of the
-   gain. */
+/* Updates the temperature, gain and offset by the heating of a move of the drive. Newton steps
+   update the reciprocal of the gain. */
 static void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *self,
                               hystgen_real_t amount) {
     const hystgen_real_t high = self->high;
@@ -76,7 +76,7 @@ static void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *sel
     const hystgen_real_t rise = next > t->hottest ? t->hottest : next;
     unsigned int i;
     self->high = next;
-    self->low = change - (next - high); /* what rounding took from the sum */
+    self->low = change - (next - high); /* rounding remainder of the sum */
     self->gain = 1 + t->per_degree * rise;
     self->offset = t->offset_per_degree * rise;
     for (i = 0; i < t->turns; ++i) {
@@ -84,7 +84,7 @@ static void hystgen_heat_move(const hystgen_heat_table_t *t, hystgen_heat_t *sel
     }
 }
 
-/* The input that gives the output y. */
+/* The input for the output y. */
 static hystgen_real_t hystgen_heat_solve(const hystgen_heat_t *self, hystgen_real_t y) {
     return (y - self->offset) * self->inverse;
 }

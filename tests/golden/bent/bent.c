@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 0cb93cf10b4b6b65d627aeaa5c3b5ee8d0c857e3d5a8474551143cda96a4596c, without this line
+ * Text: sha256 6bd5db20c5b621e110f979c42b13b93fb83762d89e81dbd655bffdf38046a2a5, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -13,15 +13,15 @@
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   pending: the drive answered last: part of the memory only when the next call absorbs it, or the
+   pending: the last returned drive: part of the memory only when the next call absorbs it, or the
        drive committed in its place.
 */
 
-/* Products are rounded before they are added, whatever the compiler's default is. clang and others
-   have the pragma of C99 for it. gcc does not, and fuses a product and a sum across statements,
-   assignments, casts and inline functions alike: short of a volatile object or a call for each
-   product, no wording of the arithmetic keeps the bits. GCC's manual means its own pragma for
-   debugging; it stands here only where the target has a fused instruction. */
+/* Products are rounded before they are added, whatever the compiler's default. clang and others
+   obey the C99 pragma. gcc does not, and fuses products and sums across statements, assignments,
+   casts and inline functions alike: only a volatile object or a call for each product would keep
+   the bits. GCC's manual recommends its own pragma for debugging only, so the pragma is used only
+   on targets with a fused instruction. */
 #if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
@@ -43,12 +43,12 @@ typedef struct {
     const bent_real_t *weight;        /* p_0 .. p_n */
     const bent_real_t *lift;          /* lift[k] = p_0 r_0 + ... + p_(k-1) r_(k-1) */
     const bent_real_t *inverse_slope; /* 1 / (p_0 + ... + p_(k-1)); entry 0 is not used */
-    uint_least16_t n;                 /* plays without r_0 */
+    uint_least16_t n;                 /* number of plays, not counting r_0 */
 } bent_tables_t;
 
 /* Dead-zone sum as straight pieces, piece j between break points j-1 and j. */
 typedef struct {
-    const bent_real_t *break_x; /* n break points, rising */
+    const bent_real_t *break_x; /* n break points, ascending */
     const bent_real_t *break_y;
     const bent_real_t *anchor_x; /* n + 1 pieces, each through its anchor */
     const bent_real_t *anchor_y;
@@ -88,7 +88,7 @@ static bent_real_t bent_dead_zone_inverse(const bent_dead_zone_t *z, bent_real_t
 }
 
 /* The textbook engine: every sample visits every play. Stores go through volatile where a compiler
-   would otherwise call memset or memcpy, which a freestanding target need not have. */
+   would otherwise call memset or memcpy, which a freestanding target may lack. */
 static void bent_loop_rest(const bent_tables_t *t, bent_real_t *play, bent_real_t w) {
     volatile bent_real_t *entry = play;
     unsigned int i;
@@ -118,11 +118,11 @@ static bent_real_t bent_loop_output(const bent_tables_t *t, const bent_real_t *p
     return sum;
 }
 
-/* The input of the plays that gives `output`; now they give `here`. Assumes first that every play
-   follows, then drops the largest thresholds one by one until the solution reaches the last play
-   that is left. The answer must not pass the input at which the play dropped last would follow: a
-   rounding error of `output` is divided by the slope before that input, which may be small, and
-   must not run on along the steeper slope behind it. */
+/* Input of the plays at which their sum is `output`; the present sum is `here`. Assumes first that
+   every play follows, then drops the largest thresholds one by one until the last remaining play
+   follows at the solution. The solution must not pass the input at which the play dropped last
+   would follow: a rounding error of `output` is divided by the slope before this input, which may
+   be small, and must not extend into the steeper slope beyond it. */
 static bent_real_t bent_loop_solve(const bent_tables_t *t, const bent_real_t *play,
         bent_real_t here, bent_real_t output) {
     const bool rising = output >= here;
@@ -188,9 +188,9 @@ static const bent_dead_zone_t bent_stage_1 = {
 };
 
 #define BENT_OFFSET 0.0              /* part of every output */
-#define BENT_START 0.0               /* what each play holds after init */
-#define BENT_INVERSE_INIT_DRIVE 0.0  /* that the plays stand for then */
-#define BENT_INVERSE_RESET_DRIVE 0.0 /* that the plays stand for then */
+#define BENT_START 0.0               /* value of each play after init */
+#define BENT_INVERSE_INIT_DRIVE 0.0  /* drive of the start memory */
+#define BENT_INVERSE_RESET_DRIVE 0.0 /* drive of the start memory */
 
 /* Input of the plays: w = G[v]. */
 static bent_real_t bent_front_forward(bent_real_t v) {
@@ -199,7 +199,7 @@ static bent_real_t bent_front_forward(bent_real_t v) {
     return w;
 }
 
-/* v = G^-1[w], or at an end of G for w beyond it. */
+/* v = G^-1[w], or an end of G for w beyond it. */
 static bent_real_t bent_front_inverse(bent_real_t w) {
     bent_real_t v = w;
     v = bent_dead_zone_inverse(&bent_stage_1, v);
@@ -211,7 +211,7 @@ static bent_real_t bent_forward_displaced(bent_real_t y) {
     return y + BENT_OFFSET;
 }
 
-/* The output of the chain that gives the displacement u, or the nearest that there is. */
+/* The output of the chain for the displacement u, or the nearest possible one. */
 static bent_real_t bent_inverse_undisplaced(bent_real_t u) {
     return u - BENT_OFFSET;
 }
@@ -226,23 +226,23 @@ static bent_real_t bent_inverse_clamp(bent_real_t u) {
     return (bent_real_t)(least > BENT_OUTPUT_MAX ? BENT_OUTPUT_MAX : least);
 }
 
-/* The actuator is at drive v. */
+/* The actuator has moved to drive v. */
 static void bent_inverse_set_drive(bent_inverse_t *self, bent_real_t v) {
     self->drive = v;
 }
 
-/* The actuator is at drive v. Returns the input of the plays. */
+/* The actuator has moved to drive v. Returns the input of the plays. */
 static bent_real_t bent_inverse_arrive(bent_inverse_t *self, bent_real_t v) {
     bent_inverse_set_drive(self, v);
     return bent_front_forward(v);
 }
 
-/* The last answer once more. */
+/* Last returned drive again. */
 static bent_real_t bent_inverse_held(const bent_inverse_t *self) {
     return self->stepped ? self->answer : self->drive;
 }
 
-/* Whether the last answer still stands for reference u; u is the last reference from now on. */
+/* Whether the last returned drive is still valid for u, which becomes the last reference. */
 static bool bent_inverse_stands(bent_inverse_t *self, bent_real_t u) {
     if (self->repeated && u >= self->reference && u <= self->reference) {
         self->status |= self->bits;
@@ -270,24 +270,24 @@ static inline bent_real_t bent_applied_drive(bent_real_t v) {
     return bent_clamp_drive(v) + 0;
 }
 
-/* Input of the plays at which their sum is h. The plays are summed up again where their present
-   sum is not kept, as without effects, or lacks bits, as in fixed point, whose kernel does that. */
+/* Input of the plays at which their sum is h. The plays are summed again if their present sum is
+   not stored, as without effects, or lacks bits, as in fixed point, where the kernel sums them. */
 static inline bent_real_t bent_input_of(const bent_real_t *play, bent_real_t h) {
     return bent_loop_solve(&bent_model_tables, play, bent_loop_output(&bent_model_tables, play), h);
 }
 
-/* Drive v has passed through the drive side and moved the plays. */
+/* Passes drive v through the drive side and moves the plays. */
 static inline void bent_forward_played(bent_forward_t *self, bent_real_t v) {
     bent_loop_absorb(&bent_model_tables, self->play, bent_front_forward(v));
 }
 
-/* The part common to init and reset, once the plays are set: they rest at this drive. */
+/* The part common to init and reset, after the plays are set: everything rests at this drive. */
 static void bent_forward_begin(bent_forward_t *self) {
     self->status = 0;
     self->answer = bent_forward_displaced(bent_loop_output(&bent_model_tables, self->play));
 }
 
-/* Drive v has passed through the drive side and moved the plays. */
+/* Passes drive v through the drive side and moves the plays. */
 static inline void bent_inverse_played(bent_inverse_t *self, bent_real_t v) {
     bent_loop_absorb(&bent_model_tables, self->play, bent_inverse_arrive(self, v));
 }
@@ -309,7 +309,7 @@ static bent_real_t bent_inverse_answer(bent_inverse_t *self, bent_real_t v) {
     return v;
 }
 
-/* The part common to init and reset, once the plays are set: they rest at this drive. */
+/* The part common to init and reset, after the plays are set: everything rests at this drive. */
 static void bent_inverse_begin(bent_inverse_t *self, bent_real_t drive) {
     self->pending = drive;
     self->answer = drive;
@@ -361,7 +361,7 @@ bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v) {
     return answer;
 }
 
-/* A reference that is no number: the newest one stands once more. */
+/* A reference that is not finite: repeats the newest one. */
 static void bent_inverse_unread(bent_inverse_t *self) {
     self->status |= BENT_STATUS_HELD;
 }
@@ -376,7 +376,7 @@ static bent_real_t bent_inverse_limited(bent_inverse_t *self, bent_real_t v) {
     return inside;
 }
 
-/* The next drive, for reference u; the memory is up to date. `bits` is its status so far. */
+/* The next drive, for reference u; the memory is up to date. `bits`: status of the reference. */
 static inline bent_real_t bent_inverse_next(bent_inverse_t *self, bent_real_t u) {
     bent_real_t level = u;
     unsigned int bits = 0;

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 391f50dd7f8e37ae376501dfd2b5337918932fcff20ab1d96d631234f94a9b92, without this line
+ * Text: sha256 590d0a6d3af4f938936dc4112a3770f5fcf68f696f0a430c39f8f94bd40abce2, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -38,7 +38,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* What floating-point code requires of a build. */
+/* Build settings that floating-point code requires. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
 #error "bent: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
 #endif
@@ -91,7 +91,7 @@ typedef double bent_real_t;
 
 /* One forward operator: drive in, displacement out. Plain data, owned by the caller. */
 typedef struct {
-    bent_real_t answer; /* output returned last */
+    bent_real_t answer; /* last returned output */
     unsigned int status;
     bent_real_t play[BENT_N_PLAYS + 1]; /* play 0 is the input of the plays */
 } bent_forward_t;
@@ -99,19 +99,19 @@ typedef struct {
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     bent_real_t pending;   /* drive sent but not yet part of the memory */
-    bent_real_t drive;     /* seen last */
+    bent_real_t drive;     /* last applied drive */
     bent_real_t reference; /* of the last step */
-    bent_real_t answer;    /* drive returned last */
+    bent_real_t answer;    /* last returned drive */
     bool has_pending;
-    bool repeated;     /* the last answer still stands for `reference` */
-    bool stepped;      /* a step has answered */
+    bool repeated;     /* the last returned drive is still valid for `reference` */
+    bool stepped;      /* a step has returned a drive */
     unsigned int bits; /* of the last step */
     unsigned int status;
     bent_real_t play[BENT_N_PLAYS + 1]; /* play 0 is the input of the plays */
 } bent_inverse_t;
 
 /**
- * Start memory of the parameter file.
+ * Sets the start memory of the parameter file.
  *
  * @param self the instance
  * @pre before every other call; at any time again
@@ -155,7 +155,7 @@ bent_real_t bent_forward_step(bent_forward_t *self, bent_real_t v);
 unsigned int bent_forward_status(bent_forward_t *self);
 
 /**
- * Start memory of the parameter file.
+ * Sets the start memory of the parameter file.
  *
  * @param self the instance
  * @pre before every other call; at any time again
@@ -188,7 +188,7 @@ void bent_inverse_reset(bent_inverse_t *self, bent_real_t u);
 bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u);
 
 /**
- * After a step: the drive that was really applied in place of the one returned.
+ * After a step: the drive actually applied in place of the one returned.
  *
  * @param self the instance
  * @param applied drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: ignored

@@ -5,15 +5,15 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 5106831d69091b3b72f10c855958ef4ca5957fb7c0e1104a81d99a1523f8f786, without this line
+ * Text: sha256 026d71a2d48da3dc2dc5bdd14c37a25d161341547f67108f54863dfc3337da3f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent_selftest.h"
 
 #include "bent.h"
 
-/* One call: 's'tep, 'c'ommit or 'r'eset with an argument, and the answer expected of a step. Status
-   is that of all calls since it was last read; 128: not read behind this call. */
+/* One call: 's'tep, 'c'ommit or 'r'eset with an argument, and the expected answer of a step. Status
+   holds the bits of all calls since the last reading; 128: not read after this call. */
 typedef struct {
     char kind;
     bent_real_t argument;

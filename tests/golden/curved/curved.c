@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 6d660fa50d3d3c1c8e3e238441650c5a1134f7d2611bda462c75f9165d8cb615, without this line
+ * Text: sha256 e9353afcabc0eca79ab55d749756364fb90b5393468e4d5e5ba014bcca25a501, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -13,17 +13,17 @@
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   move: what the input does from one turning point to the next: it rises, or it falls. Lengths are
-       taken along the move, so that a falling one is a rising one with all signs changed.
-   corner: a turning point that some plays still hold their values from; corners are a stack, the
+   move: the rise or the fall of the input from one turning point to the next. Lengths are taken
+       along the move, so that a falling one is a rising one with all signs changed.
+   corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
    block: the plays that one corner holds: those with larger thresholds than the corner above it
        has, up to its `top`.
-   way: how far the input has gone from a turning point.
-   reach: how far the output has gone from there; a reach_t also holds inputs and drives beyond
+   way: distance of the input from a turning point.
+   reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
-   segment: the curve of output over input from where one more play follows to where the next does.
-   kink: a place along the move where another play begins to follow.
+   segment: a straight piece of output over input, up to where the next play begins to follow.
+   kink: a point along the move where another play begins to follow.
 */
 
 #if defined(__GNUC__)
@@ -34,10 +34,9 @@
 
 #define CURVED_FAR ((int64_t)1 << 62) /* beyond every output */
 #define CURVED_LARGEST 2147483647     /* the largest input of the plays */
-#define CURVED_MOST_PLAYS 0x7fffu     /* the largest number of plays that a corner can name */
+#define CURVED_MOST_PLAYS 0x7fffu     /* the largest index of a play that a corner can store */
 
-/* Play k begins to follow this far from a turning point; the curve is straight from there to where
-   the next play does. */
+/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
 typedef struct {
     int64_t reach;       /* of the output: 2 z_k */
     uint32_t way;        /* of the input: 2 r_k */
@@ -50,11 +49,11 @@ typedef struct {
 typedef struct {
     const curved_segment_t *segment; /* plays 0 .. n, and one that never follows */
     int64_t offset;                   /* part of every output */
-    int64_t range[2]; /* inputs at the end of falling moves, sign changed, and of rising ones */
-    uint_least16_t n; /* plays without play 0 */
+    int64_t range[2]; /* limits of the input in falling moves, sign changed, and in rising ones */
+    uint_least16_t n; /* number of plays, not counting play 0 */
 } curved_curve_t;
 
-/* The drive that a start memory stands for, within its range. */
+/* The drive of a start memory, within the drive range. */
 typedef struct {
     int32_t drive;
     bool ascending;
@@ -62,20 +61,20 @@ typedef struct {
 
 /* Ends of one branch of the inverse from the input of the plays to the drive. */
 typedef struct {
-    int64_t envelope_least; /* inputs of the plays that an envelope can give */
+    int64_t envelope_least; /* limits of the input of the plays that an envelope can reach */
     int64_t envelope_most;
-    curved_reach_t least; /* up to here an input outside first .. last is off by rounding only */
+    curved_reach_t least; /* inputs outside first .. last but within these: off by rounding only */
     curved_reach_t most;
-    int32_t first; /* inputs of the plays that the drive range gives */
+    int32_t first; /* inputs of the plays at the ends of the drive range */
     int32_t last;
 } curved_ends_t;
 
-/* Bits of a word and of half of one, and the lower half. */
+/* Bits of a word and of half a word, and the mask of the lower half. */
 #define CURVED_WORD 32u
 #define CURVED_HALF_WORD 16u
 #define CURVED_LOW_HALF 0xffffu
 
-/* a times b; by half words, without a library call, on cores without a long multiplication. */
+/* a times b; cores without a long multiplication use half words instead of a library call. */
 static uint64_t curved_wide(uint32_t a, uint32_t b) {
 #if defined(__ARM_ARCH_6M__) || defined(__ARM_ARCH_8M_BASE__)
     const uint32_t low = (a & CURVED_LOW_HALF) * (b & CURVED_LOW_HALF);
@@ -114,7 +113,7 @@ static void curved_copy_place(curved_place_t *to, const curved_place_t *from) {
     to->rising = from->rising;
 }
 
-/* The direction of a move that rises, or falls. */
+/* The direction of a rising or falling move. */
 static inline curved_direction_t curved_direction(bool rising) {
     return rising ? CURVED_RISING : CURVED_FALLING;
 }
@@ -134,7 +133,7 @@ CURVED_APART void curved_leave_corner(curved_place_t *here, curved_corner_t *cor
     here->depth = (uint_least16_t)(here->depth + 1u);
 }
 
-/* Where the play of a segment of a corner's block begins to follow, along the move. */
+/* Input or output, along the move, at which a segment of a corner's block begins. */
 static inline int64_t curved_begins(const curved_place_t *here, const curved_corner_t *c,
         const curved_segment_t *s, bool by_output) {
     const int64_t output = (int64_t)c->high * CURVED_HIGH_STEP + (int64_t)c->low;
@@ -143,7 +142,7 @@ static inline int64_t curved_begins(const curved_place_t *here, const curved_cor
     return held + (c->rose == here->rising ? 0 : whole);
 }
 
-/* A corner stays where plays have followed. */
+/* Turns the move back, and leaves a corner if plays have followed. */
 CURVED_APART void curved_turn_back(curved_place_t *here, curved_corner_t *corner) {
     if (here->k > 0) {
         curved_leave_corner(here, corner);
@@ -152,8 +151,8 @@ CURVED_APART void curved_turn_back(curved_place_t *here, curved_corner_t *corner
     here->rising = !here->rising;
 }
 
-/* The last kink before an output or input along the move, which kink->output gives: where another
-   play begins to follow, or here. */
+/* Finds the last kink before an output or input along the move, passed in kink->output: the point
+   where another play begins to follow, or the present point. */
 CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *here,
         const curved_corner_t *corner, curved_kink_t *kink, bool by_output) {
     const curved_corner_t *c = NULL; /* the corner that held play k until it began to follow */
@@ -196,7 +195,7 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
     }
 }
 
-/* The same for any move to an input. May turn back, but moves nothing. */
+/* The same for a move to any input. May turn the move back, but moves no play. */
 static inline void curved_find_input(const curved_curve_t *t, curved_place_t *here,
         curved_corner_t *corner, int32_t to, curved_kink_t *kink) {
     if (here->rising ? to < here->input : to > here->input) {
@@ -206,7 +205,7 @@ static inline void curved_find_input(const curved_curve_t *t, curved_place_t *he
     curved_find(t, here, corner, kink, false);
 }
 
-/* Moves the plays to an input short of the next kink; `moved` is the output since the last one. */
+/* Moves the plays to an input short of the next kink; `moved`: output gained since the last one. */
 static void curved_go_on(curved_place_t *here, const curved_kink_t *kink, int32_t to,
         int64_t moved) {
     here->output = curved_along(here, kink->output + moved);
@@ -229,7 +228,7 @@ CURVED_APART void curved_move_to_input(const curved_curve_t *t, curved_place_t *
     curved_go_on(here, kink, to, curved_gained(t, here, kink, to));
 }
 
-/* The input that gives `to`, an output beyond a kink along the move; at most a little outside the
+/* Input for the output `to`, which lies beyond a kink along the move; at most slightly out of
    range. */
 CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t *here,
         const curved_kink_t *kink, int64_t to) {
@@ -240,9 +239,9 @@ CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t
     return curved_along(here, x > most ? most : x);
 }
 
-/* The input that gives `output`, at most a little outside the range, and the kink it is counted
-   from. May turn back, but moves nothing. The same plays are known to follow up to the output
-   `next`, along the move. */
+/* Input for `output`, at most slightly out of range, and the last kink before this input. May turn
+   the move back, but moves no play. Up to the output `next`, along the move, the same plays are
+   known to follow. */
 static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curved_corner_t *corner,
         int64_t output, int64_t next, curved_kink_t *kink) {
     if (here->rising ? output < here->output : output > here->output) {
@@ -270,13 +269,13 @@ static int64_t curved_next_output(const curved_curve_t *t, const curved_place_t 
         : CURVED_FAR;
 }
 
-/* Moves the plays to an input near the one that was solved for from a kink. Returns the output,
-   along the move, at which another play begins to follow. */
+/* Moves the plays to an input near the solution found from a kink. Returns the output, along the
+   move, at which another play begins to follow. */
 static int64_t curved_move_to_solution(const curved_curve_t *t, curved_place_t *here,
         curved_corner_t *corner, curved_kink_t *kink, int32_t to) {
     int64_t next = curved_next_output(t, here, corner, kink);
     int64_t moved = curved_gained(t, here, kink, to);
-    if (moved < 0 || kink->output + moved > next) { /* by rounding, or it was limited */
+    if (moved < 0 || kink->output + moved > next) { /* by rounding, or the input was limited */
         curved_find_input(t, here, corner, to, kink);
         next = curved_next_output(t, here, corner, kink);
         moved = curved_gained(t, here, kink, to);
@@ -286,7 +285,7 @@ static int64_t curved_move_to_solution(const curved_curve_t *t, curved_place_t *
 }
 
 /* Start memory: a value for each play (step 1), or one for all (step 0). Each play is a block of
-   its own, left by a move to where it begins to follow. */
+   its own, with a corner where it begins to follow. */
 CURVED_APART void curved_start(const curved_curve_t *t, curved_place_t *here,
         curved_corner_t *corner, const int32_t *play, unsigned int step) {
     int64_t aside = t->offset; /* output of the plays above play k, with the offset */
@@ -317,8 +316,8 @@ static int64_t curved_nearest(int64_t x, unsigned int bits) {
 }
 
 /* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece:
-   where the pieces begin, the left shifts that stretch them to 2^31, and their coefficients from
-   degree 0. */
+   the arguments are the beginnings of the pieces, the left shifts that scale their lengths to 2^31,
+   and their coefficients from degree 0. */
 static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,
         unsigned int pieces, unsigned int degree, int32_t x) {
     unsigned int low = 0;
@@ -345,7 +344,7 @@ static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int
 }
 
 /* Drive code for an input w of the plays outside the image of the drive range: the end of the
-   range, and one code more if w is off by more than rounding. Sets `limited` if no envelope gives
+   range, and one code more if w is off by more than rounding. Sets `limited` if no envelope reaches
    w. */
 static curved_reach_t curved_beyond(const curved_ends_t *e, curved_reach_t w, int32_t drive_min,
         int32_t drive_max, bool *limited) {
@@ -435,7 +434,7 @@ static const curved_ends_t curved_back_ends = {
     -24326964, 26004684, -21940052, 24379278, -21939941, 24379201
 };
 
-#define CURVED_START 0      /* what each play holds after init */
+#define CURVED_START 0      /* value of each play after init */
 #define CURVED_START_STEP 0 /* entries from play to play; reset takes 0 for each */
 #define CURVED_FRACTION 31u /* bits of a sum below an output code */
 #define CURVED_DEGREE 3u    /* of the polynomials of every curve */
@@ -459,7 +458,7 @@ CURVED_APART curved_play_t curved_front_forward(curved_real_t v) {
         curved_front_coefficient, CURVED_FRONT_PIECES, CURVED_DEGREE, v);
 }
 
-/* v = G^-1[w], or at an end of G for w beyond it. */
+/* v = G^-1[w], or an end of G for w beyond it. */
 CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool *limited) {
     const curved_ends_t *ends = &curved_back_ends;
     int64_t v;
@@ -472,30 +471,30 @@ CURVED_APART curved_reach_t curved_front_inverse(curved_reach_t w, bool *limited
     return (curved_reach_t)curved_nearest(v, CURVED_BELOW);
 }
 
-/* The actuator is at drive v. */
+/* The actuator has moved to drive v. */
 static void curved_inverse_set_drive(curved_inverse_t *self, curved_real_t v) {
     self->drive = v;
 }
 
-/* The actuator is at drive v. Returns the input of the plays. */
+/* The actuator has moved to drive v. Returns the input of the plays. */
 static curved_play_t curved_inverse_arrive(curved_inverse_t *self, curved_real_t v) {
     curved_inverse_set_drive(self, v);
     return curved_front_forward(v);
 }
 
-/* Keeps the place for a commit to go back to. */
+/* Saves the place that a commit returns to. */
 CURVED_APART void curved_inverse_keep(curved_inverse_t *self) {
     curved_copy_place(&self->undo, &self->here);
     self->undo_drive = self->drive;
 }
 
-/* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
-   applied drive in its place.
+/* One sample. The memory takes the returned drive as applied at once; a commit undoes the step and
+   applies the committed drive instead.
 
-   last call   the memory is at      a commit replaces     the same reference again
-   init        the start memory      nothing               is solved for
-   step        the last answer       the last answer       has the same answer
-   commit      the committed drive   the committed drive   is solved for */
+   last call   memory at             commit replaces       the same reference again
+   init        the start memory      nothing               is solved
+   step        the returned drive    the returned drive    returns the same drive
+   commit      the committed drive   the committed drive   is solved again */
 curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u) {
     curved_inverse_keep(self);
     if (!self->repeated || u != self->reference) {

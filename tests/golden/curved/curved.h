@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 af832ff15b059a842bffb255f1147e2c5fde06120d21055284c618bbde7ca8b7, without this line
+ * Text: sha256 53d93b9a8e5deaa50ab6a4068d95c2279c6e4f3f199a1aee4a177f30bed51b69, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -49,7 +49,7 @@ extern "C" {
 
 /* Codes: a drive code is CURVED_DRIVE_LSB, V, an output code CURVED_OUTPUT_LSB, um */
 typedef int16_t curved_real_t;
-/* Inputs of the plays, where plays start to follow, and outputs before they are rounded */
+/* Inputs of the plays, inputs at which plays start to follow, and outputs before rounding */
 typedef int32_t curved_play_t;
 typedef int32_t curved_reach_t;
 typedef int64_t curved_sum_t;
@@ -74,13 +74,13 @@ typedef int64_t curved_sum_t;
 #define CURVED_STATUS_HELD 4u           /* never set: every code is a number */
 #define CURVED_STATUS_DOMAIN 8u         /* inverse: the argument of an envelope was limited */
 
-/* The direction of a move, which has an entry of its own where both directions are listed. */
+/* The direction of a move, which indexes arrays with one entry per direction. */
 typedef enum {
     CURVED_FALLING = 0,
     CURVED_RISING = 1
 } curved_direction_t;
 
-/* Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others. */
+/* The place of the plays: plays 0 .. k follow the present move, `depth` corners hold the others. */
 typedef struct {
     int64_t output; /* sum of the plays and the offset, not rounded to a code */
     int32_t input;  /* of the plays */
@@ -89,8 +89,8 @@ typedef struct {
     bool rising; /* direction of the present move */
 } curved_place_t;
 
-/* A place along the present move where another play begins to follow, or the present one: from
-   there on plays 0 .. k follow and `depth` corners hold the others. */
+/* A point along the present move where another play begins to follow, or the present point: from
+   this point on plays 0 .. k follow and `depth` corners hold the others. */
 typedef struct {
     int64_t output;
     int64_t input;
@@ -98,34 +98,34 @@ typedef struct {
     uint_least16_t depth;
 } curved_kink_t;
 
-/* A turning point. It holds the plays of its block: those above the plays of the next corner, up to
- * play `top`. */
+/* A turning point, which holds the plays of its block: those above the plays of the next corner, up
+   to play `top`. */
 typedef struct {
     int32_t high; /* output at the turning point: high 2^16 + low */
     int32_t input;
     unsigned int low : 16;
     unsigned int top : 15;
-    bool rose : 1; /* whether a rising move ended here, or a falling one */
+    bool rose : 1; /* true: a rising move ended here; false: a falling one */
 } curved_corner_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     curved_place_t here;
     int64_t next; /* output, along the present move, at which another play begins to follow */
-    curved_real_t drive; /* where the plays are */
+    curved_real_t drive; /* present drive */
     curved_real_t undo_drive;
     curved_real_t reference; /* of the last step */
-    bool repeated;           /* the last answer still stands for `reference` */
-    bool limited;            /* no drive gives it; here rather than on the stack */
-    uint_least8_t bits;      /* status of that answer */
+    bool repeated;           /* the last returned drive is still valid for `reference` */
+    bool limited;            /* no drive reaches `reference`; kept here rather than on the stack */
+    uint_least8_t bits;      /* status of the last returned drive */
     unsigned int status;
-    curved_place_t undo; /* where the plays were before the last step */
-    curved_kink_t kink;  /* of the present step; here rather than on the stack */
+    curved_place_t undo; /* place of the plays before the last step */
+    curved_kink_t kink;  /* of the present step; kept here rather than on the stack */
     curved_corner_t corner[6];
 } curved_inverse_t;
 
 /**
- * Start memory of the parameter file.
+ * Sets the start memory of the parameter file.
  *
  * @param self the instance
  * @pre before every other call; at any time again
@@ -160,7 +160,7 @@ void curved_inverse_reset(curved_inverse_t *self, curved_real_t u);
 curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u);
 
 /**
- * After a step: the drive that was really applied in place of the one returned.
+ * After a step: the drive actually applied in place of the one returned.
  *
  * @param self the instance
  * @param applied drive, in codes of CURVED_DRIVE_LSB V; limited to CURVED_DRIVE_MIN .. MAX

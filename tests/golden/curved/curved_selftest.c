@@ -5,15 +5,15 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 326a86e7ff5d61cf0d4fea4f407dd11b58df1983062559a7a0965ac71969e972, without this line
+ * Text: sha256 92e2f4e576545deea593b13692421ab94999552fda86b26b27901838bec03d97, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved_selftest.h"
 
 #include "curved.h"
 
-/* One call: 's'tep, 'c'ommit or 'r'eset with an argument, and the answer expected of a step. Status
-   is that of all calls since it was last read; 128: not read behind this call. */
+/* One call: 's'tep, 'c'ommit or 'r'eset with an argument, and the expected answer of a step. Status
+   holds the bits of all calls since the last reading; 128: not read after this call. */
 typedef struct {
     char kind;
     curved_real_t argument;

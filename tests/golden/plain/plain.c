@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 13d3d7c61a159df2ba90cb1f20a99c61171880b5a6a24314d389f6b150fbfdfd, without this line
+ * Text: sha256 2742a14fc651931f511e519956db148cb0ab80ccd73ee33c21977a74161ce7c2, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -13,25 +13,25 @@
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   move: what the input does from one turning point to the next: it rises, or it falls. Lengths are
-       taken along the move, so that a falling one is a rising one with all signs changed.
-   corner: a turning point that some plays still hold their values from; corners are a stack, the
+   move: the rise or the fall of the input from one turning point to the next. Lengths are taken
+       along the move, so that a falling one is a rising one with all signs changed.
+   corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
    block: the plays that one corner holds: those with larger thresholds than the corner above it
        has, up to its `top`.
-   way: how far the input has gone from a turning point.
-   reach: how far the output has gone from there; a reach_t also holds inputs and drives beyond
+   way: distance of the input from a turning point.
+   reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
-   segment: the curve of output over input from where one more play follows to where the next does.
+   segment: a straight piece of output over input, up to where the next play begins to follow.
    pass: the input at which a move has taken a whole block along: the corner is passed, and
        forgotten.
 */
 
-/* Products are rounded before they are added, whatever the compiler's default is. clang and others
-   have the pragma of C99 for it. gcc does not, and fuses a product and a sum across statements,
-   assignments, casts and inline functions alike: short of a volatile object or a call for each
-   product, no wording of the arithmetic keeps the bits. GCC's manual means its own pragma for
-   debugging; it stands here only where the target has a fused instruction. */
+/* Products are rounded before they are added, whatever the compiler's default. clang and others
+   obey the C99 pragma. gcc does not, and fuses products and sums across statements, assignments,
+   casts and inline functions alike: only a volatile object or a call for each product would keep
+   the bits. GCC's manual recommends its own pragma for debugging only, so the pragma is used only
+   on targets with a fused instruction. */
 #if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
@@ -48,28 +48,28 @@
 #define PLAIN_APART static
 #endif
 
-/* Play k begins to follow this far from a turning point; the curve is straight up to the next. */
+/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
 typedef struct {
-    plain_real_t way;   /* of the input: 2 r_k if that is the drive, 2 z_k if it is the output */
-    plain_real_t reach; /* of the output: the other of the two */
+    plain_real_t way;   /* of the input: 2 r_k in the forward operator, 2 z_k in the inverse */
+    plain_real_t reach; /* of the output: 2 z_k in the forward operator, 2 r_k in the inverse */
     plain_real_t gain;  /* of the output over the input from there on */
     plain_real_t slope; /* 1 / gain */
 } plain_segment_t;
 
-/* One operator; of two entries one is for falling moves, with signs changed, one for rising ones.
- */
+/* One operator; of two entries the first is for falling moves, with signs changed, the second for
+   rising ones. */
 typedef struct {
     const plain_segment_t *segment; /* plays 0 .. n, and one that never follows */
     plain_real_t limit[2];          /* of the output */
-    plain_real_t inside[2]; /* outputs up to here stay within the limit in spite of rounding */
-    plain_real_t range[2];  /* of the input */
+    plain_real_t inside[2];         /* outputs up to these stay within the limit despite rounding */
+    plain_real_t range[2];          /* of the input */
 } plain_curve_t;
 
-/* A start memory. `center`: input and output of the sum if plays 0 .. k hold what play k holds. */
+/* A start memory. `center`: input and output of the sum with plays 0 .. k at play k's value. */
 typedef struct {
     const plain_real_t (*center)[2];
-    uint_least16_t step;  /* 1: a center for each play, 0: one for all, if all hold the same */
-    uint_least16_t risen; /* plays up to this one are left by rising moves, the others by falling */
+    uint_least16_t step;   /* 1: a center for each play, 0: one for all, which have one value */
+    uint_least16_t risen;  /* plays up to this one were left by rising moves, others by falling */
     plain_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } plain_start_t;
 
@@ -81,7 +81,7 @@ static void plain_copy_place(plain_place_t *to, const plain_place_t *from) {
     to->rising = from->rising;
 }
 
-/* The direction of a move that rises, or falls. */
+/* The direction of a rising or falling move. */
 static inline plain_direction_t plain_direction(bool rising) {
     return rising ? PLAIN_RISING : PLAIN_FALLING;
 }
@@ -95,7 +95,7 @@ static inline plain_real_t plain_along(const plain_plays_t *m, plain_real_t x) {
 #endif
 }
 
-/* Forgets the line of the last outputs: the next sample searches. */
+/* Discards the line of the last outputs, so that the next sample searches. */
 static void plain_forget_line(plain_plays_t *m) {
     m->sign = (plain_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
@@ -129,7 +129,7 @@ static void plain_turn_back(const plain_curve_t *t, plain_plays_t *m, plain_corn
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k does. */
+/* Last of segments k .. end - 1 that begins before x, a way or a reach; segment k always does. */
 static inline unsigned int plain_find_segment(const plain_segment_t *segment, unsigned int k,
         unsigned int end, plain_real_t x, bool by_reach) {
     unsigned int middle = (k + end) / 2;
@@ -143,7 +143,7 @@ static inline unsigned int plain_find_segment(const plain_segment_t *segment, un
     return k;
 }
 
-/* Ends the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
+/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever is first. */
 PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
         const plain_corner_t *corner, plain_real_t output, plain_real_t input) {
     const plain_corner_t *c = &corner[m->here.depth - 1u];
@@ -163,7 +163,7 @@ PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
     plain_forget_line(m);
 }
 
-/* Moves the plays to where their sum is `output`, up to rounding. */
+/* Moves the plays to the sum `output`, up to rounding. */
 PLAIN_APART void plain_move_to_output(const plain_curve_t *t, plain_plays_t *m,
         plain_corner_t *corner, plain_real_t output) {
     if (plain_along(m, output) < plain_along(m, m->here.output)) {
@@ -213,7 +213,7 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
     plain_real_t start = plain_along(m, c->output);
     unsigned int k = m->here.k;
     m->behind = input;
-    if (c->rose != on) { /* plays follow one by one, and not all of the block at the corner */
+    if (c->rose != on) { /* plays follow one by one, not the whole block at the corner */
         const plain_real_t from = c->pass[other];
         const plain_real_t room = t->inside[on] - start;
         k = plain_find_segment(t->segment, k, c->top, x + from, false);
@@ -273,7 +273,7 @@ PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, p
     return true;
 }
 
-/* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
+/* Start memory. Each play is a block of its own, with a corner where it begins to follow. */
 PLAIN_APART void plain_start(const plain_curve_t *t, plain_plays_t *m, plain_corner_t *corner,
         const plain_start_t *start) {
     unsigned int k;
@@ -321,7 +321,7 @@ static plain_real_t plain_clamp_drive(plain_real_t v) {
     return (plain_real_t)(least > PLAIN_DRIVE_MAX ? PLAIN_DRIVE_MAX : least);
 }
 
-/* Any sample but a usual one. */
+/* Any sample that needs a search. */
 PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_t u) {
     const plain_curve_t *t = &plain_inverse_curve;
     plain_plays_t *m = &self->plays;
@@ -332,7 +332,7 @@ PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_
         bits = u >= -FLT_MAX && u <= FLT_MAX ? PLAIN_STATUS_INPUT_CLAMPED : PLAIN_STATUS_HELD;
         x = (u < PLAIN_OUTPUT_MIN ? PLAIN_OUTPUT_MIN : PLAIN_OUTPUT_MAX) - PLAIN_OFFSET;
     }
-    if (bits == PLAIN_STATUS_HELD) { /* not finite: repeat the last answer */
+    if (bits == PLAIN_STATUS_HELD) { /* not finite: repeat the last returned drive */
         if (self->stepped && self->committed) {
             plain_move_to_output(t, m, self->corner, self->returned);
         }
@@ -352,15 +352,15 @@ PLAIN_APART plain_real_t plain_inverse_search(plain_inverse_t *self, plain_real_
     return m->here.output;
 }
 
-/* One sample. The memory takes the answer as applied at once; a commit undoes the step and puts the
-   applied drive in its place. While `limited` is set, references beyond `input` have the same
-   answer, a limit of the drive.
+/* One sample. The memory takes the returned drive as applied at once; a commit undoes the step and
+   applies the committed drive instead. While `limited` is set, references beyond `input` return the
+   same drive, a limit of its range.
 
-   stepped  committed  the memory is at     a commit replaces    a NaN answers, and leaves there
+   stepped  committed  memory at            commit replaces      NaN returns, and sets memory to
    no       no         the start drive      nothing              the start drive
    no       yes        the committed drive  the committed drive  the committed drive
-   yes      no         the last answer      the last answer      the last answer
-   yes      yes        the committed drive  the committed drive  the last answer, `returned` */
+   yes      no         the returned drive   the returned drive   the returned drive
+   yes      yes        the committed drive  the committed drive  the returned drive, `returned` */
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u) {
     plain_plays_t *m = &self->plays;
     const plain_real_t x = u - PLAIN_OFFSET;

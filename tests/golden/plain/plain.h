@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 5d5535c784e7ea7bc719030a60b1015c7fb728e0a6597633008d7f4d0c41a795, without this line
+ * Text: sha256 6790efbfb35b1419ea20122db6137ccaf69e45c6f953d9905ddd9912afe047c0, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -35,7 +35,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* What floating-point code requires of a build. */
+/* Build settings that floating-point code requires. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
 #error "plain: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
 #endif
@@ -85,14 +85,14 @@ typedef float plain_real_t;
 #define PLAIN_STATUS_HELD 4u           /* NaN or infinite input: the last answer was held */
 #define PLAIN_STATUS_DOMAIN 8u         /* never set: no envelope limits an argument */
 
-/* The direction of a move, which has an entry of its own where both directions are listed. */
+/* The direction of a move, which indexes arrays with one entry per direction. */
 typedef enum {
     PLAIN_FALLING = 0,
     PLAIN_RISING = 1,
-    PLAIN_BOTTOM = 2 /* no move: what holds the plays that never follow */
+    PLAIN_BOTTOM = 2 /* no move: the corner that holds the plays that never follow */
 } plain_direction_t;
 
-/* Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others. */
+/* The place of the plays: plays 0 .. k follow the present move, `depth` corners hold the others. */
 typedef struct {
     plain_real_t input; /* of the play sum (forward: drive, inverse: output) */
     plain_real_t output;
@@ -101,45 +101,45 @@ typedef struct {
     bool rising; /* direction of the present move */
 } plain_place_t;
 
-/* A turning point. It holds the plays of its block: those above the plays of the next corner, up to
-   play `top`. `pass`: input at which a falling or a rising move has taken the whole block along,
-   sign changed for falling; one of the two is the input at the turning point itself. */
+/* A turning point, which holds the plays of its block: those above the plays of the next corner, up
+   to play `top`. `pass`: inputs at which a falling and a rising move have taken the whole block
+   along, sign changed for falling; one of these is the input at the turning point itself. */
 typedef struct {
     plain_real_t output; /* at the turning point */
     plain_real_t pass[2];
     uint_least16_t top;
-    uint_least8_t rose; /* a plain_direction_t: that of the move that ended here */
+    uint_least8_t rose; /* a plain_direction_t: direction of the move that ended here */
 } plain_corner_t;
 
-/* The place of the play sum, and the line that its next outputs lie on. */
+/* The place of the play sum, and the straight line of its next outputs. */
 typedef struct {
     plain_place_t here;
-    plain_real_t next;       /* input up to which the same plays follow and nothing is limited */
-    plain_real_t cap;        /* input up to which the same corner counts and nothing is limited */
+    plain_real_t next;       /* input up to which the same plays follow within the limits */
+    plain_real_t cap;        /* input up to which the same corner applies within the limits */
     plain_real_t behind;     /* while no play follows: the same as `next`, on the other side */
-    plain_real_t from_input; /* input and output that the top corner's block counts from */
+    plain_real_t from_input; /* origin of the top corner's block: input and output */
     plain_real_t from_output;
     plain_real_t begin; /* output = start + (input - begin) gain */
     plain_real_t start;
     plain_real_t gain;
     plain_real_t sign; /* 1 for rising, -1 for falling */
-    bool limited;      /* the output is a limit and the input may lie beyond what gives it */
+    bool limited; /* the output is a limit, and the input may lie beyond the one for this output */
 } plain_plays_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     plain_plays_t plays;
-    plain_place_t undo;    /* where the plays were before the last step, if not along a line */
-    plain_real_t before;   /* input before such a step, else the present one */
+    plain_place_t undo;    /* place of the plays before the last step, if not along a line */
+    plain_real_t before;   /* input before a step along a line, else the present input */
     plain_real_t returned; /* by the last step, if another drive was committed since */
-    bool stepped;          /* a step has answered */
+    bool stepped;          /* a step has returned a drive */
     bool committed;        /* a drive was committed since */
     unsigned int status;
     plain_corner_t corner[7];
 } plain_inverse_t;
 
 /**
- * Start memory of the parameter file.
+ * Sets the start memory of the parameter file.
  *
  * @param self the instance
  * @pre before every other call; at any time again
@@ -172,7 +172,7 @@ void plain_inverse_reset(plain_inverse_t *self, plain_real_t u);
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u);
 
 /**
- * After a step: the drive that was really applied in place of the one returned.
+ * After a step: the drive actually applied in place of the one returned.
  *
  * @param self the instance
  * @param applied drive, V; limited to PLAIN_DRIVE_MIN .. MAX; NaN and infinite: ignored

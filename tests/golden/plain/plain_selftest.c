@@ -5,15 +5,15 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 498096def5fc885b1ffeeb363155bea04e841a2ab9620c2e9ec4f154160906ee, without this line
+ * Text: sha256 a51b7c208528bcf656cacb3fe5e5a1eacfdd2a5d418254e639ad6def5e5e250c, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain_selftest.h"
 
 #include "plain.h"
 
-/* One call: 's'tep, 'c'ommit or 'r'eset with an argument, and the answer expected of a step. Status
-   is that of all calls since it was last read; 128: not read behind this call. */
+/* One call: 's'tep, 'c'ommit or 'r'eset with an argument, and the expected answer of a step. Status
+   holds the bits of all calls since the last reading; 128: not read after this call. */
 typedef struct {
     char kind;
     plain_real_t argument;

@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 0fc7d9696ca9dc613bb1158e7042a44ee45044ea379180a20a45be4746169857, without this line
+ * Text: sha256 2c225961073d536754227b72466133cd5682b692ee1d6be5cfe5e5815d2bc728, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -38,7 +38,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* What floating-point code requires of a build. */
+/* Build settings that floating-point code requires. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
 #error "two_branches: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
 #endif
@@ -93,14 +93,14 @@ typedef float two_branches_real_t;
 #define TWO_BRANCHES_STATUS_HELD 4u   /* NaN or infinite input: the last answer was held */
 #define TWO_BRANCHES_STATUS_DOMAIN 8u /* inverse: the argument of an envelope was limited */
 
-/* The direction of a move, which has an entry of its own where both directions are listed. */
+/* The direction of a move, which indexes arrays with one entry per direction. */
 typedef enum {
     TWO_BRANCHES_FALLING = 0,
     TWO_BRANCHES_RISING = 1,
-    TWO_BRANCHES_BOTTOM = 2 /* no move: what holds the plays that never follow */
+    TWO_BRANCHES_BOTTOM = 2 /* no move: the corner that holds the plays that never follow */
 } two_branches_direction_t;
 
-/* Where the plays are: plays 0 .. k follow the present move, `depth` corners hold the others. */
+/* The place of the plays: plays 0 .. k follow the present move, `depth` corners hold the others. */
 typedef struct {
     two_branches_real_t input; /* of the play sum (forward: drive, inverse: output) */
     two_branches_real_t output;
@@ -109,39 +109,38 @@ typedef struct {
     bool rising; /* direction of the present move */
 } two_branches_place_t;
 
-/* A turning point. It holds the plays of its block: those above the plays of the next corner, up to
-   play `top`. `pass`: input at which a falling or a rising move has taken the whole block along,
-   sign changed for falling; one of the two is the input at the turning point itself. */
+/* A turning point, which holds the plays of its block: those above the plays of the next corner, up
+   to play `top`. `pass`: inputs at which a falling and a rising move have taken the whole block
+   along, sign changed for falling; one of these is the input at the turning point itself. */
 typedef struct {
     two_branches_real_t output; /* at the turning point */
     two_branches_real_t pass[2];
     uint_least16_t top;
-    uint_least8_t rose; /* a two_branches_direction_t: that of the move that ended here */
+    uint_least8_t rose; /* a two_branches_direction_t: direction of the move that ended here */
 } two_branches_corner_t;
 
-/* The place of the play sum, and the line that its next outputs lie on. */
+/* The place of the play sum, and the straight line of its next outputs. */
 typedef struct {
     two_branches_place_t here;
-    /* input up to which the same plays follow and nothing is limited */
-    two_branches_real_t next;
-    /* input up to which the same corner counts and nothing is limited */
+    two_branches_real_t next; /* input up to which the same plays follow within the limits */
+    /* input up to which the same corner applies within the limits */
     two_branches_real_t cap;
     /* while no play follows: the same as `next`, on the other side */
     two_branches_real_t behind;
-    two_branches_real_t from_input; /* input and output that the top corner's block counts from */
+    two_branches_real_t from_input; /* origin of the top corner's block: input and output */
     two_branches_real_t from_output;
     two_branches_real_t begin; /* output = start + (input - begin) gain */
     two_branches_real_t start;
     two_branches_real_t gain;
     two_branches_real_t sign; /* 1 for rising, -1 for falling */
-    bool limited;             /* the output is a limit and the input may lie beyond what gives it */
+    bool limited; /* the output is a limit, and the input may lie beyond the one for this output */
 } two_branches_plays_t;
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
     two_branches_plays_t plays;
-    two_branches_place_t undo; /* where the plays were before the last step */
-    two_branches_real_t drive; /* where the plays are */
+    two_branches_place_t undo; /* place of the plays before the last step */
+    two_branches_real_t drive; /* present drive */
     two_branches_real_t undo_drive;
     two_branches_real_t returned;  /* by the last step, if another drive was committed since */
     two_branches_real_t reference; /* of the last step */
@@ -149,17 +148,17 @@ typedef struct {
     two_branches_real_t last;
     bool ascending; /* direction of the drive's last move */
     bool undo_ascending;
-    bool stepped;      /* a step has answered */
+    bool stepped;      /* a step has returned a drive */
     bool committed;    /* a drive was committed since */
-    bool repeated;     /* the last answer still stands for `reference` */
-    bool limited;      /* no drive gives it; here rather than on the stack */
-    unsigned int bits; /* status of that answer */
+    bool repeated;     /* the last returned drive is still valid for `reference` */
+    bool limited;      /* no drive reaches `reference`; kept here rather than on the stack */
+    unsigned int bits; /* status of the last returned drive */
     unsigned int status;
     two_branches_corner_t corner[7];
 } two_branches_inverse_t;
 
 /**
- * Start memory of the parameter file.
+ * Sets the start memory of the parameter file.
  *
  * @param self the instance
  * @pre before every other call; at any time again
@@ -194,7 +193,7 @@ void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_
 two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_branches_real_t u);
 
 /**
- * After a step: the drive that was really applied in place of the one returned.
+ * After a step: the drive actually applied in place of the one returned.
  *
  * @param self the instance
  * @param applied drive, V; limited to TWO_BRANCHES_DRIVE_MIN .. MAX; NaN and infinite: ignored
@@ -228,16 +227,16 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   move: what the input does from one turning point to the next: it rises, or it falls. Lengths are
-       taken along the move, so that a falling one is a rising one with all signs changed.
-   corner: a turning point that some plays still hold their values from; corners are a stack, the
+   move: the rise or the fall of the input from one turning point to the next. Lengths are taken
+       along the move, so that a falling one is a rising one with all signs changed.
+   corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
    block: the plays that one corner holds: those with larger thresholds than the corner above it
        has, up to its `top`.
-   way: how far the input has gone from a turning point.
-   reach: how far the output has gone from there; a reach_t also holds inputs and drives beyond
+   way: distance of the input from a turning point.
+   reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
-   segment: the curve of output over input from where one more play follows to where the next does.
+   segment: a straight piece of output over input, up to where the next play begins to follow.
    pass: the input at which a move has taken a whole block along: the corner is passed, and
        forgotten.
 */
@@ -246,11 +245,11 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #pragma GCC push_options
 #endif
 
-/* Products are rounded before they are added, whatever the compiler's default is. clang and others
-   have the pragma of C99 for it. gcc does not, and fuses a product and a sum across statements,
-   assignments, casts and inline functions alike: short of a volatile object or a call for each
-   product, no wording of the arithmetic keeps the bits. GCC's manual means its own pragma for
-   debugging; it stands here only where the target has a fused instruction. */
+/* Products are rounded before they are added, whatever the compiler's default. clang and others
+   obey the C99 pragma. gcc does not, and fuses products and sums across statements, assignments,
+   casts and inline functions alike: only a volatile object or a call for each product would keep
+   the bits. GCC's manual recommends its own pragma for debugging only, so the pragma is used only
+   on targets with a fused instruction. */
 #if defined(__clang__) || !defined(__GNUC__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__FP_FAST_FMA) || defined(__FP_FAST_FMAF)
@@ -268,34 +267,34 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #define TWO_BRANCHES_APART static
 #endif
 
-/* Play k begins to follow this far from a turning point; the curve is straight up to the next. */
+/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
 typedef struct {
-    /* of the input: 2 r_k if that is the drive, 2 z_k if it is the output */
+    /* of the input: 2 r_k in the forward operator, 2 z_k in the inverse */
     two_branches_real_t way;
-    two_branches_real_t reach; /* of the output: the other of the two */
+    /* of the output: 2 z_k in the forward operator, 2 r_k in the inverse */
+    two_branches_real_t reach;
     two_branches_real_t gain;  /* of the output over the input from there on */
     two_branches_real_t slope; /* 1 / gain */
 } two_branches_segment_t;
 
-/* One operator; of two entries one is for falling moves, with signs changed, one for rising ones.
- */
+/* One operator; of two entries the first is for falling moves, with signs changed, the second for
+   rising ones. */
 typedef struct {
     const two_branches_segment_t *segment; /* plays 0 .. n, and one that never follows */
     two_branches_real_t limit[2];          /* of the output */
-    /* outputs up to here stay within the limit in spite of rounding */
-    two_branches_real_t inside[2];
-    two_branches_real_t range[2]; /* of the input */
+    two_branches_real_t inside[2]; /* outputs up to these stay within the limit despite rounding */
+    two_branches_real_t range[2];  /* of the input */
 } two_branches_curve_t;
 
-/* A start memory. `center`: input and output of the sum if plays 0 .. k hold what play k holds. */
+/* A start memory. `center`: input and output of the sum with plays 0 .. k at play k's value. */
 typedef struct {
     const two_branches_real_t (*center)[2];
-    uint_least16_t step;  /* 1: a center for each play, 0: one for all, if all hold the same */
-    uint_least16_t risen; /* plays up to this one are left by rising moves, the others by falling */
+    uint_least16_t step;     /* 1: a center for each play, 0: one for all, which have one value */
+    uint_least16_t risen;    /* plays up to this one were left by rising moves, others by falling */
     two_branches_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } two_branches_start_t;
 
-/* The drive that a start memory stands for, within its range, and the input of the plays there. */
+/* The drive of a start memory, within the drive range, and the input of the plays at this drive. */
 typedef struct {
     two_branches_real_t drive;
     two_branches_real_t w;
@@ -310,7 +309,7 @@ typedef struct {
     two_branches_real_t a3;
     two_branches_real_t inverse_a0;
     two_branches_real_t inverse_a1;
-    two_branches_real_t limit; /* largest |argument| that atanh is given */
+    two_branches_real_t limit; /* largest |argument| of atanh */
 } two_branches_envelope_t;
 
 /*
@@ -474,7 +473,7 @@ static void two_branches_copy_place(two_branches_place_t *to, const two_branches
     to->rising = from->rising;
 }
 
-/* The direction of a move that rises, or falls. */
+/* The direction of a rising or falling move. */
 static inline two_branches_direction_t two_branches_direction(bool rising) {
     return rising ? TWO_BRANCHES_RISING : TWO_BRANCHES_FALLING;
 }
@@ -489,7 +488,7 @@ static inline two_branches_real_t two_branches_along(const two_branches_plays_t 
 #endif
 }
 
-/* Forgets the line of the last outputs: the next sample searches. */
+/* Discards the line of the last outputs, so that the next sample searches. */
 static void two_branches_forget_line(two_branches_plays_t *m) {
     m->sign = (two_branches_real_t)(m->here.rising ? 1 : -1);
     m->next = m->here.input;
@@ -524,7 +523,7 @@ static void two_branches_turn_back(const two_branches_curve_t *t, two_branches_p
     m->sign = -m->sign;
 }
 
-/* The last of segments k .. end - 1 that begins before x, a way or a reach; segment k does. */
+/* Last of segments k .. end - 1 that begins before x, a way or a reach; segment k always does. */
 static inline unsigned int two_branches_find_segment(const two_branches_segment_t *segment,
         unsigned int k, unsigned int end, two_branches_real_t x, bool by_reach) {
     unsigned int middle = (k + end) / 2;
@@ -538,7 +537,7 @@ static inline unsigned int two_branches_find_segment(const two_branches_segment_
     return k;
 }
 
-/* Ends the move in the top corner's block: where the sum is `output` or, if first, at `input`. */
+/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever is first. */
 TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t,
         two_branches_plays_t *m, const two_branches_corner_t *corner, two_branches_real_t output,
         two_branches_real_t input) {
@@ -559,7 +558,7 @@ TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t
     two_branches_forget_line(m);
 }
 
-/* Moves the plays to where their sum is `output`, up to rounding. */
+/* Moves the plays to the sum `output`, up to rounding. */
 TWO_BRANCHES_APART void two_branches_move_to_output(const two_branches_curve_t *t,
         two_branches_plays_t *m, two_branches_corner_t *corner, two_branches_real_t output) {
     if (two_branches_along(m, output) < two_branches_along(m, m->here.output)) {
@@ -609,7 +608,7 @@ TWO_BRANCHES_APART bool two_branches_move_to_input(const two_branches_curve_t *t
     two_branches_real_t start = two_branches_along(m, c->output);
     unsigned int k = m->here.k;
     m->behind = input;
-    if (c->rose != on) { /* plays follow one by one, and not all of the block at the corner */
+    if (c->rose != on) { /* plays follow one by one, not the whole block at the corner */
         const two_branches_real_t from = c->pass[other];
         const two_branches_real_t room = t->inside[on] - start;
         k = two_branches_find_segment(t->segment, k, c->top, x + from, false);
@@ -696,7 +695,7 @@ static two_branches_real_t two_branches_plays_step(const two_branches_curve_t *t
     return m->here.output;
 }
 
-/* Start memory. Each play is a block of its own, left by a move to where it begins to follow. */
+/* Start memory. Each play is a block of its own, with a corner where it begins to follow. */
 TWO_BRANCHES_APART void two_branches_start(const two_branches_curve_t *t, two_branches_plays_t *m,
         two_branches_corner_t *corner, const two_branches_start_t *start) {
     unsigned int k;
@@ -749,7 +748,7 @@ static const two_branches_envelope_t two_branches_stage_1_descending = {
 };
 
 #define TWO_BRANCHES_OFFSET 0.0f        /* part of every output */
-#define TWO_BRANCHES_HOLD 0.0030799445f /* a drive that is stepped back by no more is held */
+#define TWO_BRANCHES_HOLD 0.0030799445f /* largest step back for which the drive is held instead */
 
 /* Input of the plays: w = G[v], on the branch of the drive's direction. */
 static two_branches_real_t two_branches_front_forward(two_branches_real_t v, bool ascending) {
@@ -759,7 +758,7 @@ static two_branches_real_t two_branches_front_forward(two_branches_real_t v, boo
     return w;
 }
 
-/* v = G^-1[w], on the branch of the drive's direction, or at an end of G for w beyond it. */
+/* v = G^-1[w], on the branch of the drive's direction, or an end of G for w beyond it. */
 static two_branches_real_t two_branches_front_inverse(two_branches_real_t w, bool ascending,
         bool *limited) {
     two_branches_real_t v = w;
@@ -787,8 +786,9 @@ static bool two_branches_inverse_fits(const two_branches_inverse_t *self, two_br
     return self->ascending == ascending;
 }
 
-/* The drive that gives w on the branch of its own move. Tries the branch of the reference's move,
-   then the other one; if neither fits, the drive holds. Sets `limited` if no drive gives w. */
+/* Drive for an input w of the plays, on the branch of its own move. Tries the branch of the
+   reference's move, then the other one; if neither fits, the drive holds. Sets `limited` if no
+   drive reaches w. */
 TWO_BRANCHES_APART two_branches_real_t
         two_branches_inverse_choose(const two_branches_inverse_t *self, two_branches_real_t level,
         two_branches_real_t w, bool *limited) {
@@ -802,7 +802,7 @@ TWO_BRANCHES_APART two_branches_real_t
     if (!two_branches_inverse_fits(self, v, up)) {
         const two_branches_real_t back = two_branches_clamp_drive(v) - self->drive;
         if (up == self->ascending && back >= -TWO_BRANCHES_HOLD && back <= TWO_BRANCHES_HOLD) {
-            /* it moves back only by rounding */
+            /* the drive moves back only by rounding */
             v = self->drive;
         } else {
             v = two_branches_front_inverse(w, !up, limited);
@@ -812,7 +812,7 @@ TWO_BRANCHES_APART two_branches_real_t
     return v;
 }
 
-/* The actuator is at drive v. */
+/* The actuator has moved to drive v. */
 static void two_branches_inverse_set_drive(two_branches_inverse_t *self, two_branches_real_t v) {
     if (v > self->drive) { /* the direction of the move picks the branch */
         self->ascending = true;
@@ -822,21 +822,21 @@ static void two_branches_inverse_set_drive(two_branches_inverse_t *self, two_bra
     self->drive = v;
 }
 
-/* The actuator is at drive v. Returns the input of the plays. */
+/* The actuator has moved to drive v. Returns the input of the plays. */
 static two_branches_real_t two_branches_inverse_arrive(two_branches_inverse_t *self,
         two_branches_real_t v) {
     two_branches_inverse_set_drive(self, v);
     return two_branches_front_forward(v, self->ascending);
 }
 
-/* Keeps the place for a commit to go back to. */
+/* Saves the place that a commit returns to. */
 static void two_branches_inverse_keep(two_branches_inverse_t *self) {
     two_branches_copy_place(&self->undo, &self->plays.here);
     self->undo_drive = self->drive;
     self->undo_ascending = self->ascending;
 }
 
-/* Undoes the last step: the actuator has gone to v instead. */
+/* Undoes the last step: the actuator has moved to v instead. */
 TWO_BRANCHES_APART void two_branches_inverse_replace(two_branches_inverse_t *self,
         two_branches_real_t v) {
     two_branches_copy_place(&self->plays.here, &self->undo);
@@ -849,7 +849,7 @@ TWO_BRANCHES_APART void two_branches_inverse_replace(two_branches_inverse_t *sel
     }
 }
 
-/* A sample that is not finite: repeat the last answer. */
+/* A sample that is not finite: repeats the last returned drive. */
 static two_branches_real_t two_branches_inverse_hold(two_branches_inverse_t *self) {
     two_branches_inverse_keep(self);
     two_branches_inverse_replace(self,
@@ -860,14 +860,14 @@ static two_branches_real_t two_branches_inverse_hold(two_branches_inverse_t *sel
     return self->drive;
 }
 
-/* One sample. The memory takes the answer as applied at once; a commit, a limit or a drive that
-   holds undoes the step and puts the applied drive in its place.
+/* One sample. The memory takes the returned drive as applied at once; a commit, a limit or a held
+   drive undoes the step and applies the actual drive instead.
 
-   stepped  committed  the memory is at     a commit replaces    a NaN answers, and leaves there
+   stepped  committed  memory at            commit replaces      NaN returns, and sets memory to
    no       no         the start drive      nothing              the start drive
    no       yes        the committed drive  the committed drive  the committed drive
-   yes      no         the last answer      the last answer      the last answer
-   yes      yes        the committed drive  the committed drive  the last answer, `returned` */
+   yes      no         the returned drive   the returned drive   the returned drive
+   yes      yes        the committed drive  the committed drive  the returned drive, `returned` */
 two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_branches_real_t u) {
     if (!(u >= -FLT_MAX && u <= FLT_MAX)) {
         return two_branches_inverse_hold(self);
@@ -889,7 +889,7 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
         const bool clamped = inside < v || inside > v;
         self->bits |= self->limited ? TWO_BRANCHES_STATUS_DOMAIN : 0u;
         if (clamped || (inside <= self->drive && inside >= self->drive)) {
-            /* this drive does not give w: the plays are elsewhere */
+            /* the plays do not reach w with this drive */
             self->bits |= clamped ? TWO_BRANCHES_STATUS_OUTPUT_CLAMPED : 0u;
             two_branches_inverse_replace(self, inside);
         } else {

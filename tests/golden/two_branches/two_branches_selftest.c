@@ -5,15 +5,15 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 82a0cf9e0090adc6000eacf7464b59e9076696c38223111ab2c9ec53ad64689d, without this line
+ * Text: sha256 c58b8998c5efd0bf947abb20c0197e0c320177633c8047a337d289957c2da52a, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "two_branches_selftest.h"
 
 #include "two_branches.h"
 
-/* One call: 's'tep, 'c'ommit or 'r'eset with an argument, and the answer expected of a step. Status
-   is that of all calls since it was last read; 128: not read behind this call. */
+/* One call: 's'tep, 'c'ommit or 'r'eset with an argument, and the expected answer of a step. Status
+   holds the bits of all calls since the last reading; 128: not read after this call. */
 typedef struct {
     char kind;
     two_branches_real_t argument;
