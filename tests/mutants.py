@@ -176,11 +176,11 @@ KILLED = (
         "here->rising ? whole : whole);", "plain", "q31",
     ),
     Mutant(
-        "a committed drive answers the same reference", USUAL, "if (!self->repeat || u != self->reference)",
+        "a committed drive answers the same reference", USUAL, "if (!self->repeated || u != self->reference)",
         "if (u != self->reference)", "plain", "q31",
     ),
     Mutant(
-        "the same behind a memoryless part", FRONT, "if (!self->repeat || u != self->reference)",
+        "the same behind a memoryless part", FRONT, "if (!self->repeated || u != self->reference)",
         "if (u != self->reference)", "curved", "q15",
     ),
     Mutant(
@@ -208,7 +208,7 @@ KILLED = (
     ),
     Mutant(
         "a committed drive answers the same reference, loop", "c_runtime/compensator/chain/chain_calls.c",
-        "    self->repeat = false;\n    self->pending = inside;", "    self->pending = inside;", "plain", "q31", "loop",
+        "    self->repeated = false;\n    self->pending = inside;", "    self->pending = inside;", "plain", "q31", "loop",
     ),
     Mutant(
         "what is pending stays out of the memory", "c_runtime/compensator/chain/chain.c",
@@ -347,7 +347,7 @@ OF_EFFECTS = tuple(itertools.starmap(_of_loop, (
      "self->offset = 0 * above;", "warm", "float32"),
     ("a limited temperature is not told", "effects/thermal/gain.c", "inside < temperature ||",
      "inside < t->coldest ||", "warm", "float32"),
-    ("a gain is followed with one Newton step less", "effects/thermal/gain_fixed.c", "i < turns; ++i",
+    ("a gain is followed with one Newton step less", "effects/gains.c", "i < turns; ++i",
      "i + 1u < turns; ++i", "heated", "q31"),
     ("heat loses the remainder", "effects/thermal/heat.c", "self->low = change - (next - high);",
      "self->low = 0;", "heated", "float32"),

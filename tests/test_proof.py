@@ -269,7 +269,7 @@ FAULTS = [
     ("loop", ".c", CLAMP, UNCLAMPED, "signed downcast"),
     ("loop", ".c", r"if \(code > TWO_BRANCHES_CODE_MAX\) \{[^}]*\}", "", "downcast"),
     ("loop", ".c", r"(k = 1; k <= t->n)(; \+\+k)", r"\1 + 1u\2", "out of bounds"),
-    ("loop", ".c", r"(self->has_pending = false;)\s*self->repeat = false;", r"\1", "uninitialized"),
+    ("loop", ".c", r"(self->has_pending = false;)\s*self->repeated = false;", r"\1", "uninitialized"),
     ("corners", ".c", CLAMP, UNCLAMPED, "signed downcast"),
     ("corners", ".c", r"(#define TWO_BRANCHES_HIGH_STEP \(\(int64_t\)1 << )\d+", r"\g<1>37", "signed overflow"),
     ("corners", ".c", r"(middle = \(low \+ left\)) / 2;", r"\1 / 2 + 1u;", "out of bounds"),
