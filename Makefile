@@ -44,7 +44,7 @@ test: $(VENV)/ready
 # All that CI runs; each file in one process too, whose tests share what they compute
 check: $(VENV)/ready lint
 	$(BIN)/python tests/static_checks.py
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist worksteal
 
 # All proofs of Frama-C, which has to be there; `make check` does a third of them
 prove: $(VENV)/ready

@@ -109,7 +109,7 @@ def samples(t: Tables | FixedTables | ChainTables, x: NDArray[Any]) -> NDArray[A
     """Samples as the operators take them. In fixed point raises ValueError for numbers that are not codes."""
     with np.errstate(invalid="ignore"):  # numbers that are not codes are found below
         found = np.ascontiguousarray(x, dtype=t.threshold.dtype)
-    if not t.fixed:
+    if found.dtype.kind == "f":
         return found
     most = int(t.limits[CODE_MAX])
     if np.any(x != found) or np.any(found < -most - 1) or np.any(found > most):
