@@ -88,10 +88,10 @@ class Target:
         return sum(self._compare(file.name, text) for file, text in zip(files, inputs, strict=True))
 
     def _called(self, *arguments: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
-        # A process's peak memory begins with that of whoever started it, which libFuzzer would count: a shell has little
+        # A process's peak memory starts at its parent's, which libFuzzer would count; that of a shell is small
         return subprocess.run(
-            ["sh", "-c", '"$@"; exit $?', "sh", self.binary, *arguments], capture_output=True, text=True, errors="replace", check=False,
-            env={**os.environ, **environment},
+            ["sh", "-c", '"$@"; exit $?', "sh", self.binary, *arguments],
+            capture_output=True, text=True, errors="replace", check=False, env={**os.environ, **environment},
         )  # fmt: skip
 
     def _logged(self, *inputs: Path) -> tuple[subprocess.CompletedProcess[str], list[str]]:

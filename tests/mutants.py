@@ -208,7 +208,8 @@ KILLED = (
     ),
     Mutant(
         "a committed drive answers the same reference, loop", "c_runtime/compensator/chain/chain_calls.c",
-        "    self->repeated = false;\n    self->pending = inside;", "    self->pending = inside;", "plain", "q31", "loop",
+        "    self->repeated = false;\n    self->pending = inside;", "    self->pending = inside;",
+        "plain", "q31", "loop",
     ),
     Mutant(
         "what is pending stays out of the memory", "c_runtime/compensator/chain/chain.c",
