@@ -255,7 +255,7 @@ class Effect(BaseModel):
     shown_by: ClassVar[Mapping[str, int]] = {}
     """records of a plan that show it, and its place among the effects that a record shows, 1 for the plainest"""
     rank: ClassVar[float] = math.inf
-    """which of several effects that explain the records equally well is named: the one of lowest rank"""
+    """order of effects that explain records equally well: a lag or a delay, which every drive has, before late plays"""
     from_start: ClassVar[bool] = False
     """whether it counts the seconds from the first sample"""
     block: ClassVar[OwnBlock | None] = None

@@ -533,23 +533,25 @@ def made_of(
             s.plays.step.status[0] |= LIMITED_SETTING
 
     @jit
-    def init(t: ChainTables, s: ChainState) -> None:
-        """Set the start memory of the parameter file, and its settings."""
-        settings_reset(t, s)
-        plays_init(t.plays, s.plays, s.own.inverse[0])
-        start(t, s, 0)
+    def start_at(t: ChainTables, s: ChainState, after: int) -> None:
+        """Start where the plays are, after init (0) or reset (1)."""
+        start(t, s, after)
         begin(t, s)
         if not s.own.inverse[0]:
             s.plays.step.answer[0] = expected(t, s)
 
     @jit
+    def init(t: ChainTables, s: ChainState) -> None:
+        """Set the start memory of the parameter file, and its settings."""
+        settings_reset(t, s)
+        plays_init(t.plays, s.plays, s.own.inverse[0])
+        start_at(t, s, 0)
+
+    @jit
     def reset(t: ChainTables, s: ChainState) -> None:
         """Set all plays to 0 and clear the status; the caller makes the step of the reset."""
         plays_reset(t.plays, s.plays, s.own.inverse[0])
-        start(t, s, 1)
-        begin(t, s)
-        if not s.own.inverse[0]:
-            s.plays.step.answer[0] = expected(t, s)
+        start_at(t, s, 1)
 
     @jit
     def seen(t: ChainTables, s: ChainState, v: Any) -> None:

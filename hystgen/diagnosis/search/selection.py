@@ -227,24 +227,20 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
         for n in least
     }
 
-    def order(one: tuple[int, float, float, Tried]) -> tuple[int, float, float, tuple[float, int]]:
+    def order(one: tuple[int, float, float, Tried]) -> tuple[int, float, float, tuple[int, float]]:
         n, everywhere, residual, each = one
         return n, max(everywhere, equal * least[n]), max(residual, equal * held_out[n]), place(each.name)
 
     return [*(each for *_, each in sorted(near, key=order)), *others]
 
 
-BEND_RANK = 5
-"""Rank of a bent front: an asymmetric actuator comes before a nonlinear sensor."""
-
-
-def place(name: str) -> tuple[float, int]:
-    """Which of equal effects is named: the first by rank, then in the catalogue, with the user's own effects last."""
-    if name == effects.BEND:
-        return BEND_RANK, 0
+def place(name: str) -> tuple[int, float]:
+    """Place among equal effects, of which the first is named: effects with a rank, then a bent front, since an
+    asymmetric actuator comes before a nonlinear sensor, then the rest of the catalogue, then the user's own."""
     if name not in effects.CATALOGUE:
-        return math.inf, len(effects.CATALOGUE)
-    return effects.shapes(name)[0].rank, effects.CATALOGUE.index(name)
+        return (1 if name == effects.BEND else 3), 0
+    rank = effects.shapes(name)[0].rank
+    return (0, rank) if rank < math.inf else (2, effects.CATALOGUE.index(name))
 
 
 def _at_an_end(fitted: Fitted) -> bool:

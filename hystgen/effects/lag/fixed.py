@@ -28,6 +28,7 @@ from hystgen.plays.slots import Counts, zero
 EXACT_BITS = 8
 """Bits of the state of a lag that is inverted exactly, which no rounding can stall."""
 
+
 class FixedLagTable(Struct):
     """A lag that is led."""
 
