@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from modelfiles import ALLOWED, BRAKED, BRANCHES, CALM, CHAINS, CREEP, FILES, INVERSE_ALONE, STEADY, TANH, chain
+from modelfiles import ALLOWED, BRAKED, BRANCHES, CALM, CHAINS, CREEP, FILES, INVERSE_ALONE, LED, STEADY, TANH, chain
 from scipy import signal
 from scipy.integrate import solve_ivp
 
@@ -21,7 +21,7 @@ import hystgen
 from hystgen.basics import jit
 from hystgen.basics.problems import EffectsError, FormatError, UnsupportedEffectsError
 from hystgen.compensator import reference
-from hystgen.compensator.chain import bounds, layout, preview, tables
+from hystgen.compensator.chain import bounds, layout, measured, preview, tables
 from hystgen.compensator.chain.run import answers
 from hystgen.compensator.chained import Compensator
 from hystgen.effects import Run
@@ -525,6 +525,26 @@ def test_stays_within_its_bounds(name: str, seed: int) -> None:
         last_bit = float(np.finfo(np.float32).eps) * max(map(abs, ends))
         assert not slew or np.max(np.abs(np.diff(v))) <= max(slew) + last_bit
         assert np.max(np.abs(forward - one.simulate(v, t=run.t, extra=run.extra))) <= bound.forward
+
+
+@pytest.mark.parametrize("arithmetic", ["float32", "float64", "q31", "q15"])
+@pytest.mark.parametrize("name", ["led", "wider"])
+def test_other_references_find_no_more_than_ten_times_the_error_stated(name: str, arithmetic: str) -> None:
+    """Smooth ones with plateaus, at speeds of their own; and the error stated is no more than ten times theirs."""
+    one = model(name, {**CHAINS, **LED}[name])
+    how = one.parameters.emit.compensation
+    numbers, ends = compiled(one, arithmetic), one.cascade.input_range
+    stated = measured.measured(numbers, one.chain, how).error
+    drive, output = (1.0, 1.0) if numbers.codes is None else (numbers.codes.drive_lsb, numbers.codes.output_lsb)
+    worst = 0.0
+    for seed in (21, 22):
+        run = record(numbers, seed, 600)
+        if numbers.codes:
+            run = Run(run.t, np.rint(run.v), {})
+        v = answers(numbers, run, True).astype(float)
+        wanted = Compensator(one.chain, how).drives(Run(run.t, run.v * float(output), {}), ends) / float(drive)
+        worst = max(worst, float(np.max(np.abs(v - wanted))))
+    assert stated / 10.0 <= worst <= 10.0 * stated
 
 
 @pytest.mark.parametrize("name", ["lagging", "everything", "dilated", "wider"])

@@ -294,14 +294,16 @@ def test_effects_that_are_over_within_a_sample_are_told(effect: str) -> None:
         assert not any(each.startswith("Effects are over") for each in told(other))
 
 
-def test_a_bound_of_the_whole_range_is_told() -> None:
-    said = told(of("name: lag, time_constant: 1.0e-3"))
-    bound = float(header(of("name: lag, time_constant: 1.0e-3"), "INVERSE_ROUNDING_ERROR"))
-    assert said == [
-        f"Error: NOISY_INVERSE_MAX_ERROR is the whole range of the drive, 100 V; at most {bound:.3g} V while both have "
-        "seen the same drives"
+def test_an_inverse_without_a_bound_states_the_error_found() -> None:
+    one = of("name: lag, time_constant: 1.0e-3")
+    found = float(header(one, "INVERSE_MEASURED_ERROR"))
+    assert told(one) == [
+        f"Error: no bound of NOISY_INVERSE is known; the largest error found in 4800 samples is {found:.2g} V"
     ]
-    assert told(of("name: lag, time_constant: 1.0e-3"), operator="forward") == []
+    text = emitted_files(one)["noisy.h"]
+    assert "INVERSE_MAX_ERROR" not in text
+    assert "no bound: the largest found in 4800 samples" in text
+    assert told(one, operator="forward") == []
 
 
 def test_sizes_of_codes_are_refused_where_there_are_no_codes(tmp_path: Path) -> None:

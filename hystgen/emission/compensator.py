@@ -8,6 +8,7 @@ import textwrap
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, TypeAlias
 
 from hystgen.chain.static import StaticModel
@@ -21,6 +22,7 @@ from hystgen.plays.slots import Reals
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables, Compiled
+    from hystgen.compensator.chain.measured import Measured
 
 Macro: TypeAlias = tuple[str, str, str]
 """A macro of a model: its name after the model's, its value, and a comment."""
@@ -415,6 +417,19 @@ class Compensator:
     numbers: Numbers
     compiled: Compiled | None
     glue: Glue | None
+
+    @cached_property
+    def measured(self) -> Measured | None:
+        """The largest error that a search finds, for an inverse whose error only the range of the drive bounds."""
+        limits = self.numbers.tables.limits
+        whole = float(limits[slots.DRIVE_MAX]) - float(limits[slots.DRIVE_MIN])
+        if not self.options.inverse or self.compiled is None or self.numbers.errors.inverse < whole:
+            return None
+        from hystgen.chain.chain import Chain
+        from hystgen.compensator.chain.measured import measured
+
+        chain, how = Chain(self.cascade, self.parameters.model.effects), self.parameters.emit.compensation
+        return measured(self.compiled, chain, how)
 
     @property
     def units(self) -> Units:

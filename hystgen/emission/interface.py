@@ -19,7 +19,6 @@ from hystgen.emission.runtime import Piece
 from hystgen.emission.text import WIDTH, comment_text, define, literal, operand
 from hystgen.front.tanh.model import TanhEnvelope
 from hystgen.parameters.files import Parameters
-from hystgen.plays import slots
 
 if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import Compiled
@@ -66,18 +65,18 @@ def conditions(one: Compensator) -> tuple[str, str]:
 
 
 def unbounded(one: Compensator) -> list[str]:
-    """A sentence if the bound of the inverse's error is useless."""
-    if not one.options.inverse:
+    """A sentence if no bound of the inverse's error is known."""
+    if (found := one.measured) is None:
         return []
-    limits, errors, form = one.numbers.tables.limits, one.numbers.errors, one.form
-    whole = float(limits[slots.DRIVE_MAX]) - float(limits[slots.DRIVE_MIN])
-    if errors.inverse < whole:
-        return []
-    macro, unit = f"{one.names.NAME}_INVERSE_MAX_ERROR{form.suffix}", form.unit(one.units.drive)
-    said = f"Error: {macro} is the whole range of the drive, {whole:.4g}{unit}"
-    if errors.rounding < whole:
-        return [f"{said}; at most {errors.rounding:.3g}{unit} while {together(*conditions(one))}"]
-    return [f"{said}: no drive is near the exact one for certain"]
+    unit = one.form.unit(one.units.drive)
+    said = (
+        f"Error: no bound of {one.names.NAME}_INVERSE is known; the largest error found in {found.samples} samples is "
+        f"{found.error:.2g}{unit}"
+    )
+    rounding = float(one.numbers.errors.rounding)
+    if found.confirms(rounding):
+        said += f", and it is at most {rounding:.3g}{unit} while {together(*conditions(one))}"
+    return [said]
 
 
 def reading(one: Compensator) -> list[str]:
@@ -251,8 +250,15 @@ def limits(one: Compensator) -> list[str]:
         found.append((f"FORWARD_MAX_ERROR{suffix}", operand(errors.forward), bound + output))
     branch, condition = conditions(one)
     if one.options.inverse:
-        found.append((f"INVERSE_MAX_ERROR{suffix}", operand(errors.inverse), bound + drive))
-        if one.variant.branches or (condition and errors.rounding != errors.inverse):
+        measured = one.measured
+        if measured is None:
+            found.append((f"INVERSE_MAX_ERROR{suffix}", operand(errors.inverse), bound + drive))
+        else:
+            comment = f"no bound: the largest found in {measured.samples} samples, {bound}{drive}"
+            error = literal(one.family.arithmetic.real(measured.error))
+            found.append((f"INVERSE_MEASURED_ERROR{suffix}", error, comment))
+        stated = measured is None or measured.confirms(float(errors.rounding))
+        if stated and (one.variant.branches or (condition and errors.rounding != errors.inverse)):
             same = f"the same while {together(branch, condition)}"
             found.append((f"INVERSE_ROUNDING_ERROR{suffix}", operand(errors.rounding), same))
     return _defined(one, found)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
 import hystgen
-from hystgen.basics.problems import FormatError
+from hystgen.basics.problems import FormatError, UnsupportedEffectsError
 from tests.oracle.check import HERE, KINDS, compiled_library, doubles
 
 SAMPLES = 20_000
@@ -212,12 +212,12 @@ def read(path: Path, arithmetic: str) -> Case:
 
 
 def emit(case: Case, folder: Path) -> bool:
-    """Write the C of a case; whether its numbers fit the arithmetic."""
+    """Write the C of a case; whether its numbers fit the arithmetic, and its noise gain is emitted unasked."""
     path = folder / f"{case.name}.yaml"
     path.write_text(text(case.data))
     try:
         hystgen.emit(hystgen.load(path), folder, operator="both", arithmetic=case.arithmetic, engine="auto")
-    except FormatError:
+    except (FormatError, UnsupportedEffectsError):
         return False
     return True
 
@@ -247,7 +247,7 @@ def _shim(case: Case) -> str:
     inverse = [wrapped("inverse", "init", "void"), wrapped("inverse", "step", "double", x),
                *(wrapped("inverse", call, "void", x) for call in ("push", "commit", "settle", "temperature")),
                wrapped("inverse", "status", "unsigned")]  # fmt: skip
-    bounds = [f"{macro}_FORWARD_MAX_ERROR{ending}", f"{macro}_INVERSE_MAX_ERROR{ending}"]
+    bounds = [f"{macro}_FORWARD_MAX_ERROR{ending}", f"BOUND_{macro}"]
     numbers = [
         str(KINDS[case.arithmetic]), f"{macro}_DRIVE_MIN", f"{macro}_DRIVE_MAX", f"{macro}_OUTPUT_MIN",
         f"{macro}_OUTPUT_MAX", *([f"{macro}_DRIVE_LSB", f"{macro}_OUTPUT_LSB"] if fixed else ["1", "1"]),
@@ -257,8 +257,15 @@ def _shim(case: Case) -> str:
     lines += [
         f"#ifdef {macro}_INVERSE_ROUNDING_ERROR{ending}",
         f"#define ROUNDING_{macro} {macro}_INVERSE_ROUNDING_ERROR{ending}",
+        f"#elif defined {macro}_INVERSE_MAX_ERROR{ending}",
+        f"#define ROUNDING_{macro} {macro}_INVERSE_MAX_ERROR{ending}",
+        "#else",  # a bound of more than ten times the error found is left out, so that this is the stricter one
+        f"#define ROUNDING_{macro} (10.0 * {macro}_INVERSE_MEASURED_ERROR{ending})",
+        "#endif",
+        f"#ifdef {macro}_INVERSE_MAX_ERROR{ending}",
+        f"#define BOUND_{macro} {macro}_INVERSE_MAX_ERROR{ending}",
         "#else",
-        f"#define ROUNDING_{macro} {bounds[1]}",
+        f"#define BOUND_{macro} ({macro}_DRIVE_MAX - {macro}_DRIVE_MIN)",
         "#endif",
         f"const effects_probe_t {name}_probe = {{{', '.join(numbers)}}};",
     ]
