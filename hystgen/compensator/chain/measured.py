@@ -57,8 +57,8 @@ def measured(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
     worst, count = 0.0, 0
     columns = {name: getattr(effect, "reference", 0.0) for effect in chain.effects for name in effect.columns}
     for share in (kind(fastest * speed) for kind in (_legs, _multisine) for speed in SPEEDS):
-        given: Array = low + (high - low) * share
-        given = given.astype(t.threshold.dtype).astype(np.float64) if codes is None else np.rint(given)
+        whole = low + (high - low) * share
+        given = np.asarray(whole.astype(t.threshold.dtype) if codes is None else np.rint(whole), dtype=np.float64)
         times = np.arange(len(given)) * compiled.seconds
         extra = {name: np.full(len(given), at) for name, at in columns.items()}
         with jit.plain():
