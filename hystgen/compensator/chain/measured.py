@@ -58,8 +58,8 @@ def measured(compiled: Compiled, chain: Chain, how: Compensation) -> Measured:
     columns = {name: getattr(effect, "reference", 0.0) for effect in chain.effects for name in effect.columns}
     for share in (kind(fastest * speed) for kind in (_legs, _multisine) for speed in SPEEDS):
         whole = low + (high - low) * share
-        given = np.asarray(whole.astype(t.threshold.dtype) if codes is None else np.rint(whole), dtype=np.float64)
-        times = np.arange(len(given)) * compiled.seconds
+        given = whole.astype(t.threshold.dtype).astype(np.float64) if codes is None else np.rint(whole)
+        times = compiled.seconds * np.arange(len(given), dtype=np.float64)
         extra = {name: np.full(len(given), at) for name, at in columns.items()}
         with jit.plain():
             found = answers(compiled, Run(times, given, extra), True).astype(np.float64)
