@@ -667,12 +667,12 @@ class TestRefused:
     @pytest.mark.parametrize(
         ("v", "y", "options", "message"),
         [
-            (SINE[:15], SINE[:15], (), "{path}: error: has 15 samples, at least 16 are needed; record for longer"),
+            (SINE[:15], SINE[:15], (), "{path}: error: has 15 samples, but at least 16 are needed; record for longer"),
             (
                 SINE * 0.0 + 5.0,
                 SINE,
                 (),
-                "{path}: error: the drive v is 5 throughout; a fit needs a drive that moves, check the columns",
+                "{path}: error: the drive v is 5 throughout, but a fit needs a drive that moves; check the columns",
             ),
             (SINE, SINE * 0.0, (), "data.csv: the measured output is constant; is y the right column?"),
             (
@@ -701,8 +701,8 @@ class TestRefused:
                 SINE[:60],
                 SINE[:60],
                 ("--thresholds", "100", "--history", "1"),
-                "60 samples can be compared, 100 plays need at least 102; record more cycles, give --history, or use "
-                "fewer thresholds",
+                "60 samples can be compared, but 100 plays need at least 102; record more cycles, give --history, or "
+                "use fewer thresholds",
             ),
             (
                 SINE,
