@@ -203,7 +203,7 @@ class Loop:
         except (TypeError, ValueError):
             r = np.empty(0)
         if r.ndim != 1 or not len(r) or not np.all(np.isfinite(r)):
-            raise ValueError("a reference is one finite number per sample, at least one")
+            raise ValueError("a reference has to be one finite number per sample, for at least one sample")
         return r
 
 

@@ -129,7 +129,7 @@ class Model:
         return Chain(self.cascade, self.effects)
 
     def need_static(self, what: str) -> None:
-        """Raise UnsupportedEffectsError if the model has effects: `what` (`the inverse`) does not cover them yet."""
+        """Raise UnsupportedEffectsError if the model has effects, which `what` ("the inverse") does not cover yet."""
         if self.effects:
             names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
             raise UnsupportedEffectsError(
@@ -284,10 +284,10 @@ class Model:
         'float32', 'float64', 'q31' or 'q15' the result is the bit reference of the emitted C, which limits the drive to
         `input_range`; fixed point takes and returns codes.
 
-        Only effects use time, which is `t` (N,) in seconds, increasing, or follows from the parameter file's
-        `sample_time`, and `extra`, further columns (N,) such as `temperature`. The model starts at rest at the first
-        sample. Raises EffectsError if effects lack something they need, UnsupportedEffectsError for effects that
-        `arithmetic` does not support.
+        Only effects use time and `extra`. The time is `t` (N,) in seconds, increasing, or else follows from the
+        parameter file's `sample_time`; `extra`: further columns (N,) such as `temperature`. The model starts at rest at
+        the first sample. Raises EffectsError if effects lack something they need, UnsupportedEffectsError for effects
+        that `arithmetic` does not support.
 
         Warns (`SampleWarning`) with the number of drives outside `input_range` and of non-finite ones, which hold the
         drive before them.
@@ -395,8 +395,8 @@ class Model:
         return Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)
 
     def settling(self, within: float = SETTLED) -> Settling:
-        """How long after a full-range step of the drive, up and down, the output takes to stay close to its final
-        value.
+        """How long the output takes to settle close to its final value after a full-range step of the drive, up and
+        down.
 
         `within`: the error, as a share of the final step of the output. Found by simulating the steps with all effects,
         up to an hour; drift and effects that follow a logged column are left out. Raises EffectsError if one of the
@@ -490,10 +490,10 @@ class InverseModel:
 
 
 def _held(name: str, x: ArrayLike, first: float | None) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Samples (N,), called `name`, in which each non-finite one is replaced by the finite one before it, and a mask of
-    those replaced.
+    """The samples `x` (N,), each non-finite one replaced by the last finite one before it, and a mask of those
+    replaced.
 
-    Those before the first finite one become `first` or, if that is None, the first finite one itself.
+    Those before the first finite one become `first` or, if that is None, that one. `name`: of the samples in messages.
     """
     samples = np.array(arguments.signal(name, x), dtype=np.float64)
     wrong = ~np.isfinite(samples)

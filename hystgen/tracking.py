@@ -27,7 +27,7 @@ error over a fifth of a record of `examples/` is 0.12 to 2.0 times that over the
 3.1 times. Set by: benchmarks/chosen_numbers.py unknown."""
 
 LINE, PLAYS, WHOLE = "straight line", "plays alone", "whole model"
-"""The compensators that turn the reference into a drive."""
+"""The compensators compared, each of which turns the reference into a drive."""
 
 
 @dataclass(frozen=True)

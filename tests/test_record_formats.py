@@ -290,7 +290,7 @@ def test_what_a_file_keeps_elsewhere_is_not_read(
         file["t"], file["v"] = T, V
         assert np.array_equal(file["y"][()], Y)
     refusal = (
-        "is kept outside this file, and no other file is opened; copy its numbers into this one, or name another "
+        "is stored outside this file, and no other file is opened; copy its numbers into this one, or name another "
         'column with --columns "y=COLUMN"'
     )
     assert problems(tmp_path / name) == [f'"y" {refusal}']
@@ -302,7 +302,7 @@ def test_what_a_file_keeps_elsewhere_is_not_read(
         file["y"] = Y
     record = read_record(tmp_path / name)
     check(record)
-    assert record.notes == (f"columns kept outside the file were left out: {path}",)
+    assert record.notes == (f"columns stored outside the file were left out: {path}",)
 
 
 def test_a_group_that_lies_in_another_file_is_not_read(tmp_path: Path) -> None:
@@ -310,7 +310,7 @@ def test_a_group_that_lies_in_another_file_is_not_read(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["t"], file["v"], file["run"] = T, V, h5py.ExternalLink("other.h5", "/")
     (problem,) = problems(tmp_path / "a.h5", columns={"y": "run/y"})
-    assert problem.startswith('"run" is kept outside this file, ')
+    assert problem.startswith('"run" is stored outside this file, ')
 
 
 @pytest.mark.parametrize("shape", [(N,), (N, 1), (1, N), (1, N, 1)])

@@ -200,7 +200,10 @@ class TestCut:
             ({"samples": 1e9}, ["samples: has to be a whole number, at least 2, not 1000000000.0"]),
             ({"history": [1.0]}, ["history: has to be the highest and the lowest drive"]),
             ({"history": [0.0, 1.0]}, ["history: has to be the highest and the lowest drive"]),
-            ({"rest": None, "rise": "x"}, ["rest: has to be a number from 0 on, not nothing", "rise: has to be a num"]),
+            (
+                {"rest": None, "rise": "x"},
+                ["rest: has to be a number of at least 0, not nothing", "rise: has to be a num"],
+            ),
             ({"speed": 1}, ["speed: this key is unknown"]),
             ({"records": []}, ["records: has to be a list of records, not a list"]),
             ({"records": [1, {"name": "a"}]}, ["records[0]: has to be a record, not 1", "records[1].first: is missing",

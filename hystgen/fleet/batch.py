@@ -37,7 +37,7 @@ from hystgen.identification.settings import Settings
 from hystgen.records import FORMATS, Record, several, write_atomically
 
 SUFFIXES = (".csv", ".tsv", ".lvm", *FORMATS)
-"""Files that are picked up from a folder."""
+"""Suffixes of the files that are picked up from a folder."""
 
 KEPT_IN = ".hystgen"
 """Folder, inside the output folder, with the results of finished units."""

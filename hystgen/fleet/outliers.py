@@ -20,7 +20,7 @@ FEWEST = 8
 """[units] With fewer, a median absolute deviation means little, and no unit is marked."""
 
 SAME = 1e-6
-"""Relative spread below which units count as equal: rounding on writing, and different solvers, change figures less."""
+"""Relative spread below which units count as equal: rounding of written digits and different solvers change less."""
 
 MATTERS, MATTERS_ERROR = 0.05, 0.2
 """[share of the median] An outlier differs from the median by at least the first, and an error exceeds it by at least

@@ -266,7 +266,7 @@ def smooth(record: Record) -> Record:
 
 
 def _beyond(x: Array, times: float) -> Flags:
-    """Samples that lie beyond all but the outermost ones by `times` their range."""
+    """Samples that lie outside the range of all but the outermost samples by more than `times` that range."""
     low, high = _ends(x)
     away = times * (high - low)
     return np.asarray((x < low - away) | (x > high + away))
@@ -354,7 +354,7 @@ MOVES_ON = 0.01
 converter's range."""
 
 SUDDEN = 4.0
-"""The end of a converter's range is reached in steps below this many times the steps expected from the drive."""
+"""Steps that reach the end of a converter's range are smaller than this many times those expected from the drive."""
 
 GRAINS = 8.0
 """A coarse output counts as held if it stays constant while the drive should move it by this many of its steps."""
@@ -459,7 +459,7 @@ def rails(y: Array, v: Array) -> list[tuple[str, float]]:
     between = known & (y > low) & (y < high)
     if not between.any():
         return []
-    slope = sensitivity(y[between], v[between])  # samples at the ends of the range would flatten it
+    slope = sensitivity(y[between], v[between])  # samples at the ends of the range would lower the slope
     for name, end, sign in (("largest", high, 1.0), ("least", low, -1.0)):
         least = max(MOVES_ON * float(np.ptp(v)), GRAINS * grain / slope if slope > 0.0 and grain < np.inf else 0.0)
         runs = runs_of(y == end)

@@ -146,7 +146,7 @@ def _finished(
     fitted = _solve_behind(courses, front, shape, replace(how, wanted=tuple(float(x) for x in r)))
     if how.wanted is None:
         fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
-    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # the front does not change it
+    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # a front does not change the sense
     largest = float(fitted.solution.thresholds[-1])
     firsts = [fitted.inner(item).resettled(largest).first for item in courses]
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]

@@ -64,7 +64,7 @@ class Sense:
 class Solution:
     """A fitted play sum.
 
-    `reach`: largest threshold that the records support; `fitted`: the weights as fitted; `sense`: of the records.
+    `reach`: largest threshold that the records support; `fitted`: the weights as fitted; `sense`: the records' sense.
     """
 
     thresholds: Array
@@ -221,8 +221,8 @@ def runs_clockwise(courses: Sequence[Course]) -> bool:
 
 
 def _direction(turns: Sequence[_Turn], both: bool) -> int:
-    """1 if these loops run counterclockwise, -1 if clockwise, 0 if undecided. `both`: only from turns at the top and at
-    the bottom.
+    """1 if these loops run counterclockwise, -1 if clockwise, 0 if undecided. `both`: undecided unless there are turns
+    both at the top and at the bottom.
 
     The width of a loop, the output of the downward leg minus that of the upward leg, is taken as proportional to the
     span of drive that both share. A drift adds as much to it after a turn at the top as it takes away after one at the
@@ -257,7 +257,7 @@ class _Turn:
     """The two legs of the drive on either side of a turning point, over the `span` of drive that they share.
 
     `widths` (LEVELS,): outputs on the way down minus those on the way up; `later`: samples by which the way down is
-    later; `deviation`: of the mean width, due to the noise of the output.
+    later; `deviation`: standard deviation of the mean width due to the noise of the output.
     """
 
     span: float

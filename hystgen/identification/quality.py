@@ -308,7 +308,7 @@ def about_model(
         if beyond:
             above = f" above {solution.reach:.6g}"
             reported.append(
-                f"{counted(len(beyond), f'threshold{above} hardly moves', f'thresholds{above} hardly move')} in these "
+                f"{counted(len(beyond), f'play{above} hardly moves', f'plays{above} hardly move')} in these "
                 "records; do not trust their weights for larger drives"
             )
     outputs = [y[np.isfinite(y)] for y in (item.y[item.first : item.last] for item in compared)]

@@ -252,7 +252,7 @@ def turns_of(r: Array, states: Array) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class _Bounds:
-    """Slopes of memories over the thresholds."""
+    """Bounds on the slopes of memories over the thresholds."""
 
     number: int
 

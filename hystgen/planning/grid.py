@@ -74,8 +74,8 @@ class Grid:
 
 @dataclass(frozen=True)
 class Tempo:
-    """Times as multiples of the sample time: the spacing of samples of `fast` records, the duration of `slow` ones, the
-    `rest`.
+    """Times as multiples of the sample time: the spacing of samples of `fast` records, the duration of `slow` ones, and
+    the `rest` between records.
 
     `move`: samples of a full-scale move of the fast triangles.
     """

@@ -108,8 +108,8 @@ class Session:
             if max(off) > OFF * (top - bottom):
                 raise PlanError(
                     [
-                        f"{recording.name}: the drive is {record.v[0]:.6g} and {record.v[-1]:.6g} where {part.name} "
-                        f"begins and ends at {bottom:.6g}; is it a recording of this session, at this rate?"
+                        f"{recording.name}: the drive is {record.v[0]:.6g} and {record.v[-1]:.6g} at the ends of "
+                        f"{part.name}, not {bottom:.6g}; is it a recording of this session, at this rate?"
                     ]
                 )
             (held if part.held_out else to_fit).append(record)
@@ -138,7 +138,7 @@ GIVE = f"give the {FILE} that hystgen diagnose --plan --rate wrote"
 
 def _number(low: float, strict: bool = False) -> Callable[[object], str]:
     """A function that returns the problem with a value, empty if it is a finite number >= `low` (> if `strict`)."""
-    wanted = f"a number {'above' if strict else 'from'} {low:g}{'' if strict else ' on'}"
+    wanted = f"a number {'above' if strict else 'of at least'} {low:g}"
 
     def wrong(value: object) -> str:
         right = isinstance(value, int | float) and not isinstance(value, bool) and -HUGE < value < HUGE and (
@@ -237,7 +237,7 @@ def _problems(content: Mapping[str, Any]) -> Iterator[Wrong]:
         names.add(part["name"])
         end = part["first"] + part["samples"]
         if ("samples",) not in wrong and "samples" in content and end > content["samples"]:
-            yield (*place, "samples"), f"ends at sample {end}, and the session at {content['samples']}; {GIVE}", False
+            yield (*place, "samples"), f"ends at sample {end}, but the session at {content['samples']}; {GIVE}", False
 
 
 def crossing(t: NDArray[np.float64], v: NDArray[np.float64], middle: float) -> float | None:

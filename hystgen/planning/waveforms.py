@@ -150,7 +150,7 @@ def _steps(drive: Waveform, hold: int, levels: Sequence[float]) -> None:
 
 
 def _sweep(drive: Waveform, samples: int = 1100) -> None:
-    """Frequency rises with time squared to an eighth of the sampling rate; amplitude falls as the limit requires."""
+    """Frequency rises as time squared to an eighth of the sampling rate; amplitude falls to keep the rate limit."""
     first, last = 1.0 / (16.0 * drive.pace), 1.0 / 8.0
     turns, values = 0.0, []
     for k in range(samples):
@@ -269,7 +269,7 @@ RECORDS = (
         partial(_reversals, seed=2, turns=14, slowest=3.0), _lasting(1.25, 600), True,
     ),
     RecordKind(
-        "sweep", "A sine from slow to an eighth of the sampling rate: the peak of a resonance, the phase of a lag.",
+        "sweep", "A sine sweep up to an eighth of the sampling rate: the peak of a resonance, the phase of a lag.",
         _sweep, _fast,
     ),
     RecordKind(

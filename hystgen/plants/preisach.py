@@ -55,9 +55,9 @@ def _add_up(corner: Places, change: Array, out: Array) -> None:
 class EverettTable:
     """Everett surface between grid points: `values[i][j]` is E at alpha = `edges[i]`, beta = `edges[j]`, j <= i.
 
-    `edges`: increasing inputs, at least two; `values`: square, in output units, 0 on the diagonal; those above it are
-    ignored. Bilinear in a cell, linear in the half cells on the diagonal. Raises ValueError for other tables, and for
-    points that are not between the edges.
+    `edges`: increasing inputs, at least two; `values`: square, in output units, 0 on the diagonal; values above the
+    diagonal are ignored. Bilinear in a cell, linear in the half cells on the diagonal. Raises ValueError for other
+    tables, and for points that are not between the edges.
     """
 
     edges: Sequence[float]
@@ -114,8 +114,8 @@ class Preisach:
 
     `everett(alpha, beta)`: change of the output when the input rises from beta to alpha, 0 for alpha = beta, increasing
     in alpha and decreasing in beta, a function of two arrays; in output units. `low`, `high`: range of the relays,
-    outside which an input changes nothing; `offset`: output with all relays down, the start, after which the input
-    visits `history`. A rise from the remembered minimum m gives `y = y_m + E(v, m)`, a fall from a maximum M
+    outside which an input changes nothing; `offset`: output with all relays down, as they are before the input visits
+    `history`. A rise from the remembered minimum m gives `y = y_m + E(v, m)`, a fall from a maximum M
     `y = y_M - E(M, v)`; an input that passes an extremum wipes it out. Raises ValueError for wrong arguments or a
     surface that is not an Everett surface on 33 x 33 points. Sources: D. H. Everett, A general approach to hysteresis,
     part 4, Trans. Faraday Soc. 51, 1955; I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer, 1991.

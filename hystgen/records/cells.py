@@ -53,14 +53,14 @@ class Clock:
         """Seconds from the column's first time. Raises ValueError for a cell that is not a time."""
         match = _TIME.fullmatch(cell.strip())
         if match is None:
-            raise ValueError("no time of day")
+            raise ValueError("not a time of day")
         hour, minute, second = int(match["hour"]), int(match["minute"]), int(match["second"])
         if match["half"]:
             if not 1 <= hour <= 12:
                 raise ValueError("not an hour of a twelve-hour clock")
             hour = hour % 12 + 12 * (match["half"][0] in "pP")
         if hour > 23 or minute > 59 or second > 60:
-            raise ValueError("no time of day")
+            raise ValueError("not a time of day")
         fraction = int((match["fraction"] or "")[:9].ljust(9, "0"))
         time = ((hour * 60 + minute) * 60 + second - _offset(match["zone"])) * NANO + fraction
         if match["date"]:

@@ -50,7 +50,7 @@ def split_unit(header: str) -> tuple[str, str]:
     """Name and unit of a header: `pos [um]`, `pos (um)`, `U / V`, `time_ms`; the unit may be empty."""
     text = header.strip()
     match = re.fullmatch(r"(.*?\S)\s*\[\s*([^\[\]]*?)\s*\]", text)
-    # In square brackets anything is a unit except a number, which counts channels
+    # In square brackets anything is a unit except a number, which is that of a channel
     if match and not match[2].isdecimal() and len(match[2]) <= MAX_UNIT and match[2].isprintable():
         return match[1], "" if match[2] == "-" else match[2]
     match = re.fullmatch(r"(.*?\S)\s*\(\s*([^()]*?)\s*\)", text) or re.fullmatch(r"(.*?[^\s/])\s*/\s*(\S+)", text)
@@ -176,7 +176,7 @@ class Step:
 
 
 def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
-    """The sample rate found in numbered lines of text."""
+    """The sample times and rates found in numbered lines of text."""
     found = []
     for number, line in lines:
         for match in _LINE.finditer(line.replace('"', "")):
@@ -359,8 +359,8 @@ def parse_columns(text: str) -> dict[str, str]:
 class Finder:
     """Finds the requested columns; `problems` lists what is wrong with those not found.
 
-    `understood`: columns found by the meaning of their names, by our names; `steps`: the file's sample rate for the
-    columns found, if it has no time.
+    `understood`: columns found by the meaning of their names, keyed by our names; `steps`: the file's sample rate for
+    the columns found, if it has no time.
     """
 
     columns: Sequence[Column]
@@ -377,7 +377,7 @@ class Finder:
     def find(
         self, need: Sequence[str], timed: bool, steps: Sequence[Step] = (), points: bool = False
     ) -> dict[str, Column]:
-        """The columns found, by our names.
+        """The columns found, keyed by our names.
 
         `need`: names that must be present; `timed`: the user gives the sample time, so the file need not have a time;
         `steps`: sample rates in the file, used only if it has no time; `points`: the file need not have a time either
@@ -451,7 +451,7 @@ class Finder:
         )
 
     def _example(self, unnamed: Sequence[str], found: Mapping[str, Column]) -> str:
-        """An example for that report, with columns in file order, if only as many columns remain as are needed."""
+        """An example that assigns the remaining columns in file order, if there are only as many as are needed."""
         taken = set(found.values())
         free = [c for c in self.columns if c.name and c not in taken and not _words(c) & COUNTING]
         times = [c for c in free if is_time_unit(c.unit) or meaning(c) == "t"]
@@ -511,7 +511,7 @@ class Finder:
             if wanted != name and not name.endswith(("/" + wanted, "." + wanted)) and not wanted.startswith(name + "/"):
                 continue
             self.problems.append(
-                f'"{printable(name)}" is kept outside this file, and no other file is opened; copy its numbers into '
+                f'"{printable(name)}" is stored outside this file, and no other file is opened; copy its numbers into '
                 f'this one, or name another column with --columns "{ours}=COLUMN"'
             )
             return

@@ -1,4 +1,4 @@
-"""Text tables, read in blocks: numpy's C reader takes the sound blocks, the others are read line by line.
+"""Text tables, read in blocks: numpy's C reader takes the sound blocks; the others are read line by line.
 
 A file of any size thus needs little more memory than its columns, and every fault is reported with its position.
 """
@@ -388,7 +388,7 @@ class _Body:
         return cells
 
     def _regular(self, text: str, lines: int) -> bool:
-        """Whether every line has as many cells as the header; numpy only checks the ones it is asked for."""
+        """Whether every line has as many cells as the header; numpy checks only the columns that are requested."""
         try:
             data = np.frombuffer(text.encode("latin-1"), dtype=np.uint8)
         except UnicodeEncodeError:
@@ -398,7 +398,7 @@ class _Body:
             if '"' in text:
                 return False
             blank = (data == ord(" ")) | (data == ord("\t")) | ends
-            # Cells are counted where they begin; in the other case a line has one cell more than separators
+            # Cells are counted where they begin; with any other delimiter a line has one cell more than delimiters
             between = ~blank & np.concatenate([[True], blank[:-1]])
             extra = 1
         else:

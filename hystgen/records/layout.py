@@ -145,7 +145,7 @@ def _view(dialect: Dialect, lines: Sequence[_Line]) -> _View | None:
 
 
 def _with_header(reading: Reading, view: _View, lines: Sequence[_Line]) -> TableLayout | None:
-    """The layout with the plain header, or with one in a comment right above the numbers if it names more of ours."""
+    """The layout with the plain header, or with one in a comment above the numbers if it names more of our columns."""
     plain, comment = _plain_header(view, lines), _comment_header(view, lines)
     if plain is None or comment is None:
         return plain or comment
@@ -254,7 +254,7 @@ def _headerless(reading: Reading, view: _View, lines: Sequence[_Line]) -> TableL
             cells = len(view.dialect.cells(above[-1].text))
             if cells > 1:
                 raise reading.refuse(
-                    f"the line above the numbers has {cells} cells, but they have {view.width}; correct the header, or "
+                    f"the line above the numbers has {cells} cells, but the rows {view.width}; correct the header, or "
                     f"name columns by their numbers with --columns {EXAMPLES.get(view.width, EXAMPLE)}",
                     above[-1].number,
                 )

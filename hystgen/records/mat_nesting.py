@@ -33,7 +33,7 @@ COMPLEX = 0x800
 """Flag of an array with an imaginary part."""
 
 PIECE = 1 << 16
-"""[bytes] Read or unpacked at a time."""
+"""[bytes] Amount read or unpacked at a time."""
 
 
 def problem(stream: IO[bytes]) -> str:
@@ -127,7 +127,7 @@ class _Elements:
         return struct.unpack(f"{self._order}{len(data) // 4}i", data)
 
     def matrix(self) -> int:
-        """The size of an array, whose header comes next."""
+        """Read the tag of an array and return its size; the array's header comes next."""
         kind, size, inside = self._tag()
         if kind != MATRIX or inside is not None:
             raise ValueError

@@ -142,7 +142,7 @@ class Reading:
         line: int | None = None,
         steps: Sequence[Step] = (),
     ) -> dict[str, Column]:
-        """The requested columns, by our names. Raises RecordError for those that are missing.
+        """The requested columns, keyed by our names. Raises RecordError for those that are missing.
 
         `steps`: sample rates in the file, used if there is neither a time nor `sample_time`.
         """
@@ -172,7 +172,7 @@ class Reading:
         return found
 
     def further(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> dict[str, Column]:
-        """The columns that were not requested, by the names they get; a column whose name is taken is noted."""
+        """The columns not requested, keyed by the names they get; a column whose name is taken is noted."""
         used = {c.name for c in chosen.values()}
         others = [c for c in columns if c.name not in used]
         names = further_names(others, list(chosen))
@@ -210,7 +210,7 @@ class Reading:
             raise self.refuse(f"the columns differ in length: {parts} samples; export them with one length")
         folders = {c.folder for c in chosen.values()}
         self.left_out("without numbers", ignored)
-        self.left_out("kept outside the file", outside)
+        self.left_out("stored outside the file", outside)
         self.left_out("of other groups", [c.name for c in columns if c.folder not in folders])
         near = [c for c in columns if c.folder in folders]
         self.left_out("of another length", [c.name for c in near if c.length not in lengths])
