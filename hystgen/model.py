@@ -493,7 +493,7 @@ def _held(name: str, x: ArrayLike, first: float | None) -> tuple[NDArray[np.floa
     """The samples `x` (N,), each non-finite one replaced by the last finite one before it, and a mask of those
     replaced.
 
-    Those before the first finite one become `first` or, if that is None, that one. `name`: of the samples in messages.
+    Those before the first finite one become `first` or, if that is None, that one. `name`: what messages call `x`.
     """
     samples = np.array(arguments.signal(name, x), dtype=np.float64)
     wrong = ~np.isfinite(samples)

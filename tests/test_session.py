@@ -150,7 +150,7 @@ int main(void) { play(print); return 0; }
         samples = parts_of(played).samples
         assert f"{samples} samples in {samples / RATE / 60.0:.1f} min" in words
         assert f"{samples} codes, {2 * samples / 1e6:.3g} MB of memory at 2 bytes each" in words
-        assert "12 bits over -40 to 160 V, straight binary: a code is 0.04883 V" in words
+        assert "12-bit DAC over -40 to 160 V, straight binary: one code is 0.04883 V" in words
         assert "--session" in words
         assert sorted(path.name for path in (tmp_path / "plan").iterdir()) == sorted(played.names)
 
@@ -215,7 +215,7 @@ class TestCut:
              ["records[1].name: the text \"a\" is the name", "records[1].first: begins within the previous record"]),
             ({"records": [{"name": "a", "first": 0, "samples": 10**8, "held_out": False}]},
              ["records[0].samples: ends at sample 100000000"]),
-            ({"dac": {"bits": 99, "low": 1, "high": 0, "coding": "straight"}}, ["a DAC of 99 bits", "not increasing"]),
+            ({"dac": {"bits": 99, "low": 1, "high": 0, "coding": "straight"}}, ["has 99 bits", "not increasing"]),
             ({"dac": {"bits": 16, "low": 0, "coding": "gray"}}, ["dac.high: is missing", "dac.coding: has to be"]),
             ({"dac": 3}, ["dac: has to be a mapping or null, not 3"]),
         ],

@@ -153,7 +153,7 @@ def _stands_out(x: Array, first: int, last: int) -> bool:
 def wrong_drive(v: Array, y: Array) -> Flags:
     """Isolated samples of the drive that jump away and back without a response of the output (NaN: unknown).
 
-    A real pulse of the drive shows in the output, at once or a little later; one that does not is a fault of the
+    A real pulse of the drive shows in the output, at once or a little later; a pulse that does not is a fault of the
     recording. At either end of a record there is only one jump. Numbers that stand for "no value" always count.
     """
     found = no_value(v)

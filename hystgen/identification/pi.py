@@ -158,7 +158,7 @@ SENSED_RANK = 1e-6
 """Share of the largest singular value below which the records do not determine a combination of plays."""
 
 LEAST_TURN = 0.05
-"""[share of the drive's range] Smaller moves back belong to the leg that they interrupt: noise of the drive, dither."""
+"""[share of the drive's range] A smaller reversal belongs to the leg that it interrupts: noise of the drive, dither."""
 
 LEVELS = 32
 """Number of points of a leg, each the mean of a group of samples, and of drives at which two legs are compared."""
@@ -172,8 +172,8 @@ ONE_WAY = 0.5
 opposite directions and cancel. Set by: tests/test_start.py TestDirection."""
 
 SLOWEST, SAME_SPEED = (0.125, 0.25, 0.5, 1.0), 1.05
-"""Shares of the time taken by the slowest turns, tried one by one; turns that are at most a twentieth faster are
-included. Set by: tests/test_start.py TestDirection."""
+"""[share of the time] The slowest turns that take up each share are tried in order; turns that are at most a twentieth
+faster are included. Set by: tests/test_start.py TestDirection."""
 
 FALLING = (
     "y falls when v rises; if the sensor counts the other way, change the sign of y, otherwise check which column "
@@ -561,8 +561,8 @@ RIDGE = 1e-7
 """Weight of the tie break between solutions that fit equally well, with columns scaled to length one."""
 
 INFEASIBLE = 1e-10
-"""A distance of the dual problem's solution from its target, of length 1, below this is rounding: the target is
-reached, and no point satisfies all inequalities (Farkas)."""
+"""If the dual problem's solution is closer than this to its target, of length 1, the rest is rounding: the target is
+reached, so no point satisfies all inequalities (Farkas)."""
 
 
 class InfeasibleError(ValueError):

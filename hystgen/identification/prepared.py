@@ -32,8 +32,8 @@ LESS_MISSED = 0.25
 
 
 LEAST_MOVEMENT = 1e-20
-"""A smaller motion of drive or output cannot be a measurement: its squares, and its ratio to the other motion, exceed
-the range of double precision and of parameter files."""
+"""A smaller motion of drive or output cannot be a measurement: its squares, and its ratio to the other motion, fall
+outside the range of double precision and of parameter files."""
 
 
 def courses(

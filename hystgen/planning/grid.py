@@ -1,4 +1,4 @@
-"""Drive and time of a plan, as integer numbers of steps of decimal grids."""
+"""Drives and times of a plan, as integer multiples of decimal steps."""
 
 from __future__ import annotations
 

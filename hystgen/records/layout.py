@@ -254,7 +254,7 @@ def _headerless(reading: Reading, view: _View, lines: Sequence[_Line]) -> TableL
             cells = len(view.dialect.cells(above[-1].text))
             if cells > 1:
                 raise reading.refuse(
-                    f"the line above the numbers has {cells} cells, but the rows {view.width}; correct the header, or "
+                    f"the line above the numbers has {cells} cells, but rows have {view.width}; correct the header, or "
                     f"name columns by their numbers with --columns {EXAMPLES.get(view.width, EXAMPLE)}",
                     above[-1].number,
                 )

@@ -197,8 +197,8 @@ class Reading:
         """The table of a file whose columns are read one by one.
 
         It reads the requested columns and, from the groups that hold them, all others of the same length, except those
-        that are not numeric (`ignored`) or whose numbers are stored outside the file (`outside`). `matrices`: name to
-        shape and reader; in a file without vectors, a single matrix is the record.
+        that are not numeric (`ignored`) or whose numbers are stored outside the file (`outside`). `matrices`: shapes
+        and readers by name; in a file without vectors, a single matrix is the record.
         """
         if not columns and len(matrices) == 1:
             ((name, (shape, read)),) = matrices.items()

@@ -21,7 +21,7 @@ from hystgen.records.columns import TIMES, plain
 from hystgen.records.record import Array, Record
 
 TEMPERATURE = "temperature"
-"""The column that effects take in degC."""
+"""The column that effects expect in degC."""
 
 PREFIXES = {"f": -15, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "": 0, "k": 3, "M": 6, "G": 9}
 WORDS = {"pico": -12, "nano": -9, "micro": -6, "milli": -3, "centi": -2, "": 0, "kilo": 3, "mega": 6}
