@@ -454,7 +454,7 @@ class TestStartMemory:
         fit = hystgen.identify(record(v, y), thresholds=(0.0, 10.0, 60.0), holdout=record(v, y))
         assert row(fit, "fit").ignored == 80 == int(np.argmin(v))
         assert fitted(fit)[1] == pytest.approx((0.5, 0.3, 0.0), abs=1e-8)
-        assert any("1 threshold above" in text for text in fit.warnings)
+        assert any("1 play above" in text for text in fit.warnings)
 
     def test_skipped_samples_still_move_the_plays(self) -> None:
         v = wander(17)
