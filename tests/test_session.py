@@ -274,7 +274,7 @@ class TestCommand:
         words = ["--rate", RATE, "--dac-bits", "16", "--dac-range", "-30,130", "--dac-coding", "twos-complement"]
         code, _, err = run("diagnose", "--plan", file_of(tmp_path), *words, "-o", folder)
         assert code == 0, err
-        assert "16 bits over -30 to 130 V, two's complement" in err
+        assert "16-bit DAC over -30 to 130 V, two's complement" in err
         command = err.splitlines()[-1].removeprefix("then run: hystgen ").split()
         rows = (folder / "session.csv").read_text().splitlines()
         (folder / "recording.csv").write_text("t,v,y\n" + "\n".join(row.rsplit(",", 1)[0] + ",1.0" for row in rows[1:]))
