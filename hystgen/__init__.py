@@ -6,7 +6,7 @@
 >>> v = model.inverse().simulate(u)
 >>> hystgen.emit(model, "firmware/")
 
-`hystgen.closed_loop` simulates it with a plant and a controller, `hystgen.plants` other hysteretic plants.
+`hystgen.closed_loop` simulates a model with a plant and a controller; `hystgen.plants` has other hysteretic plants.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from hystgen.report.plan import plan as plan
     from hystgen.verification.run import verify as verify
 
-# Where each public name is, imported when it is first used: `hystgen emit` has to start fast. A test holds this to the
-# imports above, which are what type checkers read.
+# The module of each public name, imported on first use because `hystgen emit` has to start fast. A test checks that it
+# agrees with the imports above, which type checkers read.
 _PLACES = {
     "Cascade": "cascade",
     "DeadZone": "front.dead_zone.model",

@@ -1,4 +1,4 @@
-"""`python -m hystgen`: the command line of this interpreter, whatever `hystgen` is on the path."""
+"""`python -m hystgen`: runs the command line in this interpreter, regardless of which `hystgen` is on the path."""
 
 from hystgen.cli import main
 

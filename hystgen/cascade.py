@@ -1,4 +1,4 @@
-"""Models as frozen objects that run: what the parts of a model are made of is in the rooms below.
+"""Models as frozen objects that can be simulated; their parts are implemented in the packages imported here.
 
 `PI` is the play sum, `DeadZone` and `TanhEnvelope` are the memoryless parts in front of it, and `Cascade` is the whole
 actuator: stages in order from the drive, the play sum, an output offset and the drive range it is used in.
@@ -25,8 +25,8 @@ class PI(PlaySum):
     """Play sum `y = p_0 v + sum p_i play_(r_i)[v]` (21).
 
     `thresholds`: r_0 = 0 < r_1 < ... < r_n in units of the input; `weights`: p_0 .. p_n, any finite numbers, in output
-    per input unit; `initial_state`: one number or n+1 of them, projected to the admissible set (`projected`: whether it
-    was). Raises ValueError for anything else.
+    per input unit; `initial_state`: one number or n+1 of them, projected to the admissible set (`projected`: whether
+    that changed it). Raises ValueError for anything else.
     """
 
     def simulate(self, v: ArrayLike) -> Array:
@@ -38,16 +38,16 @@ class PI(PlaySum):
 class Cascade(StaticModel):
     """The actuator: `y = PI[G[v]] + output_offset` (39), `G` the stages in order from the drive.
 
-    `input_range`: the drive it is used in (two numbers, or unbounded). `simulate` runs it, `inverse` gives the
-    compensator.
+    `input_range`: the range of drives in which it is used (two numbers, or unbounded). `simulate` runs it, `inverse`
+    gives the compensator.
     """
 
     pi: PI
 
     def simulate(self, v: ArrayLike, clamp: bool = False) -> Array:
-        """Output for the drive samples `v` (N,) from the start memory, in double; `clamp` limits the drive.
+        """Output for the drive samples `v` (N,) from the start memory, in double precision; `clamp` limits the drive.
 
-        Warns (`SampleWarning`) of drives outside `input_range`, and of samples that are not finite, which are held.
+        Warns (`SampleWarning`) of drives outside `input_range`, and of non-finite samples, which repeat the last drive.
         """
         y, said = remarks.run(Session(self, "forward", clamp=clamp), v)
         remarks.tell(said)
@@ -68,14 +68,14 @@ class InverseCascade:
     forward: Cascade
 
     def inverse(self) -> Cascade:
-        """The model that this compensates."""
+        """The model that this inverse compensates."""
         return self.forward
 
     def simulate(self, u: ArrayLike, clamp: bool = True) -> Array:
         """Drive for the reference samples `u` (N,), in double precision; `clamp` keeps it inside `input_range`.
 
-        The memory follows the limited drive. Warns (`SampleWarning`) with the number of limited samples, and of those
-        that are not finite, for which the drive holds.
+        The memory follows the limited drive. Warns (`SampleWarning`) with the number of limited samples and of
+        non-finite samples, for which the drive is held.
         """
         session = Session(self.forward, "inverse", clamp=clamp)
         v, said = remarks.run(session, u, Session(self.forward, "forward"))

@@ -1,17 +1,17 @@
-"""Closed loops: a plant with hysteresis at its input, a compensator and a controller, at the firmware's rate.
+"""Closed loops: a plant with hysteresis at its input, a compensator and a controller, at the firmware's sample rate.
 
     reference --(+)--> controller --> compensator --> hysteresis --> plant --+--> output
                 -^                                                           |
                  +-----------------------------------------------------------+
 
-At sample k, at t_k = k T, in this order: the sensor takes the output y_k before anything moves; the controller answers
-the error r_k - y_k with u_k; the compensator turns u_k into the drive v_k; the actuator turns that into h_k without a
-delay; v_k, and with it h_k, is held until t_(k+1). So y_k depends on drives up to v_(k-1), and there is no algebraic
-loop even if the plant passes its input straight on. A controller or compensator that takes a whole sample to compute is
-a factor 1/z in the controller.
+At sample k, at t_k = k T, in this order: the sensor reads the output y_k before anything moves; the controller turns
+the error r_k - y_k into u_k; the compensator turns u_k into the drive v_k; the actuator turns v_k into the displacement
+h_k without delay; v_k, and with it h_k, is held until t_(k+1). So y_k depends on drives up to v_(k-1), and there is no
+algebraic loop even if the plant has direct feedthrough. To model a controller or compensator that takes a whole sample
+to compute, include a factor 1/z in the controller.
 
-Nothing is integrated numerically: hysteresis is rate-independent, so that a held drive gives a held h, and a zero-order
-hold is exact for a linear plant with a held input. A finer step would not change the values at the samples.
+Nothing is integrated numerically: hysteresis is rate-independent, so a held drive gives a held h, and a zero-order hold
+is exact for a linear plant with a held input. A finer step would not change the values at the samples.
 
 >>> import math
 >>> from hystgen import PI
@@ -54,25 +54,25 @@ Array = NDArray[np.float64]
 
 @runtime_checkable
 class LoopPart(Protocol):
-    """A part of the loop with a memory.
+    """A part of the loop that has a memory.
 
     A controller (error in, demand out), a compensator (demand in, drive out) or an actuator (drive in, displacement
     out).
     """
 
     def reset(self) -> None:
-        """Back to the start; called before every run."""
+        """Return to the start state; called before every run."""
 
     def step(self, x: float, /) -> float:
-        """The answer to one sample."""
+        """The output for the next input sample."""
 
 
 @dataclass(frozen=True)
 class PIController:
     """Proportional-integral controller `u_k = kp e_k + ki T (e_0 + ... + e_k)`, T the loop's sample time.
 
-    `kp` in controller output per error unit, `ki` in the same per second. Nothing is limited. Raises ValueError for
-    gains that are not finite.
+    `kp` in controller output per error unit, `ki` in the same per second. Neither the output nor the integral is
+    limited. Raises ValueError for non-finite gains.
     """
 
     kp: float
@@ -86,9 +86,9 @@ class PIController:
 class Response:
     """The response of a loop: arrays (N,), one entry per sample.
 
-    `t` in s; `reference`, `output` and `error` (reference less output) in units of the plant's output; `control`: the
-    answer of the controller; `drive`: that of the compensator; `displacement`: the plant's input, behind the
-    hysteresis. A loop that diverges ends in infinities and NaN.
+    `t` in s; `reference`, `output` and `error` (reference minus output) in units of the plant's output; `control`:
+    output of the controller; `drive`: output of the compensator; `displacement`: output of the hysteresis, which is the
+    plant's input. A loop that diverges ends in infinities and NaN.
     """
 
     t: Array
@@ -108,7 +108,7 @@ class Response:
         return float(np.sqrt(np.mean(self._error_from(start) ** 2)))
 
     def _error_from(self, start: float) -> Array:
-        # a start that is meant to be a sample counts as one in spite of rounding
+        # a start meant to fall on a sample includes that sample despite rounding
         kept = self.error[self.t >= start - 1e-9 * abs(start)]
         if not len(kept):
             raise ValueError(f"the response ends at {self.t[-1]:g} s, before {start:g} s")
@@ -119,21 +119,20 @@ class Response:
 class Loop:
     """A closed loop, sampled every `sample_time` seconds.
 
-    `plant`: a continuous system of scipy.signal, or arguments of one, (num, den), (zeros, poles, gain) or (A, B, C, D),
-    with one input and one output, at rest at first; or a discrete one with dt = sample_time. Controller, hysteresis
-    and compensator are each one of
+    `plant`: a continuous system of scipy.signal or its arguments (num, den), (zeros, poles, gain) or (A, B, C, D), with
+    one input and one output, initially at rest; or a discrete system with dt = sample_time. Controller, hysteresis and
+    compensator are each one of
 
     - None: passes its input on (not for the controller);
     - a number: a gain;
-    - a model (`Model`, `Cascade`, `PI`), in double precision and unlimited, or the `inverse()` of one: that of a
-      `Model` or `Cascade` keeps the drive inside its `input_range`;
+    - a model (`Model`, `Cascade`, `PI`), in double precision and unlimited, or the `inverse()` of a `Model` or
+      `Cascade`, which keeps the drive inside its `input_range`;
     - a `PIController`, or a discrete system of scipy.signal with dt = sample_time;
     - a `LoopPart`, such as `BitReference` and `CompiledC`, or any object with `step` and `reset`;
     - a function of one number, without memory.
 
-    Raises ValueError for a plant, gain or sample time that cannot be used and for one block in two places, TypeError
-    for a part that is none of these, UnsupportedEffectsError for a model with effects, whose linear ones belong in the
-    plant.
+    Raises ValueError for an unusable plant, gain or sample time and for the same block in two places, TypeError for a
+    part that is none of these, UnsupportedEffectsError for a model with effects; linear effects belong in the plant.
     """
 
     plant: object
@@ -151,7 +150,7 @@ class Loop:
             raise TypeError("a loop needs a controller")
         _ = self.sampled_plant
         if len(set(map(id, self._blocks))) < len(self._blocks):
-            raise ValueError("one block, with one memory, stands in two places of the loop; give each place its own")
+            raise ValueError("the same block, with one memory, is used in two places; give each place its own block")
 
     @cached_property
     def sampled_plant(self) -> tuple[Array, Array, Array, float]:
@@ -167,10 +166,10 @@ class Loop:
         )
 
     def run(self, reference: ArrayLike | Callable[[float], float], duration: float | None = None) -> Response:
-        """The response to `reference` from rest: N samples at t_k, or a function of the time in s with a `duration`.
+        """The response from rest to `reference`: N samples at t_k, or a function of time in s with a `duration` in s.
 
-        Every run starts anew: the plant at 0, all memories at their start. Raises ValueError for a reference that is
-        not a signal, or for an impossible duration.
+        Every run starts with the plant at 0 and all memories at their start values. Raises ValueError for a reference
+        that is not a signal, or for an impossible duration.
         """
         r = self._reference(reference, duration)
         controller, compensator, hysteresis = self._blocks
@@ -194,7 +193,7 @@ class Loop:
     def _reference(self, reference: ArrayLike | Callable[[float], float], duration: float | None) -> Array:
         if callable(reference):
             if duration is None or not (math.isfinite(duration) and duration >= self.sample_time):
-                raise ValueError("a reference that is a function needs a duration of a sample or more, in s")
+                raise ValueError("a reference given as a function needs a duration in s of at least one sample")
             count = round(duration / self.sample_time)
             reference = [reference(k * self.sample_time) for k in range(count)]
         elif duration is not None:
@@ -204,7 +203,7 @@ class Loop:
         except (TypeError, ValueError):
             r = np.empty(0)
         if r.ndim != 1 or not len(r) or not np.all(np.isfinite(r)):
-            raise ValueError("a reference is one finite number per sample, at least one")
+            raise ValueError("a reference has to be one finite number per sample, for at least one sample")
         return r
 
 
@@ -222,23 +221,23 @@ def _sampled(system: Any, sample_time: float, what: str) -> tuple[Array, Array, 
     try:
         space = system.to_ss()
     except ValueError as error:
-        raise ValueError(f"{what} is not proper, it has more zeros than poles: {error}") from None
+        raise ValueError(f"{what} is not proper: it has more zeros than poles ({error})") from None
     matrices = [np.asarray(m) for m in (space.A, space.B, space.C, space.D)]
     if any(np.any(m.imag) for m in matrices):
-        raise ValueError(f"{what} has complex coefficients; poles and zeros that are complex come in conjugate pairs")
+        raise ValueError(f"{what} has complex coefficients; complex poles and zeros must come in conjugate pairs")
     a, b, c, d = (np.array(m.real, dtype=np.float64) for m in matrices)
     if d.shape != (1, 1):
-        raise ValueError(f"{what} has {d.shape[1]} inputs and {d.shape[0]} outputs, a loop needs one of each")
+        raise ValueError(f"{what} has {d.shape[1]} inputs and {d.shape[0]} outputs; a loop needs one of each")
     if not all(np.all(np.isfinite(m)) for m in (a, b, c, d)):
-        raise ValueError(f"{what} has coefficients that are not finite")
+        raise ValueError(f"{what} has non-finite coefficients")
     if space.dt is None:
-        # the entries of a companion matrix differ by orders of magnitude, which costs up to half of the digits
+        # the entries of a companion matrix differ by orders of magnitude, which costs up to half the digits
         a, (scale, _) = linalg.matrix_balance(a, permute=False, separate=True)
         a, b, c, d, _ = signal.cont2discrete((a, b / scale[:, None], c * scale, d), sample_time, "zoh")
     elif space.dt is True:
         raise ValueError(f"{what} has no sample time; give its dt")
     elif not math.isclose(float(space.dt), sample_time, rel_tol=1e-9):
-        raise ValueError(f"{what} has a sample time of {space.dt} s, the loop {sample_time:g} s")
+        raise ValueError(f"{what} has a sample time of {space.dt} s, but the loop has {sample_time:g} s")
     return a, b[:, 0], c[0], float(d[0, 0])
 
 
@@ -270,7 +269,7 @@ def _block(part: object, sample_time: float, what: str) -> LoopPart:
         return part
     if callable(part) and not isinstance(part, type):
         return _Function(part)
-    raise TypeError(f"{what} is none of the parts that a loop can have: {part!r}")
+    raise TypeError(f"{what} is not a part that a loop can have: {part!r}")
 
 
 class _Function:
@@ -300,7 +299,7 @@ class _PI:
 
 
 class _Discrete:
-    """A linear discrete system, its state 0 at first."""
+    """A linear discrete system whose state is initially 0."""
 
     def __init__(self, a: Array, b: Array, c: Array, d: float) -> None:
         self._a, self._b, self._c, self._d = a, b, c, d
@@ -316,7 +315,7 @@ class _Discrete:
 
 
 class _Operator:
-    """A model or its inverse, starting at its start memory, in the numbers of its session."""
+    """A model or its inverse, run from its start memory in the number format of its session."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -330,9 +329,9 @@ class _Operator:
 
 
 class _InUnits:
-    """An operator in an arithmetic's numbers between its converters: physical units in and out.
+    """An operator in its arithmetic's number format between two converters: physical units in and out.
 
-    Fixed point gets the nearest code, ties away from zero, limited to the type; for a NaN the last code again.
+    A fixed-point operator gets the nearest code, ties away from zero, limited to the type; a NaN repeats the last code.
     """
 
     def __init__(self, operator: _Operator | CompiledInstance, model: Model, options: Options) -> None:
@@ -348,7 +347,7 @@ class _InUnits:
         self._code = 0
 
     def reset(self) -> None:
-        """Back to the start memory of the parameter file."""
+        """Return to the start memory of the parameter file."""
         self._code = 0
         self._operator.reset()
 
@@ -369,7 +368,7 @@ def _one_operator(model: Model, operator: str, arithmetic: str | None, engine: s
 
 
 class BitReference(_InUnits):
-    """A model's `inverse` or `forward` operator with the emitted C's bits, computed in Python; in physical units.
+    """A model's `inverse` or `forward` operator, bit for bit as in the emitted C, in Python; in physical units.
 
     `source`: a model or a parameter file; `arithmetic` and `engine` default to the parameter file's. Raises
     ParameterError, NotInvertibleError, FormatError, ValueError and UnsupportedEffectsError.

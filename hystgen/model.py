@@ -38,12 +38,12 @@ if TYPE_CHECKING:
 
 
 MOST_A_CODE = 0.01
-"""[share of its range] The drive may move this far for one code of the reference; in fixed point, anything more is
-noise."""
+"""[share of its range] The farthest that one code of the reference may move the drive; in fixed point, more than that
+is noise."""
 
 MOST_GAIN = 100.0
-"""[times the gain at rest] Largest noise gain that an inverse may have without being asked for: white noise of 1e-4 of
-the reference's range is then 0.6 to 1.5 % of the drive's range, about MOST_A_CODE, behind a lag of 25 samples. Set by:
+"""[times the gain at rest] Largest noise gain of an inverse unless the user allows more: white noise of 1e-4 of the
+reference's range then becomes 0.6 to 1.5 % of the drive's range, about MOST_A_CODE, with a lag of 25 samples. Set by:
 benchmarks/chosen_numbers.py noisy."""
 
 SETTLED = 0.01
@@ -67,7 +67,7 @@ def cascade_of(parameters: Parameters) -> Cascade:
 
 
 Answers: TypeAlias = tuple[NDArray[Any], list[str]]
-"""Samples (N,) of an operator, in the type of its arithmetic, and remarks about them."""
+"""Output samples (N,) of an operator, in the type of its arithmetic, and remarks about them."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -94,8 +94,8 @@ class Model:
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
         """A picture of loops, the initial loading curve and, if it exists, the inverse with its accuracy.
 
-        Returns matplotlib's Figure, which a notebook shows; with `path`, a .png or .svg file, it is also written there.
-        Effects are not drawn. Needs matplotlib, of the extra `plot`. Raises PlotError, OSError.
+        Returns a matplotlib Figure, which a notebook displays; it is also saved to `path`, a .png or .svg file, if
+        given. Effects are not drawn. Needs matplotlib, from the extra `plot`. Raises PlotError, OSError.
         """
         return drawing.picture(self._figure, path)
 
@@ -129,7 +129,7 @@ class Model:
         return Chain(self.cascade, self.effects)
 
     def need_static(self, what: str) -> None:
-        """Raise UnsupportedEffectsError if the model has effects: `what` (`the inverse`) does not cover them yet."""
+        """Raise UnsupportedEffectsError if the model has effects, which `what` ("the inverse") does not cover yet."""
         if self.effects:
             names = ", ".join(dict.fromkeys(effect.name for effect in self.effects))
             raise UnsupportedEffectsError(
@@ -138,9 +138,9 @@ class Model:
             )
 
     def need_compensated(self, arithmetic: str, operator: str) -> None:
-        """Raise, with all reasons, if an operator in `arithmetic` cannot have all the model's effects.
+        """Raise, with all reasons, if an operator in `arithmetic` cannot include all of the model's effects.
 
-        Raises UnsupportedEffectsError, EffectsError without a sample time, NotInvertibleError as `inverse`.
+        Raises UnsupportedEffectsError, EffectsError without a sample time, NotInvertibleError as `inverse` does.
         """
         if not self.effects:
             return
@@ -148,7 +148,7 @@ class Model:
         if self.parameters.sample_time is None:
             raise EffectsError(
                 f"C for a model with effects ({names}) needs sample_time in the parameter file; add "
-                "`sample_time: 1.0e-4`, the time between two calls of step in s"
+                "`sample_time: 1.0e-4`, the time in s between two calls of step"
             )
         if refused := self.refusals(operator, arithmetic):
             raise UnsupportedEffectsError(
@@ -161,8 +161,8 @@ class Model:
             if self.parameters.emit.compensation.quiet and self.cascade.branches_differ:
                 raise UnsupportedEffectsError(
                     "emit.compensation.quiet: with effects, a drive in front of a memoryless part with two branches "
-                    "cannot be held near its target; give both branches the same numbers, or leave out quiet: "
-                    "behind one lag the drive comes to rest anyway"
+                    "cannot be held near its target; give both branches the same parameters, or leave out quiet: "
+                    "with one lag the drive comes to rest anyway"
                 )
 
     def _check_noise_gain(self, arithmetic: str) -> None:
@@ -179,7 +179,7 @@ class Model:
             noise.check(gain, how.noise_gain)
             return
         advice = (
-            "limit it by averages of the reference with emit.compensation.noise_gain: 10, or allow it with "
+            "limit it by averaging the reference with emit.compensation.noise_gain: 10, or allow it with "
             f"noise_gain: {math.ceil(gain)}"
         )
         if arithmetic in FIXED:
@@ -187,21 +187,21 @@ class Model:
             low, high = (int(end) for end in compiled.tables.limits[slots.OUTPUT_MIN : slots.OUTPUT_MAX + 1])
             if gain > MOST_A_CODE * (high - low):
                 raise UnsupportedEffectsError(
-                    f"with a noise gain of {gain:.4g} one of the {high - low} codes of a reference in {arithmetic} "
-                    f"moves the drive by {100.0 * gain / (high - low):.2g} % of its range; use "
+                    f"with a noise gain of {gain:.4g}, a step of one of the reference's {high - low} codes in "
+                    f"{arithmetic} moves the drive by {100.0 * gain / (high - low):.2g} % of its range; use "
                     f"{ARITHMETICS[arithmetic].finer}, or {advice}"
                 )
         if gain > MOST_GAIN:
             drive, hertz = noise.loudest(responses)
             units = self.parameters.units
             raise UnsupportedEffectsError(
-                f"the noise gain is {gain:.4g}, above {MOST_GAIN:g}: noise of the reference of 1 "
+                f"the noise gain is {gain:.4g}, above {MOST_GAIN:g}: reference noise of 1 "
                 f"{units.output or 'output unit'} rms at {hertz:.4g} Hz would move the drive by {drive:.4g} "
                 f"{units.input or 'input units'} rms; {advice}"
             )
 
     def refusals(self, operator: str, arithmetic: str) -> list[tuple[Effect, str]]:
-        """The effects that an emitted operator cannot have, with the reasons; none without a sample time."""
+        """The effects that an emitted operator cannot include, each with the reason; empty without a sample time."""
         if not self.effects or self.parameters.sample_time is None:
             return []
         from hystgen.compensator.chain import tables as chain_tables
@@ -222,7 +222,7 @@ class Model:
         arithmetic: str | None = None,
         optimize: str | None = None,
     ) -> str:
-        """'corners' or 'loop': the given one, or else the parameter file's, with `auto` decided for `optimize`."""
+        """'corners' or 'loop': the given engine, else the parameter file's; `auto` picks the better for `optimize`."""
         emit = self.parameters.emit
         if self.effects:
             own = [effect.name for effect in self.effects if effect.moves_plays() or effect.bends_plays()]
@@ -241,7 +241,7 @@ class Model:
     def tables(
         self, arithmetic: str, engine: str, operator: str | None = None
     ) -> Tables | FixedTables | ChainTables:
-        """The number format of an emitted operator, by default the parameter file's, with its LSBs in fixed point."""
+        """The tables of an emitted operator (by default the parameter file's) in the number format of `arithmetic`."""
         if self.effects:
             from hystgen.compensator.chain import tables as chain_tables
 
@@ -280,16 +280,17 @@ class Model:
     ) -> NDArray[Any]:
         """Output (N,) for the drive samples `v` (N,) from the start memory.
 
-        Without `arithmetic` it computes in double precision, unlimited unless `clamp`. With 'float32', 'float64', 'q31'
-        or 'q15' it is the bit reference of the emitted C, which limits the drive to `input_range`; fixed point takes
-        and returns codes.
+        Without `arithmetic` the model is computed in double precision, and the drive is limited only with `clamp`. With
+        'float32', 'float64', 'q31' or 'q15' the result is the bit reference of the emitted C, which limits the drive to
+        `input_range`; fixed point takes and returns codes.
 
-        Only effects use time: `t` (N,) in seconds, increasing, or the parameter file's `sample_time`; and `extra`,
-        further columns (N,) such as `temperature`. Everything starts at rest at the first sample. Raises EffectsError
-        if effects lack something they need, UnsupportedEffectsError for effects in an `arithmetic`.
+        Only effects use time and `extra`. The time is `t` (N,) in seconds, increasing, or else follows from the
+        parameter file's `sample_time`; `extra`: further columns (N,) such as `temperature`. The model starts at rest at
+        the first sample. Raises EffectsError if effects lack something they need, UnsupportedEffectsError for effects
+        that `arithmetic` does not support.
 
-        Warns (`SampleWarning`) with the number of drives outside `input_range`, and of samples that are not finite: the
-        drive before them is held.
+        Warns (`SampleWarning`) with the number of drives outside `input_range` and of non-finite ones, which hold the
+        drive before them.
         """
         y, said = self.answers(v, arithmetic, clamp, engine, t=t, extra=extra)
         remarks.tell(said)
@@ -371,7 +372,7 @@ class Model:
         clamp: bool = False,
         rest: float = 0.0,
     ) -> Run:
-        """A record as `chain.simulate` takes it; arguments as for `simulate`, `rest` in seconds before it."""
+        """The record that `chain.simulate` takes; arguments as for `simulate`, and a pause of `rest` s before it."""
         from hystgen.effects import Run
 
         drive = np.array(arguments.signal("v", v), dtype=np.float64)
@@ -394,8 +395,8 @@ class Model:
         return Run(times, np.clip(drive, low, high) if clamp else drive, columns, rest)
 
     def settling(self, within: float = SETTLED) -> Settling:
-        """How long after a full-range step of the drive, up and down, the output takes to stay close to its final
-        value.
+        """How long the output takes to settle close to its final value after a full-range step of the drive, up and
+        down.
 
         `within`: the error, as a share of the final step of the output. Found by simulating the steps with all effects,
         up to an hour; drift and effects that follow a logged column are left out. Raises EffectsError if one of the
@@ -409,7 +410,7 @@ class Model:
         return settling(self.chain, within)
 
     def inverse(self) -> InverseModel:
-        """The compensator. Raises NotInvertibleError with the reasons and ranges, UnsupportedEffectsError."""
+        """The compensator. Raises NotInvertibleError with the reasons and ranges, or UnsupportedEffectsError."""
         if self.effects:
             self.compensator  # noqa: B018  raises
         else:
@@ -445,16 +446,15 @@ class InverseModel:
     ) -> NDArray[Any]:
         """Drive (N,) for the reference samples `u` (N,); arguments as for `Model.simulate`.
 
-        The drive stays in `input_range` like that of the C, and the memory follows the limited drive, so that
-        everything is exact again at the next reference in reach; `clamp=False` gives the mathematical inverse without a
-        range, in double precision. The drive is held for a sample that is not finite. Warns (`SampleWarning`) with the
-        numbers of limited and of held samples.
+        As in the C, the drive stays in `input_range` and the memory follows the limited drive, so the inverse is exact
+        again at the next reachable reference; `clamp=False` gives the unlimited inverse, in double precision. A
+        non-finite sample holds the drive. Warns (`SampleWarning`) with the numbers of limited and of held samples.
 
-        With effects the whole reference is known: delays and modes use it ahead of time, and everything is at rest at
-        the first sample. It is treated as `emit.compensation` in the parameter file says, in samples of the record;
-        `quiet` changes nothing in double precision, which has no codes to dither between. The error of a mode is the
-        fourth difference of its reference over 6, that of a lag a quarter of the second difference of the drive behind
-        it; everything else is exact.
+        With effects the whole reference is known in advance: delays and modes look ahead in it, and the model is at
+        rest at the first sample. The settings of `emit.compensation` in the parameter file apply, counted in samples of
+        the record; `quiet` changes nothing in double precision, which has no codes to dither between. The error of a
+        mode is a sixth of the fourth difference of its reference, the error of a lag a quarter of the second difference
+        of the drive behind it; everything else is exact.
         """
         v, said = self.answers(u, arithmetic, clamp, engine, t=t, extra=extra)
         remarks.tell(said)
@@ -490,10 +490,10 @@ class InverseModel:
 
 
 def _held(name: str, x: ArrayLike, first: float | None) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Samples (N,), called `name`, in which each non-finite one is replaced by the finite one before it, and a mask of
-    those replaced.
+    """The samples `x` (N,), each non-finite one replaced by the last finite one before it, and a mask of those
+    replaced.
 
-    Those before the first finite one become `first` or, if that is None, the first finite one itself.
+    Those before the first finite one become `first` or, if that is None, that one. `name`: what messages call `x`.
     """
     samples = np.array(arguments.signal(name, x), dtype=np.float64)
     wrong = ~np.isfinite(samples)
@@ -506,9 +506,9 @@ def _held(name: str, x: ArrayLike, first: float | None) -> tuple[NDArray[np.floa
 
 
 def load(path: str | os.PathLike[str], effects: Sequence[str | os.PathLike[str] | type[Effect]] = ()) -> Model:
-    """The model of a parameter file; `effects`: files, or classes, of the user's own effects that it names.
+    """The model of a parameter file; `effects`: the user's own effects that the file names, as files or classes.
 
-    Raises ParameterError with every problem in the file, EffectsError for an unusable file of effects; warns if a start
+    Raises ParameterError with every problem in the file, EffectsError for an unusable effects file; warns if the start
     memory had to be projected.
     """
     path = arguments.path("the parameter file", path)
@@ -534,7 +534,7 @@ def _own_effects(sources: Sequence[str | os.PathLike[str] | type[Effect]]) -> li
 
 
 def check_arithmetic(arithmetic: str) -> None:
-    """Raise FormatError for the name of an arithmetic that does not exist."""
+    """Raise FormatError for an unknown arithmetic."""
     if arithmetic not in ARITHMETICS:
         raise FormatError(f"arithmetic {arithmetic!r} is none of {', '.join(ARITHMETICS)}")
 

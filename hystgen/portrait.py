@@ -24,7 +24,7 @@ def figure(
 ) -> Figure:
     """The figure; to be drawn within `drawing.styled`.
 
-    `inverse`: drives (N,) for references (N,), inside the drive range; None where there is none to show; `effects`:
+    `inverse`: maps references (N,) to drives (N,) inside the drive range; None if no inverse is to be shown; `effects`:
     whether the model has effects, which are not drawn.
     """
     low, high = cascade.input_range

@@ -22,11 +22,11 @@ def simulate_records(
     history: Sequence[float] = (),
     rest: float = 0.0,
 ) -> list[Answers]:
-    """Answers of the model (column v) or its inverse (column u) for records that are one session, each with remarks.
+    """Outputs of the model (for column v) or its inverse (for column u) over the records of one session, with remarks.
 
-    `history`: drives visited before the first record; `rest`: seconds of pause before every record, which effects
-    alone see. Records in other units of the same quantity are converted to the model's. The forward model is not
-    limited to `input_range`, the inverse and every `arithmetic` are. Raises NotInvertibleError, FormatError,
+    `history`: drives visited before the first record; `rest`: pause in s before every record, which only effects
+    notice. Records in other units of the same quantity are converted to the model's units. The forward model is not
+    limited to `input_range`; the inverse and every `arithmetic` are. Raises NotInvertibleError, FormatError,
     EffectsError, UnsupportedEffectsError and RecordError.
     """
     converted = in_units(records, model.parameters.units, need=("v" if operator == "forward" else "u",))
@@ -47,7 +47,7 @@ def _simulated(
     history: Sequence[float],
     rest: float,
 ) -> list[Answers]:
-    """The same for records in the model's units."""
+    """`simulate_records` for records that are already in the model's units."""
     if operator == "inverse":
         model.inverse()
     if model.effects and arithmetic is None and operator == "inverse":
@@ -75,7 +75,7 @@ def _simulated(
 def _emulated(
     model: Model, records: Sequence[Record], operator: str, arithmetic: str | None
 ) -> Answers:
-    """Answers of the bit reference of a model with effects, which takes one record, and remarks."""
+    """Output of the bit reference of a model with effects, which takes a single record, and remarks."""
     if len(records) > 1:
         raise EffectsError("the bit reference of a model with effects takes one record; simulate them one by one")
     (record,) = records
@@ -88,7 +88,7 @@ def _emulated(
 def _compensated(
     model: Model, records: Sequence[Record], history: Sequence[float], rest: float
 ) -> list[Answers]:
-    """Drives for the references of records that are one session, of a model with effects."""
+    """Drives from the inverse of a model with effects for the references of one session's records, and remarks."""
     runs = [model.run(record.columns()["u"], record.t, record.extra, rest=rest) for record in records]
     session = join(runs, history)
     low, high = ends = model.cascade.input_range

@@ -1,4 +1,4 @@
-"""How well a compensator would track on the actuator that was recorded: straight line, plays alone, whole model."""
+"""How well the recorded actuator would track with each compensator: straight line, plays alone, whole model."""
 
 from __future__ import annotations
 
@@ -22,21 +22,21 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 MOST_UNKNOWN = 0.8
-"""[share of a record] If the drive reaches the second of its ends later than this, the whole record is judged. Over a
-fifth of a record of `examples/` the rms error is 0.12 to 2.0 times that over all of it, over a twentieth 0.02 to 3.1
-times. Set by: benchmarks/chosen_numbers.py unknown."""
+"""[share of a record] If the drive has not visited both its extremes by this point, the whole record is judged. The rms
+error over a fifth of a record of `examples/` is 0.12 to 2.0 times that over the whole record, over a twentieth 0.02 to
+3.1 times. Set by: benchmarks/chosen_numbers.py unknown."""
 
 LINE, PLAYS, WHOLE = "straight line", "plays alone", "whole model"
-"""The compensators that turn the reference into a drive."""
+"""The compensators compared, each of which turns the reference into a drive."""
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """The motion of one record, tracked: error (N,) of each compensator in output units, over `span` of the motion.
+    """Tracking of one record's motion: error (N,) of each compensator and `span` of the motion, in output units.
 
-    `known`: the first sample behind both ends of the drive, from where on it no longer matters what the stage did
-    before the record. Errors are about their mean from there on: the zero of a displacement is free. `limited`: what
-    ends of ranges did to the drives of each compensator, one sentence each.
+    `known`: the sample by which the drive has visited both its extremes, so that the motion before the record no longer
+    matters. Errors have their mean from `known` on removed, because the zero of a displacement is arbitrary. `limited`:
+    how the limits of ranges affected each compensator's drives, one sentence each.
     """
 
     name: str
@@ -58,10 +58,9 @@ class Tracked:
 
 @dataclass(frozen=True)
 class Tracking:
-    """Errors that tracking would leave on the recorded actuator, record by record.
+    """Tracking errors that each compensator would leave on the recorded actuator, record by record.
 
-    `left_out`: names of the effects that the model has and its plays alone have not; `notes`: what was converted, one
-    sentence each.
+    `left_out`: names of the model's effects, which "plays alone" lacks; `notes`: unit conversions, one sentence each.
     """
 
     unit: str
@@ -71,7 +70,7 @@ class Tracking:
 
     @property
     def compensators(self) -> dict[str, str]:
-        """What each compensator is, in words."""
+        """A description of each compensator."""
         names = ", ".join(self.left_out)
         without = f"the inverse of the model without its effects ({names}), all else as in the parameter file"
         return {
@@ -92,7 +91,7 @@ class Tracking:
         return "\n".join(lines)
 
     def to_json(self) -> str:
-        """The same for programs: errors in % of each motion's span, the span in output units."""
+        """The table as JSON: errors in % of each motion's span, the span in output units."""
         content = {
             "hystgen": 1,
             "unit": self.unit,
@@ -113,7 +112,7 @@ class Tracking:
 
 
 def late(model: Model, records: Sequence[Record]) -> str:
-    """A sentence about how late the motion is if `emit.compensation` makes it so, else empty."""
+    """A sentence saying how late `emit.compensation` makes the motion; empty if it is not late."""
     if not model.effects:
         return ""
     step = float(np.median(np.diff(records[0].t)))
@@ -131,13 +130,13 @@ def track(
 ) -> Tracking:
     """The error that each compensator would leave if the records' motions were the references.
 
-    The recorded actuator answers a drive as the model does, and beyond that by what it did in the record that the model
-    does not explain: `y = model[v] + (y_recorded - model[v_recorded])`. The reference is the model's own motion of the
-    record. `straight line`: the drive as a linear function of the reference, least squares; `plays alone`: the inverse
-    of `model` without its effects, nothing else changed and nothing fitted; `whole model`: the inverse of `model`.
-    `history` and `rest` come before every record; `skip`: seconds at its start that are not compared. Raises
-    NotInvertibleError, EffectsError, ValueError for records without y, RecordError for units that do not fit the
-    model's.
+    The recorded actuator is assumed to respond to a drive as the model does, plus the residual of the record:
+    `y = model[v] + (y_recorded - model[v_recorded])`. The reference is the model's motion for the recorded drive.
+    `straight line`: the drive as a linear function of the reference, by least squares; `plays alone`: the inverse of
+    `model` without its effects, nothing else changed and nothing fitted; `whole model`: the inverse of `model`.
+    `history` and `rest` come before every record; `skip`: seconds at the start of each record that are not compared.
+    Raises NotInvertibleError, EffectsError, ValueError for records without y, RecordError for units that do not fit
+    the model's.
     """
     if any(record.y is None for record in records):
         raise ValueError("tracking needs the measured motion: a column y in every record")

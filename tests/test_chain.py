@@ -221,7 +221,7 @@ def test_a_quiet_drive_knows_the_step_of_a_converter(lsb: float | None, changes:
 
 def test_two_branches_are_not_quiet() -> None:
     one = model("lagging", CHAINS["lagging"] + "emit: {compensation: {quiet: true}}\n")
-    with pytest.raises(UnsupportedEffectsError, match="behind one lag the drive comes to rest anyway"):
+    with pytest.raises(UnsupportedEffectsError, match="with one lag the drive comes to rest anyway"):
         emitted_files(one)
 
 

@@ -846,7 +846,7 @@ def test_a_record_that_is_fitted_and_held_out_is_told(command: str, tmp_path: Pa
     words = ["identify"] if command == "identify" else ["diagnose", _model(tmp_path)]
     code, _, err = run(*words, files[0], files[1], "--holdout", files[3], "-o", tmp_path / "out")
     assert code == 0, err
-    assert "warning: d.csv: held out, but also fitted, as a.csv, so it judges nothing; leave it out of" in err
+    assert "warning: d.csv: held out, but also fitted, as a.csv, so it tests nothing; leave it out of" in err
     assert "b.csv" not in err
     code, _, err = run(*words, files[0], files[1], files[3], "--holdout", files[2], "-o", tmp_path / "out")
     assert code == 0, err

@@ -1056,9 +1056,9 @@ def test_model_simulate_takes_time_columns_or_the_sample_time() -> None:
 
 
 @pytest.mark.parametrize(("ask", "said"), [
-    (lambda m: m.inverse().simulate([0.0], "q15"), "a reference in q15 moves the drive by 7 % of its range; use q31"),
-    (lambda m: hystgen.emit(m, "nowhere", arithmetic="q15"), "a reference in q15 moves the drive by 7 % of its range"),
-    (lambda m: hystgen.verify(m, arithmetic="q15"), "a reference in q15 moves the drive by 7 % of its range"),
+    (lambda m: m.inverse().simulate([0.0], "q15"), "codes in q15 moves the drive by 7 % of its range; use q31"),
+    (lambda m: hystgen.emit(m, "nowhere", arithmetic="q15"), "codes in q15 moves the drive by 7 % of its range"),
+    (lambda m: hystgen.verify(m, arithmetic="q15"), "codes in q15 moves the drive by 7 % of its range"),
     (lambda m: m.session(), r"of a model with effects \(lag, creep\) is not supported yet"),
 ])  # fmt: skip
 def test_what_effects_do_not_have_yet_is_refused_by_name(ask: Callable[[hystgen.Model], Any], said: str) -> None:
@@ -1320,7 +1320,7 @@ def test_commands_that_do_not_cover_effects_name_them(run: Callable[..., tuple[i
         assert (code, said) == (2, "")
         assert err == (
             "error: C for a model with effects (lag, slew_limit) needs sample_time in the parameter file; add "
-            "`sample_time: 1.0e-4`, the time between two calls of step in s"
+            "`sample_time: 1.0e-4`, the time in s between two calls of step"
         )
         assert not out.exists()
     moved = "    - {name: rate_dependence, shape: relaxation, time_constant: 0.1}\nsample_time: 1.0e-3\n"

@@ -361,8 +361,8 @@ class TestNoValue:
         place = len(lines) if line < 0 else line + 1
         name = "vy"[column - 1]
         assert err == (
-            f"warning: a.csv: 1 sample without a value in v or y or t ({float(value):.6g} in {name} counts as none) "
-            f"dropped, the first in line {place}"
+            f"warning: a.csv: 1 sample without a value in v or y or t ({float(value):.6g} in {name} counts as no "
+            f"value) dropped, the first in line {place}"
         )
         low, high = written(tmp_path / "a.yaml")["input_range"]
         assert (low, high) == pytest.approx((0.0, 100.0), abs=3.0)
@@ -604,7 +604,7 @@ def test_a_false_history_that_the_fit_could_bend_to(tmp_path: Path) -> None:
 
 def test_what_a_file_without_values_is_called(tmp_path: Path) -> None:
     v, y = DRIVES["fading"], output(DRIVES["fading"])
-    with pytest.raises(RecordError, match=r"2000 of 2000 samples are without a value.*such as .* count as none"):
+    with pytest.raises(RecordError, match=r"2000 of 2000 samples are without a value.*such as .* count as no value"):
         read_record(write_csv(tmp_path / "a.csv", v, (y + 10.0) * 1e300))
     with pytest.raises(IdentificationError, match=r"y moves by .* which is too little in any unit; convert it"):
         prepared.course_of(record(v, y * 1e-300), None, 0)

@@ -509,7 +509,7 @@ def test_without_dask_one_line_says_what_to_install(
         (["--batch", "few", "--batch", "none.csv", "-o", "new"], "no file matches none.csv"),
         (["--batch", "clash", "-o", "new"], "clash/a-1.csv and clash/a_1.csv would both be unit a_1; rename one"),
         (["--batch", "few", "-o", "new", "--holdout", "few/SN-100.csv"], "write {unit} for the unit's name"),
-        (["--batch", "few", "-o", "few"], "few has records in it"),
+        (["--batch", "few", "-o", "few"], "few contains records"),
         (["--batch", "few", "-o", "few/SN-100.csv"], "few/SN-100.csv: File exists"),
         (["--batch", "few", "-o", "new", "--thresholds", "-1"], "thresholds is a number of plays"),
         (["--batch", "few", "-o", "new", "--name", "stage"], "--name is for one model"),

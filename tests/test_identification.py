@@ -454,7 +454,7 @@ class TestStartMemory:
         fit = hystgen.identify(record(v, y), thresholds=(0.0, 10.0, 60.0), holdout=record(v, y))
         assert row(fit, "fit").ignored == 80 == int(np.argmin(v))
         assert fitted(fit)[1] == pytest.approx((0.5, 0.3, 0.0), abs=1e-8)
-        assert any("1 threshold above" in text for text in fit.warnings)
+        assert any("1 play above" in text for text in fit.warnings)
 
     def test_skipped_samples_still_move_the_plays(self) -> None:
         v = wander(17)
@@ -667,12 +667,12 @@ class TestRefused:
     @pytest.mark.parametrize(
         ("v", "y", "options", "message"),
         [
-            (SINE[:15], SINE[:15], (), "{path}: error: has 15 samples, at least 16 are needed; record for longer"),
+            (SINE[:15], SINE[:15], (), "{path}: error: has 15 samples, but at least 16 are needed; record for longer"),
             (
                 SINE * 0.0 + 5.0,
                 SINE,
                 (),
-                "{path}: error: the drive v is 5 throughout; a fit needs a drive that moves, check the columns",
+                "{path}: error: the drive v is 5 throughout, but a fit needs a drive that moves; check the columns",
             ),
             (SINE, SINE * 0.0, (), "data.csv: the measured output is constant; is y the right column?"),
             (
@@ -701,8 +701,8 @@ class TestRefused:
                 SINE[:60],
                 SINE[:60],
                 ("--thresholds", "100", "--history", "1"),
-                "60 samples can be compared, 100 plays need at least 102; record more cycles, give --history, or use "
-                "fewer thresholds",
+                "60 samples can be compared, but 100 plays need at least 102; record more cycles, give --history, or "
+                "use fewer thresholds",
             ),
             (
                 SINE,

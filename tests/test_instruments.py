@@ -99,7 +99,7 @@ def test_labview_with_comments_and_faults(tmp_path: Path) -> None:
     text = problem(put(tmp_path / "d.lvm", lvm("Multi", steps=("1E-3", "2E-3"))))
     assert "channels have separate times" in text
     cut = read_record(put(tmp_path / "e.lvm", lines[:-10]))
-    assert cut.notes == ("the file says that it has 50 samples, it has 40",)
+    assert cut.notes == ("the file says that it has 50 samples, but it has 40",)
     assert "without a segment" in problem(put(tmp_path / "f.lvm", lines[:14]))
 
 
@@ -234,7 +234,7 @@ def test_pi_gcs_that_is_not_clear_or_damaged(tmp_path: Path) -> None:
     assert ':10:1: error: there is no column "v" among Target Position' in problem(path)
     check(read_record(path, {"v": names[0]}))
     cut = read_record(put(tmp_path / "b.dat", gcs(count=N + 1), "\n"))
-    assert cut.notes == ("the file says that it has 51 samples, it has 50",)
+    assert cut.notes == ("the file says that it has 51 samples, but it has 50",)
     lines = [line.replace("= 0.001000", "= fast") for line in gcs()]
     assert ":7:1: error: SAMPLE_TIME is not a number of seconds" in problem(put(tmp_path / "c.dat", lines, "\n"))
     lines = [line.replace("DIM = 2", "DIM = 3") for line in gcs()]
@@ -332,7 +332,7 @@ def test_tdms(tmp_path: Path) -> None:
     # Waveforms that start apart are not put side by side
     later = {**wave, "wf_start_offset": 0.2}
     path = write_tdms(tmp_path / "b.tdms", {"Drive": V, "Sensor": Y}, Drive=wave, Sensor=later)
-    assert "the columns start at different times,  Scan/Drive at 2024-03-05T14:21:05" in problem(path)
+    assert "the columns start at different times: Scan/Drive at 2024-03-05T14:21:05" in problem(path)
     path = write_tdms(
         tmp_path / "c.tdms", {"Drive": V, "Sensor": Y}, Drive=wave, Sensor={**wave, "wf_increment": 0.002}
     )

@@ -239,10 +239,10 @@ class TestCommand:
     @pytest.mark.parametrize(
         ("dac", "problems"),
         [
-            ({"dac_bits": 4, "dac_range": (150.0, 0.0)}, ["need a rate", "a DAC of 4 bits", "150 to 0 is not incr"]),
-            ({"dac_bits": 40}, ["need a rate", "its bits and its range", "a DAC of 40 bits"]),
+            ({"dac_bits": 4, "dac_range": (150.0, 0.0)}, ["need a rate", "the DAC has 4 bits", "150 to 0 is not incr"]),
+            ({"dac_bits": 40}, ["need a rate", "its bits and its range", "the DAC has 40 bits"]),
             ({"dac_range": (9.0, 1.0), "rate": 50.0}, ["its bits and its range", "9 to 1 is not increasing"]),
-            ({"dac_bits": 4, "dac_range": (1, 2, 3), "rate": 0.0}, ["the rate 0.0", "has 3 numbers", "a DAC of 4"]),
+            ({"dac_bits": 4, "dac_range": (1, 2, 3), "rate": 0.0}, ["the rate 0.0", "has 3 numbers", "the DAC has 4"]),
         ],
     )
     def test_every_problem_of_a_converter_at_once(

@@ -290,7 +290,7 @@ def test_what_a_file_keeps_elsewhere_is_not_read(
         file["t"], file["v"] = T, V
         assert np.array_equal(file["y"][()], Y)
     refusal = (
-        "is kept outside this file, and no other file is opened; copy its numbers into this one, or name another "
+        "is stored outside this file, and no other file is opened; copy its numbers into this one, or name another "
         'column with --columns "y=COLUMN"'
     )
     assert problems(tmp_path / name) == [f'"y" {refusal}']
@@ -302,7 +302,7 @@ def test_what_a_file_keeps_elsewhere_is_not_read(
         file["y"] = Y
     record = read_record(tmp_path / name)
     check(record)
-    assert record.notes == (f"columns kept outside the file were left out: {path}",)
+    assert record.notes == (f"columns stored outside the file were left out: {path}",)
 
 
 def test_a_group_that_lies_in_another_file_is_not_read(tmp_path: Path) -> None:
@@ -310,7 +310,7 @@ def test_a_group_that_lies_in_another_file_is_not_read(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
         file["t"], file["v"], file["run"] = T, V, h5py.ExternalLink("other.h5", "/")
     (problem,) = problems(tmp_path / "a.h5", columns={"y": "run/y"})
-    assert problem.startswith('"run" is kept outside this file, ')
+    assert problem.startswith('"run" is stored outside this file, ')
 
 
 @pytest.mark.parametrize("shape", [(N,), (N, 1), (1, N), (1, N, 1)])
@@ -540,7 +540,7 @@ def test_more_samples_than_memory(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "a.h5", "w") as file:
         for name in "tvy":
             file.create_dataset(name, shape=(1 << 50,), chunks=(1 << 20,), dtype="f8")
-    assert problems(tmp_path / "a.h5") == ["needs more memory than there is; export fewer samples or columns"]
+    assert problems(tmp_path / "a.h5") == ["needs more memory than is available; export fewer samples or columns"]
 
 
 @pytest.mark.parametrize("write", [write_h5, write_npz, write_mat])
@@ -553,7 +553,7 @@ def test_more_samples_than_memory_of_a_system_that_promises_any(
     monkeypatch.setattr(reading, "_memory", lambda: 2.0 * 8.0 * 3.0 * len(T))
     assert len(read_record(path)) == len(T)
     monkeypatch.setattr(reading, "_memory", lambda: 2.0 * 8.0 * 3.0 * len(T) - 1.0)
-    assert problems(path) == ["needs more memory than there is; export fewer samples or columns"]
+    assert problems(path) == ["needs more memory than is available; export fewer samples or columns"]
 
 
 @pytest.mark.skipif(not Path("/proc/meminfo").exists(), reason="the other account of the memory")
@@ -750,7 +750,7 @@ def test_seconds_by_other_names_and_unknown_units_of_time(tmp_path: Path) -> Non
     write_csv(tmp_path / "a.csv", {"t [samples]": T, "v": V, "y": Y})
     record = read_record(tmp_path / "a.csv")
     check(record)
-    assert record.notes == ('the unit "samples" of t is not a known unit of time; its numbers were read as seconds',)
+    assert record.notes == ('the unit "samples" of t is not a known unit of time; t was read as seconds',)
 
 
 def test_units_of_parquet_fields(tmp_path: Path) -> None:
@@ -778,7 +778,7 @@ def test_units_that_records_agree_on() -> None:
     units, reported = agreed_units([record("a.csv", v="µm", y="V")])
     assert units == {"input": "µm", "output": "V"}
     assert len(reported) == 1
-    assert "as if they were exchanged" in reported[0]
+    assert "which suggests that they are exchanged" in reported[0]
     for v, y in (("um", "nm"), ("m", ""), ("V", "um")):
         assert agreed_units([], {"input": v, "output": y})[1] == []
     units, reported = agreed_units([record("a.csv", v="x" * 41, y="a\nb")])

@@ -105,7 +105,7 @@ class TestRead:
     def test_own_time_wins_over_a_given_sample_time(self, tmp_path: Path) -> None:
         record = read_record(write(tmp_path / "a.csv", rows()), sample_time=0.5)
         assert record.sample_time == pytest.approx(0.001)
-        assert "0.5 s given was not used" in record.notes[0]
+        assert "the given sample time 0.5 s was not used" in record.notes[0]
 
     def test_references_for_the_inverse(self, tmp_path: Path) -> None:
         path = write(tmp_path / "a.csv", [["0", "1"], ["1", "1"], ["2", "nan"]], "t,u")
@@ -233,7 +233,7 @@ class TestRefuse:
         (tmp_path / "b.csv").write_text("# only a comment\n")
         assert "has no header row" in problems(tmp_path / "b.csv")[0]
         (tmp_path / "c.csv").write_text("t,v,y\n")
-        assert "has 0 samples, at least 16 are needed" in problems(tmp_path / "c.csv")[0]
+        assert "has 0 samples, but at least 16 are needed" in problems(tmp_path / "c.csv")[0]
 
     def test_numbers_for_a_header(self, tmp_path: Path) -> None:
         (problem,) = problems(write(tmp_path / "a.csv", rows(), "0,1,2"))
@@ -311,7 +311,7 @@ class TestRefuse:
 
     def test_too_short_and_constant(self, tmp_path: Path) -> None:
         (problem,) = problems(write(tmp_path / "a.csv", rows(15)))
-        assert problem == ": error: has 15 samples, at least 16 are needed; record for longer"
+        assert problem == ": error: has 15 samples, but at least 16 are needed; record for longer"
         assert len(read_record(write(tmp_path / "b.csv", rows(16)))) == 16
         still = [[row[0], "5", row[2]] for row in rows()]
         (problem,) = problems(write(tmp_path / "c.csv", still))

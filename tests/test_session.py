@@ -150,7 +150,7 @@ int main(void) { play(print); return 0; }
         samples = parts_of(played).samples
         assert f"{samples} samples in {samples / RATE / 60.0:.1f} min" in words
         assert f"{samples} codes, {2 * samples / 1e6:.3g} MB of memory at 2 bytes each" in words
-        assert "12 bits over -40 to 160 V, straight binary: a code is 0.04883 V" in words
+        assert "12-bit DAC over -40 to 160 V, straight binary: one code is 0.04883 V" in words
         assert "--session" in words
         assert sorted(path.name for path in (tmp_path / "plan").iterdir()) == sorted(played.names)
 
@@ -200,7 +200,10 @@ class TestCut:
             ({"samples": 1e9}, ["samples: has to be a whole number, at least 2, not 1000000000.0"]),
             ({"history": [1.0]}, ["history: has to be the highest and the lowest drive"]),
             ({"history": [0.0, 1.0]}, ["history: has to be the highest and the lowest drive"]),
-            ({"rest": None, "rise": "x"}, ["rest: has to be a number from 0 on, not nothing", "rise: has to be a num"]),
+            (
+                {"rest": None, "rise": "x"},
+                ["rest: has to be a number of at least 0, not nothing", "rise: has to be a num"],
+            ),
             ({"speed": 1}, ["speed: this key is unknown"]),
             ({"records": []}, ["records: has to be a list of records, not a list"]),
             ({"records": [1, {"name": "a"}]}, ["records[0]: has to be a record, not 1", "records[1].first: is missing",
@@ -212,7 +215,7 @@ class TestCut:
              ["records[1].name: the text \"a\" is the name", "records[1].first: begins within the previous record"]),
             ({"records": [{"name": "a", "first": 0, "samples": 10**8, "held_out": False}]},
              ["records[0].samples: ends at sample 100000000"]),
-            ({"dac": {"bits": 99, "low": 1, "high": 0, "coding": "straight"}}, ["a DAC of 99 bits", "not increasing"]),
+            ({"dac": {"bits": 99, "low": 1, "high": 0, "coding": "straight"}}, ["has 99 bits", "not increasing"]),
             ({"dac": {"bits": 16, "low": 0, "coding": "gray"}}, ["dac.high: is missing", "dac.coding: has to be"]),
             ({"dac": 3}, ["dac: has to be a mapping or null, not 3"]),
         ],
@@ -271,7 +274,7 @@ class TestCommand:
         words = ["--rate", RATE, "--dac-bits", "16", "--dac-range", "-30,130", "--dac-coding", "twos-complement"]
         code, _, err = run("diagnose", "--plan", file_of(tmp_path), *words, "-o", folder)
         assert code == 0, err
-        assert "16 bits over -30 to 130 V, two's complement" in err
+        assert "16-bit DAC over -30 to 130 V, two's complement" in err
         command = err.splitlines()[-1].removeprefix("then run: hystgen ").split()
         rows = (folder / "session.csv").read_text().splitlines()
         (folder / "recording.csv").write_text("t,v,y\n" + "\n".join(row.rsplit(",", 1)[0] + ",1.0" for row in rows[1:]))

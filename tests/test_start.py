@@ -281,7 +281,7 @@ class TestPoints:
         path = tmp_path / "points.csv"
         path.write_text("v,y\n" + "\n".join(f"{a!r},{b!r}" for a, b in zip(v.tolist(), y.tolist(), strict=True)))
         fit = hystgen.identify(path)
-        assert any("no time: taken as points" in text for text in fit.warnings)
+        assert any("no time: read as points" in text for text in fit.warnings)
         fit.write(tmp_path / "a.yaml")
         found = hystgen.diagnose(tmp_path / "a.yaml", path)
         assert [each["name"] for each in found.content["effects"]][:1] in (["asymmetry"], ["noncongruent"])

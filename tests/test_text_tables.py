@@ -206,7 +206,7 @@ def test_decimal_commas_that_may_be_thousands_marks(tmp_path: Path) -> None:
     # With a point behind it the comma is not a decimal comma, and nothing is read
     rows = [f'{k},"{1 + k % 9},{100 + k}.5",{k % 7}' for k in range(N)]
     (problem,) = problems(put(tmp_path / "c.csv", "t,v,y", *rows))
-    assert ':2:3: error: "1,100.5" in column "v" is not a number; thousands marks are not read' in problem
+    assert ':2:3: error: "1,100.5" in column "v" is not a number; export numbers without thousands marks' in problem
     assert problem.endswith("(and 59 more, the last in line 61)")
 
 
@@ -216,7 +216,7 @@ def test_a_point_among_decimal_commas_is_not_read_as_one(tmp_path: Path) -> None
     (problem,) = problems(put(tmp_path / "a.csv", "t;v;y", *rows))
     assert problem.startswith(f":22:{rows[20].index('1.234') + 1}: error: \"1.234\"")
     rows[20] = rows[20].replace("1.234", "1.234,5")
-    assert "thousands marks are not read" in problems(put(tmp_path / "a.csv", "t;v;y", *rows))[0]
+    assert "export numbers without thousands marks" in problems(put(tmp_path / "a.csv", "t;v;y", *rows))[0]
 
 
 def test_one_cause_one_message(tmp_path: Path) -> None:
@@ -353,7 +353,7 @@ def test_a_broken_time_of_day_has_a_place(tmp_path: Path) -> None:
     lines = list(STYLES["ISO"])
     lines[30] = "soon," + lines[30].split(",", 1)[1]
     (problem,) = problems(put(tmp_path / "a.csv", *lines))
-    assert problem == ':31:1: error: "soon" in column "time" is not a time of day; write every time as the first one'
+    assert problem == ':31:1: error: "soon" in column "time" is not a time of day; write every time like the first one'
     lines[30] = "," + lines[30].split(",", 1)[1]
     assert len(read_record(put(tmp_path / "a.csv", *lines))) == N - 1
 
@@ -381,7 +381,7 @@ def test_times_with_too_few_digits(tmp_path: Path) -> None:
     assert "give --sample-time (here about 0.0005" in problem
     record = read_record(path, sample_time=0.0005)
     check(record)
-    assert record.notes == ("t is written in steps of 0.01 s; the sample time 0.0005 s given was used",)
+    assert record.notes == ("t is written in steps of 0.01 s; the given sample time 0.0005 s was used",)
     (problem,) = problems(path, sample_time=0.001)
     assert "does not fit the time of the file" in problem
 

@@ -145,7 +145,7 @@ def test_simulate_converts_whatever_the_file(suffix: str, tmp_path: Path, run: R
     ("unit", "why"),
     [
         ("V", "column u is in V and the model's output in nm, which are different quantities; choose another column"),
-        ("raw", 'and "raw" is not a known unit; convert the column and write the same unit after its name, or none'),
+        ("raw", 'and "raw" is not a known unit; convert the column and write the same unit, or none, after its name'),
     ],
 )
 def test_what_is_another_quantity_is_refused(unit: str, why: str, tmp_path: Path, run: Run) -> None:

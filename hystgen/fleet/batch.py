@@ -37,7 +37,7 @@ from hystgen.identification.settings import Settings
 from hystgen.records import FORMATS, Record, several, write_atomically
 
 SUFFIXES = (".csv", ".tsv", ".lvm", *FORMATS)
-"""Files that are picked up from a folder."""
+"""Suffixes of the files that are picked up from a folder."""
 
 KEPT_IN = ".hystgen"
 """Folder, inside the output folder, with the results of finished units."""
@@ -152,16 +152,16 @@ def identify_batch(
     paths of held-out records in which `{unit}` stands for the name of the unit's file without its suffix; these files
     are not units. `emit`: False leaves out the C; `emission`: options of `emit`. `jobs`: number of processes, all cores
     by default. `scheduler`: address of a Dask scheduler, whose workers then do the work and need the package, but no
-    access to any file. `progress`: a bar on a terminal's stderr. Any other option is one of `identify`.
+    access to any file. `progress`: a progress bar on a terminal's stderr. Other options are those of `identify`.
 
     A unit that fails gets a row with its message and does not stop the others; its older files are kept. A later call
     does not repeat finished work, as long as record, options and tool version are the same and the files are unchanged.
-    An interrupted call leaves only complete files, and the units it had finished. When an existing parameter file is
+    An interrupted call leaves only complete files and keeps its finished units. When an existing parameter file is
     rewritten, its description, `sample_time` and `emit` are kept.
 
-    Units are outliers by the modified z-scores of `outliers`: a held-out rms error far above the others (its logarithm,
-    in %), or a gain (output range over drive range), width or p_0 far off; with fewer than 8 finished units none is
-    marked. Raises ValueError for arguments that fit no unit, FileNotFoundError if a source leads to no file,
+    Units are outliers by the modified z-scores of `outliers`: a held-out rms error (logarithm of %) far above the
+    others, or a gain (output range over drive range), width or p_0 far off; with fewer than 8 finished units none is
+    marked. Raises ValueError for arguments that fit no unit, FileNotFoundError if a source matches no file,
     workers.SchedulerError, an OSError, for an unusable scheduler.
     """
     extras.require_fit("identify_batch")
@@ -176,7 +176,7 @@ def identify_batch(
     found = _jobs(sources, patterns)
     folder = writing.destination(output)
     if any(Path(file).resolve().parent == folder for job in found for file in (job.file, *job.holdout)):
-        what = f"{os.fspath(output)} has records in it, among which summary.csv would be one more"
+        what = f"{os.fspath(output)} contains records, and summary.csv would be taken for one of them"
         raise ValueError(f"{what}; use another folder")
     wanted = dict(emission or {}) if emit else None
     with workers.cluster(scheduler) if scheduler is not None else contextlib.nullcontext() as client:
@@ -209,7 +209,7 @@ def _complete(options: Mapping[str, object]) -> dict[str, Any]:
     return {name: value for name, value in bound.arguments.items() if name not in ("records", *own)}
 
 
-# -- which units there are --------------------------------------------------------------------------------------------
+# -- units to fit -----------------------------------------------------------------------------------------------------
 
 
 def _jobs(
@@ -233,7 +233,7 @@ def _jobs(
     taken: dict[str, str] = {}
     clashes = []
     for job in jobs:
-        other = taken.setdefault(job.unit.lower(), job.file)  # as file systems and macros see them
+        other = taken.setdefault(job.unit.lower(), job.file)  # file systems and macros may ignore case
         if other != job.file:
             clashes.append(f"{other} and {job.file} would both be unit {job.unit}; rename one")
     if clashes:
@@ -256,7 +256,7 @@ def _expanded(source: str) -> list[Path]:
     return found
 
 
-# -- what is done already ---------------------------------------------------------------------------------------------
+# -- finished units ---------------------------------------------------------------------------------------------------
 
 
 def _keyed(job: _Job, options: Mapping[str, object], emission: Mapping[str, str | None] | None) -> _Job:
@@ -284,7 +284,7 @@ def _digest(path: Path) -> str | None:
 
 
 def _kept_rows(folder: Path, jobs: Sequence[_Job]) -> dict[str, Unit]:
-    """The units finished by an earlier call; a warning if the notes on some cannot be read."""
+    """The units finished by an earlier call; warns if the notes on some of them cannot be read."""
     rows = {}
     unreadable = []
     for job in jobs:
@@ -312,7 +312,7 @@ def _kept(folder: Path, job: _Job) -> Unit | None:
     except FileNotFoundError:
         return None
     if not (isinstance(known, dict) and isinstance(known.get("sha256"), str)):
-        raise ValueError("no notes of a unit")
+        raise ValueError("not the notes of a unit")
     if known["sha256"] != job.key:
         return None
     outputs, figures = known.get("outputs"), known.get("figures")
@@ -321,7 +321,7 @@ def _kept(folder: Path, job: _Job) -> Unit | None:
     for name, value in figures.items():
         sort = str if name == "kind" else int | float | None
         if not isinstance(value, sort) or isinstance(value, bool):
-            raise ValueError(f"{name} is none")
+            raise ValueError(f"{name} has no usable value")
     if any(_digest(folder / name) != digest for name, digest in outputs.items()):
         return None
     return Unit(job.unit, job.file, True, "", figures, job.key, kept=True)

@@ -1,8 +1,8 @@
 """Units that differ from the rest of their fleet.
 
 Modified z-scores: `0.6745 (x - median) / MAD`, with MAD the median absolute deviation from the median; 0.6745 makes
-them comparable with scores of a normal distribution, and beyond 3.5 a value counts as an outlier (B. Iglewicz and D. C.
-Hoaglin, How to Detect and Handle Outliers, 1993).
+them comparable with z-scores of a normal distribution, and a value beyond 3.5 counts as an outlier (B. Iglewicz and
+D. C. Hoaglin, How to Detect and Handle Outliers, 1993).
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ FEWEST = 8
 """[units] With fewer, a median absolute deviation means little, and no unit is marked."""
 
 SAME = 1e-6
-"""Relative spread below which units are equal for every purpose: written digits and solvers differ by less."""
+"""Relative spread below which units count as equal: rounding of written digits and different solvers change less."""
 
 MATTERS, MATTERS_ERROR = 0.05, 0.2
-"""An outlier differs from the median by at least this share of it, and an error lies above it by at least this share:
-units of a tight fleet score high for differences that nobody would act on."""
+"""[share of the median] An outlier differs from the median by at least the first, and an error exceeds it by at least
+the second: in a tight fleet, units score high for differences that nobody would act on."""
 
 LEAST_ERROR = 1e-6
 """Held-out errors below this, in %, come from rounding of the written digits."""

@@ -32,13 +32,13 @@ if TYPE_CHECKING:
     from hystgen.model import Model
 
 LOST = "the Dask scheduler was lost; the same command resumes from here"
-DIED = "the process that fitted it kept dying; is there too little memory for its records?"
+DIED = "the process that fitted this unit kept dying; is there too little memory for its records?"
 
 PATIENCE = 15.0
-"""Seconds allowed for a scheduler to answer, and for it to have a worker."""
+"""[s] Time allowed for a scheduler to answer, and then for it to have a worker."""
 
 IDLE = 30.0
-"""Seconds after which an idle process ends."""
+"""[s] Time after which an idle process ends."""
 
 WATCH = 1.0
 """[s] Interval at which a process checks that its parent is still there."""
@@ -166,8 +166,8 @@ def _figures(fit: Fit, model: Model) -> dict[str, object]:
 def _begin(folder: str, parent: int) -> None:
     """Set up a worker process; the process that started it, `parent`, ends it and cleans up.
 
-    Ctrl-C reaches all processes of a terminal; the parent ends the others. Temporary files go into a folder of the
-    parent, which removes it. If the parent is killed, a worker would otherwise wait for ever to deliver its results.
+    Ctrl-C reaches all processes of a terminal, so workers ignore it. Temporary files go into a folder that the parent
+    removes. A worker ends when its parent is killed, instead of waiting forever to deliver its results.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     tempfile.tempdir = folder
@@ -244,7 +244,7 @@ def _quiet() -> Iterator[None]:
 
 @contextlib.contextmanager
 def cluster(address: str) -> Iterator[Client]:
-    """A client of the Dask scheduler at `address`, which has a worker. Raises SchedulerError."""
+    """A client of the Dask scheduler at `address`, once that has a worker. Raises SchedulerError."""
     try:
         from distributed import Client
     except ModuleNotFoundError:
@@ -253,7 +253,7 @@ def cluster(address: str) -> Iterator[Client]:
         try:
             asyncio.run(_answer(address))  # an unanswered client would wait once more when it is deleted
             client = Client(address, timeout=PATIENCE, set_as_default=False)
-        except Exception as failure:  # each protocol has its own
+        except Exception as failure:  # each protocol has its own errors
             reason = (str(failure).splitlines() or [type(failure).__name__])[0]
             raise SchedulerError(f"no Dask scheduler answers at {address}: {reason}") from None
         with client:
@@ -265,7 +265,7 @@ def cluster(address: str) -> Iterator[Client]:
 
 
 async def _answer(address: str) -> None:
-    """Wait until a Dask scheduler answers. Each protocol has errors of its own."""
+    """Wait until a Dask scheduler answers; each protocol raises its own errors if it does not."""
     from distributed.comm import connect
     from distributed.security import Security
 
@@ -277,7 +277,7 @@ def on_cluster(tasks: Iterable[Task], client: Client, work: Work = fit_unit) -> 
     """Results in order of completion, from the workers of a Dask scheduler.
 
     Only as many tasks as the workers soon need are in flight, so that few records are in memory. Dask repeats the tasks
-    of a dying worker; a unit that keeps killing workers has failed. Raises SchedulerError.
+    of a dying worker; a unit that keeps killing workers counts as failed. Raises SchedulerError.
     """
     from distributed import as_completed
     from distributed.scheduler import KilledWorker

@@ -36,26 +36,26 @@ if TYPE_CHECKING:
     from hystgen.parameters.schema import Parameters
 
 MODELS = (*gpi.KINDS, "auto")
-"""Names defined by the contract."""
+"""Values of the option `model`, fixed by the contract."""
 
 P0_FLOOR = 0.05
 """Share of the sum of weights below which p_0 is raised if the data allow it."""
 
 NEAR_ZERO = 0.01
-"""[share of the drive range] A loading curve may miss 0, and fall back, by this much."""
+"""[share of the drive range] The farthest from 0 that a loading curve may start, and the farthest it may fall back."""
 
 PASSES = 60.0
-"""Approximate number of passes of the search for a front through all samples, for the progress bar."""
+"""Approximate number of passes through all samples in the search for a front, for the progress bar."""
 
 MOST_PLAYS = 1000
-"""Most plays that are fitted; the memory and time of a fit grow with the square and the cube of their number."""
+"""Maximum number of plays; the memory used by a fit grows with the square of their number, its time with the cube."""
 
 MOST_BREAKS = 64
-"""Most breaks of a dead-zone sum that are fitted, eight times as many as are tried by default."""
+"""Maximum number of breaks of a dead-zone sum, eight times as many as are tried by default."""
 
 BEYOND = 0.1
-"""Largest excursion of a held-out part of a record beyond the fitted drive range, as a share of it; further out every
-model is a guess."""
+"""Largest excursion of a held-out part of a record beyond the fitted drive range, as a share of that range; farther out
+every model is a guess."""
 
 MODEL_PARSIMONY = 1.03
 """`auto` takes the simplest model whose held-out error is within this factor of the best."""
@@ -84,33 +84,33 @@ def identify(
     """Fit a model to measured records.
 
     - `records`: one or more of: a path, a data frame or a dict of named columns, a tuple of arrays (t, v, y) of shape
-      (N,), an array (N, 3), all read with `columns`, `sample_time` (s), `delimiter`, or a `Record`; each gets a free
-      offset.
+      (N,), an array (N, 3), or a `Record`; all but the last are read with `columns`, `sample_time` (s), `delimiter`.
+      Each record gets a free offset.
     - `model`: `pi`; `gpi-deadzone` and `gpi-tanh`, which have a memoryless part in front; or `auto`, the simplest of
       them whose held-out error is within 3 % of the best.
-    - `thresholds`: a number of plays without r_0, or a list of thresholds (behind a memoryless part, which preserves
-      the length of the drive range and the position of 0, in its output); by default both number and positions are
-      chosen by blocked validation on the records.
-    - `breaks`: how many points, or which, a dead-zone sum may bend at, chosen in the same way by default.
-    - `holdout`: records that take no part in any choice except that of `auto`, and that of one branch or two for
-      `gpi-tanh`; without them the last quarter of each record gives the held-out figures, from a trial model that has
-      not seen it, and the model written is then fitted to everything.
-    - `history`: drive values visited before every record, beginning in a virgin state. Without it, the start of each
+    - `thresholds`: the number of plays without r_0, or a list of thresholds (if there is a memoryless part, in terms of
+      its output; that part preserves the length of the drive range and the position of 0); by default both number and
+      thresholds are chosen by blocked validation on the records.
+    - `breaks`: the number of points at which a dead-zone sum may bend, or their drives; by default chosen the same way.
+    - `holdout`: records that decide nothing except which model `auto` takes, and whether `gpi-tanh` has one branch or
+      two. Without them, the held-out figures are those of a trial model on the last quarter of each record, which it
+      has not seen; the model written is then fitted to everything.
+    - `history`: drive values visited before every record, starting from the virgin state. Without it, the start of each
       record is ignored until the drive has wiped the memory that matters; if that leaves less than half of the record,
       its start memory is estimated together with the weights.
-    - `rest`: seconds of pause after the history; a PI model does not depend on time, so it changes nothing here.
+    - `rest`: pause after the history in seconds; it changes nothing, since a PI model does not depend on time.
     - `name`: C identifier of the model.
     - `units`: `input` and `output`, by default those of the first record that gives any; columns in other units of the
-      same quantity are converted, but not `history`, `thresholds` and `breaks`.
-    - `skip`: seconds at the start of every record that are not compared, although their drive counts.
-    - `loading_curve`: the records are initial loading curves, with the drive rising from 0 in a virgin actuator, and
-      nothing is held out of them: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22).
+      same quantity are converted, but `history`, `thresholds` and `breaks` are not.
+    - `skip`: seconds at the start of every record that are not compared, although their drive moves the plays.
+    - `loading_curve`: the records are initial loading curves, with the drive rising from 0 in a virgin actuator, and no
+      part of them is held out: `p_0 = phi'(0)`, `p(r) = phi''(r)` (22).
     - `p0_floor`: see `pi.fit_weights`; 0 leaves p_0 as fitted.
-    - `progress`: a bar on a terminal's stderr when it takes more than a second.
+    - `progress`: show a progress bar on a terminal's stderr if the fit takes more than a second.
 
-    The start memory in the parameter file is the one that `history` leads to. Without a history it is 0, that of a
-    virgin actuator: no record shows in which state the firmware will find it. Raises RecordError for unusable files,
-    IdentificationError for records that nothing can be fitted to, ValueError and TypeError for wrong arguments.
+    The start memory in the parameter file is the one that `history` leads to. Without a history it is 0, as in a virgin
+    actuator, since no record shows the state in which the firmware will find it. Raises RecordError for unusable files,
+    IdentificationError for records to which no model can be fitted, ValueError and TypeError for wrong arguments.
 
     >>> import numpy as np, hystgen
     >>> t = np.linspace(0.0, 2.0, 2001)
@@ -204,7 +204,7 @@ def check_options(
     before = None if history is None else visited(history)
     if loading_curve:
         if before:
-            raise ValueError("history and loading_curve exclude each other: an initial loading curve has none")
+            raise ValueError("history and loading_curve exclude each other: an initial loading curve has no history")
         before = ()
     arguments.number("rest", rest, "seconds", 0.0)
     arguments.number("skip", skip, "seconds", 0.0)
@@ -237,8 +237,8 @@ def auto(courses: Sequence[Course], held: Sequence[Course]) -> FittedModel:
 
 
 def _best(courses: Sequence[Course], held: Sequence[Course], kind: str, how: gpi.How) -> _Tried:
-    """Fit one kind to courses and compare it with held-out ones, which choose if `gpi.to_judge` leaves them a
-    choice."""
+    """Fit one kind to courses and compare it with held-out ones, which choose if `gpi.to_judge` returns several
+    fits."""
     found = gpi.to_judge(courses, kind, how)
     tried = [_compared(fitted, compared, fitted.begun(held)) for fitted, compared in found]
     return tried[_choose(tried)]
@@ -258,18 +258,18 @@ def _compared(fitted: FittedModel, compared: list[Course], begun: Sequence[Cours
     for item in settled:
         if item.used < SHORTEST:
             raise IdentificationError(
-                f"{item.name} is held out, but only {item.used} of its samples can be compared, at least {SHORTEST} "
-                "are needed; hold out a longer record"
+                f"{item.name} is held out, but only {item.used} of its samples can be compared, and at least "
+                f"{SHORTEST} are needed; hold out a longer record"
             )
     errors = [_compare(item, fitted) for item in settled]
     return _Tried(fitted, compared, settled, errors, ErrorRow.of("held out", "written", errors))
 
 
 def _choose(tried: Sequence[_Tried]) -> int:
-    """The first, and so the simplest, whose held-out error is close to the smallest.
+    """Index of the first, and so the simplest, model whose held-out error is close to the smallest.
 
-    Samples whose drive lies far outside the fitted range do not count, if there are others: every model is a guess
-    there.
+    Samples whose drive lies far outside the fitted range do not count unless there are no others, since every model is
+    a guess there.
     """
     found = [_rms_inside(each) for each in tried]
     enough = MODEL_PARSIMONY * min(found)
@@ -360,8 +360,8 @@ def _trial(
         if len(kinds) > 1:
             raise ValueError("model auto needs something held out: give holdout records besides the loading curve")
         return [], kinds[0], [], ""
-    short = "too short, or too little of the drive's range in its first part, to hold its end out; give --holdout"
-    instead = "" if len(kinds) == 1 else f". With nothing held out there is no choice: {kinds[0]} was fitted"
+    short = "too short, or its first part covers too little of the drive's range, to hold out its end; give --holdout"
+    instead = "" if len(kinds) == 1 else f". With nothing held out auto cannot choose: {kinds[0]} was fitted"
     fronts, ends = [], []
     for item in courses:
         front, end = _parted(item)
@@ -378,7 +378,7 @@ def _trial(
     own = ErrorRow.of("fit", "trial", [_compare(item, best.fitted) for item in best.compared])
     rows = [each.as_candidate() for each in tried] if len(tried) > 1 else []
     rows += [own, replace(best.held_out, model="trial")]
-    # if the amplitude fades, the end alone has a smaller range, which is no measure for the errors of both
+    # if the amplitude fades, the end alone has a smaller range; percentages of both parts refer to the whole
     whole = max(item.output_range for item in courses)
     return [replace(row, output_range=whole) for row in rows], kinds[chosen], best.errors, ""
 
@@ -386,8 +386,8 @@ def _trial(
 def _parted(item: Course) -> tuple[Course, Course]:
     """The part of a record to fit, and the part to hold out.
 
-    That is the record's end, unless the drive goes far beyond its earlier range there, for example with growing
-    amplitudes; then it is the last part of the same length that stays within the range of the rest.
+    The part held out is the record's end, unless the drive there goes far beyond its earlier range, for example with
+    growing amplitudes; then it is the last part of the same length that stays within the range of the rest.
     """
     number = round(len(item.v) * HELD_OUT)
     last = len(item.v)
@@ -458,7 +458,7 @@ def _start(r: NDArray[np.float64], history: tuple[float, ...] | None) -> float |
 
 
 def identifier_from(text: str) -> str:
-    """A C identifier made from any text, such as a file's stem; `stage` if nothing is left of it."""
+    """A C identifier made from any text, such as a file's stem; `stage` if no usable character is left."""
     words = re.sub(r"[^0-9A-Za-z]+", "_", text).strip("_")
     if not words:
         return "stage"

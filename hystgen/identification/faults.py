@@ -23,14 +23,14 @@ LONGEST = 4
 """Longest run of samples that counts as an isolated fault; a longer one must come from the actuator or the sensor."""
 
 OUTLYING = 8.0
-"""[standard deviations of the scatter around it] An outlier is farther than this from the median around it."""
+"""[standard deviations of the scatter] An outlier is farther than this from the running median."""
 
 LITTLE = 5e-4
-"""Least scatter, as a share of the peak-to-peak output: a model of a simulation has hardly any error except at kinks,
-and an error of `OUTLYING` times this in a single sample spoils no fit."""
+"""Least scatter assumed, as a share of the peak-to-peak output: a model of a simulation has hardly any error except at
+kinks, and an error of `OUTLYING` times this in a single sample spoils no fit."""
 
 WINDOW = 15
-"""Samples of the running median, more than twice `LONGEST`."""
+"""[samples] Length of the running median, more than twice `LONGEST`."""
 
 AROUND, CLEAR = 6, 2.5
 """An outlier jumps away and back by more than `CLEAR` times the steps of the `AROUND` samples on either side."""
@@ -42,35 +42,35 @@ TAIL, NORMAL_TAIL = 0.98, 2.326
 """A quantile of the deviations, and its value for a normal distribution with standard deviation 1."""
 
 STEP, STEP_OF_RANGE = 3.0, 0.02
-"""A step of the drive is `STEP` times the quantile `TAIL` of its moves, and at least this share of its range."""
+"""A step of the drive exceeds `STEP` times the quantile `TAIL` of its moves, and `STEP_OF_RANGE` times its range."""
 
 MOST_OUTLIERS = 0.01
-"""Largest share of samples that is left out as outliers; if there are more, they are not outliers."""
+"""Largest share of samples that may be rejected as outliers; if there are more, they are not outliers."""
 
 FEW = 2
-"""Number of samples that may be left out of a record of any length: its first and its last one."""
+"""Number of samples that may be rejected in a record of any length: its first and its last one."""
 
 LONG_GAP = 25.0
-"""Median steps of a gap after which the drive in between, and with it the memory, counts as unknown."""
+"""[median steps] In a gap longer than this, the drive, and with it the memory, counts as unknown."""
 
 SEEN, SIGMAS = 0.05, 4.0
 """The output responds to a pulse of the drive if it moves by this share of the expected motion, and by this number of
 standard deviations of its noise."""
 
 OUT_OF_SCALE = 3.0
-"""Outputs that lie outside all others by this many times their range are wrong, unless the drive is as far out."""
+"""Outputs that lie outside all others by this many times their range are wrong, unless the drive is far out as well."""
 
 
 def most(samples: int) -> int:
-    """Most samples of a record that are left out as isolated."""
+    """Maximum number of samples of a record that may be rejected as isolated."""
     return max(FEW, math.ceil(MOST_OUTLIERS * samples))
 
 
 def outliers(error: Array, v: Array, swing: float) -> Flags:
-    """Isolated samples of an error signal (N,) that lie far from their neighbours; never NaN.
+    """Isolated samples of an error signal (N,) that lie far from their neighbours; NaN is never flagged.
 
-    `swing`: peak-to-peak output; errors far below it spoil nothing. Samples at a step of the drive `v` (N,) do not
-    count: a model without a lag or a resonance misses them.
+    `swing`: peak-to-peak output; errors far below it do no harm. Samples at a step of the drive `v` (N,) do not count,
+    since a model without a lag or a resonance misses them.
     """
     found = np.zeros(len(error), dtype=bool)
     stepped = _stepped(v)
@@ -89,7 +89,7 @@ def far_from_others(error: Array, swing: float) -> list[tuple[int, int]]:
     `swing`: as in `outliers`.
 
     The scatter is taken from the median absolute deviation from a running median (Hampel identifier; Pearson, Control
-    Engineering Practice 2005), so that neither the outliers nor systematic model errors widen it.
+    Engineering Practice 2005), so that neither the outliers nor systematic model errors inflate it.
     """
     from scipy.ndimage import median_filter
 
@@ -107,8 +107,8 @@ def far_from_others(error: Array, swing: float) -> list[tuple[int, int]]:
 
 
 def _scatter(sizes: Array, faulty: int) -> float:
-    """Standard deviation of a normal distribution with the same median or tail, whichever is larger, as these sizes
-    without the `faulty` largest: a model that misses sharp corners has wide tails, and so has a drive with corners."""
+    """Standard deviation of a normal distribution that matches the median or the tail of `sizes` without the `faulty`
+    largest, whichever is larger: a model that misses sharp corners has wide tails, and so has a drive with corners."""
     tail = float(np.quantile(np.sort(sizes)[:-faulty], TAIL)) / NORMAL_TAIL
     return max(1.4826 * float(np.median(sizes)), tail)
 
@@ -145,7 +145,7 @@ def _stands_out(x: Array, first: int, last: int) -> bool:
         return False
     before, after = np.diff(x[max(first - AROUND, 0) : first]), np.diff(x[last : last + AROUND])
     around = np.sort(np.abs(np.concatenate([before, after])))
-    # between two others, a nearby outlier makes two large steps; at an end, a transient is fastest
+    # inside a record, the two largest steps may be a nearby outlier's; at an end, a transient is fastest there
     fewer = 1 if first == 0 or last == len(x) else 3
     return len(around) >= 3 and bool(jump > CLEAR * around[-fewer])
 
@@ -153,8 +153,8 @@ def _stands_out(x: Array, first: int, last: int) -> bool:
 def wrong_drive(v: Array, y: Array) -> Flags:
     """Isolated samples of the drive that jump away and back without a response of the output (NaN: unknown).
 
-    A real pulse of the drive shows in the output, at once or a little later; one that does not is a fault of the
-    recording. At the ends of a record the drive jumps once. Numbers that stand for "no value" always count.
+    A real pulse of the drive shows in the output, at once or a little later; a pulse that does not is a fault of the
+    recording. At either end of a record there is only one jump. Numbers that stand for "no value" always count.
     """
     found = no_value(v)
     known = np.isfinite(y)
@@ -205,7 +205,7 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
     from scipy.ndimage import rank_filter
 
     step = np.abs(np.diff(v))
-    # a sample that stands apart makes three of them large
+    # a single sample that stands apart makes three of these second differences large
     usual_bend = _scatter(np.abs(v[1:-1] - 0.5 * (v[:-2] + v[2:])), 3 * FEW)
     least = max(STEP_OF_RANGE * span, OUTLYING * usual_bend)
     # of the steps around the two jumps, at most `LONGEST` + 1 belong to the pulse, and two to another one
@@ -227,7 +227,7 @@ def _pulses(v: Array, span: float) -> list[tuple[int, int, float]]:
 def _notice(follows: Array, y: Array, first: int, last: int) -> float:
     """How far the output leaves the line through its surroundings at samples [first, last) and soon after.
 
-    `follows`: the motion of the output expected without the pulse, which is not a response to it.
+    `follows`: the motion of the output expected without the pulse, which does not count as a response.
     """
     at_once = _bent(y[max(first - 1, 0) : last + 1])
     near = slice(max(first - 1, 0), last + LONGEST)
@@ -256,7 +256,7 @@ def wrong_output(v: Array, y: Array) -> Flags:
 
 
 def smooth(record: Record) -> Record:
-    """The record with straight lines across samples that are obviously wrong without a model, to judge it as a
+    """The record with straight lines across samples that are obviously wrong even without a model, for judging it as a
     whole."""
     assert record.y is not None
     v, y = record.v, np.asarray(record.y, dtype=np.float64)
@@ -266,7 +266,7 @@ def smooth(record: Record) -> Record:
 
 
 def _beyond(x: Array, times: float) -> Flags:
-    """Samples that lie beyond all but the outermost ones by `times` their range."""
+    """Samples that lie outside the range of all but the outermost samples by more than `times` that range."""
     low, high = _ends(x)
     away = times * (high - low)
     return np.asarray((x < low - away) | (x > high + away))
@@ -297,7 +297,7 @@ def bridged(v: Array, wrong: Flags) -> Array:
 
 @dataclass(frozen=True)
 class Segment:
-    """A part of a record without a gap, which begins at sample `first`. `after_gap`: its start memory is unknown."""
+    """A part of a record without gaps, beginning at sample `first`. `after_gap`: its start memory is unknown."""
 
     record: Record
     first: int
@@ -325,17 +325,17 @@ def sentence(name: str, found: NDArray[np.intp], what: str) -> str:
     return f"{name}: {counted(len(found), 'isolated sample')} of {what}; the first is sample {found[0]}"
 
 
-# Stretches of the output: drop-outs, held samples, a converter at its end ------------------------------------
+# Stretches of the output: drop-outs, held samples, a saturated converter -------------------------------------
 
 
 FEWEST_HELD = 6
-"""Fewest equal samples in a row, while the drive moves, that count as held."""
+"""Minimum number of equal samples in a row, while the drive moves, that count as held."""
 
 CHANCE = 1e-6
-"""Largest probability that a record contains a run of equal samples by chance, for it to count as held."""
+"""A run of equal samples counts as held only if it occurs in the record by chance with less than this probability."""
 
 RAIL = 12
-"""Fewest samples in a row, exactly at the end of the output's range, that count as saturated."""
+"""Minimum number of samples in a row, exactly at the end of the output's range, that count as saturated."""
 
 SHARP, USUAL = 8.0, 0.98
 """A drop-out begins and ends with a step of `SHARP` times the quantile `USUAL` of the steps."""
@@ -344,20 +344,20 @@ SWINGS = 0.4
 """A step is part of a swing if all but one of the steps next to it exceed this share of it."""
 
 LONGEST_DROP_OUT = 200
-"""Most samples of a drop-out, but never more than a twentieth of the record."""
+"""[samples] Longest drop-out, though never more than a twentieth of the record."""
 
 SHORT = 3
-"""Fewer samples count as isolated; the fit itself leaves those out."""
+"""[samples] Shorter drop-outs count as isolated samples, which the fit itself leaves out."""
 
 MOVES_ON = 0.01
-"""[share of its range] The drive goes on outwards by at least this while the output is stuck at the end of a
+"""[share of its range] Least distance that the drive continues outwards while the output is stuck at the end of a
 converter's range."""
 
 SUDDEN = 4.0
-"""The end of a converter's range is reached in steps below this many times the steps expected from the drive."""
+"""Steps that reach the end of a converter's range are smaller than this many times those expected from the drive."""
 
 GRAINS = 8.0
-"""A coarse output is held if it stays while the drive should move it by this many of its steps."""
+"""A coarse output counts as held if it stays constant while the drive should move it by this many of its steps."""
 
 NEAR = 4
 """Equal samples are also counted over this many lengths of the run on either side: while the drive is slow, a coarse
@@ -375,7 +375,7 @@ def sensitivity(y: Array, v: Array) -> float:
 
 
 def drop_outs(y: Array, v: Array) -> list[tuple[int, int]]:
-    """Runs [a, b) in which the output leaves by a step, stays away and comes back by a step, while the drive does not.
+    """Runs [a, b) in which the output steps away, stays there and steps back, while the drive does not.
 
     Ringing takes several steps. `y`: NaN in samples that are not compared.
     """
@@ -435,7 +435,7 @@ def held(y: Array, v: Array) -> list[tuple[int, int]]:
             around = np.concatenate([same[max(a - NEAR * (b - a), 0) : a], same[b : b + NEAR * (b - a)]])
             likely = max(chance, float(np.mean(around))) if len(around) else chance
             wrong = likely ** (b - a) * len(y) < CHANCE and moved > 0.25 * noise and (real or catches_up)
-        else:  # without any fault, a coarse converter repeats codes and then moves on by one of them
+        else:  # a sound coarse converter also repeats codes, but then moves on by a single one
             wrong = moved > GRAINS * grain and catches_up
         if wrong:
             found.append((a, b + 1))
@@ -446,8 +446,8 @@ def rails(y: Array, v: Array) -> list[tuple[str, float]]:
     """Ends of the output's range at which many samples in a row are equal while the drive moves on outwards, with their
     levels.
 
-    An end reached and left by a step does not count, since that is a drop-out; nor does one where the drive just turns:
-    that is backlash or a coarse converter.
+    An end reached and left by a step does not count, since that is a drop-out; nor does an end at which the drive just
+    turns, since that is backlash or a coarse converter.
     """
     known = np.isfinite(y)
     if not known.any():
@@ -459,7 +459,7 @@ def rails(y: Array, v: Array) -> list[tuple[str, float]]:
     between = known & (y > low) & (y < high)
     if not between.any():
         return []
-    slope = sensitivity(y[between], v[between])  # samples at the ends of the range would flatten it
+    slope = sensitivity(y[between], v[between])  # samples at the ends of the range would lower the slope
     for name, end, sign in (("largest", high, 1.0), ("least", low, -1.0)):
         least = max(MOVES_ON * float(np.ptp(v)), GRAINS * grain / slope if slope > 0.0 and grain < np.inf else 0.0)
         runs = runs_of(y == end)

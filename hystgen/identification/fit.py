@@ -67,10 +67,10 @@ class Fit:
         return Model(self.parameters)
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
-        """A picture: the loop of a record (a held-out one if any) with the model's; residuals over time; weights.
+        """A picture: a record's loop (held-out if possible) with the model's loop; residuals over time; weights.
 
-        Returns matplotlib's Figure, which a notebook shows; with `path`, a .png or .svg file, it is also written there.
-        Needs matplotlib, of the extra `plot`. Raises PlotError, OSError.
+        Returns a matplotlib Figure, which a notebook displays; it is also saved to `path`, a .png or .svg file, if
+        given. Needs matplotlib, from the extra `plot`. Raises PlotError, OSError.
         """
         if self.draw is None:
             raise drawing.PlotError("this fit has no figure; use the one returned by hystgen.identify")
@@ -85,9 +85,9 @@ class Fit:
     ) -> NDArray[np.float64]:
         """Free-run output (N,) of the model along a record's drive, in output units.
 
-        The start memory comes from `history`, or else from the history of the fit; otherwise the plays are at rest at
-        the first drive value, so samples before the drive has swept its range mean little. `free_offset` shifts the
-        result to the mean of the record's `y`. Warns if the drive leaves the fitted range.
+        The start memory comes from `history`, or else from the history of the fit; without either, the plays start at
+        rest at the first drive value, so samples before the drive has swept its range mean little. `free_offset` shifts
+        the result to the mean of the record's `y`. Warns if the drive leaves the fitted range.
         """
         (data,) = in_units([_read(record)], self.parameters.units, sources=[record])
         outside = quality.outside(data.name, data.v, self.parameters.input_range)
@@ -105,9 +105,9 @@ class Fit:
     def along(self, record: Record, used: Used) -> NDArray[np.float64]:
         """Free-run output (N,) along a record, computed as in the fit.
 
-        The drive is bridged where the fit bridged it; every part between gaps starts again and has the free offset that
-        fits its compared samples best; NaN in parts that were left out. Raises ValueError if `used` belongs to another
-        record.
+        The drive is bridged where the fit bridged it; every part between gaps starts afresh and has the free offset
+        that fits its compared samples best; parts that were left out are NaN. Raises ValueError if `used` belongs to
+        another record.
         """
         if (record.name, len(record)) != (used.name, used.samples) or record.y is None:
             raise ValueError(f"{record.name} is not the record {used.name} of {used.samples} samples that was compared")
@@ -126,7 +126,7 @@ class Fit:
         return found
 
     def settled(self, record: Source) -> int:
-        """First sample of a record at which no play remembers an unknown start; 0 if a history was given."""
+        """First sample of a record from which no play remembers an unknown start; 0 if a history was given."""
         if self.history is not None:
             return 0
         largest = self.parameters.model.pi.thresholds[-1]
@@ -177,8 +177,8 @@ class Fit:
         """Explanations of the terms in the fit table, one or two sentences each."""
         n = len(self.parameters.model.pi.thresholds) - 1
         reported = [
-            f"{counted(n, 'play')}. Errors of a free run with a free offset per record; % of the largest compared "
-            "peak-to-peak output of one of the row's records."
+            f"{counted(n, 'play')}. Errors of a free run with a free offset per record; % of the largest peak-to-peak "
+            "output compared in any of the row's records."
         ]
         if any(row.model == "trial" for row in self.rows):
             reported.append(
@@ -217,9 +217,9 @@ class Used:
     `name`: of the record; `held_out`: whether it took no part in the fit; `samples`: its length; `parts`: first and
     last sample (exclusive) of each part that was run, a single part if there is no gap; `starts`: the start memory
     found for each part, None if it was given or not found; `skipped`: excluded at the start on request; `ignored`: not
-    compared at the start of a part because its start memory is unknown; `outliers`: samples of y not compared;
-    `stretches`: the same in drop-outs, held samples or converter saturation; `bridged`: samples of v replaced by a
-    straight line; `gaps`: first sample after each gap; `left_out`: parts between gaps that are too short to use.
+    compared at the start of a part because its start memory is unknown; `outliers`: isolated samples of y not compared;
+    `stretches`: samples of y not compared in drop-outs, held runs or converter saturation; `bridged`: samples of v
+    replaced by a straight line; `gaps`: first sample after each gap; `left_out`: parts between gaps too short to use.
     """
 
     name: str
@@ -244,11 +244,11 @@ class Used:
         return found
 
     def start_sentence(self, unit: str) -> str:
-        """The sentence about the start memories that were found."""
+        """The sentence about the start memories that were estimated."""
         most = max(start.uncertainty for start in self.starts if start is not None)
         return (
-            f"{self.name}: the start memory was estimated with the weights, the output at the start to +-{most:.3g}"
-            f"{' ' if unit else ''}{unit} (95 %)."
+            f"{self.name}: the start memory was estimated with the weights; its part of the output is known to "
+            f"+-{most:.3g}{' ' if unit else ''}{unit} (95 %)."
         )
 
     def sentences(self) -> list[str]:

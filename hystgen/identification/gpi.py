@@ -30,7 +30,7 @@ BREAK_COUNTS = (1, 2, 4, 8)
 """Numbers of breaks of a dead-zone sum that are tried."""
 
 FRONT_PARSIMONY = 1.02
-"""A front with fewer shape numbers is taken if its validation error is within this factor of the best."""
+"""A front with fewer shape parameters is chosen if its validation error is within this factor of the best."""
 
 INVERSE_PLAYS = 10
 """Number of plays of the measured output in the convex problem that starts the search for a dead-zone sum."""
@@ -41,8 +41,8 @@ LEAST_SLOPE = 0.1
 
 @dataclass(frozen=True)
 class How:
-    """The options of a fit: `wanted` plays, their number or thresholds, and `breaks`, None for those that records bear;
-    `floor`: least share of p_0 in the sum of weights; `tick`: counts samples as they are fitted."""
+    """The options of a fit: `wanted`, the number or the thresholds of plays, and `breaks`, None to let the records
+    decide; `floor`: least share of p_0 in the sum of weights; `tick`: counts samples as they are fitted."""
 
     wanted: int | tuple[float, ...] | None
     breaks: int | tuple[float, ...] | None
@@ -73,10 +73,10 @@ class FittedModel:
 
 
 def solve(courses: Sequence[Course], kind: str, how: How) -> tuple[FittedModel, list[Course]]:
-    """Fit a model of one kind; also returns the courses, with the measured drive, over the compared samples.
+    """Fit a model of one kind; also returns the courses as they were compared, with the measured drive.
 
-    Of several fronts of a kind, it takes the one with the fewest shape numbers whose prediction of blocks left out of
-    the fit is close to the best. Raises IdentificationError.
+    Of several fronts of a kind, the one chosen has the fewest shape parameters among those whose error on blocks left
+    out of the fit is close to the smallest. Raises IdentificationError.
     """
     return _solved(courses, kind, how, lambda found: [_by_blocks(found)])[0]
 
@@ -84,9 +84,9 @@ def solve(courses: Sequence[Course], kind: str, how: How) -> tuple[FittedModel, 
 def to_judge(courses: Sequence[Course], kind: str, how: How) -> list[tuple[FittedModel, list[Course]]]:
     """The fits of one kind from which held-out records choose, the simplest first; otherwise the same as `solve`.
 
-    Tanh envelopes with one branch and with two: two branches form a loop of their own, as wide in a small swing as in a
-    large one. Records of a single swing do not show whether their loop is of that kind, and neither do blocks left out
-    of them.
+    There are several only for tanh envelopes, with one branch and with two: two branches form a loop of their own, as
+    wide for a small amplitude as for a large one. Records of a single amplitude do not show whether their loop is of
+    that kind, and neither do blocks left out of them.
     """
 
     def chosen(found: Sequence[_Found]) -> Sequence[_Found]:
@@ -105,7 +105,7 @@ class _Found:
 
 
 def _by_blocks(found: Sequence[_Found]) -> _Found:
-    """The front with the fewest shape numbers whose error on blocks left out of the fit is close to the best."""
+    """The front with the fewest shape parameters whose error on blocks left out of the fit is close to the best."""
     best = found[0]
     for each in found[1:]:
         if each.error * FRONT_PARSIMONY < best.error:
@@ -117,12 +117,12 @@ def _solved(
     courses: Sequence[Course], kind: str, how: How, choose: Callable[[Sequence[_Found]], Sequence[_Found]]
 ) -> list[tuple[FittedModel, list[Course]]]:
     """The fits with the fronts that `choose` selects."""
-    # a start memory found without the front is not exact behind it, but better than too few samples to compare
+    # a start memory found without the front is not exact with it, but better than too few samples to compare
     courses = start.needed(courses, (), how.wanted if kind == "pi" else None)
     plain, compared = pi.solve(courses, how.wanted, how.floor, how.tick)
     if kind == "pi":
         return [(FittedModel(Kept(), np.empty(0), plain), compared)]
-    # the missing front distorts the choice of a plain play sum: search the shape with a dense list of plays
+    # without the front the wrong plays would be chosen: search the shape with a dense list of plays
     fine = plain.thresholds
     if not isinstance(how.wanted, tuple) and plain.reach > 0.0:
         fine = np.array(pi.dense(plain.reach, sum(item.used for item in compared)).thresholds)
@@ -146,7 +146,7 @@ def _finished(
     fitted = _solve_behind(courses, front, shape, replace(how, wanted=tuple(float(x) for x in r)))
     if how.wanted is None:
         fitted = replace(fitted, solution=fitted.solution.without_idle_plays())
-    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # whatever the front
+    fitted = replace(fitted, solution=replace(fitted.solution, sense=plain.sense))  # a front does not change the sense
     largest = float(fitted.solution.thresholds[-1])
     firsts = [fitted.inner(item).resettled(largest).first for item in courses]
     return fitted, [replace(item, first=first) for item, first in zip(courses, firsts, strict=True)]
@@ -189,7 +189,7 @@ def _shaped(
 
 
 def validation(shaped: joint.LocalFit, front: Front) -> float:
-    """rms error on blocks of the records that took no part in the weights and in the last step of the shape."""
+    """rms error on blocks of the records that took no part in fitting the weights and the last step of the shape."""
     squares = 0.0
     for fold, left_out in enumerate(shaped.system.folds):
         training = reduction.others(shaped.system, fold)
@@ -205,7 +205,7 @@ def convex_start(courses: Sequence[Course], front: DeadZones) -> Array | None:
     `PI^-1[y] = G[v]`: plays of the measured output, with weights q_0 > 0 and q_i <= 0, on one side, pieces of the drive
     with positive slopes on the other (Kuhnen, European Journal of Control 9, 2003, 407-418, where the memoryless part
     lies behind the plays). It is convex, but it minimises an error of the drive, and noise of the output enters the
-    plays: it is only a starting point for the fit of the output. None if no sample is left.
+    plays, so its solution is only a starting point for the fit of the output. None if no sample is left.
     """
     low, high = front.drive
     places = np.array([low, *front.breaks, high])

@@ -1,8 +1,8 @@
 """The shape of a front and the weights of the plays fitted together: least squares on the free-run output error.
 
-The weights enter linearly, the shape does not: a Gauss-Newton method with a trust region, in which every step solves
-for all weights and the change of the shape at once, under the constraints that keep the model invertible. Derivatives
-with respect to the shape are differences of free runs, which include what the plays remember of earlier samples.
+The weights enter linearly, the shape does not. The method is Gauss-Newton with a trust region; every step solves for
+all weights and the change of the shape at once, under the constraints that keep the model invertible. Derivatives with
+respect to the shape are differences of free runs, and so include the effect of earlier samples through the plays.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ Array = NDArray[np.float64]
 
 
 STEEPEST = math.log(20.0)
-"""Largest ratio of two slopes of a dead-zone sum, as its logarithm."""
+"""Logarithm of the largest ratio of two slopes of a dead-zone sum."""
 
 FLATTER = math.log(200.0)
-"""Largest ratio of the slopes of a limiter, as its logarithm."""
+"""Logarithm of the largest ratio of the slopes of a limiter."""
 
 SMOOTH = 16
-"""Pieces of a dead-zone sum that approximates a smooth curve: with a ratio of 20 over the whole range, slopes of
-neighbours differ by at most a fifth."""
+"""Number of pieces of a dead-zone sum that approximates a smooth curve: with a ratio of 20 over the whole range, the
+slopes of neighbouring pieces differ by at most a fifth."""
 
 FLATTEST = 3.0
-"""Largest argument of a tanh within the drive range, where its slope is a hundredth of the largest."""
+"""Largest argument of a tanh within the drive range; its slope there is a hundredth of the largest."""
 
 CURVED = (0.02, 3.0)
 """Least and largest half drive range in units of the tanh's argument."""
@@ -65,15 +65,15 @@ class Front(Protocol):
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Least and largest value of every shape number."""
+        """Least and largest value of every shape parameter."""
 
     def slack(self, shape: Array) -> Array:
         """Values that must not be negative for the front to be invertible, in addition to the bounds; may be empty."""
 
     def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
-        """The stages of the model, with numbers rounded to `digits` if given.
+        """The stages of the model, with their parameters rounded to `digits` if given.
 
-        A search uses them unrounded: the difference of two numbers rounded to ten digits has lost six.
+        A search uses them unrounded, because differences of two numbers rounded to ten digits would lose six digits.
         """
 
 
@@ -94,12 +94,12 @@ class Kept(_Bounded):
 
     @property
     def straight(self) -> Array:
-        """No shape numbers."""
+        """No shape parameters."""
         return np.empty(0)
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """None."""
+        """No bounds."""
         return np.empty(0), np.empty(0)
 
     def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
@@ -157,10 +157,10 @@ class DeadZones(_Bounded):
 
 @dataclass(frozen=True)
 class Ends(_Bounded):
-    """A limiter: a straight line that becomes flatter near the ends of the drive range, with two dead zones (41).
+    """A limiter: a straight line that becomes flatter near the ends of the drive range, made of two dead zones (41).
 
-    The shape is the distance from each end at which that begins, as a share of the range, and the logarithm of the
-    ratio of the outer slope to the inner one.
+    The shape is the length of each flatter end, as a share of the range, and the logarithm of the ratio of the outer
+    slope to the inner one.
     """
 
     drive: tuple[float, float]
@@ -168,16 +168,16 @@ class Ends(_Bounded):
 
     @property
     def straight(self) -> Array:
-        """Slightly flatter at the ends, so that the derivatives with respect to the distances are not zero."""
+        """Slightly flatter at the ends, so that the derivatives with respect to the lengths are not zero."""
         return np.array([0.1, 0.1, -0.1])
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """A distance may be zero, where it has no effect; the two bends do not meet."""
+        """A length may be so small that it has no effect; the two bends do not meet."""
         return np.array([1e-3, 1e-3, -FLATTER]), np.array([0.45, 0.45, 0.0])
 
     def widest(self, shape: Array) -> float:
-        """The longer of the two flat ends, as a share of the range."""
+        """The length of the longer flatter end, as a share of the range."""
         return float(np.max(shape[:2]))
 
     def stages(self, shape: Array, digits: int | None = None) -> tuple[Stage, ...]:
@@ -206,7 +206,7 @@ class BentFront(_Bounded):
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Ratios of slopes are limited as in a piecewise search."""
+        """Bounds that keep ratios of slopes within the limit of a piecewise search."""
         most = np.full(self.degree, 0.5 * STEEPEST / self.degree)
         return -most, most
 
@@ -225,9 +225,9 @@ class BentFront(_Bounded):
 class Tanh:
     """Tanh envelopes with one branch or two (45).
 
-    The shape of a branch is `a1` times half the drive range, and the position of its steepest point, counted from the
-    middle of the range in units of half its length. The descending branch has two more numbers: the logarithm of its
-    height relative to the ascending one, and its lift above it in the middle of the range, as a share of the range.
+    The shape of a branch is `a1` times half the drive range, and the position of its steepest point, measured from the
+    middle of the range in units of half its length. The descending branch has two more parameters: the logarithm of its
+    height relative to the ascending branch, and its lift above that branch at mid-range, as a share of the range.
     """
 
     drive: tuple[float, float]
@@ -240,11 +240,11 @@ class Tanh:
 
     @property
     def straight(self) -> Array:
-        """A gently bent branch, so that the derivative with respect to its position is not zero; no gap between two."""
+        """Gently bent, so that the derivative with respect to the position is not zero; two branches have no gap."""
         return np.array([0.3, 0.0] if self.branches == 1 else [0.3, 0.0, 0.3, 0.0, 0.0, 0.0])
 
     def doubled(self, single: Array) -> Array:
-        """Two branches that both equal the single one of that shape."""
+        """The shape of two branches that both equal a single branch of shape `single`."""
         return np.concatenate([single, single, [0.0, 0.0]])
 
     @property
@@ -258,7 +258,7 @@ class Tanh:
         """Distances of the ends from where a branch becomes flat, and of the descending branch above the ascending
         one."""
         held = [FLATTEST - shape[2 * b] * (1.0 + abs(shape[2 * b + 1])) for b in range(self.branches)]
-        if self.branches == 2 and min(held) < -FLATTEST:  # a branch may be flat to the last digit, and have no height
+        if self.branches == 2 and min(held) < -FLATTEST:  # a branch may be flat to the last digit, with no height left
             held += [-1.0] * len(self._places)
         elif self.branches == 2:
             stage = self._stage(shape, None)
@@ -321,7 +321,7 @@ def even_breaks(drive: tuple[float, float], count: int) -> tuple[float, ...]:
 
 
 def aside(places: Sequence[float], least: float) -> tuple[float, ...]:
-    """The positions; one within `least` of 0 moves to `least`, since a dead zone with threshold 0 is the line
+    """The positions, with any within `least` of 0 moved to `least`, since a dead zone with threshold 0 is the line
     itself."""
     return tuple(rounded(least, 6) if abs(x) < least else x for x in places)
 
@@ -330,48 +330,48 @@ def aside(places: Sequence[float], least: float) -> tuple[float, ...]:
 
 
 DIFFERENCE = 2.0**-16
-"""Change of a shape number for a derivative; shape numbers are of the order of one. A search needs a few digits of a
-derivative: this leaves five before the curvature shows, and eleven digits of the output above the rounding of
-doubles."""
+"""Change of a shape parameter for a derivative; shape parameters are of the order of one. A search needs only a few
+digits of a derivative: this leaves five before the curvature shows, and eleven digits of the output above the rounding
+of doubles."""
 
 MOST_STEPS = 25
-"""Most steps of a search. For `examples/stage_recording.csv`, fronts take 2 to 10."""
+"""Maximum number of steps of a search. For `examples/stage_recording.csv`, fronts take 2 to 10."""
 
 DAMPING = 1e-3
-"""Damping of the first step, relative to the diagonal of its equations."""
+"""Damping of the first step, relative to the diagonal of its normal equations."""
 
 ENOUGH = 0.005
-"""The search ends when the sum of squares falls by less than this many times its share per sample.
+"""[mean square error] The search ends when a step lowers the sum of squared errors by less than this.
 
-A step of one standard deviation of an estimate changes it by one such share.
+Moving an estimate by one of its standard deviations changes the sum by one mean square error.
 """
 
 LEAST_CHANGE = 1e-8
-"""The search also ends when no shape number changes by more than this."""
+"""The search also ends when no shape parameter changes by more than this."""
 
 GRAIN = 1.0 / 32.0
-"""[of the rms error] A number in a step is rounded by at most half of what moves the output by this much.
+"""[rms error] Every unknown of a step is rounded to a multiple of a unit that moves the output by at most this much.
 
-As the rounding errors of m numbers are independent, together they raise the sum of squares by m GRAIN^2 / 12 times its
-share per sample: half of `ENOUGH` for 32 numbers.
+The rounding errors of m unknowns are independent, so together they raise the sum of squared errors by m GRAIN^2 / 12
+times the mean square error: half of `ENOUGH` for 32 unknowns.
 """
 
 COARSEST = 2.0**-10
-"""Largest rounding unit of a shape number, of the order of one: rounding must not move numbers that hardly show yet."""
+"""Largest rounding unit of a shape parameter: rounding must not move parameters that hardly affect the output yet."""
 
 COMPARED = 200_000
-"""Samples compared in the search for the shape: an even selection from longer records, although all samples run through
-the plays."""
+"""Number of samples compared in the search for the shape: an even selection from longer records, although all samples
+run through the plays."""
 
 Tick = Callable[[int], None] | None
 
 
 @dataclass(frozen=True)
 class LocalFit:
-    """A shape, weights over a list of thresholds, and the system linearised about both.
+    """A shape, weights for a list of thresholds, and the system linearised about both.
 
-    `rms`: error of the `best` weights for the shape, to which `weights` are close. `derived` computes the system, which
-    a rejected step does not need.
+    `rms`: error of `best`, the best weights for the shape; `weights` are close to them. `derived` computes the system,
+    which a rejected step does not need.
     """
 
     shape: Array
@@ -426,10 +426,10 @@ class Limits(Protocol):
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Least and largest value of every shape number."""
+        """Least and largest value of every shape parameter."""
 
     def slack(self, shape: Array) -> Array:
-        """Values that must not be negative, beyond the bounds."""
+        """Values that must not be negative, in addition to the bounds."""
 
 
 def search(
@@ -443,8 +443,8 @@ def search(
     """The best shape near that of `now`, and the damping with which the search would continue.
 
     `linear` linearises the system about a shape and weights. `little`: the search also ends after a step that lowers
-    the error by less than this share. Failed steps count, and increase the damping of the next one. It ends before a
-    step for which the linear system predicts less than `ENOUGH`.
+    the error by less than this share. Failed steps count towards `most`, and increase the damping of the next step. The
+    search ends before a step for which the linear system predicts an improvement below `ENOUGH`.
     """
     shape = now.shape
     low, high = limits.bounds
@@ -466,7 +466,7 @@ def search(
         least = 0.5 * ENOUGH / now.samples
         residual = system[:, -1] - system[:, :-1] @ np.concatenate([p, moved - now.shape])
         promised = root_mean_square(float(residual @ residual), now.samples)
-        if now.rms - promised < least * now.rms:  # most steps like that fail, at full cost
+        if now.rms - promised < least * now.rms:  # most such steps fail, at full cost
             break
         trial = linear(moved, p) if _allowed(limits, moved) else None
         if trial is not None and trial.rms < now.rms:
@@ -480,11 +480,11 @@ def search(
 
 
 def _grained(found: Array, sizes: Array, rms: float, most: float = math.inf) -> Array:
-    """Solutions of a linear system, rounded to what the records can tell about them; `sizes`: lengths of its columns.
+    """A solution of a linear system, rounded to what the records determine; `sizes`: lengths of the system's columns.
 
-    The rounding units are powers of two, `most` the largest. Linear algebra libraries differ in the last bits from
-    processor to processor, and a search that carried those along from step to step could end in another minimum; with
-    rounding, its steps are the same everywhere.
+    The rounding units are powers of two, at most `most`. The last bits from linear algebra libraries differ between
+    processors, and a search that carried them along from step to step could end in another minimum; with rounding, its
+    steps are the same everywhere.
     """
     rounded = found.copy()
     known = (sizes > 0.0) & (rms > 0.0)
@@ -506,7 +506,7 @@ def _linear(courses: Sequence[Course], front: Front, shape: Array, p: Array, thr
     columns = np.arange(len(thresholds))
     best = pi.non_negative(system.whole, columns)
     rms = root_mean_square(pi.residual(system.whole, columns, best), system.samples)
-    # `p`, with which the derivatives were taken: the next step of the shape refers to it
+    # not `best` but `p`, with which the derivatives were taken: the next step starts from it
     return LocalFit(shape, p, rms, best, system.samples, lambda: system)
 
 
@@ -549,7 +549,7 @@ def _rows_with_derivatives(
             found[:, n1 + 1 + k] = (total - sums[0]) / DIFFERENCE
         found[:, 0] = 1.0
         found[:, -1] = course.y[start:stop]
-        # one sample in `every` stands for all of them
+        # one sample in `every` stands for all `every`
         found = found[-start % every :: every]
         return found[np.isfinite(found[:, -1])] * math.sqrt(every) if compared else found[:0]
 

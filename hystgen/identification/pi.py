@@ -1,8 +1,8 @@
 """Fitting a PI model to records: positions, number and weights of the plays.
 
-The weights are non-negative least squares on the triangular system of `reduction`, whose offsets are projected out and
-hence free, by Lawson and Hanson's active set algorithm (Solving Least Squares Problems, 1974, chapter 23) as
-implemented in scipy.
+The weights solve a non-negative least-squares problem on the triangular system of `reduction`, from which the free
+offsets have been projected out, by Lawson and Hanson's active set algorithm (Solving Least Squares Problems, 1974,
+chapter 23) as implemented in scipy.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 DIGITS = 10
-"""Significant digits of offsets and of the numbers of a front: more than a record determines."""
+"""Significant digits of offsets and of the parameters of a front: more than a record determines."""
 
 WEIGHT_DIGITS = 8
-"""Significant digits of weights. With the tie break below, a millionth remains of a direction in which plays move
-alike: the last bits of the linear algebra library reach the tenth digit, and two more are dropped."""
+"""Significant digits of weights. Where plays move alike, the tie break below leaves a singular value of a millionth,
+through which the last bits of the linear algebra library reach the tenth digit; two more are dropped for safety."""
 
 DUST = 1e-9
 """A weight below this share of their sum is rounding, not a play."""
@@ -36,11 +36,11 @@ FALLS = (
     "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change the sign of y, "
     "otherwise check which column is which"
 )
-"""The message if no play is left in the model."""
+"""The message if no play has a positive weight."""
 
 
 class IdentificationError(ValueError):
-    """Records that no model can be fitted to; `str()` says why and what to do."""
+    """Records to which no model can be fitted; `str()` says why and what to do."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Sense:
     clockwise: bool
 
     def sentences(self, plays: int) -> list[str]:
-        """What the user should know, one sentence each; `plays`: their number in the fitted model."""
+        """What the user should know, one sentence each; `plays`: number of plays in the fitted model."""
         found = [FALLING] if self.falls else [CLOCKWISE] if self.clockwise else []
         return [*found, NO_PLAYS] if plays == 0 else found
 
@@ -64,7 +64,7 @@ class Sense:
 class Solution:
     """A fitted play sum.
 
-    `reach`: largest threshold that the records support; `fitted`: the weights as fitted; `sense`: of the records.
+    `reach`: largest threshold that the records support; `fitted`: the weights as fitted; `sense`: the records' sense.
     """
 
     thresholds: Array
@@ -74,7 +74,7 @@ class Solution:
     sense: Sense
 
     def without_idle_plays(self) -> Solution:
-        """The same without plays of weight 0, which have no effect."""
+        """The solution without plays of weight 0, which have no effect."""
         kept = (self.weights > 0.0) | (self.thresholds == 0.0)
         return replace(self, thresholds=self.thresholds[kept], weights=self.weights[kept])
 
@@ -100,7 +100,7 @@ def solve(
         lists = [ThresholdList(wanted)]
     else:
         wide = once(courses, reach)
-        if wanted is not None and len(wide) > wanted // 2:  # too few samples would be left
+        if wanted is not None and len(wide) > wanted // 2:  # too few of the wanted plays would be left
             wide = ()
         count = None if wanted is None else wanted - len(wide)
         lists = candidates(reach, sum(item.used for item in courses), count)
@@ -111,7 +111,7 @@ def solve(
     fewest = min(candidate.n for candidate in lists) + 2
     if samples < fewest:
         raise IdentificationError(
-            f"{samples} samples can be compared, {fewest - 2} plays need at least {fewest}; record more cycles, "
+            f"{samples} samples can be compared, but {fewest - 2} plays need at least {fewest}; record more cycles, "
             "give --history, or use fewer thresholds"
         )
     reduced = reduction.reduce(compared, union(lists), tick)
@@ -143,37 +143,37 @@ def compare(item: Course, r: Array, p: Array) -> FreeRunErrors:
 
 
 # Direction of the output, and direction of its loops. A play sum with positive weights rises with its drive, and its
-# loops run counterclockwise: the output is higher on the way back than on the way there. The direction of recorded
-# loops is determined from the recording alone: weights of either sign also follow a saturating output, with negative
-# ones in loops that run counterclockwise.
+# loops run counterclockwise: the output is higher on the way down than on the way up. The direction of recorded loops
+# is determined from the recording alone, because fitted weights do not show it: a saturating output needs negative
+# weights even if its loops run counterclockwise.
 
 
 CLEARLY = 0.9
-"""[rms error] Share of the error below which another explanation of a record is clearly better."""
+"""[share of the rms error] Another explanation of a record is clearly better if its error is below this."""
 
 SENSED_PLAYS = 8
-"""[plays] Number of plays with weights of either sign: with many more, the weights of neighbours cancel."""
+"""Number of plays in the fit with weights of either sign: with many more, the weights of neighbours cancel."""
 
 SENSED_RANK = 1e-6
 """Share of the largest singular value below which the records do not determine a combination of plays."""
 
 LEAST_TURN = 0.05
-"""[share of the drive's range] Smaller moves back belong to the leg that they interrupt: noise of the drive, dither."""
+"""[share of the drive's range] A smaller reversal belongs to the leg that it interrupts: noise of the drive, dither."""
 
 LEVELS = 32
-"""Points of a leg, each the mean of a group of its samples; drives at which the outputs of two legs are compared."""
+"""Number of points of a leg, each the mean of a group of samples, and of drives at which two legs are compared."""
 
 SIGMAS = 4.0
-"""[standard deviations] Loops have a direction if their width differs from zero by more than this: of 60 straight lines
-and saturating curves with noise, none has. Set by: tests/test_start.py TestDirection."""
+"""[standard deviations] Loops have a direction if their width differs from zero by more than this: none of 60 straight
+lines and saturating curves with noise does. Set by: tests/test_start.py TestDirection."""
 
 ONE_WAY = 0.5
-"""[share of the area between the legs] Least net area when areas of both directions cancel: the wings of a butterfly
-run in opposite directions. Set by: tests/test_start.py TestDirection."""
+"""[share of the area between the legs] Least net area of loops that have a direction: the wings of a butterfly run in
+opposite directions and cancel. Set by: tests/test_start.py TestDirection."""
 
 SLOWEST, SAME_SPEED = (0.125, 0.25, 0.5, 1.0), 1.05
-"""Shares of the time taken by the slowest turns, tried one by one; turns that are at most a twentieth faster are
-included. Set by: tests/test_start.py TestDirection."""
+"""[share of the time] The slowest turns that take up each share are tried in order; turns that are at most a twentieth
+faster are included. Set by: tests/test_start.py TestDirection."""
 
 FALLING = (
     "y falls when v rises; if the sensor counts the other way, change the sign of y, otherwise check which column "
@@ -208,7 +208,7 @@ def _covaried(item: Course) -> float:
 def runs_clockwise(courses: Sequence[Course]) -> bool:
     """Whether the recorded loops enclose their area clockwise, beyond what noise, drift and lags can produce.
 
-    A lag in either signal adds a width that vanishes with the speed: the slowest turns that show a direction decide.
+    A lag in either signal adds a width that vanishes with the speed, so the slowest turns that show a direction decide.
     """
     turns = sorted((turn for item in courses for turn in _turns(item)), key=lambda turn: turn.speed)
     spent = np.cumsum([abs(turn.later) for turn in turns])
@@ -221,8 +221,8 @@ def runs_clockwise(courses: Sequence[Course]) -> bool:
 
 
 def _direction(turns: Sequence[_Turn], both: bool) -> int:
-    """1 if these loops run counterclockwise, -1 if clockwise, 0 if undecided. `both`: only from turns at the top and at
-    the bottom.
+    """1 if these loops run counterclockwise, -1 if clockwise, 0 if undecided. `both`: undecided unless there are turns
+    both at the top and at the bottom.
 
     The width of a loop, the output of the downward leg minus that of the upward leg, is taken as proportional to the
     span of drive that both share. A drift adds as much to it after a turn at the top as it takes away after one at the
@@ -245,8 +245,8 @@ def _direction(turns: Sequence[_Turn], both: bool) -> int:
 
 
 def _deviation(error: Array, noise: Array, row: Array) -> float:
-    """Standard deviation of a fitted number, `row @ width`, from the noise of the widths, or from their scatter if that
-    is larger."""
+    """Standard deviation of a fitted coefficient, `row @ width`, from the noise of the widths, or from their scatter if
+    that is larger."""
     spare = len(error) - (2 if len(error) > 2 else len(error))
     scatter = math.sqrt(float(error @ error) / spare) if spare > 0 else 0.0
     return float(np.linalg.norm(row * np.maximum(noise, scatter)))
@@ -257,7 +257,7 @@ class _Turn:
     """The two legs of the drive on either side of a turning point, over the `span` of drive that they share.
 
     `widths` (LEVELS,): outputs on the way down minus those on the way up; `later`: samples by which the way down is
-    later; `deviation`: of the mean width, due to the noise of the output.
+    later; `deviation`: standard deviation of the mean width due to the noise of the output.
     """
 
     span: float
@@ -294,7 +294,7 @@ def _turns(item: Course) -> Iterator[_Turn]:
 def _corners(v: Array) -> list[int]:
     """First sample, turning points and last sample of the legs of a drive; fewer than three if there is no turn.
 
-    A play of half of `LEAST_TURN` follows the drive without its smaller moves, and last moved where the drive turned.
+    A play with half of `LEAST_TURN` as threshold ignores smaller moves, and last moved where the drive turned.
     """
     if len(v) < 3:
         return []
@@ -310,7 +310,7 @@ def _corners(v: Array) -> list[int]:
 
 
 def _leg(v: Array, y: Array, place: NDArray[np.intp], a: int, b: int) -> tuple[Array, Array, Array, float]:
-    """Drive, output and sample of the points of one leg in the order of the drive, and samples per point."""
+    """Drive, output and sample number of the points of one leg in order of rising drive, and samples per point."""
     order = a + np.argsort(v[a : b + 1], kind="stable")
     edges = np.unique(np.linspace(0, len(order), min(len(order), LEVELS) + 1).astype(int))[:-1]
     sizes = np.diff(np.append(edges, len(order)))
@@ -318,26 +318,25 @@ def _leg(v: Array, y: Array, place: NDArray[np.intp], a: int, b: int) -> tuple[A
     return drive, output, sample, len(order) / len(edges)
 
 
-# Places and number of the plays ------------------------------------------------------------------------------
+# Thresholds and number of the plays --------------------------------------------------------------------------
 
 
 LEAST_TRAVEL = 0.15
 """The largest play still moves over this share of the drive's peak-to-peak range.
 
-A play of threshold r moves over `p-p - 2 r` in a settled loop. As that goes to zero, its weight depends only on the
-last few samples before each reversal and can take any value, while a slightly larger drive multiplies it by a real
-travel. At 15 % of the range (r = 0.85 of half the range) the weight is a slope measured over about as much drive as the
-gap to the next smaller play, and the error at the ends of the loop is within 10 % of that with plays up to 0.9.
+A play of threshold r moves over `p-p - 2 r` in a settled loop. As that goes to zero, the play's weight depends only on
+the last few samples before each reversal and can take any value, yet it takes full effect once the drive becomes
+slightly larger. At 15 % of the range (r = 0.85 of half the range) the weight is a slope measured over about as much
+drive as the gap to the next smaller play, and the error at the ends of the loop is within 10 % of that with r_n = 0.9.
 """
 
 LEAST_VISIBLE = 0.05
-"""The same for a play that moves visibly, if only at the ends of the range: a fit up to a smaller threshold is hardly
-more than a straight line.
+"""The same for a play that only just moves visibly, at the ends of the range.
 
-The diagnosis fits plays up to there, since otherwise the movement of wider plays could be mistaken for an effect. So
-does a fit with an unknown start that shows them: without that play, the held-out error was 1.4 to 1.6 times that with a
-known start in one of ten plants whose drive grew both ways (`benchmarks/start_memory.py`, seeds 20 to 39); with it,
-1.2.
+The diagnosis fits plays up to this limit, since otherwise the movement of wider plays could be mistaken for an effect.
+So does a fit to records with an unknown start that show such a play: without it, the held-out error was 1.4 to 1.6
+times that with a known start in one of ten plants whose drive grew both ways (`benchmarks/start_memory.py`, seeds 20 to
+39); with it, 1.2.
 """
 
 COUNTS = (6, 8, 12, 16, 24)
@@ -353,7 +352,7 @@ DENSE = 16
 """Number of plays used while other parts of a model are searched for."""
 
 MANY_PLAYS = 100
-"""More plays than this are spaced evenly."""
+"""If there are more plays than this, only even spacing is tried."""
 
 SAMPLES_A_PLAY = 8
 """By default there is at most one play per this many samples."""
@@ -376,8 +375,8 @@ def largest(courses: Sequence[Course], least: float = LEAST_TRAVEL) -> float:
 
     `least`: the distance that is far enough, as a share of the drive's range.
 
-    The movement of a play decreases with its threshold, so bisection finds the largest one; nothing is assumed about
-    the waveform, and a first loading from a known start counts as such.
+    A play moves less the larger its threshold, so bisection finds the largest one; nothing is assumed about the
+    waveform, and a first loading from a known start counts like any other move.
     """
     found = 0.0
     for course in courses:
@@ -412,7 +411,7 @@ def candidates(reach: float, samples: int, count: int | None = None) -> list[Thr
         counts = [n for n in COUNTS if n * SAMPLES_A_PLAY <= samples] or (max(1, samples // SAMPLES_A_PLAY),)
     lists = []
     for n in counts:
-        # a single play has only one position; with very many the spacing does not matter
+        # a single play has only one possible threshold; with very many the spacing does not matter
         for power in POWERS[: 1 if n < 2 or n > MANY_PLAYS else None]:
             places = (rounded(reach * (i / n) ** power, 6) for i in range(1, n + 1))
             lists.append(ThresholdList((0.0, *places)))
@@ -432,7 +431,7 @@ def written(weights: Array) -> Array:
 
 
 def rounded(x: float, digits: int) -> float:
-    """x to a number of significant digits."""
+    """x rounded to `digits` significant digits."""
     return float(f"{x:.{digits}g}") if math.isfinite(x) else x
 
 
@@ -473,7 +472,7 @@ def choose(reduced: Reduced, lists: Sequence[ThresholdList]) -> ThresholdList:
 Columns = NDArray[np.intp]
 
 STILL = 1e-9
-"""A column shorter than this share of the first or longest one in its unit is rounding: its play does not move."""
+"""A column shorter than this share of the first, or of the longest in its unit, is rounding: its play does not move."""
 
 TIE = 1e-12
 """Weight of the tie break between solutions that fit equally well, as a share of the squared output.
@@ -500,8 +499,8 @@ def _least_squares(matrix: Array, target: Array) -> Array:
     length = float(np.linalg.norm(target))
     weights = np.zeros(len(size))
     if moving.any() and length > 0.0:
-        # columns and target of length one: the solution does not depend on units, and the solver's absolute tolerance
-        # fits
+        # scaled to length one, so that the solution does not depend on units and the solver's absolute tolerance is
+        # suitable
         n = int(np.count_nonzero(moving))
         unit = np.concatenate([matrix[:, moving] / size[moving], math.sqrt(TIE) * np.eye(n)])
         scaled, _ = nnls(unit, np.concatenate([target / length, np.zeros(n)]), maxiter=100 * n)
@@ -562,8 +561,8 @@ RIDGE = 1e-7
 """Weight of the tie break between solutions that fit equally well, with columns scaled to length one."""
 
 INFEASIBLE = 1e-10
-"""Distance of the dual problem's solution from a target of length 1, below which it is rounding: the target is then
-reached, and no point satisfies all inequalities (Farkas)."""
+"""If the dual problem's solution is closer than this to its target, of length 1, the rest is rounding: the target is
+reached, so no point satisfies all inequalities (Farkas)."""
 
 
 class InfeasibleError(ValueError):
@@ -574,8 +573,8 @@ def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array, pl
     """The x that minimises `|matrix x - target|` under `bounds x >= limits`.
 
     `matrix`: (rows, k); `bounds`: (inequalities, k); `plays`: number of leading columns with a unit of their own; the
-    others have that of the target. If the matrix does not determine x, the shortest one, measured by its columns, is
-    taken. Raises InfeasibleError.
+    others have that of the target. If the matrix does not determine x, the result is the x with the least norm after
+    multiplying each entry by the length of its column. Raises InfeasibleError.
 
     Lawson and Hanson, Solving Least Squares Problems (1974), chapter 23: the triangular factor turns the problem into
     that of the shortest vector under inequalities (LDP), whose dual is a non-negative least-squares problem.
@@ -608,7 +607,7 @@ def least_squares(matrix: Array, target: Array, bounds: Array, limits: Array, pl
         multipliers, rest = nnls(dual_matrix, dual_target, maxiter=100 * (k + len(bounds)))
         if rest < INFEASIBLE:
             raise InfeasibleError("the inequalities contradict each other")
-        # divided by the last component of the residual, computed as the square of its length, which does not cancel
+        # the last component of the residual equals the square of its length, which is computed without cancellation
         shortest = dual_matrix[:k] @ multipliers / rest**2 * scale
     return np.asarray(solve_triangular(triangle, shortest + free) / size)
 

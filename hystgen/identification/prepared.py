@@ -1,7 +1,7 @@
 """Records as a fit compares them: cut at gaps, faults of the drive bridged, wrong samples of the output left out.
 
-Faults that show without a model are found when a course is made, before any fit; isolated samples far from a first,
-robust fit to their neighbours are found after it.
+Faults that show without a model are found when a course is made, before any fit; isolated samples that lie far from a
+first, robust fit to their neighbours are found after that fit.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from hystgen.records import LARGEST, SHORTEST, Record, no_value
 Array = NDArray[np.float64]
 
 LEAST_SOUND = 0.1
-"""Least share of a record that must remain without the samples at the end of a converter's range."""
+"""Least share of a record that must remain once the samples at the ends of a converter's range are removed."""
 
 MOST_FITS = 4
-"""Maximum number of robust fits; they end with the first that finds the same faults as the one before."""
+"""Maximum number of robust fits; they end as soon as one finds the same faults as the one before."""
 
 LESS_MISSED = 0.25
 """The drive, not the output, is wrong if bridging it reduces the squared error to less than this share."""
 
 
 LEAST_MOVEMENT = 1e-20
-"""A smaller motion of drive or output is not a measurement: its squares, and its ratios to the other, leave the range
-of double precision and of parameter files."""
+"""A smaller motion of drive or output cannot be a measurement: its squares, and its ratio to the other motion, fall
+outside the range of double precision and of parameter files."""
 
 
 def courses(
@@ -79,8 +79,8 @@ def samples_in(record: Record, seconds: float) -> int:
 
 
 def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> Course:
-    """The record as it enters a fit: without the start where the memory is unknown, and with isolated faults that show
-    without a model bridged (drive) or left out (output).
+    """The record as it enters a fit: without the start where the memory is unknown; isolated faults that need no model
+    to be found are bridged (drive) or left out (output).
 
     Raises IdentificationError for a record that a fit cannot use.
     """
@@ -94,15 +94,15 @@ def course_of(record: Record, history: tuple[float, ...] | None, skip: int) -> C
         raise IdentificationError(f"{record.name} has samples without a value; drop them first")
     if len(v) < skip + SHORTEST:
         raise IdentificationError(
-            f"{record.name} has {counted(len(v), 'sample')}, at least {skip + SHORTEST} are needed"
+            f"{record.name} has {counted(len(v), 'sample')}, but at least {skip + SHORTEST} are needed"
         )
     for name, x in (("v", v), ("y", y)):
         missing = int(np.count_nonzero(no_value(x)))
         if missing > faults.most(len(x)):
             raise IdentificationError(
                 f"{record.name}: {missing} of {len(x)} samples of {name} stand for a missing value, "
-                f"{x[no_value(x)][0]:.6g} for one; from {LARGEST:g} on numbers are none in any unit. Record again, or "
-                f"convert {name}"
+                f"{x[no_value(x)][0]:.6g} for example; numbers of {LARGEST:g} or more are not readings in any unit. "
+                f"Record again, or convert {name}"
             )
     y = np.where(faults.wrong_output(v, y), np.nan, y)
     v = faults.bridged(v, faults.wrong_drive(v, y))
@@ -159,8 +159,8 @@ def _without_stretches(item: Course) -> tuple[Course, list[str]]:
     """The course without the samples of y in stretches that are plainly wrong, and a sentence about each kind."""
     left, ends = without_rails(item)
     reported = [
-        f"{item.name}: {counted(number, 'sample')} of y at the limit of the converter, the {name} of {level:.6g}, not "
-        "compared"
+        f"{item.name}: {counted(number, 'sample')} of y at the limit of the converter, the {name} value {level:.6g}, "
+        "not compared"
         for name, level, number in ends
     ]
     left, runs = _without_runs(left)
@@ -182,8 +182,8 @@ def mask_outliers(
     This includes the start, since only the final fit decides how much of it is compared. If it is the drive that is
     wrong, it is bridged. Pulses of the drive take no part in the first fit, which then decides whether they are real: a
     false one could make the memory seem known. The play sum is fitted by least trimmed squares (Rousseeuw and Van
-    Driessen, Data Mining and Knowledge Discovery 12, 2006): refitted without the samples with the largest errors, as
-    many as may be left out, so that none of them attracts it.
+    Driessen, Data Mining and Knowledge Discovery 12, 2006): it is refitted without the samples with the largest errors,
+    as many as may be rejected, so that none of them attracts it.
     """
     first = start.needed([_without_pulses(_without_runs(item)[0]) for item in to_fit])
     solution, _ = pi.solve(first, wanted, floor)
@@ -219,10 +219,10 @@ def _with_drive_right(item: Course, solution: pi.Solution, robust: bool) -> Cour
 
     A sample of the drive is wrong if bridging it makes the model's error there far smaller and no larger elsewhere: a
     wrong drive stays in the memory, a wrong output does not. It is also wrong if the whole row is, which shows in the
-    output there or after it: a real pulse would have left its memory. A pulse right before the end of a record does not
-    help a fit and looks like a fault: it would only widen the range and hide when the memory became known. With a
-    `robust` solution the largest and the least drive are also tested, if its error there is among the largest: the
-    samples that they spoil may hide them, and the range of the model ends at them.
+    output at that row or later: a real pulse would have left its mark in the memory. A pulse right before the end of a
+    record counts as a fault: it does not help a fit, and would only widen the range and hide when the memory became
+    known. With a `robust` solution the largest and the least drive are also tested if the errors there are among the
+    largest: such drives set the model's range, and the samples that they spoil may hide them.
     """
     error = _errors(item, solution)
     far = faults.far_from_others(error, item.output_range)
@@ -254,10 +254,10 @@ def _neither(error: Array, less: Array) -> bool:
 
 
 def _not_remembered(error: Array, less: Array) -> bool:
-    """Whether the errors around a pulse of the drive show a memory without the pulse, because its effect is missing.
+    """Whether the errors around a pulse of the drive show that the pulse left no trace in the memory.
 
-    Samples count where that effect exceeds the model's own errors without the pulse, `less`, and only if the sum is as
-    significant as an outlier.
+    Samples count where the pulse's effect exceeds the model's own errors without the pulse, `less`, and only if the sum
+    of the effect is as significant as an outlier.
     """
     own = np.abs(less[np.isfinite(less)])
     usual = np.sort(own)[: -faults.most(len(own))]

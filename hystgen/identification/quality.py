@@ -27,9 +27,9 @@ class ErrorRow:
     """One line of the fit table.
 
     `part`: 'fit', 'held out' or 'all'; `model`: 'written' or 'trial'; `samples`: number compared; `ignored`: number not
-    compared; `rms`, `max`: errors in output units with a free offset per record; `output_range`: the largest compared
-    peak-to-peak output of one of the row's records, to which `rms_percent` and `max_percent` refer; both rows of a
-    trial have the larger one.
+    compared; `rms`, `max`: errors in output units with a free offset per record; `output_range`: the largest
+    peak-to-peak output compared in any of the row's records, the 100 % of `rms_percent` and `max_percent`; both rows of
+    a trial have the same.
     """
 
     part: str
@@ -77,11 +77,11 @@ class ErrorRow:
 
 
 WORD_COLUMNS = (0, 1, 8)
-"""Text columns of the table."""
+"""Indices of the table's text columns."""
 
 
 def cells(rows: Sequence[ErrorRow], unit: str) -> list[tuple[str, ...]]:
-    """The table's head and rows."""
+    """The table's header and rows."""
     suffix = f" [{unit}]" if unit else ""
     head = ("part", "model", "samples", "ignored", f"rms{suffix}", "rms %", f"max{suffix}", "max %", "records")
     body = [
@@ -102,7 +102,7 @@ def cells(rows: Sequence[ErrorRow], unit: str) -> list[tuple[str, ...]]:
 
 
 def table(rows: Sequence[ErrorRow], unit: str, remarks: Sequence[str]) -> str:
-    """The rows in aligned columns, remarks below."""
+    """The rows in aligned columns, with the remarks below."""
     content = cells(rows, unit)
     widths = [max(len(line[k]) for line in content) for k in range(len(content[0]))]
     lines = [
@@ -116,35 +116,35 @@ def table(rows: Sequence[ErrorRow], unit: str, remarks: Sequence[str]) -> str:
 
 
 REDRAWS = 1000
-"""Fits with random signs of the residuals' blocks: the ends of a 95 % interval then scatter by 0.08 standard
-deviations, sqrt(0.025 * 0.975/1000) over the normal density there."""
+"""Number of fits with random signs of the residuals' blocks: the ends of a 95 % interval then scatter by 0.08 standard
+deviations, which is sqrt(0.025 * 0.975/1000) divided by the normal density there."""
 
 TAILS = (0.025, 0.975)
 """Quantiles of 95 % intervals."""
 
 FEWEST_BLOCKS, MOST_BLOCKS = 40, 4000
-"""Fewest blocks, however long the correlation of the residuals, and most, since more do not improve the intervals."""
+"""Minimum number of blocks, however long the residuals' correlation, and maximum: more do not improve the intervals."""
 
 MANY_WEIGHTS = 100
 """With more weights than this, zero weights stay zero in every redraw, so that one factorisation serves all."""
 
 MEMORY = 4.0
-"""Length of a block in correlation times of the residuals."""
+"""[correlation times of the residuals] Length of a block."""
 
 SEED = 1
 """Seed of the random numbers, so that the same records give the same intervals."""
 
 UNKNOWN = 1e-9
 """Singular values below this share of the largest belong to directions that the records do not determine, in which
-nothing is redrawn: seven digits are then the same with every linear algebra library, and four are shown."""
+nothing is redrawn: seven digits then agree between linear algebra libraries, and four are shown."""
 
 
 @dataclass(frozen=True)
 class Intervals:
     """95 % intervals, and the redraws from which they come.
 
-    `weights`: low and high end for each; `width`: for the widest loop; `held_out`: for the held-out rms error, None if
-    nothing was held out; `redrawn`: the weights of every redraw (REDRAWS, n+1); `block`: samples per block.
+    `weights`: low and high end for each weight; `width`: for the widest loop; `held_out`: for the held-out rms error,
+    None if nothing was held out; `redrawn`: the weights of every redraw (REDRAWS, n+1); `block`: samples per block.
     """
 
     weights: tuple[tuple[float, float], ...]
@@ -154,7 +154,7 @@ class Intervals:
     block: int
 
     def loading_curve(self, thresholds: Array, x: Array) -> tuple[Array, Array]:
-        """Band around the initial loading curve (22) at the places x."""
+        """Band around the initial loading curve (22) at the inputs x."""
         curves = np.maximum(x[:, None] - thresholds, 0.0) @ self.redrawn.T
         low, high = np.quantile(curves, TAILS, axis=1)
         return low, high
@@ -165,7 +165,7 @@ def intervals(
 ) -> Intervals:
     """Intervals of a fit to `courses` (drive as measured) with those `errors`; `held`: errors of held-out records.
 
-    The residuals of a hysteresis model are coloured: model errors come back at every reversal. They are therefore not
+    The residuals of a hysteresis model are coloured: model errors recur at every reversal. They are therefore not
     redrawn one by one but in blocks longer than their correlation. A block enters the normal equations only by its
     score `X_b^T e_b`; random signs of all scores (a dependent wild bootstrap; Shao, Journal of the American Statistical
     Association 105, 2010, 218-235) redraw the record, and the weights of each redraw are found under the constraints of
@@ -221,7 +221,7 @@ def _weights(fitted: FittedModel, triangle: Array, target: Array) -> Array:
 
 
 def _scores(rows: reduction.Source, item: Course, errors: FreeRunErrors, block: int) -> Array:
-    """`X_b^T e_b` of every block (blocks, unknowns), without each record's mean in its columns."""
+    """`X_b^T e_b` of every block (blocks, unknowns), with the mean over each record removed from its columns."""
     size = block * max(1, reduction.CHUNK // block)
     for start in range(0, item.first, size):
         rows(start, min(start + size, item.first), False)
@@ -244,7 +244,7 @@ def _scores(rows: reduction.Source, item: Course, errors: FreeRunErrors, block: 
 
 
 def block_length(errors: Sequence[Array]) -> int:
-    """Samples in a block: a few correlation times of the residuals, but few enough to leave `FEWEST_BLOCKS` blocks."""
+    """Samples per block: a few correlation times of the residuals, but few enough for `FEWEST_BLOCKS` blocks."""
     samples = sum(len(e) for e in errors)
     longest, shortest = max(1, samples // FEWEST_BLOCKS), max(1, samples // MOST_BLOCKS)
     times = [correlation_time(e[np.isfinite(e)]) * len(e) for e in errors]
@@ -265,7 +265,7 @@ def correlation_time(e: Array) -> float:
 
 
 def _rms_interval(errors: Sequence[Array], random: np.random.Generator) -> tuple[float, float]:
-    """Interval of the rms of coloured errors, with blocks drawn with replacement."""
+    """Interval of the rms of coloured errors, from blocks drawn with replacement."""
     block = block_length(errors)
     squares, counts = [], []
     for e in errors:
@@ -308,7 +308,7 @@ def about_model(
         if beyond:
             above = f" above {solution.reach:.6g}"
             reported.append(
-                f"{counted(len(beyond), f'threshold{above} hardly moves', f'thresholds{above} hardly move')} in these "
+                f"{counted(len(beyond), f'play{above} hardly moves', f'plays{above} hardly move')} in these "
                 "records; do not trust their weights for larger drives"
             )
     outputs = [y[np.isfinite(y)] for y in (item.y[item.first : item.last] for item in compared)]
@@ -327,7 +327,7 @@ def about_inverse(p: NDArray[np.float64], made: Weights) -> list[str]:
     if made.free_p0 is not None and made.free_rms is not None:
         return [
             f"p_0 was raised from {made.free_p0:.3g} to {p[0]:.3g} so that the model has a usable inverse; the data "
-            f"hardly determine it: rms error {made.free_rms:.4g} before, {made.rms:.4g} after. A lag in the "
+            f"hardly determine p_0: rms error {made.free_rms:.4g} before, {made.rms:.4g} after. A lag in the "
             "measurement lowers p_0: record more slowly if you can"
         ]
     if p[0] == 0.0:
@@ -370,7 +370,7 @@ def repeated(to_fit: Sequence[Record], held: Sequence[Record]) -> list[str]:
                 else:
                     alike = "" if record.name == other.name else f", as {other.name}"
                     reported.append(
-                        f"{record.name}: held out, but also fitted{alike}, so it judges nothing; leave it out of "
+                        f"{record.name}: held out, but also fitted{alike}, so it tests nothing; leave it out of "
                         "one of the two"
                     )
                 break

@@ -1,13 +1,13 @@
-"""From records to a small triangular system, which is all that a fit needs however many samples there are.
+"""From records to a small triangular system, which is all that a fit needs, however many samples there are.
 
 The regressors of a PI model are its plays, `y = sum p_i play_(r_i)[v] + offset`. They are formed a few thousand
 samples at a time and reduced by QR (a sequential TSQR; Demmel, Grigori, Hoemmen and Langou, SIAM J. Sci. Comput. 34,
 2012, A206-A239), so that memory does not grow with samples times thresholds.
-The column of ones comes first: the rows below its own are the system with the offset projected out exactly.
+The column of ones comes first: the rows below the first are then the system with the offset projected out exactly.
 
-While the same plays follow a move, each of them is the drive plus a constant, and the others do not move: all plays are
-straight lines over the drive. However many samples such a segment has, two rows hold all that least squares can learn
-about its plays, and one number the part of y that no play can follow.
+While the same plays follow a move, each of them is the drive plus a constant, and the others do not move, so all plays
+are linear in the drive. However many samples such a segment has, two rows hold all that least squares can learn about
+its plays, and one number holds the part of y that no play can follow.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ BLOCKED = 64
 """Number of columns for which the linear algebra library gets work space at a time."""
 
 AS_FAR = 1e-3
-"""[share of its range] A drive that comes within this of its largest or least value counts as having been there: four
+"""[share of its range] A drive that comes within this of its largest or least value counts as having reached it: four
 codes of a 12-bit converter. The error for plays with larger thresholds is no more than this share of the motion."""
 
 FOLDS = 4
-"""Consecutive blocks of each record for the blocked validation."""
+"""Number of consecutive blocks of each record for the blocked validation."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class StartMemory:
     """A start memory found by a fit (`start`).
 
     `turns`: drive values that lead virgin plays to it; `uncertainty`: half the width of the 95 % interval of its
-    contribution to the output at the first sample, output units; `once`: threshold of a play that moves away from it
-    and is so wide that it hardly moves back in the record, None if there is none.
+    contribution to the output at the first sample, output units; `once`: threshold of a play that leaves this memory
+    but is so wide that it hardly moves back in the record, None if there is none.
     """
 
     turns: tuple[float, ...]
@@ -55,13 +55,13 @@ class StartMemory:
 
 @dataclass(frozen=True)
 class Course:
-    """The samples of one record that take part: drive and output from the record's start, compared over [first, last).
+    """The samples of one record in a fit: drive and output from the record's start, compared over [first, last).
 
     The drive before `first` also runs through the plays, and so does the drive at samples whose `y` is NaN, which are
     not compared. `history`: drive values visited before the record; None if unknown, and `start` is then the estimated
     memory, if one was searched for. `begin`: first sample that may be compared, regardless of the start memory.
-    `origin`: index of the record it is part of, and of its first sample there. `stretches`: samples whose y was left
-    out as part of a stretch, not as isolated; None if there are none.
+    `origin`: index of the record it is part of, and index of its first sample in that record. `stretches`: samples
+    whose y was left out as part of a stretch, not as isolated; None if there are none.
     """
 
     name: str
@@ -102,7 +102,7 @@ class Course:
         return float(np.ptp(self.y[self.compared])) if self.used else 0.0
 
     def resettled(self, largest: float) -> Course:
-        """The course, ignoring only as much of its start as a largest threshold requires."""
+        """The course, ignoring only as much of its start as plays up to the threshold `largest` require."""
         first = 0 if self.visited is not None else settled(self.v[: self.last], largest)
         return replace(self, first=max(first, self.begin))
 
@@ -131,8 +131,8 @@ def settled(v: Array, reach: float) -> int:
     """First sample from which an unknown start memory affects the plays only by an offset.
 
     Once the drive has swept `2 reach`, every play up to threshold `reach` is exact. Once it has visited its own largest
-    and least value, plays with larger thresholds never move again in this record: they are constant. Whichever comes
-    first. Values within `AS_FAR` of each other count as equal; otherwise noise of the drive would decide between turns.
+    and least value, plays with larger thresholds never move again in this record: they are constant. The earlier of the
+    two counts. Values within `AS_FAR` of each other count as equal, so that noise does not decide between turns.
     """
     extremes = max(_reached(v), _reached(-v))
     swept = np.maximum.accumulate(v) - np.minimum.accumulate(v) >= 2.0 * reach
@@ -150,8 +150,8 @@ def _reached(v: Array) -> int:
 def travel(course: Course, threshold: float) -> float:
     """Peak-to-peak movement of one play over the compared samples.
 
-    If they begin before the memory of that play is known, it counts at most as much as it would move in a settled loop
-    over the range of the drive: the rest depends on the start, which is at best estimated.
+    If they begin before the memory of that play is known, the result is at most its movement in a settled loop over the
+    range of the drive: the rest depends on the start, which is at best estimated.
     """
     start = start_states(course.v, course.visited, np.array([threshold]))[0]
     moved = operators.play(course.v[: course.last], threshold, float(start))[course.first :]
@@ -180,8 +180,8 @@ def prediction(v: Array, history: Sequence[float] | None, thresholds: Array, wei
 class Reduced:
     """Triangular systems of several records over one list of thresholds; columns are the plays, then y.
 
-    `whole`: every record with its own free offset. `folds`: the same for each of the consecutive blocks, every block
-    with its own offset. `counts`: samples in each fold.
+    `whole`: every record with its own free offset. `folds`: one system for each consecutive block, every block with its
+    own offset. `counts`: samples in each fold.
     """
 
     thresholds: Array
@@ -191,14 +191,14 @@ class Reduced:
 
     @property
     def samples(self) -> int:
-        """Samples that were reduced."""
+        """Number of samples reduced."""
         return sum(self.counts)
 
 
 Source = Callable[[int, int, bool], Array]
 """Rows `[1, columns.., y]` with the normal equations of the samples from start to stop of one course.
 
-Called in order, beginning at sample 0; gives no rows if the samples are not compared.
+Called in order, beginning at sample 0; returns no rows if the samples are not compared.
 """
 
 
@@ -219,9 +219,9 @@ def reduce(
     source: Callable[[Course, Array], Source] = play_rows,
     further: int = 0,
 ) -> Reduced:
-    """Reduce the records; `tick` gets the number of samples done, chunk by chunk.
+    """Reduce the records; `tick` is called with the number of samples of each chunk.
 
-    `source`: gives the rows of a course, with `further` columns after those of the plays of `thresholds`.
+    `source`: returns the rows of a course, with `further` columns after those of the plays of `thresholds`.
     """
     width = len(thresholds) + further + 1
     whole = np.empty((0, width))
@@ -246,7 +246,7 @@ def reduce(
 
 
 def triangle(*parts: Array) -> Array:
-    """The triangular factor of parts stacked on each other: same normal equations, at most as many rows as columns."""
+    """The triangular factor of stacked parts: the same normal equations, with at most as many rows as columns."""
     rows, columns = sum(map(len, parts)), parts[0].shape[1]
     stacked = np.concatenate(parts, out=np.empty((columns, rows)).T)
     return reflected(stacked).triangle if rows > 1 else stacked
@@ -331,8 +331,8 @@ def _close_segment(
 def _segment_rows(v: Array, y: Array, thresholds: Array, states: Array, sums: Array, out: Array) -> int:
     """Write the rows of the samples whose y is a number into `out`, or none if it has no room; return their number.
 
-    Updates `states` of the plays. `sums`: room for seven numbers. The memory is admissible: if a play does not move,
-    nor do any larger ones.
+    Updates `states` of the plays. `sums`: room for seven numbers. The memory is admissible, so if a play does not move,
+    neither does any larger one.
     """
     wanted = len(out) > 0
     sums[:] = 0.0

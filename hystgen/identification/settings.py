@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 KEPT_KEYS = ("description", "sample_time", "emit")
 
 MEASURED = {"drive_lsb": "input", "output_lsb": "output", "compensation.max_rate": "input"}
-"""Keys of `emit` with numbers in units of the drive or the displacement, or per second of them."""
+"""Keys of `emit` with numbers in units of the drive or the displacement, or in those units per second."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class Settings:
         """Sentences about settings kept and dropped; `fit`: without these settings."""
         said = []
         if self.problem:
-            said.append(f"{self.file}: nothing in the old file is kept, it is not a parameter file: {self.problem}")
+            said.append(f"{self.file}: nothing is kept of the old file, which is not a parameter file: {self.problem}")
         names = [key for key in KEPT_KEYS if key in self.values]
         if self._kept(fit):
             names.insert(0, "units")
@@ -69,7 +69,7 @@ class Settings:
         return said
 
     def _emit(self, fit: Fit) -> tuple[dict[str, Any], list[str]]:
-        """The `emit` of the file in the units of the fit, and the keys whose numbers cannot be converted to them."""
+        """The `emit` of the file in the units of the fit, and the keys that cannot be converted to these units."""
         emit, lost = dict(self.values.get("emit") or {}), []
         for path, key in MEASURED.items():
             *above, last = path.split(".")
@@ -90,7 +90,7 @@ class Settings:
         return emit, lost
 
     def _units(self, fit: Fit) -> dict[str, str]:
-        """Units in the file that the fit lacks."""
+        """The file's units for quantities of which the fit has none."""
         units = fit.parameters.units.model_dump()
         return {key: unit for key, unit in (self.units or {}).items() if unit and not units[key]}
 

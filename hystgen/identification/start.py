@@ -1,13 +1,13 @@
 """The start memory of records with an unknown history, estimated together with the weights.
 
-A memory is admissible if `s(0) = v_0` and it changes over the thresholds by no more than these do:
+A memory is admissible if `s(0) = v_0` and, between two thresholds, it changes by no more than their distance:
 `s_i = s_(i-1) + d_i (r_i - r_(i-1))` with every `d_i` from -1 to 1. Until the drive moves it for the first time, a play
 adds the constant `p_i s_i` to the output; after that it no longer depends on the start. The output is therefore
-piecewise linear in the `d` of every record, which join the weights as further unknowns under bounds (`joint` has the
-search). A prior as wide as the bounds allow keeps slopes that no sample determines at `d = 0`.
+piecewise linear in the `d` of every record, which join the weights as further bounded unknowns (the search is in
+`joint`). A prior as wide as the bounds allow keeps slopes that no sample determines at `d = 0`.
 
-The result is a course's `StartMemory`: drive values that would have left that memory. Like a known history, they mean
-the same behind any front and with any thresholds.
+The result is a course's `StartMemory`: drive values that would have left that memory. Like a known history, they have
+the same meaning with any front and any thresholds.
 """
 
 from __future__ import annotations
@@ -30,21 +30,21 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 STARTS, UNLIKE = 8, 3.0
-"""Fewest samples of a start, and the ratio of its rms error to that of the rest above which the given or estimated
-memory is not that of the actuator."""
+"""Minimum number of samples of a start, and the ratio of its rms error to that of the rest above which the given or
+estimated memory is taken to be wrong."""
 
 ROUNDING = 1e-6
 """Share of the output range below which errors are only rounding, as in records computed without noise."""
 
 LEAST_KNOWN = 0.5
-"""If at least this share of a record's samples has a known memory, the samples before are left out: a start memory
-fitted to them would flatter the model that it judges. This rejects none of 56 simulated records without a history, with
-a median held-out error of 1.00 times that with the true history; 0.25 makes it 1.02."""
+"""If at least this share of a record's samples has a known memory, the samples before them are left out: a start memory
+fitted to those would flatter the model being judged. This rejects none of 56 simulated records without a history, and
+the median held-out error is 1.00 times that with the true history; with 0.25 it is 1.02 times."""
 
 PLAYS = 12
-"""Thresholds over which start memories are searched for: the middle of the numbers that default fits choose from. Given
-thresholds are used instead if they are no more than this and the records move them: time grows with the cube of their
-number."""
+"""Number of thresholds for which start memories are estimated: the middle of the numbers of plays that default fits
+try. Given thresholds are used instead if there are no more than this and the records move their plays; time grows with
+the cube of their number."""
 
 SPREAD = math.sqrt(3.0)
 """Reciprocal of the standard deviation of a slope that is uniform from -1 to 1."""
@@ -56,7 +56,7 @@ ZIGZAGS = 4
 """Pairs of turns that approximate a slope between two thresholds, with an error of at most 1/16 of their distance."""
 
 TOGETHER = 6
-"""Most courses that share weights in a search: its cost grows with the cube of their number."""
+"""Maximum number of courses that share weights in a search, whose cost grows with the cube of their number."""
 
 ROUNDS = 2
 """Number of searches; the errors of the first one set the weight of the prior in the next."""
@@ -68,8 +68,8 @@ def estimated(
     """The courses compared from their beginning, with a start memory for those with an unknown history.
 
     `stages`: the front of the plays; `wanted`: their thresholds, for which the memory is then exact, or any other value
-    of that option. A start stays ignored if its errors are far larger than those after it (a transient), or if its
-    drive does not go up and down again.
+    of that option. The start of a course stays ignored if its errors are far larger than those after it (a transient),
+    or if the drive does not go up and down again.
     """
     if all(item.history is not None for item in courses):
         return list(courses)
@@ -104,7 +104,7 @@ def needed(
     """The courses, with a start memory (`estimated`) for those of which too little could be compared without one.
 
     `least`: share of the samples of a course that is enough; `largest`: threshold above which plays hardly move; their
-    memory is ignored if including it would leave too little to compare and no start memory is found.
+    memory is ignored if waiting for it would leave too little to compare and no start memory is found.
     """
     known = [_enough(item, least, largest) for item in courses]
     short = [lacking(item, least) for item in courses]
@@ -173,8 +173,8 @@ def _started(
 ) -> list[Course]:
     """The courses with the start memories that were found, except for transients.
 
-    `once`: threshold of a play added to those of `r` (n+1,) if that makes the error clearly smaller. It represents
-    everything that the drive moves once, on its way beyond where it has been: an actuator that came from a wider range
+    `once`: threshold of a play added to those of `r` (n+1,) if that makes the error clearly smaller. It represents all
+    plays that the drive moves only once, on its way beyond its earlier range: an actuator that came from a wider range
     has such plays.
     """
     inner = [joint.through_front(item, stages) for item in courses]
@@ -203,7 +203,7 @@ def _whole(item: Course) -> Course:
 
 
 def in_front(turns: tuple[float, ...], stages: Sequence[Stage]) -> tuple[float, ...]:
-    """Drive values at which the plays see those turns."""
+    """Drive values that the stages turn into `turns` at the input of the plays."""
     drives = []
     for before, turn in itertools.pairwise((0.0, *turns)):
         value = turn
@@ -214,7 +214,7 @@ def in_front(turns: tuple[float, ...], stages: Sequence[Stage]) -> tuple[float, 
 
 
 def _transient(item: Course, settled: int, r: Array, p: Array) -> bool:
-    """Whether the errors of a model before the memory is known are far larger than those after."""
+    """Whether the errors of a model before the memory is known are far larger than those after that."""
     known = np.isfinite(item.y)
     if min(np.count_nonzero(known[item.first : settled]), np.count_nonzero(known[settled : item.last])) < STARTS:
         return False
@@ -232,9 +232,9 @@ def memory_of(slopes: Array, r: Array) -> Array:
 def turns_of(r: Array, states: Array) -> tuple[float, ...]:
     """Drive values that leave virgin plays of thresholds r (n+1,) in an admissible memory (n+1,).
 
-    Over the thresholds, a history leaves a line with slopes of only -1 and 1: going inwards from the outermost play, a
-    part that falls with the threshold comes from a turn at `s + r`, one that rises from a turn at `s - r`. Slopes in
-    between become `ZIGZAGS` pairs of both, which are exact at the thresholds.
+    As a function of the threshold, the memory left by a history has slopes of -1 and 1 only: going inwards from the
+    outermost play, a part that falls with the threshold comes from a turn at `s + r`, a part that rises from a turn at
+    `s - r`. Slopes in between become `ZIGZAGS` pairs of such parts, which are exact at the thresholds.
     """
     outermost = states[-1] + r[-1] if states[-1] >= 0.0 else states[-1] - r[-1]
     turns = [float(outermost)]
@@ -252,7 +252,7 @@ def turns_of(r: Array, states: Array) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class _Bounds:
-    """Slopes of memories over the thresholds."""
+    """Bounds on the slopes of memories over the thresholds."""
 
     number: int
 
@@ -268,7 +268,7 @@ class _Bounds:
 
 @dataclass(frozen=True)
 class _System:
-    """One course: the rows after the sample at which no play depends on the start any more, and the samples before."""
+    """One course: the rows from the sample at which no play depends on the start any more, and the samples before."""
 
     item: Course
     r: Array
@@ -326,7 +326,7 @@ class _System:
         return table[1:, 1:]
 
     def left(self, slopes: Array, p: Array) -> float:
-        """Root of the sum of squares left by a memory and weights; no table of all plays is reduced for it."""
+        """Root of the sum of squared errors for a memory and weights, found without reducing a table of all plays."""
         item, begin = self.item, min(self.item.begin, self.settled)
         states = float(item.v[0]) + memory_of(slopes, self.r)
         output = operators.play_sum(item.v[: self.settled], self.r, states, p)
@@ -395,7 +395,7 @@ class _Search:
         return parts
 
     def _first_slopes(self) -> Array:
-        """The best memory with at most one turn for every course, each with its own weights."""
+        """The best memory with at most one turn for each course, each fitted with its own weights."""
         shape = [np.empty(0)]
         for each in self.systems:
             found = each.simple()
@@ -404,7 +404,7 @@ class _Search:
         return np.concatenate(shape)
 
     def _left(self, system: _System, slopes: Array) -> float:
-        """The error that a memory leaves on one course, with the best weights for it alone unless they are known."""
+        """The error that a memory leaves on one course, with the best weights for that course unless they are known."""
         if self.known is not None:
             return system.left(slopes, self.known)
         alone = replace(self, systems=(system,))

@@ -15,21 +15,21 @@ CODINGS = ("straight", "twos-complement")
 """How codes are written: straight (offset) binary from 0 up, or two's complement with 0 in the middle of the range."""
 
 FEWEST_BITS, MOST_BITS = 8, 32
-"""Fewest and most bits of a converter: with fewer, a code is more than the margin that drives keep; with more, codes do
-not fit the C header."""
+"""Least and largest number of bits of a converter: with fewer, one code exceeds the margin that drives keep to the ends
+of the range; with more, codes do not fit the C header."""
 
 FEWEST_CODES = 100
-"""Fewest codes between the lowest and the highest drive: with fewer, a code is more than the margin that drives
-keep."""
+"""Least number of codes between the lowest and the highest drive: with fewer, one code exceeds the margin that drives
+keep to the ends of the range."""
 
 
 @dataclass(frozen=True)
 class Dac:
     """A converter as seen by the drive, including the amplifier.
 
-    `low`: drive at the lowest code; `high`: drive one code above the highest, the reference of the data sheet times the
-    gain: `drive = low + k (high - low)/2^bits`, k = 0 .. 2^bits - 1. `coding`: one of `CODINGS`; k is written as it is,
-    or minus 2^(bits-1).
+    `low`: drive at the lowest code; `high`: drive one code above the highest, the data sheet's reference times the
+    gain: `drive = low + k (high - low)/2^bits`, k = 0 .. 2^bits - 1. `coding`: one of `CODINGS`; k is written as k, or
+    as k - 2^(bits-1).
     """
 
     bits: int
@@ -70,29 +70,29 @@ class Dac:
         top = self.high - self.lsb
         if low < self.low or high > top:
             yield (
-                f"the DAC gives {self.low:g} to {top:g}, and the drives need {low:g} to {high:g}; give the range behind"
+                f"the DAC gives {self.low:g} to {top:g}, but the drives need {low:g} to {high:g}; give the range behind"
                 " the amplifier, or narrow input_range"
             )
         elif (high - low) / self.lsb < FEWEST_CODES:
             yield (
-                f"a code of the DAC is {self.lsb:.3g}, and the drives span {high - low:.3g}: fewer than {FEWEST_CODES} "
-                "codes; narrow the range of the DAC, or give it more bits"
+                f"one code of the DAC is {self.lsb:.3g}, and the drives span {high - low:.3g}: fewer than "
+                f"{FEWEST_CODES} codes; narrow the range of the DAC, or give it more bits"
             )
 
     def sentence(self, unit: str, span: float) -> str:
-        """Its resolution, for drives over `span`; `unit`: of the drive, with a space before it, or empty."""
+        """A sentence about its resolution, for drives over `span`; `unit`: the drive's, after a space, or empty."""
         how = "straight binary" if self.coding == CODINGS[0] else "two's complement"
         return (
-            f"Drives are codes of a DAC of {self.bits} bits over {self.low:g} to {self.high:g}{unit}, {how}: a code is "
-            f"{self.lsb:.4g}{unit}, {100.0 * self.lsb / span:.2g} % of the drives' span, and they lie at most one code "
-            "from the straight lines between turning points."
+            f"Drives are codes of a {self.bits}-bit DAC over {self.low:g} to {self.high:g}{unit}, {how}: one code is "
+            f"{self.lsb:.4g}{unit}, {100.0 * self.lsb / span:.2g} % of the drives' span, and drives lie at most one "
+            "code from the straight lines between turning points."
         )
 
 
 def wrong_bits(bits: int) -> Iterator[str]:
     """Problems with the number of bits of a converter."""
     if not FEWEST_BITS <= bits <= MOST_BITS:
-        yield f"a DAC of {bits} bits; give {FEWEST_BITS} to {MOST_BITS}"
+        yield f"the DAC has {bits} bits; give {FEWEST_BITS} to {MOST_BITS}"
 
 
 def wrong_range(low: float, high: float) -> Iterator[str]:
@@ -102,8 +102,8 @@ def wrong_range(low: float, high: float) -> Iterator[str]:
 
 
 def filled(codes: ArrayLike, every: int) -> Codes:
-    """Codes (N,) at every tick, from codes given at every `every`-th one: the integers nearest to straight lines
-    between them."""
+    """Codes (N,) at every tick, from codes given at every `every`-th tick: the integers nearest to the straight lines
+    between those."""
     nodes = np.asarray(codes, dtype=np.int64)
     steps = np.diff(nodes)[:, None] * (2 * np.arange(every)) + every
     return np.append((nodes[:-1, None] + steps // (2 * every)).ravel(), nodes[-1])

@@ -1,4 +1,4 @@
-"""Drive and time of a plan in integer steps of decimal grids."""
+"""Drives and times of a plan, as integer multiples of decimal steps."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from decimal import Decimal
 from hystgen.basics.problems import PlanError
 
 MARGIN = 0.01
-"""[share of the input range] No record enters this part at either end."""
+"""[share of the input range] Margin at either end that no record enters."""
 
 OF_RATE = 0.98
-"""[share of the rate limit] Fastest rate of a plan: rounding then stays below the limit."""
+"""[share of the rate limit] Fastest rate of a plan, which stays below the limit despite rounding."""
 
 FULL_SCALE = 8
 """[sample times] Duration of a move over the whole range if no rate limit is given."""
 
 LONGEST_EDGE = 32
-"""[samples] Longest full-scale move at the rate limit; if it would be longer, it is sampled less often."""
+"""[samples] Longest full-scale move at the rate limit; a move that would be longer is sampled less often."""
 
 MOVE = 12
 """[samples] Shortest full-scale move of a triangle."""
@@ -37,7 +37,7 @@ REST = 0.125
 """[durations of a slow record] Pause between records."""
 
 LONGEST_MOVE = 60.0
-"""[s] Longest move over the range; a plan with slower ones would take a day and is refused."""
+"""[s] Longest move over the range; a plan with slower moves would take a day and is refused."""
 
 SLOW_SAMPLES = 480
 """[samples] Length of a slow record."""
@@ -63,7 +63,7 @@ class Grid:
         return cls(digits, math.ceil(first), math.floor(last))
 
     def values(self, codes: Sequence[int]) -> list[float]:
-        """The drive of codes: the doubles nearest to their decimals."""
+        """The drives of codes: the doubles nearest to the decimal values."""
         unit = 10 ** abs(self.digits)
         return [code / unit if self.digits >= 0 else float(code * unit) for code in codes]
 
@@ -74,8 +74,8 @@ class Grid:
 
 @dataclass(frozen=True)
 class Tempo:
-    """Times as multiples of the sample time: the spacing of samples of `fast` records, the duration of `slow` ones, the
-    `rest`.
+    """Times as multiples of the sample time: the spacing of samples of `fast` records, the duration of `slow` ones, and
+    the `rest` between records.
 
     `move`: samples of a full-scale move of the fast triangles.
     """
@@ -103,14 +103,14 @@ class Tempo:
         return cls(sample_time, max_rate, fast, slow, math.ceil(REST * slow), move)
 
     def seconds(self, ticks: int) -> float:
-        """The double nearest to the decimal of `ticks` sample times."""
+        """The double nearest to the decimal value of `ticks` sample times."""
         return float(ticks * Decimal(repr(self.sample_time)))
 
     def every_of(self, share: float, samples: int) -> int:
-        """Sample times between the `samples` of a record that lasts this share of a slow one."""
+        """Sample times between the `samples` of a record that lasts `share` of a slow one."""
         return max(self.fast, round(share * self.slow / samples))
 
     @property
     def middle(self) -> int:
-        """Between fast and slow, halfway on a logarithmic scale."""
+        """Sample times between samples halfway between fast and slow records, on a logarithmic scale."""
         return max(self.fast, math.isqrt(self.fast * self.every_of(1.0, SLOW_SAMPLES)))

@@ -41,7 +41,7 @@ WHOLE, CODES, RECORDING = "session.csv", "session_codes.txt", "recording.csv"
 """Files of a session at one rate: its drives, its codes, and where its recording is expected."""
 
 MOST_SAMPLES = 10_000_000
-"""Most samples in a session at one rate: about 500 MB of text."""
+"""Maximum number of samples in a session at one rate: about 500 MB of text."""
 
 
 @dataclass(frozen=True)
@@ -73,9 +73,9 @@ class PlannedDrives:
     """Drive records of one session, in recording order.
 
     `source`, `effects`: files of the model and of the user's own effects; `history`: drive values visited before every
-    record; `rest`: seconds of pause before each; `max_rate`: input/s; `defaults`: a sentence for each of these that was
-    chosen by default. `session`: where the records are in `whole`, the single drive at one rate, with codes for `dac`;
-    None if no rate was given. `stretches` of it: numbers of steps between drawn points, and ticks per step.
+    record; `rest`: seconds of pause before each; `max_rate`: input/s; `defaults`: a sentence about each rate or time
+    chosen by default. If a rate was given, all drives are played as one, `whole`, with codes for `dac`; `session` says
+    where the records lie in it, `stretches` lists its numbers of steps between drawn points and ticks per step.
     """
 
     parameters: Parameters
@@ -124,7 +124,7 @@ class PlannedDrives:
         )
 
     def command(self, folder: str | os.PathLike[str]) -> str:
-        """The command line that diagnoses the measured records, those in `folder`/measured, or the single recording."""
+        """The command line that diagnoses the records measured into `folder`/measured, or the session's recording."""
         home = PurePath(os.fspath(folder))
         own = [word for path in self.effects for word in ("--effects", path)]
         out = ["-o", (home / "diagnosis").as_posix()]
@@ -141,7 +141,7 @@ class PlannedDrives:
         return shlex.join([*words, *out])
 
     def tables(self) -> dict[str, str]:
-        """Names and text of all files except the page: tables of t, v and, with a converter, codes."""
+        """Name and text of every file except the page: tables of t, v and, with a converter, codes."""
         from hystgen.records import columns_text, headers
 
         names = ("t", "v") if self.dac is None else ("t", "v", "code")
@@ -187,14 +187,14 @@ def plan(
 ) -> PlannedDrives:
     """The drive records that make all effects of the catalogue separable.
 
-    `source`: a `Model` or a parameter file; `effects`: files with effects of the user's own; `max_rate`: the fastest
-    that the drive may change, input/s (default: the whole range in `FULL_SCALE` sample times); `sample_time`: shortest
-    time between samples, s (default: the file's, else `SAMPLE_TIME`). Every drive stays inside `input_range` and below
-    `max_rate`.
+    `source`: a `Model` or a parameter file; `effects`: files with the user's own effects; `max_rate`: fastest rate of
+    the drive, input/s (default: the whole range in `FULL_SCALE` sample times); `sample_time`: shortest time between
+    samples, s (default: the file's, else `SAMPLE_TIME`). Every drive stays inside `input_range` and below `max_rate`.
 
     `rate`: the sample rate of a converter, Hz, instead of `sample_time`: every drive has one sample per tick, and all
-    are parts of one session, with the rests between them. `dac_bits`, `dac_range` and `dac_coding` say how its codes
-    are made (see `Dac`); drives are then what the codes produce, and exceed `max_rate` by no more than a code.
+    are parts of one session, with the rests between them. `dac_bits`, `dac_range` and `dac_coding` describe the
+    converter's codes (see `Dac`); drives are then those that the codes produce, and exceed `max_rate` by no more than
+    one code.
 
     Raises ParameterError, PlanError with every problem.
     """
@@ -220,7 +220,7 @@ def plan(
         if value is not None and not 0.0 < value < math.inf
     ]
     if rate is not None and sample_time is not None:
-        problems.append("a rate is one over a sample time; give only one of them")
+        problems.append("the rate is the reciprocal of the sample time; give only one of them")
     low, high = file.input_range
     grid = Grid.over(low, high)
     top, bottom = grid.values((grid.high, grid.low))
@@ -235,7 +235,7 @@ def plan(
     elif sample_time is None:
         sample_time = file.sample_time or SAMPLE_TIME
         whose = "the parameter file's" if file.sample_time else "chosen by default, since the parameter file has none"
-        defaults.append(f"The sample time of {sample_time:g} s is {whose}; --sample-time gives another.")
+        defaults.append(f"The sample time of {sample_time:g} s is {whose}; --sample-time sets another.")
     if max_rate is None:
         max_rate = (high - low) / (FULL_SCALE * sample_time)
         unit = f" {file.units.input}/s" if file.units.input else "/s"
@@ -291,7 +291,7 @@ def _dac(
 
 @dataclass(frozen=True)
 class _Player:
-    """A converter at one rate: its ticks between the samples of a drive, and all drives in one session.
+    """Plays drives through a converter at one rate: fills the ticks between their samples, and joins them.
 
     `nodes`, `every`: the lead-in that establishes the history; `first`: tick at which the first record begins.
     """
@@ -305,7 +305,7 @@ class _Player:
 
     @classmethod
     def of(cls, grid: Grid, tempo: Tempo, rate: float, dac: Dac | None, lengths: Sequence[int]) -> _Player:
-        """`lengths`: of the records, ticks. Raises PlanError if there are more samples than a file should have."""
+        """`lengths`: ticks of each record. Raises PlanError if there are more samples than a file should have."""
         every = tempo.every_of(1.0, SLOW_SAMPLES)
         made = cls(grid, tempo, rate, dac, lead_in(grid, tempo, every), every)
         samples = made.first + sum(lengths) + (len(lengths) - 1) * tempo.rest + 1
@@ -329,7 +329,7 @@ class _Player:
         return self.dac.drives(codes), codes
 
     def session(self, plan: PlannedDrives) -> PlannedDrives:
-        """The plan with its drives joined into one."""
+        """The plan with its drives joined into one session."""
         parts, at, stretches = [], self.first, [(len(self.nodes) - 1, self.every)]
         lead = self.played(self.nodes, self.every)
         pieces = [lead]

@@ -1,4 +1,4 @@
-"""A planned session, played in one go, and its recording, cut into records."""
+"""A planned session, played without a break, and its recording, which is cut into records."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from hystgen.records import Record
 FILE = "session.json"
 
 OFF = 0.05
-"""Share of the drives' span by which a record may start and end away from the lowest drive, to allow for the gain and
-noise of a monitor. A recording that is out of step with its session starts and ends anywhere."""
+"""[share of the drives' span] Distance from the lowest drive at which a record may start and end, to allow for the gain
+and noise of a monitor. In a recording that is out of step with its session, records start and end anywhere."""
 
 
 @dataclass(frozen=True)
 class PlayedRecord:
-    """A record of the session: the samples played from `first` on."""
+    """A record of the session: `samples` samples played from sample `first` on."""
 
     name: str
     first: int
@@ -39,8 +39,8 @@ class Session:
     """The signal played: `samples` at `rate`, Hz, containing `records`.
 
     `history`: drives visited before the first record and at the end of each, the highest and the lowest of all; `rest`:
-    s between them; `rise`: s from the first sample to the first crossing of the middle between both, used to align a
-    recording; `dac`: the converter, as its fields, if there are codes.
+    pause between records, s; `rise`: time of the first rise through the middle between those two, s from the first
+    sample, used to align a recording; `dac`: the fields of the converter, if there are codes.
     """
 
     rate: float
@@ -67,7 +67,7 @@ class Session:
             text = content.decode("utf-8")
         except UnicodeDecodeError:
             raise ParameterError(file, [Problem("", f"is not UTF-8; {GIVE}")]) from None
-        document = read(text)  # JSON is YAML; our reader does not recurse and knows positions
+        document = read(text)  # JSON is YAML; our reader does not recurse, and it records positions
         problems = list(document.problems)
         if document.complete:
             problems += [
@@ -99,8 +99,8 @@ class Session:
             if recording.t[-1] < last - half or b - a < 2:
                 raise PlanError(
                     [
-                        f"{recording.name}: ends {recording.t[-1] - start:.6g} s after the start of the session, and "
-                        f"{part.name} at {last - start:.6g} s; record the session to its end"
+                        f"{recording.name}: ends {recording.t[-1] - start:.6g} s after the start of the session, but "
+                        f"{part.name} ends at {last - start:.6g} s; record the session to its end"
                     ]
                 )
             record = recording.section(int(a), int(b), part.name)
@@ -108,8 +108,8 @@ class Session:
             if max(off) > OFF * (top - bottom):
                 raise PlanError(
                     [
-                        f"{recording.name}: the drive is {record.v[0]:.6g} and {record.v[-1]:.6g} where {part.name} "
-                        f"begins and ends at {bottom:.6g}; is it a recording of this session, at this rate?"
+                        f"{recording.name}: the drive is {record.v[0]:.6g} and {record.v[-1]:.6g} at the ends of "
+                        f"{part.name}, not {bottom:.6g}; is it a recording of this session, at this rate?"
                     ]
                 )
             (held if part.held_out else to_fit).append(record)
@@ -123,7 +123,7 @@ class Session:
         if abs(low - bottom) > OFF * span or abs(high - top) > OFF * span:
             raise PlanError(
                 [
-                    f"{name}: the drive goes from {low:.6g} to {high:.6g}, that of the session from {bottom:.6g} to "
+                    f"{name}: the drive goes from {low:.6g} to {high:.6g}, but in the session from {bottom:.6g} to "
                     f"{top:.6g}; give the drive in the units of the model"
                 ]
             )
@@ -137,8 +137,8 @@ GIVE = f"give the {FILE} that hystgen diagnose --plan --rate wrote"
 
 
 def _number(low: float, strict: bool = False) -> Callable[[object], str]:
-    """The problem with a value that has to be a finite number from `low` on, or above it; empty if there is none."""
-    wanted = f"a number {'above' if strict else 'from'} {low:g}{'' if strict else ' on'}"
+    """A function that returns the problem with a value, empty if it is a finite number >= `low` (> if `strict`)."""
+    wanted = f"a number {'above' if strict else 'of at least'} {low:g}"
 
     def wrong(value: object) -> str:
         right = isinstance(value, int | float) and not isinstance(value, bool) and -HUGE < value < HUGE and (
@@ -163,7 +163,7 @@ def _history(value: object) -> str:
 
 
 HUGE = 1e30
-"""Numbers of a session stay below this, like those of a parameter file."""
+"""Numbers in a session must stay below this, like those in a parameter file."""
 
 FIELDS: Mapping[str, Callable[[object], str]] = {
     "hystgen": lambda value: "" if value == 1 and isinstance(value, int) else f"1, not {shown(value)}",
@@ -198,7 +198,7 @@ Wrong = tuple[Place, str, bool]
 def _of_fields(
     place: Place, content: Mapping[str, object], fields: Mapping[str, Callable[[object], str]]
 ) -> Iterator[Wrong]:
-    """Keys of a mapping that are unknown, missing, or have a wrong value."""
+    """Problems with keys of a mapping that are unknown, missing, or have a wrong value."""
     for key in content.keys() - fields.keys():
         yield (*place, key), f"this key is unknown; {GIVE}", True
     for key, check in fields.items():
@@ -237,7 +237,7 @@ def _problems(content: Mapping[str, Any]) -> Iterator[Wrong]:
         names.add(part["name"])
         end = part["first"] + part["samples"]
         if ("samples",) not in wrong and "samples" in content and end > content["samples"]:
-            yield (*place, "samples"), f"ends at sample {end}, and the session at {content['samples']}; {GIVE}", False
+            yield (*place, "samples"), f"ends at sample {end}, but the session at {content['samples']}; {GIVE}", False
 
 
 def crossing(t: NDArray[np.float64], v: NDArray[np.float64], middle: float) -> float | None:

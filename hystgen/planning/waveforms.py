@@ -18,14 +18,14 @@ from hystgen import effects
 from hystgen.planning.grid import MOVE, SLOW_SAMPLES, Grid, Tempo
 
 EDGE = 4
-"""Fewest samples of any move: three lie between its ends."""
+"""[samples] Shortest move; three samples lie between its ends."""
 
 ROUND = 3
-"""Samples over which every drive is averaged: a sharper corner would lie between samples, where no record sees it."""
+"""[samples] Length of the average that rounds every drive: a sharper corner would lie unseen between two samples."""
 
 
 class Waveform:
-    """A drive being built up: codes sample by sample, counted from the lowest; positions are shares of the range.
+    """A drive being built up in `codes`, sample by sample, from the lowest on; positions are shares of the range.
 
     `pace`: samples of a quick full-scale move.
     """
@@ -42,8 +42,8 @@ class Waveform:
     def go(self, place: float, pace: float = 0.0) -> None:
         """A straight move at `pace` samples per full-scale move, in `EDGE` samples or more, within the rate limit.
 
-        Then the drive rests, so that two samples remain at the turning point even with round corners: it is sampled
-        even behind a delay of any fraction of a sample.
+        Then the drive rests, so that two samples remain at the turning point even once corners are rounded: the turning
+        point is then sampled even behind a delay of any fraction of a sample.
         """
         begin, end = self.codes[-1], self._code(place)
         size = abs(end - begin)
@@ -53,12 +53,12 @@ class Waveform:
         self.hold(ROUND)
 
     def hold(self, samples: int) -> None:
-        """The drive rests."""
+        """Hold the drive for a number of samples."""
         self.codes += [self.codes[-1]] * samples
 
     def wave(self, values: Sequence[float]) -> None:
-        """A wave about the middle of the range, as large as range and rate limit allow, preceded by a move to its
-        start."""
+        """A wave about the middle of the range, as large as the range and the rate limit allow, preceded by a move to
+        its start."""
         steepest = max(abs(b - a) for a, b in itertools.pairwise(values))
         size = 0.5 * (self._grid.high - self._grid.low - 2) / max(map(abs, values))
         size = min(size, (self._step - 1) / steepest)
@@ -78,7 +78,7 @@ class Waveform:
 
 
 def sine(turns: float) -> float:
-    """sin(2 pi turns), to 1e-13: the C library's sine differs in the last bit from machine to machine."""
+    """sin(2 pi turns), to 1e-13 and equal everywhere: the last bit of the C library's sine depends on the machine."""
     x = turns - math.floor(turns + 0.5)
     if abs(x) > 0.25:
         x = math.copysign(0.5, x) - x
@@ -150,7 +150,7 @@ def _steps(drive: Waveform, hold: int, levels: Sequence[float]) -> None:
 
 
 def _sweep(drive: Waveform, samples: int = 1100) -> None:
-    """Frequency rises with time squared to an eighth of the sampling rate; amplitude falls as the limit requires."""
+    """Frequency rises as time squared to an eighth of the sampling rate; amplitude falls to keep the rate limit."""
     first, last = 1.0 / (16.0 * drive.pace), 1.0 / 8.0
     turns, values = 0.0, []
     for k in range(samples):
@@ -212,7 +212,7 @@ class RecordKind:
 
     @property
     def shows(self) -> tuple[str, ...]:
-        """Names of the effects that it shows, the plainest first."""
+        """Names of the effects that the record shows, the most clearly shown first."""
         shown_by = {name: effects.shapes(name)[0].shown_by for name in effects.CATALOGUE}
         shown_by[effects.BEND] = BEND_SHOWN_BY
         places = {name: records[self.name] for name, records in shown_by.items() if self.name in records}
@@ -257,7 +257,7 @@ RECORDS = (
         _staircase, _fast, True,
     ),
     RecordKind(
-        "slow_minor", "Equal small loops at three biases, reached from both sides: congruent or not.",
+        "slow_minor", "Equal small loops at three biases, reached from both sides: whether they are congruent.",
         partial(_minor, pace=60), _lasting(1.0),
     ),
     RecordKind(
@@ -269,23 +269,23 @@ RECORDS = (
         partial(_reversals, seed=2, turns=14, slowest=3.0), _lasting(1.25, 600), True,
     ),
     RecordKind(
-        "sweep", "A sine from slow to an eighth of the sampling rate: the peak of a resonance, the phase of a lag.",
+        "sweep", "A sine sweep up to an eighth of the sampling rate: the peak of a resonance, the phase of a lag.",
         _sweep, _fast,
     ),
     RecordKind(
-        "cycles", "Many equal full loops: they accumulate travel and heat; later ones differ from earlier ones.",
+        "cycles", "Many equal full loops: they accumulate travel and heat, so later ones differ from earlier ones.",
         _cycles, _lasting(1.0, 720),
     ),
     RecordKind(
-        "settling", "Nested loops and short holds at a medium pace, while it cools: creep and rate in between.",
+        "settling", "Nested loops and short holds at a medium pace, while the stage cools: creep and rate in between.",
         _settling, _middle,
     ),
     RecordKind(
-        "fast_reversals", "Random turning points at random speeds near the limit, to judge.",
+        "fast_reversals", "Random turning points at random speeds near the limit, to judge the fast findings.",
         partial(_reversals, seed=3, turns=40, slowest=4.0), _fast, True,
     ),
     RecordKind(
-        "multisine", "Equal periods of an odd multisine with random phases: noise without a model, even nonlinearity.",
+        "multisine", "Equal periods of an odd multisine, random phases: model-free noise, even-order nonlinearity.",
         _multisine, _fast,
     ),
     RecordKind(
@@ -293,7 +293,7 @@ RECORDS = (
         partial(_reversals, seed=5, turns=25, slowest=3.0), _middle, True,
     ),
     RecordKind(
-        "slow_again", "The first record once more: changes in the session due to neither rate nor amplitude.",
+        "slow_again", "The first record again: changes during the session that neither rate nor amplitude explains.",
         _slow, _lasting(1.0),
     ),
 )

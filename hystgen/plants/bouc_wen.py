@@ -51,7 +51,7 @@ def _exactly(v: Array, v0: float, z0: float, p: tuple[float, ...], out: Array) -
     z = z0
     last = v0
     for k in range(len(v)):
-        if v[k] != last:  # computing there and back by the formulas would not preserve every bit
+        if v[k] != last:  # a round trip through the formulas would not be bit-exact
             s = abs(v[k] - last) / distance
             sign = 1.0 if v[k] > last else -1.0
             x = sign * z
@@ -70,9 +70,9 @@ class BoucWen:
     """Force `y = alpha k v + (1 - alpha) k D z`, `D dz/dv = A - (beta sgn(z dv) + gamma) |z|^n`.
 
     `alpha` >= 0: ratio of the stiffness after yielding to that before; above 1 the output lags the input, like a piezo
-    drive's, below 1 it leads; `k`: stiffness in output per input unit; `D`: input units; `A`, `beta`, `gamma`: numbers
-    with -beta < gamma <= beta, which keeps the model bounded and dissipative; `n` >= 1; `start`: z at the input 0. In
-    closed form over every monotone move for n = 1 (exponential) and n = 2 (tan and tanh), otherwise integrated to the
+    drive's, below 1 it leads; `k`: stiffness in output per input unit; `D`: input units; `A`, `beta`, `gamma`: pure
+    numbers, -beta < gamma <= beta, so that the model is bounded and dissipative; `n` >= 1; `start`: z at the input 0.
+    Closed form over every monotone move for n = 1 (exponential) and n = 2 (tan and tanh), otherwise integrated to the
     tolerance in `integration`. Raises ValueError. Sources: Y. K. Wen, Method for random vibration of hysteretic
     systems, J. Eng. Mech. Div. ASCE 102, 1976; F. Ikhouane, J. Rodellar, Systems with Hysteresis, Wiley, 2007 (the
     classes); T. S. Low, W. Guo, Modeling of a three-layer piezoelectric bimorph beam with hysteresis, J. MEMS 4, 1995.
@@ -119,7 +119,7 @@ class BoucWen:
             return z
         up, down = (functools.partial(self._slope, sign) for sign in (1.0, -1.0))
         z = integration.integrate(samples, float(self.start), up, down, self.bound)
-        return np.clip(z, -self.bound, self.bound)  # which the tolerance may exceed
+        return np.clip(z, -self.bound, self.bound)  # integration errors may exceed the bound
 
     def _slope(self, sign: float, v: float, z: float) -> float:  # noqa: ARG002, the input does not enter
         # A / (beta + gamma) at the bound; a trial step far beyond must not overflow

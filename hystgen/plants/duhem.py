@@ -19,8 +19,8 @@ from hystgen.plants.integration import Slope
 class Duhem:
     """General Duhem model: `dy/dv = rising(v, y)` where the input rises and `falling(v, y)` where it falls.
 
-    `rising`, `falling`: functions of two floats, in output per input unit; `start`: y at the input 0; `scale` > 0: size
-    of y that replaces it near zero in the tolerance of `integration`. Raises ValueError, also if the integration fails.
+    `rising`, `falling`: functions of two floats, in output per input unit; `start`: y at the input 0; `scale` > 0: the
+    magnitude of y to which the tolerance near zero refers. Raises ValueError, also if the integration fails.
     Source: J. W. Macki, P. Nistri, P. Zecca, Mathematical models for hysteresis, SIAM Review 35, 1993.
     """
 
@@ -66,7 +66,7 @@ def _dahl(v: Array, v0: float, start: float, sigma: float, limit: float, exponen
     force = start
     last = v0
     for k in range(len(v)):
-        if v[k] != last:  # computing there and back by the formulas would not preserve every bit
+        if v[k] != last:  # a round trip through the formulas would not be bit-exact
             sign = 1.0 if v[k] > last else -1.0
             s = sigma * abs(v[k] - last) / limit
             rest = 1.0 - sign * force / limit  # 0 when fully developed in this direction, 2 in the other
@@ -91,8 +91,8 @@ class Dahl:
 
     `sigma` > 0: stiffness at rest in output per input unit; `limit` > 0: F_c, the sliding force in output units;
     `exponent`: i >= 0, below 1 for brittle materials, which slide fully after a finite move (i = 0 is the stop
-    operator), 1 and above for ductile ones; `start`: F at the input 0, within the limit. In closed form over every
-    monotone move for every i. The output leads the input. Raises ValueError. Source: P. R. Dahl, A solid friction
+    operator), 1 and above for ductile ones; `start`: F at the input 0, within the limit. Closed form over every
+    monotone move, for every i. The output leads the input. Raises ValueError. Source: P. R. Dahl, A solid friction
     model, The Aerospace Corporation TOR-0158(3107-18)-1, 1968.
     """
 

@@ -18,10 +18,10 @@ RTOL = 1e-11
 """Error allowed per step, as a share of the state."""
 
 ATOL = 1e-13
-"""The same as a share of the state's scale, for states near zero."""
+"""Error allowed per step for states near zero, as a share of the state's scale."""
 
 MOST_STEPS = 100_000
-"""Steps between two samples, beyond which the state has run away."""
+"""Maximum number of steps between two samples; if more are needed, the state has run away."""
 
 
 def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: float) -> Array:
@@ -49,7 +49,7 @@ def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: floa
                     slope, y[first], places, tfirst=True, rtol=RTOL, atol=ATOL * scale, mxstep=MOST_STEPS,
                     tcrit=places[-1:], full_output=True,
                 )
-            # with tcrit LSODA does not report that its steps became too small to move on
+            # with tcrit, LSODA does not report steps that have become too small to make progress
             done = places[-1] == places[0] or np.isclose(details["tcur"][-1], places[-1], rtol=0.0, atol=1e-12 * reach)
         except (ODEintWarning, OverflowError):
             done = False
@@ -63,5 +63,5 @@ def integrate(v: Array, start: float, rising: Slope, falling: Slope, scale: floa
 
 
 def _at(slope: Slope, sign: float, along: float, y: Array) -> float:
-    """Along a variable that always increases: only then does odeint heed tcrit, beyond which no slope is evaluated."""
+    """Slope along a variable that always increases: only then does odeint respect tcrit and evaluate none beyond it."""
     return sign * slope(sign * along, float(y[0]))

@@ -13,7 +13,7 @@ from hystgen.plants import integration
 
 
 def langevin(x: float) -> float:
-    if abs(x) < 0.05:  # the difference loses digits, the series is exact to rounding
+    if abs(x) < 0.05:  # the difference loses digits; the series is exact to rounding
         return x * (1.0 / 3.0 - x * x * (1.0 / 45.0 - x * x * (2.0 / 945.0 - x * x / 4725.0)))
     return 1.0 / math.tanh(x) - 1.0 / x
 
@@ -21,7 +21,7 @@ def langevin(x: float) -> float:
 def langevin_slope(x: float) -> float:
     if abs(x) < 0.05:
         return 1.0 / 3.0 - x * x * (1.0 / 15.0 - x * x * (2.0 / 189.0 - x * x / 675.0))
-    if abs(x) > 40.0:  # the other term is below rounding, and further on it would overflow
+    if abs(x) > 40.0:  # the other term is below rounding, and for larger x it would overflow
         return 1.0 / (x * x)
     return 1.0 / (x * x) - 1.0 / math.sinh(x) ** 2
 
@@ -32,8 +32,8 @@ class JilesAtherton:
 
     `dM/dH = (1 - c) dM_irr/dH + c dM_an/dH`, `dM_irr/dH = (M_an - M_irr) / (k sgn(dH) - alpha (M_an - M_irr))`,
     `M = (1 - c) M_irr + c M_an`. `Ms`, `a`, `k` > 0 in the unit of the field (A/m); `alpha` >= 0 and 0 <= `c` < 1
-    dimensionless. Starts demagnetised at the field 0. Right after a reversal the equation has a negative slope, which
-    is unphysical; dM_irr/dH is zero until M_an is ahead of M again, as in J. H. B. Deane, Modeling the dynamics of
+    dimensionless. Starts demagnetised at zero field. Right after a reversal the equation has a negative slope, which is
+    unphysical, so dM_irr/dH is 0 until M_an is ahead of M again, as in J. H. B. Deane, Modeling the dynamics of
     nonlinear inductor circuits, IEEE Trans. Magn. 30, 1994. Raises ValueError for wrong parameters, including alpha M_s
     >= 3 a, for which the anhysteretic curve is not a function, and if the integration fails. Integrated to the
     tolerance in `integration`. Sources: D. C. Jiles, D. L. Atherton, Theory of ferromagnetic hysteresis, J. Magn. Magn.

@@ -26,9 +26,9 @@ class KrasnoselskiiPokrovskii:
     """Weighted sum of KP kernels `s_k = max(r(v_k - p_2), min(r(v_k - p_1), s_(k-1)))`.
 
     `r(x)` rises along a straight line from -1 at x = 0 to 1 at x = `ramp` > 0. `lower`, `upper`: p_1 <= p_2 of every
-    kernel, in input units, where it begins to fall back to -1 and to rise from -1; `weights`: of any sign, in output
+    kernel, in input units, where it reaches -1 as it falls and leaves -1 as it rises; `weights`: of any sign, in output
     units; `start` in [-1, 1]: state of all kernels before the first sample. Raises ValueError. With a narrow ramp a
-    kernel is a relay; with one wider than the input's range a play. Source: H. T. Banks, A. J. Kurdila, G. Webb,
+    kernel is a relay; with a ramp wider than the input's range, a play. Source: H. T. Banks, A. J. Kurdila, G. Webb,
     Identification of hysteretic control influence operators representing smart actuators, Math. Probl. Eng. 3, 1997.
     """
 
@@ -58,8 +58,8 @@ class KrasnoselskiiPokrovskii:
     ) -> KrasnoselskiiPokrovskii:
         """Kernels at all p_1 <= p_2 of a grid over [low, high - ramp], with a ramp as wide as the grid's step.
 
-        `low`, `high`: input units; `divisions`: steps between them, at least 2; `weights(p1, p2)`: from arrays of
-        positions, an array of as many weights, or one for all, in output units. Raises ValueError.
+        `low`, `high`: input units; `divisions`: steps between them, at least 2; `weights(p1, p2)`: a function of two
+        arrays of positions that returns a weight for each kernel, or one for all, in output units. Raises ValueError.
         """
         finite(low=low, high=high)
         whole_from(2, divisions=divisions)

@@ -1,4 +1,4 @@
-"""Preisach: a plane of relays, given by its Everett surface, with the staircase of remembered extrema."""
+"""Preisach: a plane of relays, given by its Everett surface, evaluated through the staircase of remembered extrema."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Everett = Callable[[Array, Array], Array]
 
 @jit
 def _staircase(v: Array, stack: Places, corner: Places) -> None:
-    """The corner at which each sample's move began, as a position in v, negative for a fall.
+    """The corner at which each sample's move began, as an index into v, negative for a fall.
 
     The stack holds a minimum, maximum, minimum, ...; v[0] is the lowest possible input, the minimum below all others,
     and no fall begins there.
@@ -55,9 +55,9 @@ def _add_up(corner: Places, change: Array, out: Array) -> None:
 class EverettTable:
     """Everett surface between grid points: `values[i][j]` is E at alpha = `edges[i]`, beta = `edges[j]`, j <= i.
 
-    `edges`: increasing inputs, at least two; `values`: square, in output units, 0 on the diagonal; those above it are
-    ignored. Bilinear in a cell, linear in the half cells on the diagonal. Raises ValueError for other tables, and for
-    points that are not between the edges.
+    `edges`: increasing inputs, at least two; `values`: square, in output units, 0 on the diagonal; values above the
+    diagonal are ignored. Bilinear in a cell, linear in the half cells on the diagonal. Raises ValueError for other
+    tables, and for points that are not between the edges.
     """
 
     edges: Sequence[float]
@@ -110,12 +110,12 @@ class EverettTable:
 
 @dataclass(frozen=True)
 class Preisach:
-    """Sum of relays that switch up at alpha and down at beta <= alpha: exact, through the remembered extrema.
+    """Sum of relays that switch up at alpha and down at beta <= alpha, computed exactly from the remembered extrema.
 
     `everett(alpha, beta)`: change of the output when the input rises from beta to alpha, 0 for alpha = beta, increasing
     in alpha and decreasing in beta, a function of two arrays; in output units. `low`, `high`: range of the relays,
-    outside which an input changes nothing; `offset`: output with all relays down. Starts there, and visits `history`
-    before the first sample. A rise from the remembered minimum m gives `y = y_m + E(v, m)`, a fall from a maximum M
+    outside which an input changes nothing; `offset`: output with all relays down, as they are before the input visits
+    `history`. A rise from the remembered minimum m gives `y = y_m + E(v, m)`, a fall from a maximum M
     `y = y_M - E(M, v)`; an input that passes an extremum wipes it out. Raises ValueError for wrong arguments or a
     surface that is not an Everett surface on 33 x 33 points. Sources: D. H. Everett, A general approach to hysteresis,
     part 4, Trans. Faraday Soc. 51, 1955; I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer, 1991.

@@ -1,14 +1,14 @@
 """Measured data in, computed columns out: one file is one experiment.
 
 Text tables (`t` time, `v` drive, `y` measured, any further columns) as instruments and programs export them, and
-`.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. All problems of a file are reported at once, each with its place;
-small faults in a recording are repaired and counted in `Record.notes`.
+`.npz`, MATLAB `.mat`, HDF5, TDMS and Parquet files. All problems of a file are reported at once, each with its
+position; small faults in a recording are repaired and counted in `Record.notes`.
 
-For a text file, `layout` finds out how the table is written, `csv_file` splits it into lines and reads the rows, and
+For a text file, `layout` determines how the table is written, `csv_file` splits it into lines and reads the rows, and
 `cells` reads single cells. For every format, `columns` finds the requested columns and the sample rate, and `reading`
 turns them into the record.
 
-A format is a file in this package and an entry in `FORMATS`.
+To add a format, add a module to this package and an entry to `FORMATS`.
 """
 
 from __future__ import annotations
@@ -77,9 +77,9 @@ def read_records(
     Samples in memory are called `record`, or `record 1`, `record 2`, .. if there are several. `points`: accept samples
     without a time, as points taken one by one.
 
-    `progress`: says once on stderr how files were interpreted ("read as: .."), with a bar on a terminal when it takes
-    more than a second. Raises RecordError with every problem in all files, ValueError and TypeError for other
-    arguments.
+    `progress`: report once on stderr how files were interpreted ("read as: .."), with a progress bar on a terminal if
+    reading takes more than a second. Raises RecordError with every problem in all files, ValueError and TypeError for
+    unusable arguments.
     """
     everything = several(sources)
     _check_options(columns, sample_time, delimiter)
@@ -120,17 +120,17 @@ def read_record(
     delimiter: str | None = None,
     need: Sequence[str] = ("v", "y"),
 ) -> Record:
-    """Read one data file, or make a record of samples in memory.
+    """Read one data file, or make a record from samples in memory.
 
     `path`: path of a file; or a mapping or data frame of columns, an array (N, 3) or a tuple of arrays (N,) in the
-    order t, v, y. `columns`: our names to the file's (`{"t": "Time"}`). The file's name may be the whole name
-    (`session1/drive` in HDF5, `data.v` for the field of a MATLAB struct), its last part, or that without a unit, as
-    long as it matches only one column; or the column's number, `#2`. `t`, `v` and `y` are found the same way, or else
-    by the meaning of a name that only one column has (`Drive (V)`, `Zeit [ms]`). `sample_time`: seconds, for a file
-    without time; `delimiter`: one character, by default the one found in the file; `need`: the columns that must be
-    there. If `need` includes `y`, the record is meant for a fit: it must then have at least 16 samples and a drive that
-    moves. Samples without a value in `t` or a needed column, and samples whose time does not increase, are dropped with
-    a note, up to 5 % of the record. A time in another unit is converted to seconds.
+    order t, v, y. `columns`: maps our column names to the file's (`{"t": "Time"}`). A file's name may be the whole name
+    (`session1/drive` in HDF5, `data.v` for the field of a MATLAB struct), its last part, or its last part without a
+    unit, as long as it matches only one column; or the column's number, `#2`. `t`, `v` and `y` are found the same way,
+    or else by meaning, if only one column has such a name (`Drive (V)`, `Zeit [ms]`). `sample_time`: seconds, for a
+    file without time; `delimiter`: one character, by default the one found in the file; `need`: the columns that must
+    be present. If `need` includes `y`, the record is meant for a fit: it must then have at least 16 samples and a drive
+    that moves. Samples without a value in `t` or a needed column, and samples whose time does not increase, are dropped
+    with a note, up to 5 % of the record. A time in another unit is converted to seconds.
 
     Raises RecordError with every problem in the file.
     """
@@ -146,13 +146,13 @@ def in_units(
     named: tuple[str, Mapping[str, str] | None] = ("units", None),
     sources: Sequence[object] = (),
 ) -> list[Record]:
-    """The records with their columns `need`, and temperatures, each in one unit throughout; each conversion adds a note
-    to the record.
+    """The records with each column of `need`, and temperatures, in one unit throughout; each conversion adds a note to
+    its record.
 
-    The target units are those that the user gave (with the option's name and the units of `input` and `output`), else
-    those of a parameter file (its path and units), else those of a model; if there are none, the first record with a
-    unit decides. Columns without a unit are assumed to be in the target unit. `sources`: the records as given, for
-    messages. Raises RecordError with every column of a different quantity or in an unknown unit.
+    The target units are the user's (`named`: the option's name and the units of `input` and `output`), else those of a
+    parameter file (`file`: its path and units), else those of `model`; if there are none, the first record with a unit
+    decides. Columns without a unit are assumed to be in the target unit. `sources`: the records as given, for messages.
+    Raises RecordError with every column of a different quantity or in an unknown unit.
     """
     everything = list(records)
     if not any(record.units for record in everything):

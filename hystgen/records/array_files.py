@@ -27,7 +27,7 @@ TOGETHER = 1 << 20
 """Samples of a .mat file loaded at a time; short vectors are loaded together up to this number."""
 
 MOST_TOGETHER = 1000
-"""Vectors loaded at a time; the library compares each name in the file with theirs one by one."""
+"""Maximum number of vectors loaded at a time: scipy compares every name in the file with each requested one."""
 
 
 def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
@@ -53,7 +53,7 @@ def read_npz(reading: Reading, stream: IO[bytes]) -> Table:
 def _scalar(
     name: str, of: str, read: Callable[[], NDArray[np.generic]], shape: tuple[int, ...], steps: list[Step]
 ) -> bool:
-    """Whether the number is the sample rate of the vectors; it is then added to `steps`."""
+    """Whether an array is a single number that gives the vectors' sample rate; it is then added to `steps`."""
     if int(np.prod(shape)) != 1 or not is_named(name):
         return False
     step = from_number(name, float(np.ravel(read())[0]), of)
@@ -126,7 +126,7 @@ def _mat_matrix(stream: IO[bytes], name: str) -> NDArray[np.generic]:
 
 
 class _MatVectors:
-    """Vectors of a file that has to be searched from its start for each of them: neighbours are therefore loaded
+    """Vectors of a file, which has to be searched from its start to find one; neighbouring vectors are therefore loaded
     together."""
 
     def __init__(self, stream: IO[bytes]) -> None:
@@ -137,7 +137,7 @@ class _MatVectors:
         self._loaded: tuple[int, dict[str, NDArray[np.generic]]] = (-1, {})
 
     def add(self, name: str, length: int) -> None:
-        """A vector of the file, in file order."""
+        """Add a vector; called in file order."""
         if not self._groups or self._samples + length > TOGETHER or len(self._groups[-1]) == MOST_TOGETHER:
             self._groups.append([])
             self._samples = 0
@@ -146,7 +146,7 @@ class _MatVectors:
         self._samples += length
 
     def read(self, name: str) -> NDArray[np.generic]:
-        """The vector of that name."""
+        """The vector called `name`."""
         group = self._group[name]
         if self._loaded[0] != group:
             self._loaded = group, _mat_variables(self._stream, self._groups[group])
@@ -154,18 +154,18 @@ class _MatVectors:
 
 
 Parts = tuple[dict[str, str], dict[str, tuple[int, Callable[[], NDArray[np.generic]]]]]
-"""Fields of a struct in a list: its texts, and its vectors with length and numbers."""
+"""Fields of a struct in a list: its texts, and its vectors as a length and a function that reads them."""
 
 _LABELS, _UNITS = ("label", "name"), ("unit", "units")
 
 HOLDING = ("data", "values")
-"""Fields of a struct whose label says what its numbers are."""
+"""Names of the fields that hold the numbers of a struct; its label says what they are."""
 
 
 def list_of_structs(folder: str, structs: Sequence[Parts]) -> list[Column]:
     """The vectors of a list of structs, named by the text next to them: signals of Simulink, traces of ControlDesk.
 
-    Vectors without a text of their own are named by their number in the list, `(2).values`.
+    Vectors without a text of their own are named by their position in the list, `(2).values`.
     """
 
     def beside(texts: dict[str, str], keys: Sequence[str]) -> str:

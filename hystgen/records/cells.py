@@ -1,4 +1,4 @@
-"""Split lines of a text table into cells, and convert cells to numbers or times, given how the file writes them."""
+"""Split lines of a text table into cells, and convert cells to numbers or times in the file's notation."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ PAST_MIDNIGHT = 0.5
 
 
 def is_time(cell: str) -> bool:
-    """Whether a cell is a time of day, with a date or without."""
+    """Whether a cell is a time of day, with or without a date."""
     return _TIME.fullmatch(cell.strip()) is not None
 
 
 class Clock:
     """Reads the times of one column, in file order, as seconds from the first one.
 
-    `problem`: why the times cannot be trusted, empty where they can.
+    `problem`: why the times cannot be trusted, empty if they can.
     """
 
     def __init__(self) -> None:
@@ -46,21 +46,21 @@ class Clock:
         self.problem = ""
 
     def copy(self) -> Clock:
-        """A clock that continues from here, for an attempt that may be abandoned."""
+        """A copy that continues from here, for an attempt that may be abandoned."""
         return copy(self)
 
     def seconds(self, cell: str) -> float:
         """Seconds from the column's first time. Raises ValueError for a cell that is not a time."""
         match = _TIME.fullmatch(cell.strip())
         if match is None:
-            raise ValueError("no time of day")
+            raise ValueError("not a time of day")
         hour, minute, second = int(match["hour"]), int(match["minute"]), int(match["second"])
         if match["half"]:
             if not 1 <= hour <= 12:
-                raise ValueError("no hour of a twelve-hour clock")
+                raise ValueError("not an hour of a twelve-hour clock")
             hour = hour % 12 + 12 * (match["half"][0] in "pP")
         if hour > 23 or minute > 59 or second > 60:
-            raise ValueError("no time of day")
+            raise ValueError("not a time of day")
         fraction = int((match["fraction"] or "")[:9].ljust(9, "0"))
         time = ((hour * 60 + minute) * 60 + second - _offset(match["zone"])) * NANO + fraction
         if match["date"]:
@@ -73,7 +73,7 @@ class Clock:
         self._latest = time
         if self._first is None:
             self._first = time
-        # The difference is an integer, so the quotient is the only rounding
+        # The difference is an integer, so only the division rounds
         return (time - self._first) / NANO
 
     def _day(self, text: str) -> int:
@@ -111,7 +111,7 @@ MISSING = frozenset(
 """Cells, in lower case, that stand for a missing value."""
 
 BLANKS = " "
-"""The delimiter of columns separated by any number of blanks, such as aligned ones."""
+"""The delimiter of columns separated by any number of blanks, for example to align them."""
 
 COMMENT = re.compile(r"^[^\S\n]*(?:#|%|//)", re.MULTILINE)
 """The beginning of a comment line."""
@@ -155,7 +155,7 @@ class Dialect:
         if cell.strip().lower() in MISSING:
             return float("nan")
         if "_" in cell or (self.decimal != "." and "." in cell):
-            raise ValueError("no number")
+            raise ValueError("not a number")
         return float(cell if self.decimal == "." else cell.replace(self.decimal, "."))
 
     def weight(self, cell: str) -> int:
@@ -173,16 +173,16 @@ class Dialect:
         return _EITHER.fullmatch(cell.strip()) is not None
 
     def fault(self, cell: str) -> tuple[str, str]:
-        """The fault of a cell that is not a number: its kind (empty if it is unique), and what to do."""
+        """The fault of a cell that is not a number: its kind (empty if it has none), and what to do about it."""
         text = cell.strip()
         if self.either(text):
-            return "comma", "its comma may be a decimal comma or a thousands mark, write decimals with a point"
+            return "comma", "its comma may be a decimal comma or a thousands mark: write decimals with a point"
         if "," in text and self.decimal == "." and _reads(text.replace(",", ".", 1)):
             return "decimal comma", "write decimals with a point"
         if any(marks.fullmatch(text) for marks in _THOUSANDS):
-            return "thousands marks", "thousands marks are not read, export numbers without them"
+            return "thousands marks", "export numbers without thousands marks, which are not read"
         if "." in text and self.decimal != "." and _reads(text):
-            return "decimal point", "the file uses decimal commas, write every number with one"
+            return "decimal point", "the file uses decimal commas, so write every number with a comma"
         if _MINUTES.fullmatch(text):
             return "minutes", "write times as hours, minutes and seconds, 0:01:30.5, or in seconds"
         return "", "write a number, or leave the cell empty if there is no value"

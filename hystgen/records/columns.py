@@ -28,7 +28,7 @@ TIMES: dict[str, tuple[float, float]] = {
     **dict.fromkeys(("min", "mins", "minute", "minutes"), (60.0, 1.0)),
     **dict.fromkeys(("h", "hr", "hour", "hours"), (3600.0, 1.0)),
 }
-"""Factor and divisor to seconds: x/1000 is the double nearest to the intended time, 0.001*x may not be."""
+"""Factor and divisor to seconds: x/1000 is the double nearest to the intended time; 0.001*x may not be."""
 
 _ONE = (
     r"(?:(?:[fpnumkMG]|d[am]?|c)?(?:s|V|A|m|rad|N|Hz|F|C|K|Pa|g|W|J|T|bar|Ohm|strain)"
@@ -39,7 +39,7 @@ _UNIT = re.compile(rf"{_ONE}(?:\^?-?\d)?(?:\s?[*/·]\s?{_ONE}(?:\^?-?\d)?)*")
 
 _LENGTH = re.compile(r"(?:[pnumc]?m|(?i:(?:pico|nano|micro|milli|centi)?met(?:er|re)s?|microns?))")
 
-# After an underscore, only an unmistakable word is a unit: v_in, y_min and v_m are names
+# After an underscore, only an unmistakable unit counts as one: v_in, y_min and v_m are names
 _AFTER_UNDERSCORE = re.compile(
     r"[mun]?s|sec|seconds|[muk]?V|volts|[mu]A|k?Hz|[munp]m|microns|deg|[mu]rad|degC|[mk]N|counts"
 )
@@ -50,7 +50,7 @@ def split_unit(header: str) -> tuple[str, str]:
     """Name and unit of a header: `pos [um]`, `pos (um)`, `U / V`, `time_ms`; the unit may be empty."""
     text = header.strip()
     match = re.fullmatch(r"(.*?\S)\s*\[\s*([^\[\]]*?)\s*\]", text)
-    # In square brackets anything is a unit except a number, which counts channels
+    # In square brackets anything is a unit except a number, which is that of a channel
     if match and not match[2].isdecimal() and len(match[2]) <= MAX_UNIT and match[2].isprintable():
         return match[1], "" if match[2] == "-" else match[2]
     match = re.fullmatch(r"(.*?\S)\s*\(\s*([^()]*?)\s*\)", text) or re.fullmatch(r"(.*?[^\s/])\s*/\s*(\S+)", text)
@@ -62,7 +62,7 @@ def split_unit(header: str) -> tuple[str, str]:
 
 
 def unit_alone(text: str) -> str | None:
-    """The unit that a cell below a header holds, `s` or `[um]`, or empty; None for a cell that is not a unit."""
+    """The unit in a cell below a header, `s` or `[um]`, possibly empty; None for a cell that is not a unit."""
     inside = re.fullmatch(r"\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\)", text.strip())
     unit = text.strip() if inside is None else inside[1] or inside[2] or ""
     if unit in ("", "-") or (inside is not None and inside[1] and not unit.isdecimal()):
@@ -89,7 +89,7 @@ def to_seconds(t: Array, unit: str) -> tuple[Array, str]:
     """Times in seconds, and a note for the user, empty if they were in seconds already."""
     scale = TIMES.get(plain(unit).partition(" since ")[0].casefold())
     if scale is None:
-        return t, f'the unit "{printable(unit)}" of t is not a known unit of time; its numbers were read as seconds'
+        return t, f'the unit "{printable(unit)}" of t is not a known unit of time; t was read as seconds'
     factor, divisor = scale
     if factor == divisor:
         return t, ""
@@ -123,8 +123,8 @@ def agreed_units(records: Iterable[Record], given: Mapping[str, str] | None = No
     drive, displacement = units.get("input", ""), units.get("output", "")
     if _LENGTH.fullmatch(plain(drive)) and displacement and not _LENGTH.fullmatch(plain(displacement)):
         strange.append(
-            f"the drive is in {printable(drive)} and the displacement in {printable(displacement)}, as if they were "
-            "exchanged; check the columns and the units, the drive comes first"
+            f"the drive is in {printable(drive)} and the displacement in {printable(displacement)}, which suggests "
+            "that they are exchanged; check the columns and the units: the drive comes first"
         )
     return units, strange
 
@@ -158,9 +158,9 @@ _LINE = re.compile(
 
 @dataclass(frozen=True)
 class Step:
-    """`seconds` between two samples, and how the file states them.
+    """The time between two samples in `seconds`, and how the file states it (`said`).
 
-    `of`: the column they belong to, or the group or struct including its separator; empty for the whole file; `start`:
+    `of`: the column it belongs to, or the group or struct including its separator; empty for the whole file; `start`:
     time of the first sample, if the file gives one per column.
     """
 
@@ -170,20 +170,20 @@ class Step:
     start: str = ""
 
     def belongs(self, names: Iterable[str]) -> bool:
-        """Whether they apply to any of the columns."""
+        """Whether the sample time applies to any of these columns."""
         group = self.of[-1:] in ("", ".", "/")
         return not self.of or any(name.startswith(self.of) if group else name == self.of for name in names)
 
 
 def from_lines(lines: Iterable[tuple[int, str]], decimal: str) -> list[Step]:
-    """The sample rate found in numbered lines of text."""
+    """The sample times and rates found in numbered lines of text."""
     found = []
     for number, line in lines:
         for match in _LINE.finditer(line.replace('"', "")):
             text = match["number"]
             if "," in text and (decimal != "," or text.count(",") > 1 or "." in text):
                 continue
-            # A word with a value of its own is not a unit but the next entry of the line
+            # A word that has its own value is not a unit but the next entry of the line
             after = "" if match["entry"] else match["after"]
             unit = match["unit"] or (match["suffix"] or "").lstrip("_") or after or ""
             step = _step(bool(match["rate"]), float(text.replace(",", ".")), unit, f"line {number}")
@@ -209,7 +209,7 @@ def from_number(name: str, value: float, of: str = "", unit: str = "") -> Step |
 
 
 def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
-    """Seconds per sample, from a rate or an interval; None if the unit fits neither."""
+    """Seconds per sample, from a rate or an interval; None if its value or unit is unusable."""
     if not 0.0 < value < float("inf"):
         return None
     text = plain(unit)
@@ -231,7 +231,7 @@ def _step(rate: bool, value: float, unit: str, where: str) -> Step | None:
 
 
 LISTED = 20
-"""Columns or bad cells listed one by one before the rest is only counted."""
+"""Columns or bad cells that are listed individually; the rest are only counted."""
 
 STANDARD = ("t", "v", "y")
 
@@ -245,7 +245,7 @@ MEANINGS = {
          "auslenkung", "déplacement", "deplacement", "desplazamiento")
     ),
 }
-"""Words in column names that suggest one of our columns if none has our name."""
+"""Words in column names that suggest one of our columns if no column has our name for it."""
 
 DECIDE = {
     "y": frozenset(("measured", "sensor", "actual", "istwert", "messwert")),
@@ -271,9 +271,9 @@ _HUMP = re.compile(r"(?<=[a-zß-ÿ])(?=[A-ZÀ-Þ])")
 class Column:
     """A column of the file; its name need not be unique.
 
-    `name`: how it is addressed, `session1/drive [V]`; `own`: the last part, `drive [V]`; `label`: that without a unit,
-    `drive`; `unit`: empty if the file gives none; `length`: samples, 0 if unknown before reading; `read`: returns its
-    numbers as a one-dimensional array that nobody else holds; `also`: another name that the file gives it.
+    `name`: how it is addressed, `session1/drive [V]`; `own`: the last part, `drive [V]`; `label`: the last part without
+    its unit, `drive`; `unit`: empty if the file gives none; `length`: samples, 0 if unknown before reading; `read`:
+    returns its numbers as a one-dimensional array that the caller owns; `also`: another name that the file gives it.
     """
 
     name: str
@@ -305,7 +305,7 @@ def column(
 
 
 def meaning(c: Column) -> str:
-    """The column of ours that the words of a name mean; empty if they mean none, or more than one."""
+    """Which of our columns the words of a name indicate; empty if they indicate none, or more than one."""
     words = _words(c)
     if words & OTHERWISE:
         return ""
@@ -320,7 +320,7 @@ def meaning(c: Column) -> str:
 
 def _words(c: Column) -> set[str]:
     """Words of a column's name, in lower case."""
-    # "Control Voltage of OutputChan1": what it is, not what it belongs to
+    # In "Control Voltage of OutputChan1", only the words before "of" say what the quantity is
     quantity = re.split(r"\s(?:of|von|de)\s", c.label, maxsplit=1)[0]
     words = [word for part in _WORDS.findall(quantity) for word in _HUMP.split(part)]
     # A capital T is a temperature more often than a time
@@ -334,11 +334,11 @@ def parse_columns(text: str) -> dict[str, str]:
     if all(part.isdecimal() for part in numbers):
         if len(numbers) not in (2, 3):
             raise ValueError(
-                f"{len(numbers)} numbers of columns are given; 3 are time, drive and measured, 2 drive and measured, "
-                "others are written t=#1,v=#3"
+                f"{len(numbers)} column numbers are given; give 3 for time, drive and measured, 2 for drive and "
+                "measured, or write t=#1,v=#3"
             )
         if len(set(numbers)) < len(numbers) or any(int(number) == 0 for number in numbers):
-            raise ValueError(f'"{printable(text)}" names no columns; write different numbers, starting at 1')
+            raise ValueError(f'"{printable(text)}" does not name columns; write different numbers, starting at 1')
         return dict(zip(STANDARD[-len(numbers) :], (f"#{int(number)}" for number in numbers), strict=True))
     mapping: dict[str, str] = {}
     for part in text.split(","):
@@ -357,10 +357,10 @@ def parse_columns(text: str) -> dict[str, str]:
 
 @dataclass
 class Finder:
-    """Finds the requested columns; `problems` says what is wrong with the others.
+    """Finds the requested columns; `problems` lists what is wrong with those not found.
 
-    `understood`: columns found by the meaning of their names, by our names; `steps`: the file's sample rate for the
-    columns found, if it has no time.
+    `understood`: columns found by the meaning of their names, keyed by our names; `steps`: the file's sample rate for
+    the columns found, if it has no time.
     """
 
     columns: Sequence[Column]
@@ -377,11 +377,11 @@ class Finder:
     def find(
         self, need: Sequence[str], timed: bool, steps: Sequence[Step] = (), points: bool = False
     ) -> dict[str, Column]:
-        """Our names to columns.
+        """The columns found, keyed by our names.
 
-        `need`: names that must be there; `timed`: the user gives the sample time, so the file need not have a time;
-        `steps`: sample rates in the file, used only if it has no time; `points`: no time is needed either, if no
-        remaining column could be one.
+        `need`: names that must be present; `timed`: the user gives the sample time, so the file need not have a time;
+        `steps`: sample rates in the file, used only if it has no time; `points`: the file need not have a time either
+        if every column is already taken.
         """
         found: dict[str, Column] = {}
         wanted = dict.fromkeys([*need, *STANDARD, *self.mapping])
@@ -410,7 +410,7 @@ class Finder:
         return found
 
     def _apart(self, named: Mapping[str, Column], found: Mapping[str, Column], need: Sequence[str]) -> None:
-        """One column cannot stand for two needed ones."""
+        """Report columns that are used for two needed ones."""
         for ours, c in found.items():
             if ours in named or ours not in (*need, "t"):
                 continue
@@ -424,7 +424,7 @@ class Finder:
             self.problems.append(f'column "{printable(twice)}" is given two names; name it once')
 
     def _meant(self, ours: str, found: Mapping[str, Column]) -> Column | None:
-        """The only column whose name has our meaning; for a time, also the first column with a unit of time."""
+        """The only column whose name means `ours`; for a time, else the first column if its unit is a unit of time."""
         taken = {c.name for c in found.values()}
         free = [c for c in self.columns if c.name and c.name not in taken]
         meant = [c for c in free if meaning(c) == ours]
@@ -435,7 +435,7 @@ class Finder:
         return meant[0] if len(meant) == 1 else None
 
     def _name_together(self, found: Mapping[str, Column]) -> None:
-        """One question for all columns that are unidentified or have several candidates."""
+        """Report all columns that are unidentified or have several candidates as one problem."""
         if not self._unnamed:
             for ours, meant in self._several.items():
                 self._ask(ours, ours, meant)
@@ -451,7 +451,7 @@ class Finder:
         )
 
     def _example(self, unnamed: Sequence[str], found: Mapping[str, Column]) -> str:
-        """A suggested answer to the question for columns, in file order, if no more columns remain than are needed."""
+        """An example that assigns the remaining columns in file order, if there are only as many as are needed."""
         taken = set(found.values())
         free = [c for c in self.columns if c.name and c not in taken and not _words(c) & COUNTING]
         times = [c for c in free if is_time_unit(c.unit) or meaning(c) == "t"]
@@ -511,7 +511,7 @@ class Finder:
             if wanted != name and not name.endswith(("/" + wanted, "." + wanted)) and not wanted.startswith(name + "/"):
                 continue
             self.problems.append(
-                f'"{printable(name)}" is kept outside this file, and no other file is opened; copy its numbers into '
+                f'"{printable(name)}" is stored outside this file, and no other file is opened; copy its numbers into '
                 f'this one, or name another column with --columns "{ours}=COLUMN"'
             )
             return
@@ -524,7 +524,7 @@ class Finder:
         self.problems.append(f'there is no column "{printable(theirs)}" among {_listed(self.columns)}; {advice}')
 
     def _advice(self, ours: str) -> str:
-        """The likely column, judged by its name without a unit, or else how to name one."""
+        """Advice: the likely column, judged by its name without a unit, or else how to name one."""
         known = MEANINGS.get(ours, frozenset()) | DECIDE.get(ours, frozenset()) | {ours}
         for c in self.columns:
             if _words(c) & known and self.mapping.get(ours) != c.name:

@@ -1,6 +1,6 @@
-"""Text tables, read in blocks: numpy's C reader takes the sound blocks, the others are read line by line.
+"""Text tables, read in blocks: numpy's C reader takes the sound blocks; the others are read line by line.
 
-A file of any size thus needs little more memory than its columns, and every fault is reported with its place.
+A file of any size thus needs little more memory than its columns, and every fault is reported with its position.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from hystgen.records.record import Array
 
 
 BLOCK = 1 << 20
-"""[bytes] Read at a time; a longer line does not belong to a text table."""
+"""[bytes] Size of the blocks read; a line longer than this does not belong to a text table."""
 
 WIDE = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16-le", codecs.BOM_UTF16_BE: "utf-16-be"}
 """Encodings by the byte order mark that a file begins with."""
 
 LOOKED_AT = 1 << 10
-"""Bytes at the start of a file that show UTF-16 without a byte order mark."""
+"""[bytes] Length of the start of a file that is searched for signs of UTF-16 without a byte order mark."""
 
 
 def texts(reading: Reading, stream: IO[bytes]) -> Iterator[str]:
@@ -58,7 +58,7 @@ def texts(reading: Reading, stream: IO[bytes]) -> Iterator[str]:
 
 
 def _eight_bit(reading: Reading, stream: IO[bytes]) -> Iterator[bytes]:
-    """The bytes of the file without its byte order mark, those of UTF-16 as UTF-8."""
+    """The bytes of the file without its byte order mark; UTF-16 is converted to UTF-8."""
     data = stream.read(BLOCK)
     mark, encoding = next(((mark, name) for mark, name in WIDE.items() if data.startswith(mark)), (b"", ""))
     encoding = encoding or _wide_without_mark(data[:LOOKED_AT])
@@ -83,7 +83,7 @@ def _eight_bit(reading: Reading, stream: IO[bytes]) -> Iterator[bytes]:
 
 
 def _wide_without_mark(start: bytes) -> str:
-    """UTF-16 if every other byte is zero, as in text that is mostly digits; otherwise an empty string."""
+    """The UTF-16 encoding if nearly every other byte is zero, as in mostly ASCII text; otherwise an empty string."""
     pairs = len(start) // 2
     for encoding, zeros, others in (
         ("utf-16-le", start[1::2].count(0), start[: 2 * pairs : 2].count(0)),
@@ -98,7 +98,7 @@ def _blocks(reading: Reading, chunks: Iterator[bytes]) -> Iterator[bytes]:
     rest = b""
     for data in chunks:
         data = rest + data
-        # A carriage return at the end may be the first half of a line end
+        # A carriage return at the end may be the first half of a CR-LF
         end = max(data.rfind(b"\n"), data.rfind(b"\r", 0, -1)) + 1
         if end:
             yield data[:end]
@@ -116,10 +116,10 @@ SAMPLE = 1 << 16
 """Characters read from the start of a file, in whole lines, to determine its layout."""
 
 SAMPLE_LINES = 8
-"""Minimum number of those lines, however long they are: a header, units and a few rows."""
+"""Minimum number of lines in that sample, however long they are: a header, units and a few rows."""
 
 PARAMETERS = re.compile(r"^hystgen\s*:", re.MULTILINE)
-"""How the text of a model begins; no table begins like this."""
+"""How a line of a parameter file begins; no line of a table begins like this."""
 
 SPARE = 1.05
 """Ratio of the rows allocated to the number that the first block suggests."""
@@ -152,7 +152,7 @@ def read_csv(reading: Reading, stream: IO[bytes]) -> Table:
 
 
 def _layout(reading: Reading, sample: str) -> TableLayout:
-    """The layout of the first lines; notes how the file was interpreted."""
+    """The layout found in the first lines; notes how the file was interpreted."""
     fewest = len("\n".join(sample.split("\n", SAMPLE_LINES)[:SAMPLE_LINES]))
     start = sample[: sample.find("\n", max(SAMPLE, fewest)) + 1]
     lines = (start or sample).split("\n")
@@ -198,7 +198,7 @@ def _is_below_text(lines: Sequence[str], header: int) -> bool:
 
 
 def _below(text: str, first: int) -> str:
-    """The text from a given line on, counted from 1."""
+    """The text from line `first` on; lines count from 1."""
     start = 0
     for _ in range(first - 1):
         start = text.find("\n", start) + 1
@@ -208,13 +208,13 @@ def _below(text: str, first: int) -> str:
 
 
 def _size(stream: IO[bytes]) -> int:
-    """Bytes of the file; 0 for a pipe."""
+    """Size of the file in bytes; 0 for a pipe."""
     return os.fstat(stream.fileno()).st_size
 
 
 @dataclass
 class _Fault:
-    """Description of a fault, with its first place, number of occurrences and last line."""
+    """Description of a fault, with its first position, number of occurrences and last line."""
 
     text: str
     line: int
@@ -233,20 +233,20 @@ class _Body:
         self.dialect = layout.dialect
         self.wanted = frozenset(wanted.values())
         self.size = size
-        # Only the time may be a time of day; in other columns that is text
+        # Only the column t may hold times of day; in other columns they are text
         self.clock_column = wanted["t"] if wanted.get("t") in layout.clocks else None
         self.clock = Clock()
         self.time_column = wanted.get("t")
-        # A segment header that continues in the next block; first row, line and seconds of each segment
+        # A segment header that continues in the next block; first row, line and start in seconds of each segment
         self.kept = ""
         self.segments: list[tuple[int, int, float]] = []
-        # The columns known to be numeric; text columns and duplicates are not stored
+        # The columns that may be numeric; text columns and duplicates are not stored
         alike = Counter(self.names)
         self.stored: dict[int, Array] = {
             k: np.empty(0) for k, name in enumerate(self.names) if (name and alike[name] == 1) or k in self.wanted
         }
         self.text_columns: set[int] = set()
-        # Cells at the end of a line may be missing if they have no name and are not needed
+        # Cells at the end of a line may be missing if their columns have no name and are not needed
         named = [k + 1 for k, name in enumerate(self.names) if name or k in self.wanted]
         self.fewest = max(named, default=len(self.names))
         self.rows = 0
@@ -255,7 +255,7 @@ class _Body:
         self.faults: dict[tuple[str, ...], _Fault] = {}
 
     def take(self, text: str) -> None:
-        """Rows of one block of whole lines, which may contain headers of further segments."""
+        """Take the rows of one block of whole lines, which may contain headers of further segments."""
         segments = self.layout.segments
         if segments is None:
             self._take_rows(text)
@@ -311,7 +311,7 @@ class _Body:
         if self.clock.problem:
             reading.problem(self.clock.problem)
         if self.layout.rows is not None and self.rows != self.layout.rows:
-            reading.notes.append(f"the file says that it has {self.layout.rows} samples, it has {self.rows}")
+            reading.notes.append(f"the file says that it has {self.layout.rows} samples, but it has {self.rows}")
         reading.refuse_if_any()
         for x in self.stored.values():
             x.resize(self.rows, refcheck=False)
@@ -341,13 +341,13 @@ class _Body:
             t[row:end] += seconds
             if 0 < row < end and not t[row] > t[row - 1]:
                 raise self.reading.refuse(
-                    f"has a segment that begins at {t[row]:g} s, when the one before it has come to {t[row - 1]:g} s; "
+                    f"has a segment that begins at {t[row]:g} s, but the one before it ends at {t[row - 1]:g} s; "
                     "one file is one experiment, export each separately",
                     line,
                 )
 
     def _room(self, rows: int, size: int) -> None:
-        """Make room for `more` rows, and at once for all that may follow if these take `size` bytes."""
+        """Make room for `rows` more rows; the first time, for all rows of the file if these take `size` bytes."""
         needed = self.rows + rows
         have = min((len(x) for x in self.stored.values()), default=needed)
         if needed <= have:
@@ -361,7 +361,7 @@ class _Body:
                 self.stored[k].resize(max(needed, expected), refcheck=False)
 
     def _fast(self, text: str, lines: int) -> NDArray[np.float64] | None:
-        """All cells, read by numpy's C reader; None if a line may have to be left out or has a fault."""
+        """All cells, read by numpy's C reader; None if a line may be faulty or may have to be left out."""
         stored = list(self.stored)
         everything = len(stored) == len(self.names)
         dialect = self.dialect
@@ -388,7 +388,7 @@ class _Body:
         return cells
 
     def _regular(self, text: str, lines: int) -> bool:
-        """Whether every line has as many cells as the header; numpy only checks the ones it is asked for."""
+        """Whether every line has as many cells as the header; numpy checks only the columns that are requested."""
         try:
             data = np.frombuffer(text.encode("latin-1"), dtype=np.uint8)
         except UnicodeEncodeError:
@@ -398,7 +398,7 @@ class _Body:
             if '"' in text:
                 return False
             blank = (data == ord(" ")) | (data == ord("\t")) | ends
-            # Where a cell begins; a line has one cell more than it has separators
+            # Cells are counted where they begin; with any other delimiter a line has one cell more than delimiters
             between = ~blank & np.concatenate([[True], blank[:-1]])
             extra = 1
         else:
@@ -408,7 +408,7 @@ class _Body:
             quotes = data == ord('"')
             quoted = np.logical_xor.accumulate(quotes)
             before = np.concatenate([[True], (ends | between)[:-1]])
-            # numpy differs in how it reads quotes that open in the middle of a cell, or stay open at the end of a line
+            # numpy reads quotes differently if they open in the middle of a cell, or stay open at the end of a line
             if np.any(quotes & quoted & ~before) or np.any(ends & quoted) or quoted[-1]:
                 return False
             between &= ~quoted
@@ -417,7 +417,7 @@ class _Body:
         return bool(np.all((self.fewest <= found) & (found <= len(self.names))))
 
     def _slow(self, text: str) -> None:
-        """Read line by line: reports wrong cells with their place, and accepts missing ones."""
+        """Read line by line: reports wrong cells with their positions, and accepts missing ones."""
         names = self.names
         values: dict[int, list[float]] = {k: [] for k in self.stored}
         lines: list[int] = []
@@ -462,7 +462,7 @@ class _Body:
         """Report a cell of a needed column that is not a number. The same fault in many cells counts as one problem."""
         name = printable(self.names[column])
         if column == self.clock_column:
-            kind, what, advice = "", "a time of day", "write every time as the first one"
+            kind, what, advice = "", "a time of day", "write every time like the first one"
         else:
             what = "a number"
             kind, advice = self.dialect.fault(cell)

@@ -1,7 +1,7 @@
 """HDF5 (`.h5`, `.hdf5`) and MATLAB `.mat` v7.3, which is HDF5 with a header of its own; uses h5py.
 
 A record is one file: datasets behind external links, with external storage, or assembled from others (virtual) are not
-read, since that would open whatever the file names.
+read, since that would open any file that this one names.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ SLICE = 1 << 18
 _UNITS = ("units", "unit", "Units", "Unit")
 
 LONGEST = 1 << 10
-"""Characters of a text that may be a label or a unit; longer texts are not read."""
+"""[characters] Longest text that may be a label or a unit; longer texts are not read."""
 
 DEEPEST = 32
-"""[levels] Nesting limit of groups, like that of structs in `mat_nesting`: paths of 20,000 levels take minutes, since
-each holds all those above it."""
+"""[levels] Nesting limit of groups, like that of structs in `mat_nesting`: 20,000 levels take minutes, since the path
+of each group contains all those above it."""
 
 _MATLAB_OWN = ("#refs#", "#subsystem#")
 """Groups in which MATLAB keeps the contents of its cell arrays and objects."""
@@ -183,7 +183,7 @@ def _unit(dataset: h5py.Dataset) -> str:
 
 
 def _vector(reading: Reading, dataset: h5py.Dataset) -> NDArray[np.float64]:
-    """A vector, slice by slice, so that HDF5's own buffers stay small and a progress bar can move."""
+    """A vector, read slice by slice so that HDF5's own buffers stay small and a progress bar can move."""
     axis = int(np.argmax(dataset.shape))
     length = dataset.shape[axis]
     # Whole chunks, since reading part of a compressed chunk costs as much as all of it

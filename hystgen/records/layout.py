@@ -1,8 +1,8 @@
 """The layout of a text table: its separator, header lines, units and number format.
 
-The numbers reveal it: the file's separator and decimal mark are the ones with which most cells of its first lines are
-numbers. Header and units are then the lines above with the same number of cells. Headers of some instruments state
-their layout.
+The layout is inferred from the numbers: the separator and decimal mark are the ones that turn the most cells of the
+first lines into numbers. Header and units are then the lines above with the same number of cells. Files of some
+instruments state their layout in a header.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ EXAMPLES = {1: "v=#1", 2: "1,2 --sample-time SECONDS"}
 """How to name columns by number in a table with this many columns."""
 
 EXAMPLE = "1,2,3"
-"""The same for every wider table."""
+"""How to name them in any wider table."""
 
 
 @dataclass
@@ -38,9 +38,9 @@ class TableLayout:
     """A text table: `names` and `units` of its columns; lines count from 1.
 
     `also`: second names of columns; `header`: line of the names, None if there is none; `first`: first line of the
-    rows; `steps`: sample rates given in the lines above; `kind`: the instrument's format, empty for text in general;
+    rows; `steps`: sample rates given in the lines above; `kind`: the instrument's format, empty for any other text;
     `clocks`: columns of times of day; `rows`: number of rows the file says it has; `another`: text that would begin
-    another table; `segments`: headers among the rows after which the table continues.
+    another table; `segments`: further headers among the rows, after which the table continues.
     """
 
     dialect: Dialect
@@ -66,7 +66,7 @@ class _Line:
 
 @dataclass(frozen=True)
 class _View:
-    """The lines as one dialect sees them: rows of `width` cells, with `score` more numbers than texts among them."""
+    """The lines as read in one dialect: rows of `width` cells; `score`: how many more cells are numbers than text."""
 
     dialect: Dialect
     width: int
@@ -78,7 +78,7 @@ class _View:
 def find(reading: Reading, lines: Sequence[str]) -> TableLayout:
     """The layout of a table: from its header if an instrument wrote it, else from the numbers.
 
-    Raises RecordError if nothing fits, or more than one layout does.
+    Raises RecordError if no layout fits, or more than one does.
     """
     said = (header(reading, lines) for header in (labview, pi_gcs, tektronix, rigol, yokogawa))
     return next((layout for layout in said if layout is not None), None) or _shown(reading, lines)
@@ -145,7 +145,7 @@ def _view(dialect: Dialect, lines: Sequence[_Line]) -> _View | None:
 
 
 def _with_header(reading: Reading, view: _View, lines: Sequence[_Line]) -> TableLayout | None:
-    """The layout with the header in plain text, or the one in a comment right above the numbers if that says more."""
+    """The layout with the plain header, or with one in a comment above the numbers if it names more of our columns."""
     plain, comment = _plain_header(view, lines), _comment_header(view, lines)
     if plain is None or comment is None:
         return plain or comment
@@ -169,13 +169,13 @@ def _plain_header(view: _View, lines: Sequence[_Line]) -> TableLayout | None:
             block.append((lines[k], names))
         elif all(view.dialect.weight(cell) <= 0 for _, cell in view.dialect.cells(lines[k].text)):
             break
-    # The lowest line without a number is the header, or the units below it; others are rows with faults
+    # The lowest line without a number is the header, or the units below it; lines with numbers are faulty rows
     for place, (line, names) in enumerate(block):
         if not any(view.dialect.weight(name) > 0 for name in names):
             more = block[place + 1 : place + 3]
             if len(more) == 2 and not _are_units(names) and _are_units(more[0][1]) and _may_be_names(view, more[1][1]):
                 made = _made(view, more[1][1], more[1][0].number, _next(lines, line), more[0][1])
-                made.also = names  # as Origin writes them: long names, units, comments
+                made.also = names  # Origin writes three lines: long names, units, comments
                 return made
             if _are_units(names) and place + 1 < len(block) and _may_be_names(view, block[place + 1][1]):
                 above, upper = block[place + 1]
@@ -188,7 +188,7 @@ def _plain_header(view: _View, lines: Sequence[_Line]) -> TableLayout | None:
 
 
 def _next(lines: Sequence[_Line], above: _Line) -> int:
-    """Number of the line below a given one, if it has rows below it."""
+    """Number of the next line below `above` that is neither blank nor a rule."""
     return next(line.number for line in lines if line.number > above.number)
 
 
@@ -200,7 +200,7 @@ def _made(view: _View, names: list[str], header: int, first: int, units: Sequenc
 def _names(view: _View, text: str) -> list[str] | None:
     """Cells of a line with as many cells as the rows; None for any other line.
 
-    A last cell without a name may be missing in the header or in the rows.
+    The last cell may be missing in the header, or in the rows if it has no name.
     """
     names = [cell.strip() for _, cell in view.dialect.cells(text)]
     if view.dialect.delimiter == BLANKS and len(names) != view.width:
@@ -243,7 +243,7 @@ def _comment_header(view: _View, lines: Sequence[_Line]) -> TableLayout | None:
 
 
 def _headerless(reading: Reading, view: _View, lines: Sequence[_Line]) -> TableLayout:
-    """The layout of a table whose columns are named by number. Raises RecordError if they are not."""
+    """The layout of a table without a header. Raises RecordError unless the user names its columns by number."""
     start = view.start
     while start and not lines[start - 1].comment and len(view.dialect.cells(lines[start - 1].text)) == view.width:
         start -= 1
@@ -254,7 +254,7 @@ def _headerless(reading: Reading, view: _View, lines: Sequence[_Line]) -> TableL
             cells = len(view.dialect.cells(above[-1].text))
             if cells > 1:
                 raise reading.refuse(
-                    f"the line above the numbers has {cells} cells, they have {view.width}; correct the header, or "
+                    f"the line above the numbers has {cells} cells, but rows have {view.width}; correct the header, or "
                     f"name columns by their numbers with --columns {EXAMPLES.get(view.width, EXAMPLE)}",
                     above[-1].number,
                 )
@@ -272,7 +272,7 @@ def _without_numbers(reading: Reading, lines: Sequence[_Line], dialects: Sequenc
     header = next((line for line in lines if not line.comment), None)
     if header is None:
         raise reading.refuse(
-            "has no header row; the first line names the columns, for example t,v,y"
+            "has no header row; the first line has to name the columns, for example t,v,y"
             if lines
             else "is empty; record again, or give another file"
         )
@@ -329,7 +329,7 @@ def _may_be_names(view: _View, cells: Sequence[str]) -> bool:
     return numbers and cells[0] in text and not _are_units(cells)
 
 
-# Headers of instruments; each function gives None for any other file -----------------------------------------
+# Headers of instruments; each function returns None for any other file ---------------------------------------
 
 
 # LabVIEW measurement files (`.lvm`) --------------------------------------------------------------------------
@@ -348,14 +348,14 @@ _SPECIAL = ("***Start_Special***", "***End_Special***")
 def labview(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
     """The layout given by the tags, according to NI's "Specification for the LabVIEW Measurement File (.lvm)".
 
-    Tags of the file, then tags of a segment, each up to `***End_of_Header***`, then names and rows. Further segments
-    continue the rows, see `Segments`; without a time column they are refused.
+    The tags of the file, then those of a segment, both ending in `***End_of_Header***`, come before names and rows.
+    Further segments continue the rows, see `Segments`; without a time column they are refused.
     """
     if not lines[0].startswith("LabVIEW Measurement"):
         return None
     ends = [number for number, line in enumerate(lines, 1) if line.startswith(END)]
     if len(ends) < 2:
-        raise reading.refuse("is a LabVIEW measurement file without a segment; record again or export it anew", 1)
+        raise reading.refuse("is a LabVIEW measurement file without a segment; record or export it again", 1)
     delimiter = "," if any(line.startswith("Separator,") for line in lines[: ends[0]]) else "\t"
     file = _tags(lines[: ends[0]], delimiter)
     segment = _tags(lines[ends[0] : ends[1]], delimiter)
@@ -420,8 +420,8 @@ class Segments:
     """Segments after the first one of a LabVIEW file: rows of the same channels, each under a header of its own.
 
     By NI's specification, times are seconds since the date and time of the segment if `Time_Pref` is `Relative`, and
-    since one moment for the whole file if it is `Absolute`. `place`: column of the times; `names`, `tags`: of the first
-    segment.
+    since the same instant throughout the file if it is `Absolute`. `place`: column of the times; `names`, `tags`: those
+    of the first segment.
     """
 
     reading: Reading
@@ -443,9 +443,9 @@ class Segments:
         return text.find("\n", names) + 1 or -1 if names else -1
 
     def read(self, header: str, line: int) -> tuple[float, int | None]:
-        """Seconds from the first segment to this one, and the number of rows that it says it has.
+        """Seconds from the first segment to this one, and the number of rows that its header states, or None.
 
-        Raises RecordError if it has other channels.
+        Raises RecordError if its channels differ from those of the first segment.
         """
         *lines, last = header.rstrip("\n").split("\n")
         tags = _tags(lines, self.dialect.delimiter)
@@ -454,7 +454,7 @@ class Segments:
         if [name for name in names if name] != [name for name in self.names if name] or units[0] != units[1]:
             raise self.reading.refuse(
                 f"has a segment with other channels ({printable(', '.join(filter(None, names)))}) than the first; one "
-                "file is one experiment, export each by itself",
+                "file is one experiment, export each separately",
                 line,
             )
         several = any(len({text for text in tags.get(tag, ()) if text}) > 1 for tag in ("X0", "Delta_X"))
@@ -503,7 +503,7 @@ def _number(reading: Reading, dialect: Dialect, text: str, tag: str, line: int) 
 
 
 LARGEST_CODE = 1 << 16
-"""Column numbers and character codes are smaller than this."""
+"""Column counts and character codes are smaller than this."""
 
 _ENTRY = re.compile(r"\s*#\s*(\w+)\s*(?:=\s*(.*?))?\s*")
 
@@ -562,7 +562,7 @@ _SETTINGS = ("Sample Interval", "Record Length", "Vertical Units")
 def tektronix(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
     """The layout given by the settings: one per line and one cell per channel, then `TIME,CH1,CH2` and the rows.
 
-    They hold what the header lacks: units of time and of each channel, and the label that a user gave it.
+    The settings hold what the header lacks: the units of time and of each channel, and the channels' labels, if given.
     """
     delimiter = reading.delimiter or next((mark for mark in ",;\t" if f"TIME{mark}" in "\n".join(lines)), ",")
     dialect = Dialect(delimiter, "," if delimiter != "," and _decimal_commas(lines, delimiter) else ".")
@@ -604,9 +604,9 @@ _RIGOL_CHANNEL = re.compile(r"(CH\d+|MATH\d*)(V|A|W)")
 
 
 def rigol(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
-    """The layout of a table without time, whose first lines give its start and increment instead.
+    """The layout of a table without a time column, whose first lines give the start and increment of time instead.
 
-    `X,CH1,CH2,Start,Increment` above `Sequence,Volt,Volt,-0.2,0.001`, newer ones `CH1V,CH2V,t0 = -0.2, tInc = 0.001`.
+    `X,CH1,CH2,Start,Increment`, `Sequence,Volt,Volt,-0.2,0.001`; in newer files `CH1V,CH2V,t0 = -0.2, tInc = 0.001`.
     """
     cells = [cell.strip() for cell in lines[0].split(",")]
     below = [cell.strip() for cell in lines[1].split(",")] if len(lines) > 1 else []
@@ -635,8 +635,8 @@ def rigol(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
 def yokogawa(reading: Reading, lines: Sequence[str]) -> TableLayout | None:
     """The layout given by the settings, one per line and one cell per channel; rows begin with an empty cell.
 
-    There is no time column. `"TraceName","CH1","CH2"` has the names, `VUnit` the units, `HResolution` the time between
-    rows.
+    There is no time column. `"TraceName","CH1","CH2"` gives the names, `VUnit` the units, and `HResolution` the time
+    between rows.
     """
     dialect = Dialect()
     settings: dict[str, tuple[int, list[str]]] = {}

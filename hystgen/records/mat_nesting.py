@@ -1,7 +1,7 @@
 """How deep structs and cells are nested in a MATLAB v5 file, from its headers alone.
 
-scipy reads them by recursion in C, and a file of some hundred kilobytes can crash the process. So the elements are
-walked here first, in the order in which scipy reads them, with an explicit stack.
+scipy reads them by recursion in C, so a file of a few hundred kilobytes can crash the process. The elements are
+therefore walked here first, in the order in which scipy reads them, with an explicit stack.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from collections.abc import Callable, Iterator
 from typing import IO
 
 MOST = 32
-"""[levels] Nesting of structs and cells: ControlDesk and Simulink save up to five. scipy 1.17 reads 1000, and crashes
-the process at 5000 with 8 MB of stack. Set by: tests/test_record_formats.py TestNesting."""
+"""[levels] Nesting limit of structs and cells: ControlDesk and Simulink save up to five levels. scipy 1.17 reads 1000,
+and crashes the process at 5000 with an 8 MB stack. Set by: tests/test_record_formats.py TestNesting."""
 
 MANY = 10_000_000
-"""[structs or cells in one array] scipy allocates as many as the header says, and visits them all before it notices
-that they are missing: 2^31 of them without a field take minutes."""
+"""[structs or cells in one array] Limit: scipy allocates as many as the header says, and visits them all before it
+notices that they are missing; 2^31 structs without fields take minutes."""
 
 HEADER = 128
 """Bytes before the first variable; the last two give the byte order."""
@@ -33,7 +33,7 @@ COMPLEX = 0x800
 """Flag of an array with an imaginary part."""
 
 PIECE = 1 << 16
-"""Bytes read or unpacked at a time."""
+"""[bytes] Amount read or unpacked at a time."""
 
 
 def problem(stream: IO[bytes]) -> str:
@@ -73,7 +73,7 @@ class _Unpacked:
         self._packed = b""
 
     def read(self, size: int) -> bytes:
-        """That many bytes, or fewer at the end."""
+        """The next `size` bytes, or fewer at the end."""
         found = b""
         while len(found) < size and not self._unpack.eof:
             if not self._packed:
@@ -107,13 +107,13 @@ class _Elements:
             self._bytes(min(PIECE, size - start))
 
     def _tag(self) -> tuple[int, int, bytes | None]:
-        """Type and size of an element, and its content if it is stored next to them."""
+        """Type and size of an element, and its content if it is stored in the tag itself."""
         raw = self._bytes(8)
         kind, size = struct.unpack(f"{self._order}II", raw)
         return (kind & 0xFFFF, kind >> 16, raw[4 : 4 + (kind >> 16)]) if kind >> 16 else (kind, size, None)
 
     def _element(self) -> int:
-        """The size of an element, which is skipped."""
+        """Skip an element and return its size."""
         _, size, inside = self._tag()
         if inside is None:
             self._skip(size + -size % 8)
@@ -127,7 +127,7 @@ class _Elements:
         return struct.unpack(f"{self._order}{len(data) // 4}i", data)
 
     def matrix(self) -> int:
-        """The size of an array, whose header comes next."""
+        """Read the tag of an array and return its size; the array's header comes next."""
         kind, size, inside = self._tag()
         if kind != MATRIX or inside is not None:
             raise ValueError

@@ -1,8 +1,8 @@
-"""Records from data in memory: columns by name, data frames, arrays side by side.
+"""Records from data in memory: named columns, data frames, parallel arrays.
 
 A data frame is recognised by its interface (`columns` or `column_names`, and columns by name), so that pandas, polars
-and Arrow tables can be read without importing those packages. Names, units in them, missing values and times are
-treated as in a file.
+and Arrow tables can be read without importing those packages. Names and the units in them, missing values and times
+are treated as in a file.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ Columns = Mapping[str, ArrayLike] | Frame | NDArray[np.generic] | tuple[ArrayLik
 of drive and displacement, preceded by the time if there are three."""
 
 _OPTION = re.compile(r'--columns "([^"]*)"|--sample-time|--columns')
-"""Options named in messages about files, and the arguments that replace them here."""
+"""Options named in messages about files; for data in memory, arguments of the call replace them."""
 
 
 def in_memory(source: object) -> TypeGuard[Columns]:
     """Whether something holds the samples of one record, judged by its type alone."""
     if isinstance(source, Mapping | np.ndarray) or _names(source) is not None:
         return True
-    # A list of paths or records is a list of sources
+    # A list may be one of paths or records, so only tuples hold arrays
     return isinstance(source, tuple) and bool(source) and all(_is_samples(each) for each in source)
 
 

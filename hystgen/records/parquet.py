@@ -25,7 +25,7 @@ _PER_SECOND = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
 def read_parquet(reading: Reading, stream: IO[bytes]) -> Table:
-    """Read a Parquet file: its columns of numbers, and times and durations in seconds; nulls become NaN."""
+    """Read a Parquet file: its numeric columns, with times and durations in seconds; nulls become NaN."""
     try:
         import pyarrow.parquet as pq
     except ImportError:
@@ -67,7 +67,7 @@ def _unit(field: pyarrow.Field) -> str:
 
 
 def _vector(reading: Reading, file: parquet.ParquetFile, field: pyarrow.Field) -> NDArray[np.float64]:
-    """A column, batch by batch; time stamps count from the first in the column."""
+    """A column, read batch by batch; time stamps count from the first in the column."""
     import pyarrow as pa
     from pyarrow import compute, types
 

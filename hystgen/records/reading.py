@@ -1,4 +1,4 @@
-"""Steps shared by all formats: the request, the problems found, the columns chosen, and the record made from them."""
+"""What all formats share: the request, the problems found, the columns chosen, and the record made from them."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from hystgen.records.columns import LISTED, STANDARD, Column, Finder, Step, colu
 from hystgen.records.record import Array, Record
 
 SAME_STEP = 1e-6
-"""Largest relative difference between sample times that count as equal: files write at least seven digits, or round."""
+"""Largest relative difference between sample times that count as equal: files write seven digits or a round number."""
 
 BESIDE = 2
-"""[times] Memory needed for a record relative to that of its numbers, because of sorted copies and marks: 1.7 with 2e7
-samples of HDF5 (2026-11-26)."""
+"""[times] Memory needed to read a record relative to that of its numbers, because of sorted copies and masks: 1.7 with
+2e7 samples of HDF5 (2026-11-26)."""
 
 NO_SECONDS = 1e11
-"""Times from here on are not seconds: seconds since 1970 get there in the year 5138, milliseconds did in 1973."""
+"""Times this large are not seconds: seconds since 1970 reach this number in the year 5138, milliseconds did in 1973."""
 
 
 def _memory() -> float:
@@ -39,14 +39,14 @@ def _memory() -> float:
 
 
 class Lines:
-    """Line of the file that each row of a table came from, stored as runs of rows."""
+    """The line of the file from which each row of a table came, stored as runs of rows."""
 
     def __init__(self) -> None:
         self._rows: list[int] = []
         self._lines: list[int | NDArray[np.int64]] = []
 
     def add(self, first_row: int, lines: int | NDArray[np.int64]) -> None:
-        """Rows from `first_row` on: their lines, or the first line if the others follow one by one."""
+        """Add rows from `first_row` on with their lines, or with the first line if the others are consecutive."""
         self._rows.append(first_row)
         self._lines.append(lines)
 
@@ -82,9 +82,9 @@ class Table:
 class Reading:
     """A file being read: the request, and the problems and notes so far.
 
-    `delimiter`: what separates cells, None to find it from the file; `fills`: for each column with numbers that stand
-    for "no value", which ones, in words; `points`: whether it may lack a time; `read_as`: interpretations that the file
-    does not state plainly.
+    `delimiter`: what separates cells, None to infer it from the file; `fills`: for each column with numbers that stand
+    for "no value", a phrase naming them; `points`: whether the file may lack a time; `read_as`: interpretations that
+    the file does not state plainly.
     """
 
     file: str
@@ -108,7 +108,7 @@ class Reading:
         self.read_as.append(text)
 
     def problem(self, text: str, line: int | None = None, column: int | None = None) -> None:
-        """Add a problem for which the file is refused, with its place if the file has lines."""
+        """Add a problem for which the file is refused, with its position if the file has lines."""
         place = self.file if line is None else f"{self.file}:{line}:{column or 1}"
         self.problems.append(f"{place}: error: {text}")
 
@@ -130,7 +130,7 @@ class Reading:
         except RecordError:
             raise
         except MemoryError:
-            raise self.refuse("needs more memory than there is; export fewer samples or columns") from None
+            raise self.refuse("needs more memory than is available; export fewer samples or columns") from None
         except Exception as failure:
             raise self.refuse(f"is not {kind} ({printable(str(failure))}); export it again") from None
 
@@ -142,7 +142,7 @@ class Reading:
         line: int | None = None,
         steps: Sequence[Step] = (),
     ) -> dict[str, Column]:
-        """The requested columns, by our names. Raises RecordError for those that are missing.
+        """The requested columns, keyed by our names. Raises RecordError for those that are missing.
 
         `steps`: sample rates in the file, used if there is neither a time nor `sample_time`.
         """
@@ -153,7 +153,7 @@ class Reading:
         steps = finder.steps
         if len({step.start for step in steps}) > 1:
             starts = " and ".join(f"{printable(step.of)} at {step.start}" for step in steps)
-            self.problem(f"the columns start at different times,  {starts}; export them with a common time", line)
+            self.problem(f"the columns start at different times: {starts}; export them with a common time", line)
         if any(abs(step.seconds - steps[0].seconds) > SAME_STEP * steps[0].seconds for step in steps):
             said = " and ".join(dict.fromkeys(step.said for step in steps))
             self.problem(f"there is no time, but the file has {said}; give --sample-time", line)
@@ -172,7 +172,7 @@ class Reading:
         return found
 
     def further(self, columns: Sequence[Column], chosen: Mapping[str, Column]) -> dict[str, Column]:
-        """The columns that were not requested, by the names they get; a column whose name is taken is noted."""
+        """The columns not requested, keyed by the names they get; a column whose name is taken is noted."""
         used = {c.name for c in chosen.values()}
         others = [c for c in columns if c.name not in used]
         names = further_names(others, list(chosen))
@@ -197,8 +197,8 @@ class Reading:
         """The table of a file whose columns are read one by one.
 
         It reads the requested columns and, from the groups that hold them, all others of the same length, except those
-        that are not numeric (`ignored`) or whose numbers are stored outside the file (`outside`). `matrices`: name to
-        shape and numbers; in a file without vectors, the only matrix is the record.
+        that are not numeric (`ignored`) or whose numbers are stored outside the file (`outside`). `matrices`: shapes
+        and readers by name; in a file without vectors, a single matrix is the record.
         """
         if not columns and len(matrices) == 1:
             ((name, (shape, read)),) = matrices.items()
@@ -210,13 +210,13 @@ class Reading:
             raise self.refuse(f"the columns differ in length: {parts} samples; export them with one length")
         folders = {c.folder for c in chosen.values()}
         self.left_out("without numbers", ignored)
-        self.left_out("kept outside the file", outside)
+        self.left_out("stored outside the file", outside)
         self.left_out("of other groups", [c.name for c in columns if c.folder not in folders])
         near = [c for c in columns if c.folder in folders]
         self.left_out("of another length", [c.name for c in near if c.length not in lengths])
         taken = {**chosen, **self.further([c for c in near if c.length in lengths], chosen)}
         if BESIDE * 8 * len(taken) * next(iter(lengths)) > _memory():
-            raise MemoryError  # a system that overcommits memory would kill the process later
+            raise MemoryError  # a system that overcommits memory would only kill the process later
         numbers: dict[str, Array] = {}
         for name, c in taken.items():
             assert c.read is not None
@@ -224,7 +224,7 @@ class Reading:
         return self.finished(numbers, taken)
 
     def _of_matrix(self, name: str, shape: tuple[int, ...], read: Callable[[], NDArray[np.generic]]) -> list[Column]:
-        """The columns of a matrix, named by number. Raises RecordError if they are not."""
+        """The columns of a matrix. Raises RecordError unless the user names them by number."""
         width = in_matrix(shape)
         if not any(theirs.lstrip("#").isdecimal() for theirs in self.columns.values()):
             example = "1,2 (drive, measured) with --sample-time" if width == 2 else "1,2,3 (time, drive, measured)"
@@ -238,13 +238,13 @@ class Reading:
         ]
 
     def finished(self, numbers: dict[str, Array], taken: Mapping[str, Column], lines: Lines | None = None) -> Table:
-        """A table with NaN for every cell that is not a number, time in seconds, and units by name."""
+        """A table with NaN for every missing value, time in seconds, and units by column name."""
         for name, x in numbers.items():
             wrong = no_value(x)
             written = np.unique(x[wrong & np.isfinite(x)])
             if len(written):
                 several, s = ("numbers such as ", "") if len(written) > 1 else ("", "s")
-                self.fills[name] = f"{several}{written[0]:.6g} in {name} count{s} as none"
+                self.fills[name] = f"{several}{written[0]:.6g} in {name} count{s} as no value"
             x[wrong] = np.nan
         units = {name: taken[name].unit for name in numbers if taken[name].unit}
         if "t" in numbers and "t" not in units and np.any(numbers["t"] >= NO_SECONDS):
@@ -262,7 +262,7 @@ class Reading:
 
 
 MOST_TOGETHER = 64
-"""Largest number of columns of a matrix that is a record; a wider one is an image or a map."""
+"""Largest number of columns of a matrix that may be a record; a wider one is an image or a map."""
 
 
 def in_matrix(shape: tuple[int, ...]) -> int:
@@ -285,7 +285,7 @@ class CountingFile(io.FileIO):
         self._tick = tick
 
     def readinto(self, buffer: bytearray | memoryview) -> int | None:  # type: ignore[override]
-        """Read as usual, and count."""
+        """Read as usual, and report the number of bytes."""
         number = super().readinto(buffer)
         self._tick(number or 0)
         return number
@@ -295,10 +295,10 @@ class CountingFile(io.FileIO):
 
 
 SHORTEST = 16
-"""Fewest samples of a record that a model can be fitted to."""
+"""Minimum number of samples in a record that a model can be fitted to."""
 
 REPAIRABLE = 0.05
-"""Largest share of samples dropped with a note; beyond it the file is refused."""
+"""Largest share of samples that may be dropped with a note; if there are more, the file is refused."""
 
 NOTED_GAP = 3.0
 """A step longer than this many median steps is a gap."""
@@ -330,16 +330,16 @@ def repaired(reading: Reading, table: Table) -> Record:
     fit = "y" in reading.need
     shortest = SHORTEST if fit else 1
     if samples < shortest and not reading.problems:
-        reading.problem(f"has {counted(samples, 'sample')}, at least {shortest} are needed; record for longer")
+        reading.problem(f"has {counted(samples, 'sample')}, but at least {shortest} are needed; record for longer")
     elif fit and samples and not reading.problems and "v" in columns and float(np.ptp(columns["v"])) == 0.0:
         reading.problem(
-            f"the drive v is {columns['v'][0]:g} throughout; a fit needs a drive that moves, check the columns"
+            f"the drive v is {columns['v'][0]:g} throughout, but a fit needs a drive that moves; check the columns"
         )
     reading.refuse_if_any()
     t: Array
     timed = "t" in columns or reading.sample_time is not None
     if not timed:
-        reading.notes.append("no time: taken as points one by one; give --sample-time if it was recorded evenly")
+        reading.notes.append("no time: read as points taken one by one; give --sample-time if they are evenly spaced")
     if "t" in columns:
         t = columns.pop("t")
         step = _step(reading, t)
@@ -371,7 +371,7 @@ def _drop(reading: Reading, table: Table, length: int, wrong: NDArray[np.bool_],
 
 
 def _repeats(t: Array) -> bool:
-    """Whether a time that never goes back repeats too often to be repaired, because it was written with too few
+    """Whether a time that never decreases repeats too often to be repaired, because it was written with too few
     digits."""
     steps = np.diff(t)
     if not len(steps) or float(steps.min()) != 0.0 or float(steps.max()) == 0.0:
@@ -399,17 +399,17 @@ def _even(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> 
     apart = float(np.ptp(even[rows] - t[rows]))
     if apart > finest + given:
         reading.problem(
-            f"the sample time {given:g} s given does not fit the time of the file: over the record they diverge by "
+            f"the given sample time {given:g} s does not fit the time of the file: over the record they diverge by "
             f"{apart:.3g} s; correct it, or export the time with more digits",
             table.line(row),
         )
     else:
-        reading.notes.append(f"t is written in steps of {finest:.3g} s; the sample time {given:g} s given was used")
+        reading.notes.append(f"t is written in steps of {finest:.3g} s; the given sample time {given:g} s was used")
     return even
 
 
 def _rising(reading: Reading, table: Table, t: Array, keep: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Keep the samples whose time is later than all before them."""
+    """Keep the samples that are later than all samples before them."""
     if len(t) < 2 or (keep.all() and np.all(t[1:] > t[:-1])):
         return keep
     latest = np.where(keep, t, -np.inf)
@@ -437,7 +437,7 @@ def _step(reading: Reading, t: Array) -> float:
     given = reading.sample_time
     if given is not None and abs(given - step) > 0.01 * step:
         reading.notes.append(
-            f"the file has its own time with a step of {step:.6g} s; the sample time {given:g} s given was not used"
+            f"the file has its own time with a step of {step:.6g} s; the given sample time {given:g} s was not used"
         )
     return step
 
@@ -446,28 +446,28 @@ def _step(reading: Reading, t: Array) -> float:
 
 
 LARGEST = 1e20
-"""Numbers from here on are not readings, whatever the unit.
+"""Numbers of this magnitude or more are not readings, whatever the unit.
 
-Instruments write 9.9E37 for an overload and 9.91E37 for no number at all (SCPI-99, volume 1, section 7.2.1.4 and 5),
-others the largest float32 or 1e30; counters end at 1.8e19. Parameter files end at 1e30, and the rate of a drive, in
-units per second, may be 1e10 times the drive itself.
+Some instruments write 9.9E37 for an overload and 9.91E37 for "not a number" (SCPI-99, volume 1, section 7.2.1.4 and 5),
+others the largest float32 or 1e30; counters end at 1.8e19. Parameter files allow numbers up to 1e30, and the rate of a
+drive, in units per second, may be 1e10 times the drive itself.
 """
 
 NINES = 3
-"""Fewest digits of a fill value written in nines, such as -999 or 99999.9."""
+"""Minimum number of digits of a fill value made of nines, such as -999 or 99999.9."""
 
 ENDS_OF_INTEGERS = frozenset(
     float(x) for bits in (16, 32, 64) for x in (2 ** (bits - 1) - 1, 2 ** (bits - 1), 2**bits - 1)
 )
-"""Magnitudes at which integer types end."""
+"""Magnitudes of the extremes of integer types."""
 
 
 def no_value(x: Array) -> NDArray[np.bool_]:
     """Whether each number (N,) of a column stands for "no value", as every non-finite number does.
 
-    A number below `LARGEST` stands for "no value" if it is a usual fill value (all nines, the end of an integer type)
-    and lies farther from all others of the column than their spread: a column may also pass through -999. The end of an
-    integer type counts only in a column with fractions; in a column of codes it is an ordinary code.
+    A number below `LARGEST` stands for "no value" if it is a usual fill value (all nines, the extreme of an integer
+    type) and lies farther from the rest of the column than their spread, since a column may also pass through -999. The
+    extreme of an integer type counts only in a column with fractions; in a column of codes it is an ordinary code.
     """
     wrong = ~np.isfinite(x) | (x >= LARGEST) | (x <= -LARGEST)
     rest, fills = x[~wrong] if wrong.any() else x, []

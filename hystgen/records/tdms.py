@@ -1,5 +1,5 @@
-"""TDMS files from LabVIEW and other NI programs, read with npTDMS: channels in groups, with their units and
-sampling."""
+"""TDMS files from LabVIEW and other NI programs, read with npTDMS: channels in groups, with their units and sample
+rates."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NANO = 1e9
 
 
 def read_tdms(reading: Reading, stream: IO[bytes]) -> Table:
-    """Read a TDMS file: its numeric channels, `group/channel`; time stamps become seconds from the first of them."""
+    """Read a TDMS file: its numeric channels, named `group/channel`; time stamps become seconds from the first one."""
     try:
         from nptdms import TdmsFile
     except ImportError:
@@ -52,7 +52,7 @@ def _unit(channel: TdmsChannel) -> str:
 
 
 def _steps(channel: TdmsChannel, name: str) -> list[Step]:
-    """The sampling of a waveform; for other channels the increment is 0 or missing."""
+    """The sample time of a waveform; in other channels the increment is 0 or missing."""
     seconds = channel.properties.get("wf_increment")
     if not isinstance(seconds, float | int) or not 0.0 < seconds < float("inf"):
         return []

@@ -1,7 +1,7 @@
 """Units of columns: which ones measure the same quantity, and how to convert records to the units of a model.
 
-Lengths, voltages and so on are converted by their SI prefixes, temperatures by scale and zero. An unknown unit is
-compared only as text, and never guessed.
+Lengths, voltages and so on are converted by their SI prefixes, temperatures by scale and zero. The meaning of an
+unknown unit is never guessed; it is only compared as text.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from hystgen.records.columns import TIMES, plain
 from hystgen.records.record import Array, Record
 
 TEMPERATURE = "temperature"
-"""The column that effects take in degC."""
+"""The column that effects expect in degC."""
 
 PREFIXES = {"f": -15, "p": -12, "n": -9, "u": -6, "m": -3, "c": -2, "d": -1, "": 0, "k": 3, "M": 6, "G": 9}
 WORDS = {"pico": -12, "nano": -9, "micro": -6, "milli": -3, "centi": -2, "": 0, "kilo": 3, "mega": 6}
@@ -39,7 +39,7 @@ SYMBOLS: dict[str, tuple[str, Fraction]] = {
     "\u2126": ("Ohm", Fraction(1)), "\u03a9": ("Ohm", Fraction(1)), "bar": ("Pa", Fraction(10**5)),
     "Oe": ("A/m", _OERSTED),
 }
-"""Symbols that take a prefix, each with its quantity and its size in the unit that names the quantity."""
+"""Symbols that take a prefix, each with its quantity and its size in the base unit that names the quantity."""
 
 ALONE: dict[str, tuple[str, Fraction]] = {
     "\u00b0": ("rad", _DEGREE), "degree": ("rad", _DEGREE), "degrees": ("rad", _DEGREE),
@@ -48,7 +48,7 @@ ALONE: dict[str, tuple[str, Fraction]] = {
     "gauss": ("T", Fraction(1, 10**4)),
     **{unit: ("s", Fraction(factor) / Fraction(divisor)) for unit, (factor, divisor) in TIMES.items()},
 }
-"""Units without a prefix, in lower case wherever they are words."""
+"""Units that take no prefix; words are in lower case."""
 
 NAMES = {
     "volt": "V", "ampere": "A", "amp": "A", "meter": "m", "metre": "m", "newton": "N", "radian": "rad", "tesla": "T",
@@ -64,11 +64,11 @@ TEMPERATURES = {
         ("degF", "deg F", "\u00b0F", "\u2109", "fahrenheit", "F"), (Fraction(5, 9), _ZERO - Fraction(160, 9))
     ),
 }
-"""Size in K, and temperature at 0. C and F are temperatures only in a temperature column."""
+"""Size in K, and the temperature at 0 in K. C and F are temperatures only in a temperature column."""
 
 
 class Quantity(NamedTuple):
-    """What a unit measures: `kind`, named by its base unit; the unit's `size` in that, and the position of its zero."""
+    """What a unit measures: `kind`, named by its base unit; the `size` and `zero` of the unit in that base unit."""
 
     kind: str
     size: Fraction
@@ -104,22 +104,22 @@ class Conversion(NamedTuple):
     plus: Fraction = Fraction(0)
 
     def __call__(self, x: Array) -> Array:
-        """The numbers (N,) in the other unit; with a power of ten, each is the double nearest to the intended
-        number."""
+        """The numbers (N,) in the other unit; if the factor is a power of ten, each is the double nearest to the exact
+        value."""
         top, bottom = self.times.numerator, self.times.denominator
         found: Array = x / bottom if top == 1 else x * float(top if bottom == 1 else self.times)
         return found + float(self.plus) if self.plus else found
 
     @property
     def same(self) -> bool:
-        """Whether the numbers stay as they are."""
+        """Whether the conversion changes nothing."""
         return self == Conversion(Fraction(1))
 
 
 def conversion(unit: str, to: str, column: str = "") -> Conversion | None:
-    """Conversion from `unit` to `to`; None if these are different quantities, or not known to be the same.
+    """Conversion from `unit` to `to`; None if their quantities differ, or are not known to be the same.
 
-    If one is unknown, they are the same if their texts are, ignoring case.
+    If either unit is unknown, they count as the same if their texts match, ignoring case.
     """
     a, b = quantity(unit, column), quantity(to, column)
     if a is not None and b is not None:
@@ -130,8 +130,8 @@ def conversion(unit: str, to: str, column: str = "") -> Conversion | None:
 class UnitGoal(NamedTuple):
     """The target unit for the drive or the displacement of records.
 
-    `unit`: empty if the first record with a unit decides; `whose`: the quantity as messages call it; `named`: given by
-    the user, who thereby declares what an unknown unit is; `told`: whether to report it when a record decides.
+    `unit`: empty if the first record with a unit decides; `whose`: what messages call the quantity; `named`: given by
+    the user, who thereby declares what an unknown unit is; `told`: whether to report that a record has decided.
     """
 
     unit: str = ""
@@ -141,7 +141,7 @@ class UnitGoal(NamedTuple):
 
 
 class HasUnits(Protocol):
-    """Units as a parameter file has them."""
+    """The units of a parameter file."""
 
     @property
     def input(self) -> str:
@@ -219,15 +219,15 @@ def _named(column: str, unit: str) -> str:
 
 
 def _apart(column: str, own: str, goal: UnitGoal, option: str) -> str:
-    """The message that a column cannot be converted to the target unit, and what to do."""
+    """The message saying that a column cannot be converted to the target unit, and what to do about it."""
     said = f"column {column} is in {own} and {goal.whose} in {goal.unit}"
     strange = [unit for unit in (own, goal.unit) if quantity(unit, column) is None]
     if not strange:
         return f"{said}, which are different quantities; choose another column, or correct the unit after its name"
     more = f", or name the units with {option}" if option else ""
     return (
-        f'{said}, and "{strange[0]}" is not a known unit; convert the column and write the same unit after its name, '
-        f"or none{more}"
+        f'{said}, and "{strange[0]}" is not a known unit; convert the column and write the same unit, or none, after '
+        f"its name{more}"
     )
 
 

@@ -14,7 +14,7 @@ from hystgen.basics.writing import write_atomically
 
 
 def columns_text(header: Sequence[str], arrays: Sequence[ArrayLike]) -> str:
-    """Columns of equal length as CSV: with the fewest digits that read back as the same number."""
+    """Columns of equal length as CSV, written with the fewest digits that read back as the same number."""
     columns = [_texts(np.asarray(values)) for values in arrays]
     if len(columns) != len(header) or len({len(column) for column in columns}) > 1:
         raise ValueError("a CSV table needs one name per column and columns of equal length")
