@@ -386,7 +386,7 @@ REFUSED = [
         '4:70: model.pi.initial_state[1]: must be a number, not the text "x"; write it like 0.45',
     ]),
     case('density_beside', pi("thresholds: [0], density: {table: {r: [0, 1], p: [1, 1]}, p0: 1, n: 1}"), [
-        '4:31: model.pi.density: stands beside thresholds; remove one or the other',
+        '4:31: model.pi.density: is given as well as thresholds; remove one or the other',
     ]),
     case('density_number', pi("density: 5"), [
         '4:23: model.pi.density: must be a mapping, not 5; write `key: value` pairs in it',
