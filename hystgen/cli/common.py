@@ -235,11 +235,11 @@ _RECORD_OPTIONS = [
         help="names t, v, y for the file's columns; in HDF5 v=run1/drive, in a MATLAB struct v=data.v; in text also by "
         "number, 1,2,3 for t, v, y",
     ),
-    click.option("--sample-time", type=float, help="seconds, for files without time"),
+    click.option("--sample-time", type=float, help="sample time in seconds, for files without time"),
     click.option("--delimiter", help="default: detected from the file"),
-    click.option("--history", metavar="V,V,..", help="drive values visited before the record, in the model's units"),
+    click.option("--history", metavar="V,V,..", help="drive values visited before each record, in the model's units"),
     click.option(
-        "--rest", type=float, callback=seconds, default=0.0, help="seconds of pause, which matter only to effects"
+        "--rest", type=float, callback=seconds, default=0.0, help="pause in seconds, which matters only to effects"
     ),
 ]
 

@@ -169,7 +169,7 @@ class _Case:
     tick: Callable[[], None]
 
     def with_history(self, history: History, unit: str | None) -> tuple[_Done, OtherHistory | None]:
-        """The search with the history; if the records contradict it, a search without it, and a finding."""
+        """The search with the history or, if the records contradict it, a search without it, and the finding."""
         done = None
         wrong = self._foreign(history)
         if wrong is None:
@@ -211,7 +211,7 @@ class _Case:
         """The search from the nominal model, or from that model without its front if the front misleads the search.
 
         A front fitted to one loop may have absorbed an effect. If held-out records are predicted better without the
-        front, a search without it counts if it finds effects but no new front; else the better of both.
+        front, the search without it is used if it finds effects but no new front, and otherwise the better one.
         """
         ready, refit, bare = self._begun(history)
         if bare is not None and selection.better(bare(ready), refit(ready), ready.held):

@@ -187,7 +187,7 @@ def dump_parameters(parameters: Parameters, comments: Mapping[str, str] | None =
 
 @cache
 def _defaults() -> dict[str, object]:
-    """Keys that are left out when they have this value."""
+    """Keys, with the values at which they are left out."""
     pi = PIParameters(weights=(1.0,))
     data = Parameters(hystgen=1, name="x", input_range=(0.0, 1.0), model=ModelParameters(pi=pi)).model_dump()
     for key in ("hystgen", "name", "input_range"):

@@ -139,7 +139,7 @@ class PIParameters(_Part):
 
     @property
     def density_error(self) -> float | None:
-        """Bound of the discretised density's error on the initial loading curve, output units; None without one."""
+        """Bound of the discretised density's error on the initial loading curve, output units; None without it."""
         return self._density_errors[0] if self._density_errors else None
 
     @property

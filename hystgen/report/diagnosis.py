@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hystgen.effects.base import Effect
 
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
-"""How exactly a compensator corrects a stage in front of the plays, and how."""
+"""How exactly a compensator corrects a stage in front of the plays, and by what method."""
 
 VISIBLE = 0.01
 """Relative difference above which an error is visibly larger than another."""

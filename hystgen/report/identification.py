@@ -49,7 +49,7 @@ identify = _with_pictures(identification.identify)
 
 
 def names() -> list[str]:
-    """Names of the files of a report."""
+    """Names of the files in a report."""
     return [PAGE, *(f"{name}.{kind}" for name in fit_figures.FIGURES for kind in ("svg", "png"))]
 
 

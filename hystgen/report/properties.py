@@ -26,7 +26,7 @@ UP = decimal.Context(prec=3, rounding=decimal.ROUND_CEILING)
 def properties(model: Model, within: float = SETTLED) -> str:
     """The text of `hystgen show`: ranges, slopes, loop width, settling, whether there is an inverse, error bounds.
 
-    `within`: error of settling, share of a step.
+    `within`: error within which the output counts as settled, share of a step.
     """
     c, p = model.cascade, model.parameters
     pi = c.pi
@@ -81,7 +81,7 @@ def properties(model: Model, within: float = SETTLED) -> str:
 
 
 def facts(model: Model, within: float = SETTLED) -> dict[str, object]:
-    """The same as data, without error bounds and cost: `hystgen show --json`."""
+    """The same properties as data, without error bounds and cost: `hystgen show --json`."""
     c, p = model.cascade, model.parameters
     problems = c.inverse_problems()
     try:

@@ -43,7 +43,7 @@ DEBIAN = {
 
 
 class CompileError(RuntimeError):
-    """The compiler failed; the message holds its output."""
+    """The compiler failed; the message contains its output."""
 
 
 class MissingError(CompileError):

@@ -15,7 +15,7 @@ from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 
 POINTS = 2000
-"""Number of points of a path: following the plays one by one in Python takes about 0.1 s for these."""
+"""Number of points of a path: following the plays one by one in Python takes about 0.1 s for this many."""
 
 # Kinds of points on the path: a drive at which a play starts to follow, one at which a play would start to follow after
 # a turn here, a limit of the drive, or any drive
@@ -28,8 +28,8 @@ COMMITTED, THERE = 0.6, 0.7
 
 @dataclass(frozen=True)
 class Path:
-    """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` the forward operator's
-    after it (meaningless for init), `risen` whether the move to it rose."""
+    """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` that of the forward
+    operator after the call (meaningless for init), `risen` whether the move to it rose."""
 
     op: Bytes
     drive: NDArray[np.float64]
@@ -60,7 +60,7 @@ class _Textbook:
             return float(self.front.front_inverse(self.tables, self.kind(w), branch if self.tables.branches else 1)[0])
 
     def move(self, drive: float) -> None:
-        """Move the drive there."""
+        """Move to a drive."""
         if drive != self.drive and not np.isnan(self.drive):
             self.rising = int(drive > self.drive)
         self.drive = drive

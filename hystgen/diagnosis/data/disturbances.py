@@ -42,7 +42,7 @@ class Removed:
 
 
 def removed_share(before: Sequence[Array], after: Sequence[Array]) -> float:
-    """Share of the power of the errors `before` that the errors `after` lack."""
+    """Share of the power of the errors `before` that is absent from the errors `after`."""
     total = _power(before)
     return 1.0 - _power(after) / total if total > 0.0 else 0.0
 
@@ -52,7 +52,7 @@ def _power(errors: Sequence[Array]) -> float:
 
 
 def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
-    """The strongest line that enough of the long records have, or that dominates the errors of a few."""
+    """The strongest line that enough sufficiently long records show, or that dominates the errors of a few."""
     found: list[tuple[float, float, int]] = []
     for k, (item, error) in enumerate(zip(items, errors, strict=True)):
         found += [(share, frequency, k) for share, frequency in peaks(item, error)]
@@ -110,10 +110,10 @@ def _mains(frequency: float, width: float) -> float | str | None:
 
 
 def steady(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
-    """The strongest line, if in most records that have it, each half of the record predicts the line in the other half.
+    """The strongest line, if in most records that show it, each half predicts the line in the other half.
 
-    The actuator itself makes no steady lines: it responds at the lines of its drive, which are excluded, or its ringing
-    decays.
+    The actuator makes no steady lines of its own: it responds at the lines of its drive, which are excluded, and its
+    ringing decays.
     """
     line = in_time(items, errors) if all(item.timed for item in items) else None
     if line is None or not isinstance(line.finding, Line):
@@ -347,7 +347,7 @@ def _strongest_first(
     return found, remaining
 
 
-# Records without the lines and ripples that rule their errors ------------------------------------------------
+# Records without the lines and ripples that dominate their errors --------------------------------------------
 
 
 Fitted = TypeVar("Fitted", bound=FittedLike)
@@ -470,7 +470,7 @@ def _stick_slip(item: Item, error: Array, noise: float) -> StickSlip | None:
 
 
 def _alone(moves: Array, at: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Whether moves at some samples far exceed those nearby; a filter may spread a jump to the adjacent ones."""
+    """Whether moves at some samples far exceed those nearby, except adjacent ones: a filter may spread a jump."""
     beside = np.array([-5, -4, -3, -2, 2, 3, 4, 5])
     around = moves[np.clip(at[:, None] + beside, 0, len(moves) - 1)]
     return np.asarray(moves[at] > acceptance.SLIP_ALONE * np.median(around, axis=1))

@@ -203,7 +203,7 @@ def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found
     return best[0] if best[1] > acceptance.FOREIGN_CORRELATION else None
 
 
-# Whether the records begin in the memory that the given history leaves ---------------------------------------
+# Whether the records start with the memory that the given history leaves -------------------------------------
 
 
 def contradicted(items: Sequence[Item], fitted: FittedLike) -> OtherHistory | None:
@@ -227,7 +227,7 @@ def bends(items: Sequence[Item], fitted: FittedLike, free: FittedLike) -> OtherH
 
 
 def _parts(items: Sequence[Item], fitted: FittedLike, own: bool) -> tuple[list[Array], list[Array]]:
-    """Errors that depend on the history, and errors that do not; `own`: minus the mean of the latter."""
+    """Errors that depend on the history, and those that do not; `own`: with the latter's mean subtracted."""
     first, later = [], []
     for item, e in zip(items, fitted.errors(items), strict=True):
         if item.history is None:
@@ -419,7 +419,7 @@ def _arrived(course: Course, edges: NDArray[np.bool_]) -> int:
 
 
 def _outliers(course: Course) -> NDArray[np.intp]:
-    """Samples that are not compared only because their output was isolated."""
+    """Samples left out only because their output was isolated."""
     missing = np.isnan(course.y)
     missing[: course.first] = False
     return np.flatnonzero(missing if course.stretches is None else missing & ~course.stretches)
@@ -439,7 +439,7 @@ def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[
     return first, second
 
 
-# Which records judge, and whether there is enough to compare -------------------------------------------------
+# Which records are held out, and whether there is enough to compare ------------------------------------------
 
 
 JUDGE = "judge by"
@@ -535,7 +535,7 @@ def parted(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:
     return beginnings, ends
 
 
-# Samples that are plainly wrong: drop-outs, held samples, a converter at its end -----------------------------
+# Plainly faulty samples: drop-outs, held samples, a converter at its limit -----------------------------------
 
 
 Runs = Sequence[tuple[int, int]]

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 
-# The noise of the measurement: from holds, from differences, from repeated periods ---------------------------
+# Measurement noise: from holds, from differences, from repeated periods --------------------------------------
 
 
 @dataclass(frozen=True)
@@ -172,7 +172,7 @@ def _periods(item: Item) -> list[tuple[float, int]]:
     return []
 
 
-# Turns of the drive, and whether all records pass one loop ---------------------------------------------------
+# Turns of the drive, and whether all records follow one loop -------------------------------------------------
 
 
 def reversals(v: Array) -> Places:

@@ -55,7 +55,7 @@ def result_of(
     """The whole result.
 
     `as_given`: errors of the nominal model before it was refitted; `odd`: findings about whole records; `one_loop`:
-    whether all records pass the same loop.
+    whether all records follow the same loop.
     """
     before = [found.refitted.errors(group) for group in (ready.to_fit, ready.held)]
     after = [found.fitted.errors(group) for group in (ready.to_fit, ready.held)]
@@ -156,7 +156,7 @@ def _in_digits(value: object) -> object:
 def _unexplained(
     ready: Prepared, after: Sequence[list[Array]], noise: float, usual: float, odd: Sequence[Finding]
 ) -> list[Finding]:
-    """The remaining error that is neither noise nor a fault of the recording; `usual`: error of a fitted record."""
+    """The remaining error that is neither noise nor a fault of the recording; `usual`: error on fitted records."""
     everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
     lines, errors = disturbances.lines(everything, errors)
     known = [each for each in odd if isinstance(each, Line | Ripple)]
@@ -304,7 +304,7 @@ VARIABLES = (
 def described(
     items: Sequence[Item], errors: Sequence[Array], noise: float, held_out_alone: Sequence[str]
 ) -> Structured:
-    """Description of errors that remain; `noise`: rms; `held_out_alone`: held-out records with far larger errors."""
+    """What the remaining errors depend on; `noise`: rms of the noise; `held_out_alone`: as in `Structured`."""
     share, by_variable = shares(items, errors)
     total = np.concatenate([e[np.isfinite(e)] for e in errors])
     rms = float(np.sqrt(np.mean(total**2))) if len(total) else 0.0

@@ -133,7 +133,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of a record in which the refitted model has a large error: from and to (s), and the rms error there."""
+    """A part of a record in which the refitted model has a large error: start and end (s), and the rms error there."""
 
     record: str
     kind: str
@@ -260,7 +260,7 @@ class Diagnosis:
         return self.result.verdict
 
     def sentence(self) -> str:
-        """The verdict in a few sentences, after any on hysteresis of another kind and on the verdict's limits."""
+        """The verdict in a few sentences; hysteresis of another kind, and the verdict's limits, come first."""
         parts = [_capital(each.sentence(self.result.unit)) for each in self._of_another_kind()]
         parts += [*self._limits(), self._finding()]
         if any(effect.at_an_end for effect in self.result.effects):
@@ -283,7 +283,7 @@ class Diagnosis:
         return [each for each in self.result.unexplained if isinstance(each, NotAPlaySum)]
 
     def _limits(self) -> list[str]:
-        """Warnings that come before any name: how few samples were compared, how much error remains."""
+        """Warnings that precede any effect name: how few samples were compared, how much error remains."""
         result = self.result
         compared, recorded = result.compared
         said = []

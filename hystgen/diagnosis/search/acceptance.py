@@ -3,7 +3,7 @@
 The text below a number begins with its unit, in brackets, and says what happens on either side of it. It ends with
 
 - `Set by`: the run that determined the number;
-- `Changed by`: the run or test that would show a wrong number, if no run that set it is recorded;
+- `Changed by`: the run or test that would reveal a wrong number, if no run that set it is recorded;
 - `Derived`: the number follows from what the text says.
 
 The runs:
@@ -15,8 +15,8 @@ The runs:
 - acceptance::x: the row x of the table in `tests/test_acceptance.py`, whose answer changes when the number is doubled
   or halved; selection::test_x: a test of `tests/test_selection.py` that then fails.
 
-`docs/thresholds.csv` lists them for every number. Other modules read the numbers as attributes of this one, so that a
-test can change a number in one place. Tolerances of searches and sizes of caches, which decide nothing, are in the
+`docs/thresholds.csv` lists the rows for every number. Other modules read the numbers as attributes of this one, so that
+a test can change a number in one place. Tolerances of searches and sizes of caches, which decide nothing, are in the
 modules that use them.
 """
 
@@ -62,7 +62,7 @@ def above_noise(removed: float) -> float:
     return math.sqrt(1.0 + removed**2)
 
 
-# Whether an effect gets a name -------------------------------------------------------------------------------
+# Whether an effect is named ----------------------------------------------------------------------------------
 
 NAME_SHARE = 0.07
 """[share of the refitted gap, rms] An effect is named if it removes at least this from the held-out or from the fitted
@@ -103,8 +103,8 @@ BLOCK_MEMORIES = 2.0
 blocks are hardly correlated. Changed by: blind none, acceptance::blocks_are_longer_than_errors_remember."""
 
 BLOCKS = 20
-"""[blocks] A record is cut into at least this many, even if its errors are correlated over longer blocks. Changed by:
-acceptance::blocks_are_longer_than_errors_remember."""
+"""[blocks] A record is cut into at least this many, even if its errors are correlated for longer than a block. Changed
+by: acceptance::blocks_are_longer_than_errors_remember."""
 
 SEEN_IN_BOTH = 0.25
 """[times the remaining error or the noise] An effect that removes `FIRST_REMOVES` or `FURTHER_REMOVES` from the fitted
@@ -124,7 +124,7 @@ selection::test_all_records_decide_between_equal_numbers."""
 
 FAR_LESS = 0.5
 """[share of an error] A candidate whose fitted error is at most this share of another's wins despite a slightly larger
-held-out error, which may mostly belong to a third effect. Nor can chance reduce a held-out error this far, since
+held-out error, most of which may belong to a third effect. Nor can chance reduce a held-out error this far, since
 nothing was fitted to it: a rate dependence next to creep left a third, visible only in a few steps, with p = 0.12 over
 blocks. Set by (the latter): second_plants pair 2004. Changed by:
 acceptance::equal_effects_come_in_the_order_of_the_catalogue, acceptance::what_chance_does_not_explain."""
@@ -141,9 +141,9 @@ fresh cases of kind poor, 7 of which had a false second name without this limit 
 
 LEAST_EXPLAINED = 0.5
 """[share of the variance above the noise] Names stand only if together they leave at most this of the held-out and of
-the fitted error, so that most is explained. Effects explain less of a disturbance: for room temperature acting on the
-gain, and for a slow crosstalk line, false names left 0.74 to 0.79 of the fitted variance; right names left at most
-0.28. Set by: second_plants foreign 0:10, single 0:13. Changed by: acceptance::names_near_the_noise_explain_half."""
+the fitted error, so that most is explained. A disturbance is explained less: for room temperature acting on the gain,
+and for a slow crosstalk line, false names left 0.74 to 0.79 of the fitted variance; right names left at most 0.28. Set
+by: second_plants foreign 0:10, single 0:13. Changed by: acceptance::names_near_the_noise_explain_half."""
 
 MOSTLY_EXPLAINED = 1.0 / 3.0
 """[share of the variance above the noise] The same limit if the names leave more than `MUCH_LEFT`, as wrong names do:
@@ -159,8 +159,8 @@ this happened for two disturbances by room temperature and for one pair. Set by 
 
 END_LEAVES = 0.105
 """[share of the gap above the noise, rms] If more than `MUCH_LEFT` remains and a parameter of an effect is at an end of
-its range, names stand only if they leave at most this of the held-out and of the fitted records: nine tenths are
-explained, in whole per cent as the verdict states it. A multiple of the noise alone says nothing about records with
+its range, names stand only if they leave at most this of the held-out and of the fitted error: nine tenths are then
+explained, to the whole per cent that the verdict states. A multiple of the noise alone says nothing about records with
 little noise. False names for room temperature acting on the gain left 0.62 and more. Set by: second_plants foreign
 300:308, 11000:11020. Changed by: selection::test_a_number_at_an_end_of_its_range_explains_nine_tenths."""
 
@@ -175,8 +175,8 @@ selection::test_how_often_a_range_is_widened."""
 
 FEW_COMPARED = 0.25
 """[share of the samples] If fewer samples were compared, the verdict says so first and names nothing. In blind records
-without a known history at least 0.5 are compared, in a test whose amplitude grows until its end 0.02 to 0.06. Set by:
-blind, all kinds, first 71000, and second_plants. Changed by: acceptance::what_a_verdict_says_first."""
+without a known history at least 0.5 are compared, in a test whose amplitude keeps growing 0.02 to 0.06. Set by: blind,
+all kinds, first 71000, and second_plants. Changed by: acceptance::what_a_verdict_says_first."""
 
 FLAT_END = 0.005
 """[share of the drive range] A limit that begins closer to both ends than this is not named: the drive meets it only in
@@ -206,7 +206,8 @@ SCREENED = 6_000
 by: run time and names of blind."""
 
 SEARCHED = 12_000
-"""[samples] Later searches fit this many, and regressions on many variables use as many. Changed by: as before."""
+"""[samples] Later searches fit this many, and regressions on many variables use as many. Changed by: run time and names
+of blind."""
 
 PLAYS = 32
 """[plays] Number of thresholds of a fit. Half as many leave up to 1.4 times the noise in records without an effect,
@@ -286,8 +287,8 @@ NOMINAL_RANGE = 3.0
 outside, the effect would be a different one. Changed by: acceptance::numbers_move_by_up_to_a_factor."""
 
 SINGLE_FACTORS = 4
-"""[numbers] A longer list of numbers is refitted with one common factor: a factor for each would make every list a fit
-of its own. Changed by: acceptance::long_lists_have_one_factor."""
+"""[numbers] A longer list is refitted with one common factor: a factor for each number would make every list a fit of
+its own. Changed by: acceptance::long_lists_have_one_factor."""
 
 TOUCHING = 1e-6
 """[share of the slack] A nominal front may violate its constraints by this: files round to ten digits. Derived."""
@@ -325,7 +326,7 @@ SET_ASIDE = 0.3
 otherwise held out. Changed by: acceptance::the_end_of_a_record."""
 
 FAST_RECORD = 0.5
-"""[share of the largest] A record counts as fast, or as wide, if its rate, or its swing, is at least this share of the
+"""[share of the largest] A record counts as fast (or wide) if its rate (or swing) is at least this share of the
 largest. Changed by: acceptance::a_fast_record."""
 
 THIN_STEPS = 32
@@ -334,7 +335,7 @@ acceptance::the_longest_stretch."""
 
 THIN_STRAIGHT = 0.3
 """[times the noise] A stretch may be left out if the prediction deviates from a straight line over it by at most this,
-and the drive by no more than moves the output that far. Changed by: acceptance::a_bump_of_the_prediction."""
+and the drive by no more than it takes to move the output that far. Changed by: acceptance::a_bump_of_the_prediction."""
 
 THIN_TURNING = 0.03
 """[times the noise] The same limit at a turning point, a tenth as large because the plays remember it. Changed by:
@@ -342,7 +343,7 @@ acceptance::a_small_turn_of_the_drive."""
 
 THIN_RESIDUAL = 1.6
 """[times the noise, rms] The same limit for the remaining error: white noise deviates from the line between two of its
-samples by sqrt(1 + 2/3) = 1.3, and an unlucky stretch of it by a quarter more. Derived."""
+samples by sqrt(1 + 2/3) = 1.3, and an unlucky stretch by a quarter more. Derived."""
 
 THIN_COLUMN = 0.01
 """[share of its range, rms] The same limit for a further column of the record. Changed by:
@@ -355,7 +356,7 @@ acceptance::a_jump."""
 
 EDGE_SAMPLES, EDGE_STANDS = 2, 4
 """[samples], [samples] The longest jump that is not resolved, from one sample to the next or with an averaged sample
-between, and the least number of samples for which the drive rests before and after it. With such samples compared, a
+between, and the minimum number of samples for which the drive rests before and after it. With such samples compared, a
 lag, a delay or a rate dependence left 2 to 8 times the noise; without them, 1.0 to 1.1. Set by: second_plants single
 0:13, pair 0:6."""
 

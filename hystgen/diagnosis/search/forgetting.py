@@ -78,7 +78,7 @@ class Forgetting(Effect):
 
 
 def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
-    """The element, if the records support it in addition to the effects found, or more than them; else None.
+    """The element, if the records support it in addition to the effects found, or rather than them; else None.
 
     The element is first tried in place of all effects of the `outcome`, then of those that depend on time, then in
     addition to all. Effects that explain more are kept. If only chance separates the two, the effects are kept if the
@@ -102,8 +102,8 @@ def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
 def _bases(outcome: Outcome, records: Records) -> Iterator[tuple[Fitted, tuple[str, ...]]]:
     """The models to which the element is added, with the effects that it would replace.
 
-    First the refitted model; then that with the effects found that do not depend on time or, if none were found, with
-    the best of these that was tried: a Duhem plant's forgetting shows only once its bent middle line is modelled.
+    First the refitted model; then the model with only the effects found that do not depend on time or, if none were
+    found, with the best such effect tried: a Duhem plant's forgetting shows only once its bent middle line is modelled.
     """
     now = outcome.fitted
     names = tuple(dict.fromkeys(each.name for each in outcome.found))

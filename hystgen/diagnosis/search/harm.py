@@ -2,7 +2,7 @@
 
 Each inverse gets the recorded outputs as its reference. The drive of the inverse with effects goes into the plain
 model, and the plain inverse's drive into the model with effects: if either model were the stage, this would be the
-error under the other's compensator. A right effect changes the output by about as much as it explains.
+error under the other's compensator. A correct effect changes the output by about as much as it explains.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ SAMPLES = 6_000
 """Maximum number of samples used from the start of a record: as many as the screening of effects compares."""
 
 SMOOTHED = 5
-"""[samples] A recorded output becomes a reference by averaging over this many, twice; residual noise is subtracted."""
+"""[samples] A recorded output is averaged over this many, twice, to make a reference; residual noise is subtracted."""
 
 SEED = 1
 """Seed of the noise passed through the inverses, fixed so that the same records give the same answer."""

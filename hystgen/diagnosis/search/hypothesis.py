@@ -48,8 +48,8 @@ LEVEL_STEPS = 3
 
 
 RANK = 1e-10
-"""[share of the largest singular value] Smaller ones count as zero: two responses of nearly the same shape. A reduction
-keeps them to 2e-16 of the largest, so one of this size still has six digits. Set by:
+"""[share of the largest singular value] Smaller ones count as zero: two responses have nearly the same shape. A
+reduction keeps them to 2e-16 of the largest, so one of this size still has six digits. Set by:
 `test_start_transients::test_nearly_equal_responses`, seeds 0 to 39: 1e-8 and 1e-12 give the same errors to 4e-14."""
 
 
@@ -76,7 +76,7 @@ class Actuator(Ordered):
 
         They hold only the compared samples if no later part needs the others; `compared` picks these in any case. With
         `p`, a single row: the weighted sum, for which the rest of the chain runs once. `sums`: weighted sums shared by
-        actuators that have effects in common.
+        actuators with common effects.
         """
         run = item.run
         rows = self._slow(item) if p is None else self._slow_sum(item, p, {} if sums is None else sums)[None, :]
@@ -124,7 +124,7 @@ class Actuator(Ordered):
         return item.moved.kept((self._moving, self.bending, self.filters, self._needed == _FILTERED), make)
 
     def _slow_sum(self, item: Item, p: Array, sums: Sums) -> Array:
-        """(N,) weighted sum of `_slow`; actuators that differ in one number share the part of the chain before it."""
+        """(N,) weighted sum of `_slow`; actuators that differ in one parameter share the chain before it."""
         by: object = (self._moving, self.bending)
         if by not in sums:
             sums[by] = self._summed(item, p)
@@ -281,7 +281,7 @@ class Actuator(Ordered):
         return self.thresholds.tobytes(), self.stages, effects, self.starts
 
     def _residual(self, item: Item, p: Array) -> Array:
-        """(2, N) at the compared samples: the error before a fit of free components, and its change with the offset."""
+        """(2, N) at the compared samples: error before free components are fitted, and its slope over the offset."""
 
         def make() -> Array:
             rows, constant = self.columns(item, p)
@@ -313,7 +313,7 @@ def _within(columns: Array, y: Array, low: Array, high: Array) -> Array:
     return found
 
 
-# Structures: which numbers a fit may change ------------------------------------------------------------------
+# Structures: which parameters a fit may change ---------------------------------------------------------------
 
 
 @dataclass(frozen=True)

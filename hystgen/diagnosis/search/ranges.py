@@ -27,8 +27,8 @@ which decides only how far a search may go."""
 LEAST, LARGEST = "least", "largest"
 
 BEYOND, NO_LESS, LIMIT, FIRM, NOISE = "beyond", "no less", "limit", "firm", "noise"
-"""Why a parameter is where it is: a wider range was better; a wider one was not; the schema allows none; the range is
-not widened; only noise is left, so none was tried."""
+"""Why a parameter is at an end: a wider range was better; a wider one was not; the schema allows none; the range is not
+widened; only noise is left, so none was tried."""
 
 
 @dataclass(frozen=True)

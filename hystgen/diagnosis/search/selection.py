@@ -168,7 +168,7 @@ def leaves_enough(now: Fitted, records: Records) -> bool:
 def _without_merit(terms: Sequence[Fitted], best: Tried, items: Sequence[Item]) -> list[Array]:
     """Errors of a hypothesis with the free start states and offset of an effect, which do not count as its merit.
 
-    Or with the hypothesis's own free ones, if the error is then smaller. `terms`: from `Records.terms`.
+    Or with the hypothesis's own free start states, if the error is then smaller. `terms`: from `Records.terms`.
     """
     now = terms[0]
     return min(now.errors(items), *(each.errors(items, best.fitted) for each in terms), key=rms)
@@ -334,7 +334,7 @@ class Explained:
 
 def explained(now: Fitted, none: Fitted, records: Records) -> tuple[Explained, Explained]:
     """The parts of the held-out and of the fitted error that effects explain, with their free start states and offsets;
-    `none`: the model without them, compared with the same ones free."""
+    `none`: the model without them, with the same ones free."""
     held, to_fit = (
         Explained(rms(none.errors(group, now)), rms(now.errors(group)), records.noise)
         for group in (records.held, records.to_fit)
@@ -346,9 +346,9 @@ def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
     """Why the effects found are withdrawn, or None: together they must explain most of the gap.
 
     This applies to held-out and to fitted records. Many effects can remove part of a disturbance; the remaining error
-    tells it from a real effect. Records of one loop support no name if more than noise remains, and too few compared
-    samples support none at all. If much remains, no parameter of an effect may be at an end of its range unless nine
-    tenths are explained: an effect so strong, slow or fast can follow part of any error, but not nearly all of it.
+    tells it from a real effect. Records of one loop support no name if more than noise remains; too few compared
+    samples never do. If much remains, no parameter of an effect may be at an end of its range unless nine tenths are
+    explained: an effect so strong, slow or fast can follow part of any error, but not nearly all of it.
     """
     if records.compared < acceptance.FEW_COMPARED:
         return Refusal("few", records.compared, acceptance.FEW_COMPARED)
@@ -497,7 +497,7 @@ def no_worse_than(other: Fitted, outcome: Outcome, records: Records, written: st
 
 
 def refused(rankings: Sequence[Sequence[Ranked]], why: Refusal) -> tuple[tuple[Ranked, ...], ...]:
-    """The rankings with this reason against any accepted effect."""
+    """The rankings, with accepted effects now refused for this reason."""
     return tuple(tuple(replace(each, refused=each.refused or why) for each in tried) for tried in rankings)
 
 
@@ -961,7 +961,7 @@ def without_effect(now: Fitted, name: str, records: Records) -> Fitted | None:
 
 
 def _without_refit(now: Fitted, name: str, records: Records) -> Fitted | None:
-    """The hypothesis without one effect, with the others' numbers unchanged."""
+    """The hypothesis without one effect, with the others' parameters unchanged."""
     smaller = _less(now, name)
     if smaller is None:
         return None
