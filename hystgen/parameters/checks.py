@@ -201,7 +201,7 @@ class _Checker:
             known = self._keys(path[:-1])
             place = next((place for place, part in _PLACES.items() if key in part.model_fields), None)
             advice = f"it belongs {place}" if place else _nearest(key, known)
-            self.add(path, f"unknown key; {advice or 'known here are ' + ', '.join(known)}{hint}", at_key=True)
+            self.add(path, f"unknown key; {advice or 'valid here: ' + ', '.join(known)}{hint}", at_key=True)
         elif value is None:
             self.add(path, _NO_VALUE, at_key=isinstance(path[-1], str))
         elif path[0] == "not_separable" and kind == "too_long":
@@ -272,7 +272,7 @@ class _Checker:
         if odd == "\n":
             self.add(path, "must be a single line; remove the line break")
         elif odd is not None:
-            self.add(path, f"holds the unprintable character U+{ord(odd):04X}; remove it")
+            self.add(path, f"contains the unprintable character U+{ord(odd):04X}; remove it")
 
     def _pi(self, path: Path) -> None:
         pi = self.at(path)
@@ -398,7 +398,7 @@ class _Checker:
         a0, a1 = self.get(*path, "a0"), self.get(*path, "a1")
         for key, value in (("a0", a0), ("a1", a1)):
             if value == 0:
-                self.add((*path, key), "must not be 0, the branch would be constant; give a0 and a1 of the same sign")
+                self.add((*path, key), "must not be 0, or the branch is constant; give a0 and a1 of the same sign")
         if a0 and a1 and (a0 > 0) != (a1 > 0):
             what = f"a0 = {shown(a0)} and a1 = {shown(a1)} make a falling branch"
             self.add(path, f"{what}; give both the same sign")
@@ -415,7 +415,7 @@ class _Checker:
         elif "name" not in effect:
             self.add(name, "is missing; add the name of an effect")
         elif not isinstance(given, str):
-            self.add(name, f"must be the name of an effect, not {shown(given)}; known are {', '.join(EFFECT_NAMES)}")
+            self.add(name, f"must name an effect, not {shown(given)}; known effects: {', '.join(EFFECT_NAMES)}")
         elif given == effects.BEND:
             self.add(name, f"{effects.BEND} is not written here; make it a stage of model.memoryless")
         elif given in EFFECT_NAMES or given in self.user:
@@ -429,7 +429,7 @@ class _Checker:
             self.add(name, f"{printable(given)} is not defined in any given file{there}; give its file (--effects)")
         else:
             names = (*EFFECT_NAMES, *self.user)
-            advice = _nearest(given, names) or f"known are {', '.join(names)}"
+            advice = _nearest(given, names) or f"known effects: {', '.join(names)}"
             self.add(name, f"unknown effect {printable(given)}; {advice}")
 
     def _shaped(self, path: Path, effect: Mapping[str, object], shapes: Shapes) -> None:
@@ -536,7 +536,7 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
     if key == "memoryless" and kind == "tuple_type":
         wrong, advice = "must be a stage or a list of stages", _KINDS
     if kind == "finite_number" or (kind == "float_type" and type(value) is int):
-        return f"must be a finite number, not {shown(value)}; write one of at most {MAX_NUMBER:g} in size"
+        return f"must be a finite number, not {shown(value)}; write one of at most {MAX_NUMBER:g} in magnitude"
     if key == "input_range" and kind in ("too_long", "tuple_type"):
         return _TWO_NUMBERS
     if wrong:

@@ -120,7 +120,7 @@ def _too_large(size: int | None, file: str) -> ParameterError:
 
 
 def _plain(value: object) -> Any:
-    """Lists as tuples, NumPy values as Python's, keys without a value left out."""
+    """The data with lists as tuples, NumPy values as Python's, and keys without a value dropped."""
     if hasattr(value, "model_dump"):
         value = value.model_dump()
     if isinstance(value, Mapping):

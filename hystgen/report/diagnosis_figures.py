@@ -40,7 +40,7 @@ HOLD = 16
 """Minimum number of samples at rest for errors to be drawn over the time since the drive stopped."""
 
 WINDOWS = 12
-"""Number of stretches into which a record is cut to draw its rms over the session."""
+"""Number of stretches of a record whose rms is drawn over the session."""
 
 
 def steps(found: Diagnosis) -> list[tuple[str, float]]:

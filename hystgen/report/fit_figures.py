@@ -412,4 +412,4 @@ def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
 FIGURES: dict[str, Callable[[Fit, Sequence[Shown], bool], Figure]] = {
     "loop": loop, "time": time, "residual": residual, "loading": loading, "weights": weights,
 }
-"""All figures by the name of their file."""
+"""All figures, by file name."""

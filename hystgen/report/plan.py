@@ -120,7 +120,7 @@ def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
         f"rests {plan.rest:g} s before each.",
         f"Record drive and displacement throughout into one file, {home}/{RECORDING}, with columns t, v and y, at "
         "this rate or another. It may start before the drive; the first rise aligns the two.",
-        f"{SESSION} says at which sample each record begins, and which are held out; the recording is cut with it.",
+        f"{SESSION} says at which sample each record begins and which are held out; diagnose cuts the recording there.",
         "Let v be the drive as measured at the time of y. A converter that holds each value until the next is half a "
         "sample late, and a commanded v would show that as a delay.",
     ]

@@ -542,7 +542,7 @@ Runs = Sequence[tuple[int, int]]
 
 
 def without_faults(items: Sequence[Item], repaired: Sequence[Finding]) -> tuple[list[Item], list[Finding]]:
-    """The items without faulty samples, and findings about these; `repaired`: findings so far.
+    """The items without faulty samples, and findings about the faults; `repaired`: findings so far.
 
     A level that marks a drop-out or the converter's limit in one record does so in all others.
     """

@@ -36,7 +36,7 @@ noise stays below it. Records of only one loop support no name if more than this
 shape leaves as much as a wrong name. Changed by: blind none, blind poor."""
 
 STRUCTURE_SHARE = 0.15
-"""[share of the error's variance] An error is structured if one variable explains more than this of it on unseen
+"""[share of the error's variance] An error is structured if one variable explains more than this share of it on unseen
 samples. The value exceeds `VARIABLE_SHARE`, so a variable that makes an error structured is also reported. Changed by:
 blind none."""
 
@@ -70,8 +70,8 @@ records. After a right name in a wrong shape, a second, wrong name removes up to
 recorded)."""
 
 NEARLY_ALL = 0.25
-"""[share of the error before it] An effect is also named if it leaves at most this: next to a far larger effect, no
-other can reach `NAME_SHARE`. Changed by: blind pair, selection::test_nearly_all_that_is_left_is_worth_a_name."""
+"""[share of the error before it] An effect is also named if it leaves at most this share: next to a far larger one, no
+effect can reach `NAME_SHARE`. Changed by: blind pair, selection::test_nearly_all_that_is_left_is_worth_a_name."""
 
 FIRST_REMOVES = 0.6
 """[times the remaining error or the noise, whichever is larger] A first effect must remove at least this, and a smaller
@@ -135,15 +135,15 @@ EQUAL = 0.005
 acceptance::equal_effects_come_in_the_order_of_the_catalogue."""
 
 MOST_OF_GAP = 0.5
-"""[share of the gap above the noise] Records of one loop support a name only if the effect leaves at most this, and do
-not separate effects that do: two curves, one up and one down, hardly show which shape is the right one. Set by: 180
+"""[share of the gap above the noise] Records of one loop support a name only if the effect leaves at most this share,
+and cannot separate effects that all do: two curves, one up and one down, hardly show which shape is right. Set by: 180
 fresh cases of kind poor, 7 of which had a false second name without this limit (commit 86e5f08, seeds not recorded)."""
 
 LEAST_EXPLAINED = 0.5
-"""[share of the variance above the noise] Names stand only if together they leave at most this of the held-out and of
-the fitted error, so that most is explained. A disturbance is explained less: for room temperature acting on the gain,
-and for a slow crosstalk line, false names left 0.74 to 0.79 of the fitted variance; right names left at most 0.28. Set
-by: second_plants foreign 0:10, single 0:13. Changed by: acceptance::names_near_the_noise_explain_half."""
+"""[share of the variance above the noise] Names stand only if together they leave at most this share of the held-out
+and of the fitted error, so that most is explained. A disturbance is explained less: for room temperature acting on the
+gain, and for a slow crosstalk line, false names left 0.74 to 0.79 of the fitted variance; right names left at most
+0.28. Set by: second_plants foreign 0:10, single 0:13. Changed by: acceptance::names_near_the_noise_explain_half."""
 
 MOSTLY_EXPLAINED = 1.0 / 3.0
 """[share of the variance above the noise] The same limit if the names leave more than `MUCH_LEFT`, as wrong names do:
@@ -159,9 +159,9 @@ this happened for two disturbances by room temperature and for one pair. Set by 
 
 END_LEAVES = 0.105
 """[share of the gap above the noise, rms] If more than `MUCH_LEFT` remains and a parameter of an effect is at an end of
-its range, names stand only if they leave at most this of the held-out and of the fitted error: nine tenths are then
-explained, to the whole per cent that the verdict states. A multiple of the noise alone says nothing about records with
-little noise. False names for room temperature acting on the gain left 0.62 and more. Set by: second_plants foreign
+its range, names stand only if they leave at most this share of the held-out and of the fitted error: nine tenths are
+then explained, to the whole per cent that the verdict states. A multiple of the noise alone says nothing about records
+with little noise. False names for room temperature acting on the gain left 0.62 and more. Set by: second_plants foreign
 300:308, 11000:11020. Changed by: selection::test_a_number_at_an_end_of_its_range_explains_nine_tenths."""
 
 WIDER = 1.0
@@ -234,7 +234,7 @@ starts with up to 3.5 (a limit of the output has no effect beyond the measured r
 
 IDLE = 0.01
 """[share of the error] A start that changes the error by less has no effect yet, and is left out if another start has:
-next to a large effect, every start for another one may be worse than none. Changed by: blind pair."""
+next to a large effect, every start for a further one may be worse than none. Changed by: blind pair."""
 
 KEPT = 5
 """[shapes] After the screening, this many with the smallest held-out errors are followed up. Changed by: blind
@@ -387,11 +387,11 @@ QUIET_HOLDS = 0.25
 still ring or creep. Changed by: blind."""
 
 RING_DECAY = 0.9
-"""[share of the amplitude] A hold rings if its oscillation keeps more than this from one sample to the next. Changed
-by: acceptance::a_hold_that_rings."""
+"""[share of the amplitude] A hold rings if its oscillation keeps more than this share from one sample to the next.
+Changed by: acceptance::a_hold_that_rings."""
 
 RING_UNPREDICTED = 0.3
-"""[share of the variance] A hold rings only if a prediction from two samples misses at most this of the next one.
+"""[share of the variance] A hold rings only if a prediction from two samples misses at most this share of the next one.
 Changed by: acceptance::a_hold_that_rings."""
 
 PERIOD_REPEATS = 2e-3
@@ -445,8 +445,8 @@ LOOP_AREA = 0.3
 Changed by: acceptance::an_output_follows_its_drive."""
 
 LOOP_SIGMAS = 5.0
-"""[standard deviations] The area of a loop counts if it exceeds that of white noise by this factor: noise does so once
-in a million. Derived."""
+"""[standard deviations] The area of a loop counts if it exceeds the standard deviation due to white noise by this
+factor: noise does so once in a million. Derived."""
 
 OFF_LINE, ON_LINE = 6.0, 0.8
 """[scatters], [share of the samples] Samples farther off a line than the first number are ignored if the others make up
@@ -464,12 +464,12 @@ acceptance::a_history_that_costs_the_rest."""
 # Lines and ripples -------------------------------------------------------------------------------------------
 
 LINE_SHARE = 0.03
-"""[share of the error's variance] A line must have at least this: smaller ones are not worth reporting. Changed by:
-acceptance::share_of_a_line."""
+"""[share of the error's variance] A line must have at least this share: smaller ones are not worth reporting. Changed
+by: acceptance::share_of_a_line."""
 
 RULING_SHARE = 0.3
-"""[share of the error's variance] A line with at least this is removed before the search for effects, and counts even
-if few records have it; a weaker line may be the error of a missing effect. Changed by: blind foreign,
+"""[share of the error's variance] A line with at least this share is removed before the search for effects, and counts
+even if few records have it; a weaker line may be the error of a missing effect. Changed by: blind foreign,
 acceptance::a_line_rules."""
 
 LINE_HEIGHT = 30.0
@@ -481,12 +481,12 @@ PEAK_HEIGHT = 10.0
 spectra, whose noise scatters less. Changed by: acceptance::height_of_a_line_of_the_drive."""
 
 DRIVE_LINE_SHARE = 1e-6
-"""[share of the drive's power] A peak of the drive is a line of its own if it has at least this: a thousandth of the
-amplitude. Changed by: acceptance::a_line_of_the_drive."""
+"""[share of the drive's power] A peak of the drive is a line of its own if it has at least this share: a thousandth of
+the amplitude. Changed by: acceptance::a_line_of_the_drive."""
 
 CARRIER_SHARE = 0.5
-"""[share of the drive's power] A drive with at least this in one line causes harmonics of it, even if its amplitude
-varies. Changed by: acceptance::harmonics_of_a_carrier."""
+"""[share of the drive's power] A drive with at least this share in one line causes harmonics of it, even if its
+amplitude varies. Changed by: acceptance::harmonics_of_a_carrier."""
 
 HARMONICS = 10
 """[harmonics] This many multiples of that line are expected in the actuator's response. Changed by:
@@ -632,8 +632,8 @@ acceptance::a_loop_that_stands_is_none."""
 # How the remaining error is described ------------------------------------------------------------------------
 
 MAIN_SHARE = 0.5
-"""[share of the error's variance] The verdict is about a disturbance if it has at least this: it is then most of the
-error. Derived."""
+"""[share of the error's variance] The verdict is about a disturbance if it has at least this share: it is then most of
+the error. Derived."""
 
 STRETCH_ABOVE_NOISE = 1.5
 """[times the noise floor] A stretch with a larger error is listed. A stretch has a 24th of the samples of a record, and
@@ -645,7 +645,7 @@ acceptance::above_the_noise."""
 
 RANGE_END, RANGE_END_SHARE = 0.1, 0.6
 """[share of the drive range], [share of a stretch] A stretch is at the ends of the range if at least the second share
-of it lies within the first of one of them. Changed by: acceptance::ends_of_the_range."""
+of it lies within the first share of either end. Changed by: acceptance::ends_of_the_range."""
 
 VARIABLE_SHARE = 0.1
 """[share of the error's variance] A variable that explains less is not reported. Changed by:
@@ -666,11 +666,11 @@ MEMORY_WINS = 1.25
 acceptance::memory_in_place_of_one_variable."""
 
 RATE_FREE_SHARE = 0.75
-"""[share] An error does not depend on rates if drive and memory alone explain at least this share of the part that they
-explain together with rates. Changed by: acceptance::rate_free."""
+"""[share] An error does not depend on rates if drive and memory alone explain at least this share of what they explain
+together with rates. Changed by: acceptance::rate_free."""
 
 REPEATABLE_SHARE = 0.5
-"""[share of the error's variance] An error is repeatable if at least this recurs with the drive: most of it.
+"""[share of the error's variance] An error is repeatable if at least this share recurs with the drive: most of it.
 Derived."""
 
 PARITY_BINS, PARITY_SAMPLES = 20, 10
@@ -678,8 +678,8 @@ PARITY_BINS, PARITY_SAMPLES = 20, 10
 many samples. Changed by: acceptance::parity."""
 
 PARITY_SHARE = 0.05
-"""[share of the error's variance] Parity is meaningful only if the mean over drive and direction has at least this:
-half of `VARIABLE_SHARE`. Derived."""
+"""[share of the error's variance] Parity is meaningful only if the mean over drive and direction has at least this
+share: half of `VARIABLE_SHARE`. Derived."""
 
 # Whether an inverse does more than records bear out ------------------------------------------------------------
 

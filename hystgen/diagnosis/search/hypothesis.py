@@ -91,7 +91,7 @@ class Actuator(Ordered):
             rows, constant = rows * gain, constant * gain + offset
         for effect in self.at(Place.LINEAR)[len(self.filters) :]:
             rows = effect.filtered(rows, run)
-            if self.at(Place.GAIN):  # without one the constant is zero
+            if self.at(Place.GAIN):  # without a gain the constant is zero
                 constant = effect.filtered(constant, run)
         if self._needed == _RINGING:
             rows, constant = item.picked(rows), constant[item.compared]

@@ -222,7 +222,7 @@ class Records:
         user: Sequence[type[Effect]] = (),
         tick: Callable[[], None] = lambda: None,
     ) -> Records:
-        """Records thinned according to the errors of the refitted model; a user's own effect sees all samples."""
+        """Records thinned by the errors of the refitted model; for a user's own effect, every sample is kept."""
         groups, structure = (to_fit, held), refitted.structure
         masks = everything(groups)
         if not user and not any(part.name.startswith(USER) for part in structure.parts):

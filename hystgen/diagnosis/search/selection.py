@@ -181,10 +181,10 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
     much better the best one fits (two shapes of one effect each have their own free states, which are part of the
     effect). Or its held-out error is within a few per cent, and its fitted error is equal, larger by chance or, if a
     parameter of the best is at an end of its range, larger by less than an effect is worth. If an amount of the best is
-    the largest that is tried, all alike candidates are about as good: so much creep can also follow a lag. Among
-    equally many parameters, the error over all records decides; if it hardly differs, the held-out error; then `place`:
-    a lag, which every amplifier has, before a delay. A small lead on held-out records, whose error may belong mostly to
-    a third effect, does not make a candidate the best if its fitted error is far larger than another's.
+    the largest that is tried, all alike candidates are about as good: so much creep can also follow a lag. With equal
+    numbers of parameters, the error over all records decides; if it hardly differs, the held-out error; then `place`: a
+    lag, which every amplifier has, before a delay. A small lead on held-out records, whose error may belong mostly to a
+    third effect, does not make a candidate the best if its fitted error is far larger than another's.
     """
     if not tried:
         return []
@@ -333,8 +333,8 @@ class Explained:
 
 
 def explained(now: Fitted, none: Fitted, records: Records) -> tuple[Explained, Explained]:
-    """The parts of the held-out and of the fitted error that effects explain, with their free start states and offsets;
-    `none`: the model without them, with the same ones free."""
+    """The parts of the held-out and of the fitted error that effects explain; `none`: the model without them, compared
+    with the same free start states and offsets."""
     held, to_fit = (
         Explained(rms(none.errors(group, now)), rms(now.errors(group)), records.noise)
         for group in (records.held, records.to_fit)
@@ -469,8 +469,8 @@ def as_given(cascade: Cascade, given: Sequence[Effect]) -> Fitted:
 def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array | None = None) -> Fitted:
     """The nominal structure with its weights, front and effect parameters refitted.
 
-    From the shape `start` and linear weights; if an output map bends the output, also from the `nominal` weights, since
-    samples beyond a limit hide the error of the weights.
+    The fit begins at the shape `start` and linear weights; if an output map bends the output, also at the `nominal`
+    weights, since samples beyond a limit hide the error of the weights.
     """
     quick = _quick(to_fit)
     starts = [_first_weights(base, quick, start)]
@@ -747,8 +747,8 @@ def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step
     """Two effects that hide each other: neither qualifies alone, but each does next to the other.
 
     Returns the first, and the step from it to both. The search begins with the effect that explains most on held-out
-    records, and with each that is certain on fitted ones. Alone, the first may even raise the error; it then gets no
-    share of the gap.
+    records, and with each that is certain on fitted ones. Alone, the first may even raise the error; it is then
+    credited with none of the gap.
     """
     one_of_each = {each.name: each for each in reversed(failed.tried)}  # the best one of each name
     fitted = failed.now.errors(records.to_fit)
