@@ -1272,7 +1272,7 @@ def test_ends_of_fitted_records_judge_too() -> None:
         assert (front.known | end.known).tolist() == item.known.tolist()
         assert not (front.known & end.known).any()
     assert items.compared([*more.to_fit, *more.held]) == items.compared([*ready.to_fit, *ready.held])
-    assert more.notes[-1].endswith("the last 30 % of each fitted record judges too")
+    assert more.notes[-1].endswith("the last 30 % of each fitted record is held out too")
     assert preparing.with_ends(more) is None
 
 
