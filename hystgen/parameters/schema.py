@@ -37,7 +37,7 @@ SCHEMA_ID = "urn:hystgen:parameters:1"
 
 _MEMBER = "\0member "
 MEMBERS = frozenset(_MEMBER + name for name in ("number", "list", *STAGE_KINDS))
-"""Names of union members: steps of pydantic's locations that are not keys of the file."""
+"""Names of union members: elements of pydantic's locations that are not keys of the file."""
 
 
 def _whole(value: object) -> object:

@@ -245,7 +245,7 @@ BESIDE = 2
 
 
 def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
-    """Share and frequency (Hz) of narrow peaks of an error that are neither lines nor harmonics of the drive."""
+    """Share and frequency (Hz) of narrow peaks of an error that are neither lines of the drive nor its harmonics."""
     filled = _filled(item, error)
     if filled is None:
         return []

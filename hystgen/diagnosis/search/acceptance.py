@@ -1,4 +1,4 @@
-"""Every number that decides something in a diagnosis, with its unit, its reason, and the run that set it.
+"""Every number by which a diagnosis decides, with its unit, its reason, and the run that set it.
 
 The text below a number begins with its unit, in brackets, and says what happens on either side of it. It ends with
 
@@ -688,7 +688,7 @@ WILDER = 2.0
 inverse's drive: hysteresis alone turns a drive that often. Changed by: acceptance::a_drive_that_is_rougher."""
 
 BEYOND_GAIN = 3.0
-"""[times the gain] Largest change that an inverse with effects makes to the plain model's output, in held-out rms that
-the effects explain, or in noise if that is larger. The change was 0.85 to 0.97 times that measure for creep, a lag and
+"""[times the gain] Largest change that an inverse with effects makes to the plain model's output, as a multiple of the
+held-out rms that the effects explain or, if larger, of the noise. The multiple was 0.85 to 0.97 for creep, a lag and
 relaxing plays at three speeds, with noise at 0.1 % of the output. Changed by:
 acceptance::an_output_that_moves_further."""
