@@ -1191,10 +1191,10 @@ def test_show_warns_of_a_hard_inverse(p0: float, warned: bool) -> None:
 @pytest.mark.parametrize(
     ("p0", "arithmetic", "advice"),
     [
-        (3e-4, "q15", "take q31, raise p_0"),
+        (3e-4, "q15", "use q31, raise p_0"),
         (3e-4, "q31", ""),
         (3e-2, "q15", ""),
-        (1e-5, "float32", "take float64, raise p_0"),
+        (1e-5, "float32", "use float64, raise p_0"),
     ],
 )
 def test_show_warns_of_a_wide_error_of_the_inverse(p0: float, arithmetic: str, advice: str) -> None:

@@ -305,11 +305,11 @@ def test_what_is_said_of_withdrawn_effects_follows_from_their_figures(why: str, 
 @pytest.mark.parametrize(
     ("why", "words"),
     [
-        ("beyond", "beyond its usual range, which ends at 3 and leaves more"),
-        ("no less", "the largest that is tried: a range up to 9 leaves 0.07 um rms"),
-        ("limit", "the largest that is tried: farther on is no other effect"),
-        ("firm", "the largest that is tried: its range is not widened"),
-        ("noise", "the largest that is tried: only noise is left"),
+        ("beyond", "beyond its usual range, which ends at 3 and fits worse"),
+        ("no less", "the largest value tried: a range up to 9 leaves 0.07 um rms"),
+        ("limit", "the largest value tried: a wider range changes nothing"),
+        ("firm", "the largest value tried: its range is not widened"),
+        ("noise", "the largest value tried: only noise is left"),
     ],
 )
 def test_the_verdict_says_what_is_left_and_which_number_is_at_its_end(why: str, words: str) -> None:
@@ -869,7 +869,7 @@ def test_a_record_that_says_nothing_is_told(held_out: bool, tmp_path: Path) -> N
     found = hystgen.diagnose(_model(tmp_path), made[: 4 if held_out else 3], holdout=held)
     spec = " ".join(found.notes)
     assert ("sweep: there is too little to judge by" in spec) is held_out
-    assert ("that can judge: c set aside" in spec) is held_out
+    assert ("held-out record was given: c set aside" in spec) is held_out
     assert ("sweep: says next to nothing, 1 sample" in spec) is not held_out
     assert found.verdict == "nothing_missing"
 
@@ -1272,7 +1272,7 @@ def test_ends_of_fitted_records_judge_too() -> None:
         assert (front.known | end.known).tolist() == item.known.tolist()
         assert not (front.known & end.known).any()
     assert items.compared([*more.to_fit, *more.held]) == items.compared([*ready.to_fit, *ready.held])
-    assert more.notes[-1].endswith("the last 30 % of each fitted record judges too")
+    assert more.notes[-1].endswith("the last 30 % of each fitted record is held out too")
     assert preparing.with_ends(more) is None
 
 
@@ -1288,4 +1288,4 @@ def test_what_only_the_fitted_records_show_is_no_noise(tmp_path: Path) -> None:
     found = hystgen.diagnose(_model(tmp_path), records[:2], holdout=records[2], history=[0.0])
     assert found.content["gap"]["after"]["fit"] > 5.0 * found.content["noise_floor"]
     assert (found.verdict, found.content["effects"]) == ("unexplained", [])
-    assert "rms is left of the fitted records" in found.sentence()
+    assert "rms is left on the fitted records" in found.sentence()

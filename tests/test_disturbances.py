@@ -480,7 +480,7 @@ class TestDescription:
 
     def test_is_said_in_words(self) -> None:
         said = self.described([3e-4 * np.gradient(item.run.v, STEP) for item in session()]).words()
-        assert said.startswith("goes mostly with the drive rate (")
+        assert said.startswith("depends mostly on the drive rate (")
         assert "depends on the rate" in said
 
 

@@ -1244,7 +1244,7 @@ def test_one_effect_says_how_the_plays_move(tmp_path: Path) -> None:
     path.write_text(FILE + "    - {name: rate_dependence, betas: [0.1, 0.1, 0.1]}\n    - {name: user:own}\n")
     from hystgen.basics.problems import ParameterError
 
-    with pytest.raises(ParameterError, match="user:own says how the plays move, as rate_dependence does") as caught:
+    with pytest.raises(ParameterError, match="user:own sets how the plays move, and so does rate_dependence") as caught:
         hystgen.load(path, effects=[tmp_path / "own.py"])
     assert [p.path for p in caught.value.problems] == ["model.effects[1].name"]
     (own,) = effects.load_user_effects(tmp_path / "own.py")

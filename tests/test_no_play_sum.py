@@ -139,7 +139,7 @@ def test_at_one_speed_no_name_takes_its_place() -> None:
     first = found.content["unexplained"][0]
     assert first["kind"] == "not_a_play_sum"
     assert first["in_place_of"]
-    assert found.sentence().startswith("The hysteresis is no play sum: minor loops stay open")
+    assert found.sentence().startswith("The hysteresis is not a play sum: minor loops stay open")
     assert any("docs/plants.md" in text for text in found.content["advice"])
     assert found.parameters.model.effects == ()
     refused = [each["refused"] for each in found.content["ranking"][0] if each["name"] in first["in_place_of"]]

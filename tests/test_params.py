@@ -210,7 +210,7 @@ REFUSED = [
     ]),
     case('unknown_keys', H + M + "sampletime: 1\nfoo: 2\n", [
         '5:1: sampletime: unknown key; did you mean sample_time?',
-        '6:1: foo: unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',
+        '6:1: foo: unknown key; valid here: hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',
     ]),
     case('keys_that_belong_elsewhere', H + M + "effects: []\nweights: [1]\npreview: 1\nemit: {sample_time: 1}\n", [
         '5:1: effects: unknown key; it belongs in model',
@@ -219,8 +219,8 @@ REFUSED = [
         '8:8: emit.sample_time: unknown key; it belongs at the top level',
     ]),
     case('odd_unknown_keys', H + M + '"a b\\n": 1\n' + "k" * 70 + ": 2\n", [
-        '5:1: "a b\\n": unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',
-        '6:1: "kkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkk...": unknown key; known here are hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',
+        '5:1: "a b\\n": unknown key; valid here: hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',
+        '6:1: "kkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkkk...": unknown key; valid here: hystgen, name, description, units, sample_time, input_range, model, emit, not_separable',
     ]),
     case('no_values', "hystgen:\nname: ~\ninput_range: null\nmodel:\n  pi:\nsample_time:\nunits: {input: }\n", [
         '1:1: hystgen: has no value; write one, or remove it',
@@ -265,7 +265,7 @@ REFUSED = [
         '5:14: description: has 501 characters, more than 500; shorten it',
     ]),
     case('description_odd', H + M + 'description: "a\\tb"\n', [
-        '5:14: description: holds the unprintable character U+0009; remove it',
+        '5:14: description: contains the unprintable character U+0009; remove it',
     ]),
     case('units_long', H + M + "units: {input: " + "x" * 41 + "}\n", [
         '5:16: units.input: has 41 characters, more than 40; shorten it',
@@ -298,18 +298,18 @@ REFUSED = [
         '3:14: input_range: must be two numbers; write [lowest, highest]',
     ]),
     case('range_items', "hystgen: 1\nname: a\ninput_range: [.inf, low]\n" + M, [
-        '3:15: input_range[0]: must be a finite number, not inf; write one of at most 1e+30 in size',
+        '3:15: input_range[0]: must be a finite number, not inf; write one of at most 1e+30 in magnitude',
         '3:21: input_range[1]: must be a number, not the text "low"; write it like 0.45',
     ]),
     case('range_huge', "hystgen: 1\nname: a\ninput_range: [-2e30, 1e400]\n" + M, [
         '3:15: input_range[0]: must be at least -1e+30, not -2e+30; correct the number',
-        '3:22: input_range[1]: must be a finite number, not inf; write one of at most 1e+30 in size',
+        '3:22: input_range[1]: must be a finite number, not inf; write one of at most 1e+30 in magnitude',
     ]),
     case('range_big_int', "hystgen: 1\nname: a\ninput_range: [0, " + "9" * 5000 + "]\n" + M, [
-        '3:18: input_range[1]: must be a finite number, not inf; write one of at most 1e+30 in size',
+        '3:18: input_range[1]: must be a finite number, not inf; write one of at most 1e+30 in magnitude',
     ]),
     case('range_hex', "hystgen: 1\nname: a\ninput_range: [0, 0x" + "f" * 400 + "]\n" + M, [
-        '3:18: input_range[1]: must be a finite number, not inf; write one of at most 1e+30 in size',
+        '3:18: input_range[1]: must be a finite number, not inf; write one of at most 1e+30 in magnitude',
     ]),
     case('pi_empty', pi(""), [
         '4:13: model.pi: needs thresholds and weights, or a density; add them',
@@ -343,9 +343,9 @@ REFUSED = [
         '4:38: model.pi.weights: must be a list, not 1; write [ ] around the values',
     ]),
     case('nan_inf', pi("thresholds: [0, .inf], weights: [.nan, -.inf]"), [
-        '4:30: model.pi.thresholds[1]: must be a finite number, not inf; write one of at most 1e+30 in size',
-        '4:47: model.pi.weights[0]: must be a finite number, not nan; write one of at most 1e+30 in size',
-        '4:53: model.pi.weights[1]: must be a finite number, not -inf; write one of at most 1e+30 in size',
+        '4:30: model.pi.thresholds[1]: must be a finite number, not inf; write one of at most 1e+30 in magnitude',
+        '4:47: model.pi.weights[0]: must be a finite number, not nan; write one of at most 1e+30 in magnitude',
+        '4:53: model.pi.weights[1]: must be a finite number, not -inf; write one of at most 1e+30 in magnitude',
     ]),
     case('weights_length', pi("thresholds: [0, 1], weights: [1]"), [
         '4:43: model.pi.weights: has 1 value for 2 in thresholds; give as many as thresholds',
@@ -386,7 +386,7 @@ REFUSED = [
         '4:70: model.pi.initial_state[1]: must be a number, not the text "x"; write it like 0.45',
     ]),
     case('density_beside', pi("thresholds: [0], density: {table: {r: [0, 1], p: [1, 1]}, p0: 1, n: 1}"), [
-        '4:31: model.pi.density: stands beside thresholds; remove one or the other',
+        '4:31: model.pi.density: is given as well as thresholds; remove one or the other',
     ]),
     case('density_number', pi("density: 5"), [
         '4:23: model.pi.density: must be a mapping, not 5; write `key: value` pairs in it',
@@ -450,7 +450,7 @@ REFUSED = [
     ]),
     case('density_state', den("formula: r, r_max: 1, p0: 1, n: 2}, initial_state: [0, 1], x: {"), [
         '4:75: model.pi.initial_state: has 2 values for 3 thresholds (r_0 included); write one number, or one per threshold',
-        '4:83: model.pi.x: unknown key; known here are thresholds, weights, initial_state, density',
+        '4:83: model.pi.x: unknown key; valid here: thresholds, weights, initial_state, density',
     ]),
     case('table_order', den("table: {r: [0, 1, 1], p: [1, 1, 1]}, p0: 1, n: 1"), [
         '4:42: model.pi.density.table.r[2]: 1 is not above the 1 before it; sort the list and remove repeated values',
@@ -469,7 +469,7 @@ REFUSED = [
     case('table_missing', den("table: {q: 1}, p0: 1, n: 1"), [
         '4:31: model.pi.density.table.r: is missing; add `r: [0, 5, 10]`',
         '4:31: model.pi.density.table.p: is missing; add `p: [0.8, 0.2, 0.1]`',
-        '4:32: model.pi.density.table.q: unknown key; known here are r, p',
+        '4:32: model.pi.density.table.q: unknown key; valid here: r, p',
     ]),
     case('density_state_length', H + "model: {pi: {density: {formula: r, r_max: 1, p0: 1, n: 2}, initial_state: [0, 1]}}\n", [
         '4:75: model.pi.initial_state: has 2 values for 3 thresholds (r_0 included); write one number, or one per threshold',
@@ -494,7 +494,7 @@ REFUSED = [
         '4:94: model.memoryless.thresholds: do not contain 0; add 0 and the weight of the linear part',
         '4:98: model.memoryless.thresholds[1]: 1 is not above the 1 before it; sort the list and remove repeated values',
         '4:114: model.memoryless.weights: has 1 value for 3 in thresholds; give as many as thresholds',
-        '4:119: model.memoryless.x: unknown key; known here are kind, thresholds, weights',
+        '4:119: model.memoryless.x: unknown key; valid here: kind, thresholds, weights',
     ]),
     case('dead_zone_missing', front("[{kind: dead_zone}]"), [
         '4:65: model.memoryless[0].thresholds: is missing; add `thresholds: [0, 0.5, 1.0]`',
@@ -509,8 +509,8 @@ REFUSED = [
     ]),
     case('tanh_sign', front("{kind: tanh, ascending: {a0: 1, a1: -1, a2: 0, a3: 0}, descending: {a0: 0, a1: 0, a2: 0, a3: 0}}"), [
         '4:88: model.memoryless.ascending: a0 = 1 and a1 = -1 make a falling branch; give both the same sign',
-        '4:136: model.memoryless.descending.a0: must not be 0, the branch would be constant; give a0 and a1 of the same sign',
-        '4:143: model.memoryless.descending.a1: must not be 0, the branch would be constant; give a0 and a1 of the same sign',
+        '4:136: model.memoryless.descending.a0: must not be 0, or the branch is constant; give a0 and a1 of the same sign',
+        '4:143: model.memoryless.descending.a1: must not be 0, or the branch is constant; give a0 and a1 of the same sign',
     ]),
     case('tanh_no_branch', front("[{kind: tanh}]"), [
         '4:65: model.memoryless[0].ascending: is missing; add `ascending: {a0: 6.0, a1: 0.4, a2: 0.0, a3: 0.0}`',
@@ -519,7 +519,7 @@ REFUSED = [
         "4:88: model.memoryless.ascending: a0 a1, the branch's steepest slope, is 0.0; keep to 1e-150 .. 1e150",
     ]),
     case('tanh_key_named_tanh', front("{kind: tanh, tanh: 1, ascending: {a0: 1}}"), [
-        '4:77: model.memoryless.tanh: unknown key; known here are kind, ascending, descending',
+        '4:77: model.memoryless.tanh: unknown key; valid here: kind, ascending, descending',
         '4:97: model.memoryless.ascending.a1: is missing; add `a1: 0.0`',
         '4:97: model.memoryless.ascending.a2: is missing; add `a2: 0.0`',
         '4:97: model.memoryless.ascending.a3: is missing; add `a3: 0.0`',
@@ -531,7 +531,7 @@ REFUSED = [
         '4:62: model.effects[0].time_constant: is missing; add `time_constant: 0.0125`',
         '4:74: model.effects[0].time_constnt: unknown key; did you mean time_constant?',
         '4:113: model.effects[1].shape: must be exponential or logarithmic, not the text "slow"; choose one of them',
-        '4:134: model.effects[2].shape: unknown key; known here are name, time',
+        '4:134: model.effects[2].shape: unknown key; valid here: name, time',
         '4:150: model.effects[2].time: must be a number, not the text "q"; write it like 0.45',
     ]),
     case('effect_shape', eff("[{name: drift, shape: bent, rate: 1}]"), [
@@ -541,7 +541,7 @@ REFUSED = [
         '4:89: model.effects[0].time_constant: must be at least 0, not -1; correct the number',
         '4:123: model.effects[1].frequency: must be above 0, not 0; correct the number',
         '4:135: model.effects[1].damping: must be at most 10, not 11; correct the number',
-        '4:160: model.effects[2].rate: must be a finite number, not inf; write one of at most 1e+30 in size',
+        '4:160: model.effects[2].rate: must be a finite number, not inf; write one of at most 1e+30 in magnitude',
     ]),
     case('effect_lengths', eff("[{name: creep, time_constants: [1, 2], weights: [1]}, {name: rate_dependence, betas: [1, 2]}, {name: noncongruent, coefficients: [[1], [2]]}]"), [
         '4:109: model.effects[0].weights: has 1 value for 2 in time_constants; give as many as time_constants',
@@ -559,7 +559,7 @@ REFUSED = [
     ]),
     case('effect_saturation_in_front', eff("[{name: saturation, side: front}]"), [
         '4:62: model.effects[0].level: is missing; add `level: 50.0` (this is saturation behind the plays; one in front is a stage of model.memoryless)',
-        '4:81: model.effects[0].side: unknown key; known here are name, shape, level, centre (this is saturation behind the plays; one in front is a stage of model.memoryless)',
+        '4:81: model.effects[0].side: unknown key; valid here: name, shape, level, centre (this is saturation behind the plays; one in front is a stage of model.memoryless)',
     ]),
     case('effect_empty_values', eff("[{name: lag, time_constant: }, {name: slew_limit, rate: 1, falling_rate: }]"), [
         '4:74: model.effects[0].time_constant: has no value; write one, or remove it',
@@ -569,7 +569,7 @@ REFUSED = [
         '4:69: model.effects[0].name: unknown effect creap; did you mean creep?',
     ]),
     case('effect_unknown', eff("[{name: zzz}]"), [
-        '4:69: model.effects[0].name: unknown effect zzz; known are creep, rate_dependence, resonance, lag, delay, slew_limit, asymmetry, saturation, thermal, drift, ageing, sensor_nonlinearity, noncongruent',
+        '4:69: model.effects[0].name: unknown effect zzz; known effects: creep, rate_dependence, resonance, lag, delay, slew_limit, asymmetry, saturation, thermal, drift, ageing, sensor_nonlinearity, noncongruent',
     ]),
     case('effect_user', eff("[{name: 'user:x'}]"), [
         '4:69: model.effects[0].name: user:x is not defined in any given file; give its file (--effects)',
@@ -580,7 +580,7 @@ REFUSED = [
     case('effect_forms', eff("[creep, {}, {name: 5}, {name: }, null]"), [
         '4:62: model.effects[0]: must be an effect with its name, not the text "creep"; write {name: ..}',
         '4:69: model.effects[1].name: is missing; add the name of an effect',
-        '4:80: model.effects[2].name: must be the name of an effect, not 5; known are creep, rate_dependence, resonance, lag, delay, slew_limit, asymmetry, saturation, thermal, drift, ageing, sensor_nonlinearity, noncongruent',
+        '4:80: model.effects[2].name: must name an effect, not 5; known effects: creep, rate_dependence, resonance, lag, delay, slew_limit, asymmetry, saturation, thermal, drift, ageing, sensor_nonlinearity, noncongruent',
         '4:85: model.effects[3].name: has no value; write one, or remove it',
         '4:94: model.effects[4]: has no value; write one, or remove it',
     ]),
@@ -593,7 +593,7 @@ REFUSED = [
         '5:50: emit.engine: must be auto, corners or loop, not 5; choose one of them',
         '5:64: emit.drive_lsb: must be above 0, not 0; correct the number',
         '5:79: emit.output_lsb: must be above 0, not -1; correct the number',
-        '5:83: emit.x: unknown key; known here are operator, arithmetic, engine, optimize, drive_lsb, output_lsb, '
+        '5:83: emit.x: unknown key; valid here: operator, arithmetic, engine, optimize, drive_lsb, output_lsb, '
         'compensation',
     ]),
     case('compensation', H + M + "emit:\n  compensation: {preview: -1, drive_hold: x, noise_gain: 0, taps: 4, corner: 1.5,"
@@ -605,7 +605,7 @@ REFUSED = [
         '6:78: emit.compensation.corner: must be a whole number, not 1.5; write it like 12',
         '6:94: emit.compensation.resonance: must be inverse, notch, shaper or none, not the text "tuned"; choose one of them',
         '6:108: emit.compensation.quiet: must be true or false, not the text "x"; write one of them, without quotes',
-        '6:111: emit.compensation.still: unknown key; known here are preview, drive_hold, noise_gain, max_rate, '
+        '6:111: emit.compensation.still: unknown key; valid here: preview, drive_hold, noise_gain, max_rate, '
         'resonance, taps, corner, quiet, compensate',
     ]),
     case('compensate', H + M + "emit: {compensation: {compensate: [lag]}}\nnot_separable: [[creep], [a, b, c], 3]\n", [
@@ -750,7 +750,7 @@ emit: {operator: revers}
     assert refusal(text) == [
         "f.yaml:2:7: error: name: double is a keyword of C or C++; choose another name, such as axis_double",
         "f.yaml:3:1: error: descripton: unknown key; did you mean description?",
-        "f.yaml:4:14: error: description: holds the unprintable character U+0009; remove it",
+        "f.yaml:4:14: error: description: contains the unprintable character U+0009; remove it",
         "f.yaml:5:19: error: units.input: this key is given twice (first in line 5); keep one of them",
         "f.yaml:6:14: error: sample_time: must be above 0, not -1; correct the number",
         "f.yaml:7:14: error: input_range: 5 is not below 1; write [lowest, highest]",
@@ -867,7 +867,7 @@ def test_make_parameters() -> None:
     with pytest.raises(ParameterError) as caught:
         make_parameters({**data, "name": "int", "input_range": [0, 10**400], "units": None}, "here")
     assert str(caught.value) == (
-        "here: error: input_range[1]: must be a finite number, not inf; write one of at most 1e+30 in size\n"
+        "here: error: input_range[1]: must be a finite number, not inf; write one of at most 1e+30 in magnitude\n"
         "here: error: name: int is a keyword of C or C++; choose another name, such as axis_int"
     )
 

@@ -384,7 +384,7 @@ def test_a_model_too_large_for_the_avr_says_how_many_plays_fit() -> None:
     needs_avr()
     board = targets.AVR.name
     (row,) = hystgen.verify(of_many_plays(900), targets=[board]).rows
-    found = re.search(r"not more than (\d+) of the 900 plays fit", row.error)
+    found = re.search(r"at most (\d+) of the 900 plays fit", row.error)
     assert found, row.error
     assert "constants, which are in RAM on an AVR" in row.error
     fit = int(found[1])

@@ -1,4 +1,4 @@
-"""The command line: parse the words, call one function, print what it returns. One file per command."""
+"""The command line: parse the arguments, call one function, print the result. One file per command."""
 
 from __future__ import annotations
 

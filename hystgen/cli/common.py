@@ -38,14 +38,14 @@ ADVICE = {
 
 
 class Failed(click.ClickException):
-    """A check that failed (exit code 1) or unusable input (2); the message says everything."""
+    """A failed check (exit code 1) or unusable input (2); the message says everything."""
 
     def __init__(self, message: str, code: int) -> None:
         super().__init__(message)
         self.exit_code = code  # type: ignore[misc]  # click declares it on the class and reads it on the instance
 
     def show(self, file: IO[str] | None = None) -> None:
-        """Print just the message: it already says that it is an error."""
+        """Print only the message, which already says that it is an error."""
         console.note(self.message, file)
 
 
@@ -128,7 +128,7 @@ layout_option = click.option(
 )
 skip_option = click.option(
     "--skip", type=float, callback=seconds, default=0.0,
-    help="seconds at the start of every record that are not compared, although their drive counts",
+    help="seconds at the start of every record to leave out of the comparison; their drive still counts",
 )
 def for_each(items: Sequence[T], action: Callable[[T], U]) -> list[U]:
     """The results of `action` for all items. Raises Failed with all messages and the highest of the exit codes."""
@@ -168,7 +168,7 @@ def number_list(option: str, text: str, example: str) -> list[float]:
 
 
 def matched(_context: click.Context, _option: click.Parameter, value: tuple[str, ...]) -> tuple[str, ...]:
-    """The files that match patterns such as 'held/*.csv', sorted by name; every other path unchanged."""
+    """The files that match patterns such as 'held/*.csv', sorted by name; all other paths unchanged."""
     found: list[str] = []
     for path in value:
         found += [path] if os.path.lexists(path) else sorted(glob.glob(path)) or [path]
@@ -176,13 +176,13 @@ def matched(_context: click.Context, _option: click.Parameter, value: tuple[str,
 
 
 class Judging(click.Command):
-    """A command with records and held-out records; says which of the files after `--holdout FILE` it would fit.
+    """A command with records and held-out records; warns of files after `--holdout FILE` that it would fit.
 
-    A shell expands `--holdout *.csv` to `--holdout a.csv b.csv`, of which the option takes only the first.
+    A shell expands `--holdout *.csv` to `--holdout a.csv b.csv`, but the option takes only the first of these.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Parse the words."""
+        """Parse the arguments."""
         words = list(args)
         rest = super().parse_args(ctx, args)
         data = ctx.params.get("data") or ()
@@ -204,7 +204,7 @@ def data_argument(required: bool) -> Callable[[Callable[..., object]], Callable[
 
 
 class ReadingArguments(TypedDict):
-    """How the command line says that records are to be read."""
+    """Arguments of the command line for reading records."""
 
     columns: str | None
     sample_time: float | None
@@ -212,7 +212,7 @@ class ReadingArguments(TypedDict):
 
 
 class ReadingOptions(TypedDict):
-    """The options of `read_records` that the command line gives."""
+    """The options of `read_records` that the command line sets."""
 
     columns: dict[str, str] | None
     sample_time: float | None
@@ -232,14 +232,14 @@ _RECORD_OPTIONS = [
     click.option(
         "--columns",
         metavar="t=Time,v=U,y=Pos",
-        help="our names for the file's columns; in HDF5 v=run1/drive, in a MATLAB struct v=data.v; in text also by "
+        help="names t, v, y for the file's columns; in HDF5 v=run1/drive, in a MATLAB struct v=data.v; in text also by "
         "number, 1,2,3 for t, v, y",
     ),
-    click.option("--sample-time", type=float, help="seconds, for files without time"),
-    click.option("--delimiter", help="default: found from the file"),
-    click.option("--history", metavar="V,V,..", help="drive values visited before the record, in the model's units"),
+    click.option("--sample-time", type=float, help="sample time in seconds, for files without time"),
+    click.option("--delimiter", help="default: detected from the file"),
+    click.option("--history", metavar="V,V,..", help="drive values visited before each record, in the model's units"),
     click.option(
-        "--rest", type=float, callback=seconds, default=0.0, help="seconds of pause, which only effects see"
+        "--rest", type=float, callback=seconds, default=0.0, help="pause in seconds, which matters only to effects"
     ),
 ]
 

@@ -14,7 +14,7 @@ from hystgen.cli import common
 
 
 def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> None:
-    """Write the drive records that a diagnosis needs; prints the files and the command to run on the measured ones."""
+    """Write the drive records that a diagnosis needs; prints the files and the command to run after measuring."""
     from hystgen.basics import drawing
     from hystgen.report.plan import plan
 
@@ -48,13 +48,13 @@ def _plan(params: str, output: str, effects: Sequence[str], **options: Any) -> N
 )
 @click.option("--plan", is_flag=True, help="write the drive records to measure, and a page that explains them")
 @click.option("--max-rate", type=float, help="with --plan: fastest change of the drive, input units per second")
-@click.option("--rate", type=float, metavar="HZ", help="with --plan: all drives in order, at a converter's rate")
+@click.option("--rate", type=float, metavar="HZ", help="with --plan: all drives in sequence, at a converter's rate")
 @click.option("--dac-bits", type=int, help="with --rate: codes for a DAC with this many bits")
 @click.option(
-    "--dac-range", metavar="LOW,HIGH", help="drive at the lowest code and one above the highest, amplifier included"
+    "--dac-range", metavar="LOW,HIGH", help="drive at the lowest code and one above the highest, after the amplifier"
 )
 @click.option(
-    "--dac-coding", type=click.Choice(["straight", "twos-complement"]), help="of the codes  [default: straight]"
+    "--dac-coding", type=click.Choice(["straight", "twos-complement"]), help="format of the codes  [default: straight]"
 )
 @click.option(
     "--session", type=click.Path(), help="session.json of a plan: DATA is one recording of the whole session"

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @common.optimize_option
 @common.layout_option
 @click.option(
-    "--check", is_flag=True, help="write nothing; exit 1 if C files differ, or none of PARAMS writes them; say which"
+    "--check", is_flag=True, help="write nothing; exit 1 and list the C files that differ or that none of PARAMS writes"
 )
 @common.partial_option
 @common.effects_option
@@ -65,7 +65,7 @@ def _check(
     models: Sequence[tuple[str, Model]], texts: Sequence[Mapping[str, str]], output: str, options: Mapping[str, Any],
     effects: Sequence[str],
 ) -> None:
-    """Exit with code 1; says how the files on disk differ and which commands bring them up to date."""
+    """Exit with code 1 if files on disk are stale; says how, and which commands bring them up to date."""
     from hystgen.emission import calls, stale
     from hystgen.emission.options import OPTIONS
 
@@ -83,7 +83,7 @@ def _check(
             other: Mapping[str, str], model: Model = model, found: Sequence[stale.Difference] = found
         ) -> list[stale.Difference]:
             try:
-                with warnings.catch_warnings(action="ignore"):  # says which files were requested
+                with warnings.catch_warnings(action="ignore"):  # already given for the files themselves
                     return calls.stale_files(model, output, **other, allow_partial=options["allow_partial"])
             except ValueError:  # the model no longer exists
                 return list(found)

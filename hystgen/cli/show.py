@@ -18,7 +18,7 @@ from hystgen.cli import common
     "--settle-within", type=float, metavar="PERCENT",
     help="error within which the output counts as settled, percent of a step  [default: 1]",
 )
-@click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the properties for programs")
+@click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the properties as JSON")
 @common.effects_option
 def show(
     params: str, plot: str | None, settle_within: float | None, json_file: str | None, effects: tuple[str, ...]

@@ -14,8 +14,8 @@ from hystgen.cli import common
 @click.command(short_help="Print the tracking error on a recorded actuator.")
 @common.params_argument
 @common.data_argument(required=True)
-@click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the tracking errors along time")
-@click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the errors for programs")
+@click.option("--plot", type=click.Path(dir_okay=False), help="PNG or SVG of the tracking errors over time")
+@click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the errors as JSON")
 @common.effects_option
 @common.record_options
 @common.skip_option
@@ -25,8 +25,8 @@ def track(
 ) -> None:
     """Print the tracking error on the recorded actuator: with a straight line, with plays alone, with the whole model.
 
-    The straight line is fitted to the records. Plays alone are the model without its effects, with nothing else changed
-    and nothing refitted.
+    The straight line is fitted to the records. Plays alone are the model without its effects; nothing else is changed
+    or refitted.
 
     Example: hystgen track diagnosed/params.yaml held_out.csv --plot tracking.svg
     """

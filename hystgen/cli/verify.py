@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 @click.option("--compiler", multiple=True, help="gcc, clang, zig or another command; default: all found")
 @click.option("--targets", default="host", show_default=True, help="comma separated: " + ", ".join(TARGETS))
 @click.option("--target-length", type=click.IntRange(min=1), help="calls per record on emulated cores")
-@click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the report for programs")
+@click.option("--json", "json_file", type=click.Path(dir_okay=False), help="write the report as JSON")
 @click.option("--junit", "junit_file", type=click.Path(dir_okay=False), help="write the report as JUnit XML")
 def verify(
     params: tuple[str, ...], compiler: tuple[str, ...], targets: str, target_length: int | None, json_file: str | None,
@@ -83,7 +83,7 @@ def verify(
 
 
 def _check(model: Model, options: Mapping[str, Any]) -> None:
-    """Raise any error of emission now, before time is spent on earlier models."""
+    """Raise any emission error now, before time is spent on other models."""
     from hystgen.emission.calls import emit_options, emitted_model
 
     chosen = emit_options(model, **options)

@@ -62,15 +62,15 @@ def diagnose(
     """Find what a nominal model is missing.
 
     `parameters`: a `Model`, a parameter file, or a result of `identify`; `records`: measured records to fit, each as
-    for `identify` and converted to the model's units; `holdout`: records with other waveforms that judge; without them,
-    or if too little of them can be compared, every third record, or the end of each, is held out. `history`: drive
-    values visited before every record, ignored if the starts of the records contradict it; `rest`: seconds of pause
-    after them. `skip`: seconds at the start of every record that are not compared, although their drive counts.
-    `effects`: further effects that take part.
+    for `identify` and converted to the model's units; `holdout`: records with other waveforms, by which models are
+    judged; if none are given, or too few of their samples can be compared, every third record, or the end of each, is
+    held out. `history`: drive values visited before every record, ignored if the starts of the records contradict it;
+    `rest`: pause after them in seconds. `skip`: seconds at the start of every record that are left out of the
+    comparison, although their drive still counts. `effects`: further effects to try.
 
-    The nominal model is refitted first. Then one effect after the other is added, with each shape fitted jointly with
-    the weights on the free-run error, and accepted if it removes a worthwhile part of the held-out error that chance
-    does not explain. Raises RecordError, IdentificationError, ValueError.
+    The nominal model is refitted first. Effects are then added one at a time: each shape is fitted jointly with the
+    weights to the free-run error, and accepted if it removes a worthwhile part of the held-out error and chance does
+    not explain the gain. Raises RecordError, IdentificationError, ValueError.
 
     >>> import numpy as np, hystgen
     >>> t = np.linspace(0.0, 4.0, 4000)
@@ -90,7 +90,7 @@ def diagnose(
     arguments.number("rest", rest, "seconds", 0.0)
     arguments.number("skip", skip, "seconds", 0.0)
     if not all(isinstance(effect, type) and issubclass(effect, Effect) for effect in effects):
-        raise TypeError("effects are classes, of files as hystgen.effects.load_user_effects returns them")
+        raise TypeError("effects must be classes, as hystgen.effects.load_user_effects returns them")
     read = read_records([*fitted, *others], columns, sample_time, delimiter, progress=progress, points=True)
     read = in_units(read, model.parameters.units, sources=[*fitted, *others])
     nominal = _with_units(model.parameters, read)
@@ -131,7 +131,7 @@ def diagnose(
 
 
 def _with_units(parameters: Parameters, records: Sequence[Record]) -> Parameters:
-    """The parameters with the units of the records where they have none."""
+    """The parameters, with missing units taken from the records."""
     units, _ = agreed_units(records, parameters.units.model_dump())
     return parameters.model_copy(update={"units": parameters.units.model_copy(update=units)})
 
@@ -141,7 +141,7 @@ NO_FRONT = "the memoryless part of the model was left out: held-out records are 
 
 @dataclass(frozen=True)
 class _Done:
-    """A finished search, with its records and further notes about it."""
+    """A finished search, with its records and notes about it."""
 
     cleaned: Cleaned
     noise: NoiseFloor
@@ -151,13 +151,13 @@ class _Done:
     notes: tuple[str, ...] = ()
 
     def noting(self, note: str) -> _Done:
-        """The same with one more note."""
+        """A copy with one more note."""
         return replace(self, notes=(*self.notes, note))
 
 
 @dataclass(frozen=True)
 class _Case:
-    """The records and the nominal model of a diagnosis, to be searched with a history or without one."""
+    """The records and the nominal model of a diagnosis, for searches with and without a history."""
 
     cascade: Cascade
     given: Sequence[Effect]
@@ -169,7 +169,7 @@ class _Case:
     tick: Callable[[], None]
 
     def with_history(self, history: History, unit: str | None) -> tuple[_Done, OtherHistory | None]:
-        """The search with the history, or without it and with a finding if the records contradict it."""
+        """The search with the history or, if the records contradict it, a search without it, and the finding."""
         done = None
         wrong = self._foreign(history)
         if wrong is None:
@@ -184,8 +184,8 @@ class _Case:
         return done, wrong
 
     def _begun(self, history: History) -> tuple[Prepared, Refit, Refit | None]:
-        """The records as they are compared, the function that refits the nominal model to them, and the same without a
-        front, if there is one."""
+        """The prepared records, a function that refits the nominal model to them and, if the model has a front, one
+        that refits it without the front."""
         ready = preparing.prepare(self.to_fit, self.held, history, self.rest, self.skip)
         base, start = hypothesis.structure_of(self.cascade, self.given, ready)
         weights = hypothesis.nominal_weights(self.cascade, base)
@@ -197,7 +197,7 @@ class _Case:
         )
 
     def _foreign(self, history: History) -> OtherHistory | None:
-        """The finding about a history that the model can follow, but only at the cost of the rest."""
+        """A finding if the model can follow the history only at the cost of the other samples, else None."""
         if history is None:
             return None
         ready, refit, _ = self._begun(history)
@@ -208,10 +208,10 @@ class _Case:
         return preparing.bends(ready.to_fit, refit(ready), refit_others(others))
 
     def _searched(self, history: History) -> _Done:
-        """The search from the nominal model, or without its front if that misleads it.
+        """The search from the nominal model, or from that model without its front if the front misleads the search.
 
-        A front fitted to one loop may follow an effect there. If held-out records are predicted better without the
-        front, the search with it has to do better in the end than the names that are found without it.
+        A front fitted to one loop may have absorbed an effect. If held-out records are predicted better without the
+        front, the search without it is used if it finds effects but no new front, and otherwise the better one.
         """
         ready, refit, bare = self._begun(history)
         if bare is not None and selection.better(bare(ready), refit(ready), ready.held):
@@ -224,9 +224,9 @@ class _Case:
         return self._thorough(ready, refit)
 
     def _thorough(self, ready: Prepared, refit: Refit) -> _Done:
-        """The search, and another one if nothing could be named although much error remains.
+        """The search, repeated if nothing could be named although much error remains.
 
-        In the second, the end of each fitted record judges too, since it may show what held-out records do not.
+        Then the end of each fitted record is held out too, since it may show what held-out records do not.
         """
         done = self._search(ready, refit)
         left = rms(done.found.fitted.errors(done.records.to_fit))
@@ -243,7 +243,7 @@ class _Case:
             refitted = refit(cleaned.clean)
         noise, records = self._records(cleaned.clean, refitted)
         found = selection.select(records, refitted, cleaned.left_by)
-        if found.found and cleaned.left_by(found.fitted):  # a line that only shows clearly beside the effects
+        if found.found and cleaned.left_by(found.fitted):  # a line that shows only once the effects are fitted
             cleaned = disturbances.taken_out(cleaned, found.fitted, partial(selection.again, found.fitted))
             refitted = refit(cleaned.clean)
             noise, records = self._records(cleaned.clean, refitted)
@@ -257,9 +257,9 @@ class _Case:
 
 
 def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None) -> tuple[Outcome, list[str]]:
-    """The outcome, or the model that `identify` chooses on the same samples, and a note that says so.
+    """The outcome or, if better, the model that `identify` chooses on the same samples, with a note that says so.
 
-    None is sought where only noise is left, of all records or, with names, of the held-out ones.
+    `identify` is not tried if only noise is left: on all records or, if effects are named, on the held-out ones.
     """
     left, of_fitted = records.residual(found.fitted), rms(found.fitted.errors(records.to_fit))
     if acceptance.is_noise(left if found.found else max(left, of_fitted), records.noise):
@@ -267,7 +267,7 @@ def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None
     courses = [[item.course for item in group if item.known.any()] for group in (records.to_fit, records.held)]
     try:
         identified = auto(*courses)
-    except IdentificationError:  # too little of these records is left behind a start whose memory is not known
+    except IdentificationError:  # too few samples remain after starts with unknown memory
         return found, []
     r, p = identified.solution.thresholds, identified.solution.weights
     other = Fitted(Structure(r, Kept(identified.stages)), np.empty(0), p, np.nan)
@@ -277,14 +277,14 @@ def _no_worse_than_identified(found: Outcome, records: Records, unit: str | None
     u = f" {unit}" if unit else ""
     return best, [
         f"{WRITTEN[selection.IDENTIFIED]} is written, since it leaves {records.residual(other):.4g}{u} rms on held-out "
-        f"records, and {WRITTEN[found.written]} {left:.4g}{u}"
+        f"records, less than {WRITTEN[found.written]} with {left:.4g}{u}"
     ]
 
 
 def _harmless(
     found: Outcome, done: _Done, written: Callable[[Outcome], Parameters]
 ) -> tuple[Outcome, list[WildInverse]]:
-    """The outcome without effects whose inverse does more than records bear out, and that finding."""
+    """The outcome, without effects whose inverse does more than the records bear out, and the finding about them."""
     from hystgen.model import Model
 
     if not found.found:
@@ -326,7 +326,7 @@ def _extended(
 ) -> Parameters:
     """The parameter file with the model refitted and the effects added; `cascade`: the nominal model.
 
-    Raises IdentificationError if no play is left.
+    Raises IdentificationError if all weights are zero.
     """
     from hystgen.parameters.files import make_parameters
 
@@ -340,7 +340,7 @@ def _extended(
     if actuator.at(Place.PLAYS):  # an effect on the plays may refer to the largest threshold
         kept[-1] = True
     fewer = tuple(r[kept].tolist())
-    if any(True for effect in actuator.effects for _ in effect.problems(fewer)):  # it has numbers for every play
+    if any(True for effect in actuator.effects for _ in effect.problems(fewer)):  # it has a parameter for every play
         kept[:] = True
     offset = rounded(_offset(fitted, ready.to_fit[0]), DIGITS)
     plays: dict[str, object] = {"thresholds": r[kept].tolist(), "weights": p[kept].tolist()}

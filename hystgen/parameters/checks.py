@@ -1,7 +1,7 @@
 """From plain data to checked parameters: every problem at once, each in one plain sentence and at its position.
 
-It checks the structure first (pydantic's findings, reworded), then how values fit together, for every part whose
-structure is sound.
+The structure is checked first (pydantic's findings, reworded), then how values fit together, in every part with a sound
+structure.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Shapes = tuple["type[Effect]", ...]
 _FRONT = effects.CATALOGUE.index(effects.LIMIT)
 
 EFFECT_NAMES = (*effects.CATALOGUE[:_FRONT], effects.BEND, *effects.CATALOGUE[_FRONT:])
-"""Names of effects: the folders of the catalogue and asymmetry, which is a memoryless stage of the model."""
+"""Names of effects: the folders of the catalogue, and asymmetry, which is a memoryless stage of the model."""
 
 _PARTS: dict[str, type[BaseModel]] = {
     "units": schema.Units,
@@ -52,9 +52,9 @@ _PLACES: dict[str, type[BaseModel]] = {
     "in emit": schema.EmitDefaults,
     "in emit.compensation": schema.Compensation,
 }
-"""Where a misplaced key belongs."""
+"""Where a misplaced key belongs, in words, with the keys of that place."""
 
-# How a key is written, for messages about a missing one.
+# How a key is written, for messages about missing keys.
 _WRITTEN = {
     "hystgen": "hystgen: 1",
     "name": "name: stage_x",
@@ -77,8 +77,8 @@ def check(
 ) -> tuple[schema.Parameters | None, list[Problem]]:
     """Parameters made from `data` (lists as tuples), or None, and every problem.
 
-    `document` gives the positions and the values already refused while reading, which are not checked again. `user`:
-    classes of the user's own effects by name.
+    `document`: positions, and values already refused while reading, which are not checked again. `user`: classes of the
+    user's own effects by name.
     """
     checker = _Checker(data, document, user or {})
     parameters = checker.structure()
@@ -115,7 +115,7 @@ class _Checker:
     # Bookkeeping ------------------------------------------------------------------------------------------
 
     def add(self, path: Path, message: str, at_key: bool = False) -> None:
-        """Note a problem with the value (or key) at `path` or, if it is missing, with what should hold it."""
+        """Record a problem with the value (or key) at `path` or, if that is missing, with what should contain it."""
         line, column = self.document.position(path, at_key) if self.document else (None, None)
         self.problems.append(Problem(path_text(path), message, line, column))
 
@@ -125,11 +125,11 @@ class _Checker:
         self._above_bad.update(path[:n] for n in range(len(path)))
 
     def sound(self, path: Path) -> bool:
-        """Whether the structure is sound at `path`, below it and in everything that holds it."""
+        """Whether the structure is sound at `path`, below it and in everything that contains it."""
         return path not in self._above_bad and not self.judged(path)
 
     def judged(self, path: Path) -> bool:
-        """Whether the structure at `path`, or of something that holds it, is known to be unsound."""
+        """Whether the structure at `path`, or of anything that contains it, is known to be unsound."""
         return any(path[:n] in self._bad for n in range(len(path) + 1))
 
     def at(self, path: Path) -> Any:
@@ -189,7 +189,7 @@ class _Checker:
             if self.judged(path):
                 return
         if kind == "too_short" and len(value) >= context.get("min_length", 0):
-            return  # too few sound values, after each unsound one has been reported
+            return  # too few sound values, but each unsound one has been reported
         self._mark(path)
         effect = self._classes.get(path[:3])
         hint = f" ({effect.hint})" if effect and effect.hint else ""
@@ -201,7 +201,7 @@ class _Checker:
             known = self._keys(path[:-1])
             place = next((place for place, part in _PLACES.items() if key in part.model_fields), None)
             advice = f"it belongs {place}" if place else _nearest(key, known)
-            self.add(path, f"unknown key; {advice or 'known here are ' + ', '.join(known)}{hint}", at_key=True)
+            self.add(path, f"unknown key; {advice or 'valid here: ' + ', '.join(known)}{hint}", at_key=True)
         elif value is None:
             self.add(path, _NO_VALUE, at_key=isinstance(path[-1], str))
         elif path[0] == "not_separable" and kind == "too_long":
@@ -272,7 +272,7 @@ class _Checker:
         if odd == "\n":
             self.add(path, "must be a single line; remove the line break")
         elif odd is not None:
-            self.add(path, f"holds the unprintable character U+{ord(odd):04X}; remove it")
+            self.add(path, f"contains the unprintable character U+{ord(odd):04X}; remove it")
 
     def _pi(self, path: Path) -> None:
         pi = self.at(path)
@@ -280,7 +280,7 @@ class _Checker:
         if "density" in pi:
             if listed:
                 what = " and ".join(listed)
-                self.add((*path, "density"), f"stands beside {what}; remove one or the other", at_key=True)
+                self.add((*path, "density"), f"is given as well as {what}; remove one or the other", at_key=True)
             else:
                 self._density((*path, "density"))
             return
@@ -398,7 +398,7 @@ class _Checker:
         a0, a1 = self.get(*path, "a0"), self.get(*path, "a1")
         for key, value in (("a0", a0), ("a1", a1)):
             if value == 0:
-                self.add((*path, key), "must not be 0, the branch would be constant; give a0 and a1 of the same sign")
+                self.add((*path, key), "must not be 0, or the branch is constant; give a0 and a1 of the same sign")
         if a0 and a1 and (a0 > 0) != (a1 > 0):
             what = f"a0 = {shown(a0)} and a1 = {shown(a1)} make a falling branch"
             self.add(path, f"{what}; give both the same sign")
@@ -415,7 +415,7 @@ class _Checker:
         elif "name" not in effect:
             self.add(name, "is missing; add the name of an effect")
         elif not isinstance(given, str):
-            self.add(name, f"must be the name of an effect, not {shown(given)}; known are {', '.join(EFFECT_NAMES)}")
+            self.add(name, f"must name an effect, not {shown(given)}; known effects: {', '.join(EFFECT_NAMES)}")
         elif given == effects.BEND:
             self.add(name, f"{effects.BEND} is not written here; make it a stage of model.memoryless")
         elif given in EFFECT_NAMES or given in self.user:
@@ -429,11 +429,11 @@ class _Checker:
             self.add(name, f"{printable(given)} is not defined in any given file{there}; give its file (--effects)")
         else:
             names = (*EFFECT_NAMES, *self.user)
-            advice = _nearest(given, names) or f"known are {', '.join(names)}"
+            advice = _nearest(given, names) or f"known effects: {', '.join(names)}"
             self.add(name, f"unknown effect {printable(given)}; {advice}")
 
     def _shaped(self, path: Path, effect: Mapping[str, object], shapes: Shapes) -> None:
-        """An effect with a known name: the class of its shape, its own checks, and whether it is there already."""
+        """Check an effect with a known name: its shape, its own checks, and whether another also moves the plays."""
         chosen, selector = shapes[0], shapes[0].selector
         if selector in effect and selector in chosen.model_fields:
             if self.judged((*path, selector)):
@@ -456,14 +456,14 @@ class _Checker:
         if chosen.moves_plays():
             first = self._mover = self._mover or (made.name, path_text(path))
             if first != (made.name, path_text(path)):
-                said = f"says how the plays move, as {printable(first[0])} does (in {first[1]}); keep one of them"
+                said = f"sets how the plays move, and so does {printable(first[0])} (in {first[1]}); keep one of them"
                 self.add((*path, "name"), f"{printable(made.name)} {said}")
         for keys, message in made.problems(self._thresholds()):
             self.add((*path, *keys), message)
         self.effects.append(made)
 
     def _thresholds(self) -> tuple[float, ...] | None:
-        """The model's thresholds, None if they are not sound."""
+        """The model's thresholds, or None if they are not sound."""
         if self.discretisation is not None:
             return tuple(self.discretisation.thresholds)
         found = self.get("model", "pi", "thresholds")
@@ -471,7 +471,7 @@ class _Checker:
 
 
 def _literals(shape: type[Effect], key: str) -> tuple[str, ...]:
-    """The words by which a shape of an effect is called."""
+    """The names of a shape of an effect."""
     return get_args(shape.model_fields[key].annotation)
 
 
@@ -492,7 +492,7 @@ def _entries(count: int) -> str:
 
 
 def _nearest(word: str, known: Sequence[str]) -> str:
-    """`did you mean ..?` if one of the known words is near, or several are equally near; otherwise empty."""
+    """`did you mean ..?` with the closest known word, or several equally close ones; empty if none is close."""
     near = difflib.get_close_matches(word.lower(), known, len(known), 0.6) if len(word) <= 60 and known else []
     shares = [difflib.SequenceMatcher(None, each, word.lower()).ratio() for each in near]
     nearest = [each for each, share in zip(near, shares, strict=True) if share == shares[0]]
@@ -515,7 +515,7 @@ _TYPES = (
     ("tuple_type", "must be a list", "write [ ] around the values"),
     (("model_", "dict_type"), "must be a mapping", "write `key: value` pairs in it"),
 )
-"""How findings of pydantic about a wrong type begin, and what to say and to advise instead."""
+"""Prefixes of pydantic's findings about a wrong type, with the message and advice to give instead."""
 
 _BOUNDS = {
     "greater_than": ("gt", "must be above"),
@@ -523,7 +523,7 @@ _BOUNDS = {
     "less_than": ("lt", "must be below"),
     "less_than_equal": ("le", "must be at most"),
 }
-"""Findings of pydantic about a number out of bounds: the key of the bound in its context, and what to say."""
+"""Pydantic's findings about a number out of bounds: the key of the bound in its context, and the words to use."""
 
 
 def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said: str) -> str:
@@ -536,7 +536,7 @@ def _reworded(kind: str, key: str, value: Any, context: Mapping[str, Any], said:
     if key == "memoryless" and kind == "tuple_type":
         wrong, advice = "must be a stage or a list of stages", _KINDS
     if kind == "finite_number" or (kind == "float_type" and type(value) is int):
-        return f"must be a finite number, not {shown(value)}; write one of at most {MAX_NUMBER:g} in size"
+        return f"must be a finite number, not {shown(value)}; write one of at most {MAX_NUMBER:g} in magnitude"
     if key == "input_range" and kind in ("too_long", "tuple_type"):
         return _TWO_NUMBERS
     if wrong:

@@ -1,7 +1,7 @@
 """Parameter files: read and check (every problem at once), write, and identify by a hash.
 
 `load_parameters`, `parse_parameters` and `make_parameters` are the ways to get checked `Parameters`; `dump_parameters`
-can write whatever they return, and reading it again gives the same value.
+can write anything they return, and reading it again gives the same value.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ _WIDTH = 100
 
 
 def load_parameters(path: str | os.PathLike[str], user_effects: Sequence[type[Effect]] = ()) -> Parameters:
-    """The checked parameters in a YAML file (UTF-8, at most 1 MiB); `user_effects` from `load_user_effects`.
+    """The checked parameters in a YAML file (UTF-8, at most 1 MiB); `user_effects`: from `load_user_effects`.
 
-    Raises ParameterError with every problem and its position; also when the file cannot be read.
+    Raises ParameterError with every problem and its position, also if the file cannot be read.
     """
     file = os.fspath(path)
     return parse_parameters(_text(file), file, user_effects)
 
 
 def parameter_data(path: str | os.PathLike[str]) -> Mapping[str, Any]:
-    """The plain data of a parameter file, as far as YAML goes: its values are not checked. Raises ParameterError."""
+    """The plain data of a parameter file, checked only as YAML, not for its values. Raises ParameterError."""
     file = os.fspath(path)
     document = read(_text(file).removeprefix("\ufeff"))
     if not document.complete:
@@ -46,11 +46,11 @@ def parameter_data(path: str | os.PathLike[str]) -> Mapping[str, Any]:
 
 
 def located(path: str | os.PathLike[str], problems: Iterable[tuple[Path, str]]) -> ParameterError:
-    """Problems found later in the values of a file already read, at their positions in it."""
+    """Problems found later in the values of a file that was already read, with their positions in it."""
     file = os.fspath(path)
     try:
         document = read(_text(file).removeprefix("\ufeff"))
-    except ParameterError:  # gone since
+    except ParameterError:  # the file has gone since
         return ParameterError(file, [Problem(path_text(place), message) for place, message in problems])
     found = [Problem(path_text(at), message, *(document.position(at) if at else ())) for at, message in problems]
     return ParameterError(file, found)
@@ -120,7 +120,7 @@ def _too_large(size: int | None, file: str) -> ParameterError:
 
 
 def _plain(value: object) -> Any:
-    """Lists as tuples, NumPy values as Python's, keys without a value left out."""
+    """The data with lists as tuples, NumPy values as Python's, and keys without a value dropped."""
     if hasattr(value, "model_dump"):
         value = value.model_dump()
     if isinstance(value, Mapping):
@@ -146,8 +146,8 @@ def _data(parameters: Parameters) -> dict[str, Any]:
 def canonical_json(parameters: Parameters) -> str:
     """The canonical text of these parameters: JSON with sorted keys, defaults filled in, shortest round-trip numbers.
 
-    A density appears as given, not as the plays made from it. Later additions, `emit.optimize`, `emit.compensation`,
-    `not_separable` and keys of effects, appear only if they differ from the default, so that files without them keep
+    A density appears as given, not as the plays made from it. Keys added later (`emit.optimize`, `emit.compensation`,
+    `not_separable` and some of effects) appear only if they differ from the default, so that files without them keep
     their hash.
     """
     data = _data(parameters)
@@ -187,7 +187,7 @@ def dump_parameters(parameters: Parameters, comments: Mapping[str, str] | None =
 
 @cache
 def _defaults() -> dict[str, object]:
-    """Keys that are left out when they have this value."""
+    """Keys, with the values at which they are left out."""
     pi = PIParameters(weights=(1.0,))
     data = Parameters(hystgen=1, name="x", input_range=(0.0, 1.0), model=ModelParameters(pi=pi)).model_dump()
     for key in ("hystgen", "name", "input_range"):

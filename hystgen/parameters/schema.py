@@ -1,6 +1,6 @@
 """The parameter file's structure: frozen pydantic models with the names of the YAML keys, and their JSON Schema.
 
-Only constraints on a single value are expressed here; how values must fit together is in `checks`.
+Only constraints on single values are expressed here; how values must fit together is in `checks`.
 """
 
 from __future__ import annotations
@@ -28,16 +28,16 @@ from hystgen.effects import Unmeasured
 MAX_STAGES = 16
 MAX_EFFECTS = 64
 MAX_DESCRIPTION = 500
-"""Limits on stages, effects, and characters of a description: no model needs as many, and checks stay fast."""
+"""Limits on stages, effects, and characters of a description: more than any model needs, and checks stay fast."""
 
 STAGE_KINDS = ("dead_zone", "tanh")
 
 SCHEMA_ID = "urn:hystgen:parameters:1"
-"""Name of the JSON Schema of format 1; a URN, since it says what the schema is and not where it is kept."""
+"""Name of the JSON Schema of format 1: a URN, since it identifies the schema rather than its location."""
 
 _MEMBER = "\0member "
 MEMBERS = frozenset(_MEMBER + name for name in ("number", "list", *STAGE_KINDS))
-"""Names of union members: steps of pydantic's locations that are not keys of the file."""
+"""Names of union members: elements of pydantic's locations that are not keys of the file."""
 
 
 def _whole(value: object) -> object:
@@ -64,12 +64,12 @@ class DensityTable(_Part):
         min_length=2, max_length=MAX_PLAYS, description="thresholds, strictly rising, input units"
     )
     p: tuple[NotNegative, ...] = Field(
-        min_length=2, max_length=MAX_PLAYS, description="density there, as many values as r"
+        min_length=2, max_length=MAX_PLAYS, description="density at these thresholds, as many values as r"
     )
 
 
 class DensityParameters(_Part):
-    """Density p(r) of the continuous model: a formula or a table, cut into n plays or as many as a tolerance needs."""
+    """Density p(r) of the continuous model, a formula or a table, discretised into n plays or to a tolerance."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -91,7 +91,7 @@ class DensityParameters(_Part):
         description="p(r) >= 0, from + - * / ** ( ) r numbers exp log sqrt sin cos tanh",
         examples=["0.8*exp(-0.3*r)"],
     )
-    table: DensityTable | None = Field(default=None, description="p(r) as points, in place of a formula")
+    table: DensityTable | None = Field(default=None, description="points of p(r), in place of a formula")
     p0: NotNegative = Field(description="weight of the drive itself (p_0); the inverse needs more than 0")
     r_max: Positive | None = Field(default=None, description="last threshold of a formula, input units")
     n: int | None = Field(default=None, ge=1, le=MAX_PLAYS, description="number of plays")
@@ -105,7 +105,7 @@ def _number_or_list(value: object) -> str:
 
 
 class PIParameters(_Part):
-    """Prandtl-Ishlinskii model: thresholds and weights, or a density from which loading makes them."""
+    """Prandtl-Ishlinskii model: thresholds and weights, or a density, from which loading makes them."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -132,14 +132,14 @@ class PIParameters(_Part):
         Annotated[Number, Tag(_MEMBER + "number")]
         | Annotated[tuple[Number, ...], Field(min_length=1, max_length=MAX_PLAYS + 1), Tag(_MEMBER + "list")],
         Discriminator(_number_or_list),
-    ] = Field(default=0.0, description="start memory M0: one number, or one a threshold (the first is ignored)")
+    ] = Field(default=0.0, description="start memory M0: one number, or one per threshold (the first is ignored)")
     density: DensityParameters | None = Field(default=None, description="density in place of thresholds and weights")
 
     _density_errors: tuple[float, float] | None = PrivateAttr(default=None)
 
     @property
     def density_error(self) -> float | None:
-        """Bound of the discretised density's error on the initial loading curve, output units; None without one."""
+        """Bound of the discretised density's error on the initial loading curve, output units; None without it."""
         return self._density_errors[0] if self._density_errors else None
 
     @property
@@ -213,7 +213,7 @@ class ModelParameters(_Part):
     effects: tuple[Any, ...] = Field(
         default=(), max_length=MAX_EFFECTS, description="effects beyond the static model, in any order"
     )
-    """Instances of `hystgen.effects.Effect`; their classes are imported when a file names them."""
+    """Instances of `hystgen.effects.Effect`, whose classes are imported when a file names them."""
 
 
 def _auto(value: object) -> object:
@@ -221,8 +221,8 @@ def _auto(value: object) -> object:
 
 
 MOST_REFERENCES = 1000
-"""[samples] References that a compensator stores, ahead of the motion or behind it: 4000 bytes in float32, and as many
-products per step; a preview of 1 s at 1 kHz."""
+"""[samples] Maximum number of references that a compensator stores: 4000 bytes in float32 and 1000 products per step; a
+preview of 1 s at 1 kHz."""
 
 
 class Compensation(_Part):
@@ -230,36 +230,36 @@ class Compensation(_Part):
 
     preview: Annotated[int, Field(ge=0, le=MOST_REFERENCES)] | None = Field(
         default=None,
-        description="samples that the reference is ahead: auto, what the model needs, or fewer, and the motion is late",
+        description="samples by which the reference leads; auto: what the model needs; with fewer, the motion is late",
     )
     drive_hold: Literal["straight", "held"] = Field(
-        default="straight", description="held: the converter holds each drive, half a sample later than a straight one"
+        default="straight", description="held: the converter holds each drive, half a sample later than a straight line"
     )
     noise_gain: Positive | None = Field(
         default=None,
-        description="largest gain from reference to drive over that at rest; averages of the reference hold it",
+        description="largest gain from reference to drive, over the static gain; averaging the reference limits it",
     )
     max_rate: Positive | None = Field(
         default=None, description="fastest drive that error bounds are stated for, input units per s"
     )
     resonance: Literal["inverse", "notch", "shaper", "none"] = Field(
         default="inverse",
-        description="how modes are compensated; notch, shaper: steps from point to point do not ring, with no preview",
+        description="how modes are compensated; notch, shaper: point-to-point steps do not ring, without a preview",
     )
-    taps: Literal[3, 5] = Field(default=3, description="references that a mode takes, 5 with an error of fourth order")
+    taps: Literal[3, 5] = Field(default=3, description="references that a mode uses; 5 for a fourth-order error")
     corner: Annotated[int, Field(ge=0, le=100)] = Field(
-        default=0, description="corners of the reference are rounded by three moving averages of this number of samples"
+        default=0, description="corners of the reference are rounded by three moving averages of this many samples"
     )
     quiet: bool = Field(
         default=False,
-        description="the drive stands still while the reference does, but for what creep asks of it; references that "
-        "move by a code now and then get larger leads",
+        description="the drive rests while the reference does, except as creep requires; references that move by a "
+        "code now and then get larger leads",
     )
 
     compensate: tuple[Unmeasured, ...] = Field(
         default=(),
-        description="effects that are compensated although nothing measures them: a drift, counted from set_offset on, "
-        "and the drive's own heat, or that of its loops",
+        description="effects to compensate although nothing measures them: a drift, counted from set_offset on, and "
+        "the drive's own heat, or that of its loops",
     )
 
     _preview = field_validator("preview", mode="before")(_auto)
@@ -274,7 +274,7 @@ class EmitDefaults(_Part):
     )
     engine: Literal["auto", "corners", "loop"] = Field(default="auto", description="how the play sum is evaluated")
     optimize: Literal["auto", "speed", "size"] = Field(
-        default="auto", description="what engine auto chooses for: instructions, code, or both weighed"
+        default="auto", description="goal of engine auto: few instructions, little code, or a balance of both"
     )
     drive_lsb: Positive | None = Field(
         default=None, description="fixed point, and a quiet drive in floating point: input units per code"
@@ -306,7 +306,7 @@ class Parameters(_Part):
     model: ModelParameters = Field(description="what the actuator does")
     emit: EmitDefaults = Field(default=EmitDefaults(), description="defaults of `hystgen emit`")
     not_separable: tuple[tuple[str, str], ...] = Field(
-        default=(), description="what a diagnosis named, and what the records could not tell from it"
+        default=(), description="pairs of an effect that a diagnosis named and one that the records leave possible"
     )
 
 
@@ -353,7 +353,7 @@ def _effects(definitions: dict[str, object]) -> list[dict[str, object]]:
 
 
 def _tidy(node: object) -> Any:
-    """Remove what only Python needs: titles of fields, null as a value, defaults that only mark absence."""
+    """Remove what only Python needs: field titles, null as a value, defaults that only mark absence."""
     if isinstance(node, list):
         return [_tidy(entry) for entry in node]
     if not isinstance(node, dict):

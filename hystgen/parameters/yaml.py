@@ -32,7 +32,7 @@ from hystgen.basics.problems import Path, Problem, path_text, printable
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 16
 MAX_VALUES = 100_000
-"""Limits of a file, so that anything that is not a parameter file is refused at once. One with 4096 plays has 8200
+"""Limits on a file, so that anything other than a parameter file is refused at once. A file with 4096 plays has 8200
 values."""
 
 _NULL = re.compile(r"(?:~|null|Null|NULL|)\Z")
@@ -57,7 +57,7 @@ class Document:
 
     Lists arrive as tuples. `values` and `keys` map a path to the 1-based (line, column) of the value and of the key
     before it. `poisoned` holds the paths whose value was refused here and is None in `data`. `complete`: whether `data`
-    is a mapping that was read to the end of the file.
+    is a mapping, read to the end of the file.
     """
 
     data: Any = None
@@ -68,7 +68,7 @@ class Document:
     complete: bool = False
 
     def position(self, path: Path, at_key: bool = False) -> Position:
-        """Position of the value (or key) at `path` or, if it is missing, of what should hold it."""
+        """Position of the value (or key) at `path` or, if that is missing, of what should contain it."""
         places = self.keys if at_key else self.values
         held = next(path[:n] for n in range(len(path), -1, -1) if path[:n] in places or n == 0)
         return places.get(held) or self.values[held]
@@ -78,7 +78,7 @@ class Document:
 
 
 class _LimitError(Exception):
-    """The rest of the file is not read."""
+    """Raised to leave the rest of the file unread."""
 
 
 class _Unusable:
@@ -156,7 +156,7 @@ def _next(events: Iterator[Event], text: str, builder: _TreeBuilder) -> Event | 
         context = f" ({_clean(error.context)})" if error.context else ""
         message = f"not valid YAML: {_clean(error.problem or 'cannot be read')}{context}; correct the text there"
     except Exception:
-        # The parser has failures of its own, such as OverflowError for the escape "\UFFFFFFFF".
+        # The parser also raises errors of other kinds, such as OverflowError for the escape "\UFFFFFFFF".
         position, message = builder.position, "not valid YAML soon after this position; correct the text there"
     builder.document.refuse((), position, message)
     builder.document.data = None
@@ -203,7 +203,7 @@ def _position(text: str, index: int) -> Position:
 
 
 def _value(event: ScalarEvent) -> str | int | float | bool | None:
-    """Value of a scalar: plain ones are resolved, quoted and block ones are text."""
+    """Value of a scalar: plain scalars are resolved, quoted and block scalars are text."""
     return resolve(event.value) if event.style is None else str(event.value)
 
 
@@ -216,7 +216,7 @@ class _TreeBuilder:
         self.documents = 0
 
     def take(self, event: Event, position: Position) -> None:
-        """Take the parser's next event; raise _LimitError if the rest is not to be read."""
+        """Take the parser's next event; raise _LimitError if the rest is to be left unread."""
         self.position = position
         if isinstance(event, DocumentStartEvent):
             self.documents += 1
@@ -262,7 +262,7 @@ class _TreeBuilder:
             self._key(event, position, path)
 
     def _plain(self, event: Any, path: Path, position: Position) -> bool:
-        """Refuse aliases, anchors and tags; False if the value itself is lost along with them."""
+        """Refuse aliases, anchors and tags; returns False if the value itself is lost with them."""
         if isinstance(event, AliasEvent):
             self.document.refuse(path, position, "aliases (*) are not accepted; write the value itself")
             return False

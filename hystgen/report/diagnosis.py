@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hystgen.effects.base import Effect
 
 FRONT = ("exact", "part of the inverse: the front is inverted behind the plays")
-"""How exactly a compensator corrects a stage in front of the plays, and by what means."""
+"""How exactly a compensator corrects a stage in front of the plays, and by what method."""
 
 VISIBLE = 0.01
 """Relative difference above which an error is visibly larger than another."""
@@ -78,12 +78,12 @@ def html(found: Diagnosis, parameters_text: str) -> str:
 
 
 def _next_step(found: Diagnosis) -> Text:
-    """The next step after the diagnosis, with its command."""
+    """The recommended next step, with its command."""
     if found.verdict == "unexplained" and not found.result.effects:
         plan = "hystgen diagnose --plan params.yaml -o plan/"
         return Text("Your next step: record drives in which every effect shows.", plan)
     if found.not_emitted():
-        return Text("Your next step: see what the model would leave.", "hystgen track params.yaml RECORDS")
+        return Text("Your next step: see how much error the model would leave.", "hystgen track params.yaml RECORDS")
     return Text("Your next step: write the compensator as C.", "hystgen emit params.yaml -o firmware/")
 
 
@@ -97,7 +97,7 @@ def _chance(p_value: float) -> str:
 
 
 def _refitted(result: Result) -> list[Text]:
-    """An explanation of the second bar if it is visibly longer than the first."""
+    """An explanation of the second bar, if it is visibly longer than the first."""
     given, refitted = result.gap.as_given, result.gap.refitted
     if refitted.holdout <= (1.0 + VISIBLE) * given.holdout:
         return []
@@ -132,7 +132,7 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
     unit = result.unit
     rows = [["effect", label("held-out rms before", unit), label("after", unit), "share of the gap", "p"]]
     means = [["effect", "compensation", "how"]]
-    numbers = [["effect", "number", "value", "95 % from", "to", "what it is"]]
+    numbers = [["effect", "parameter", "value", "95 % from", "to", "what it is"]]
     for effect in result.effects:
         before, after = effect.holdout_before, effect.holdout_after
         share = f"{100.0 * effect.share_of_gap:.0f} %"
@@ -151,8 +151,8 @@ def _found(result: Result, there: Sequence[Effect], not_emitted: str) -> list[Te
         Text(f"They cannot be emitted as C yet: {not_emitted}.") if not_emitted
         else Text("Error that the compensator would leave in the motion:", "hystgen track params.yaml RECORDS"),
         Text(
-            "Their numbers. The intervals include the correlation of the residuals and the freedom of the weights, but "
-            "not that another shape may fit as well:"
+            "Their parameters. The intervals account for correlated residuals and for free weights, but not for other "
+            "shapes that may fit as well:"
         ),
         HtmlTable(numbers, (0, 1, 5)),
     ]
@@ -166,7 +166,7 @@ def _kind(effect: NamedEffect, there: Sequence[Effect]) -> type[Effect] | None:
 
 
 def _numbers(value: object, sure: Any, name: str = "") -> list[list[str]]:
-    """Rows of name, value, low and high, one per number; the first of equal lists represents them all."""
+    """Rows of name, value, low and high end, one per number; equal lists are represented by the first."""
     if isinstance(value, Mapping):
         known = sure or {}
         return [
@@ -205,7 +205,7 @@ def _left(result: Result) -> list[Text | Listing | HtmlTable]:
             rows = [["the remaining error depends on", "share of its variance"]]
             shares = each.share_by_variable.items()
             rows += [[VARIABLE_NAMES[name], f"{100.0 * share:.0f} %"] for name, share in shares]
-            blocks += [HtmlTable(rows, (0,)), Text("Each variable alone, judged on samples that it has not seen.")]
+            blocks += [HtmlTable(rows, (0,)), Text("Each variable alone, judged on samples not used to fit it.")]
     more = [text for each in seen for text in each.advice()]
     return [*blocks, Text("To learn more:"), Listing(more)] if more else blocks
 
@@ -272,7 +272,7 @@ def _ranking(result: Result) -> list[Text | HtmlTable]:
     for k, tried in enumerate(result.ranking):
         best = min((each.holdout for each in tried), default=0.0)
         rows: list[Sequence[str]] = [
-            ["effect", "shape", label("rms of the fit", unit), label("held-out rms", unit), "above the best", "why not"]
+            ["effect", "shape", label("rms of the fit", unit), label("held-out rms", unit), "above the best", "verdict"]
         ]
         for each in tried:
             margin = percent(each.holdout / best - 1.0, ".1f") if best > 0.0 else ""

@@ -1,4 +1,4 @@
-"""The figures of a diagnosis: how the gap shrinks, where it is, and what it depends on, each with the noise."""
+"""The figures of a diagnosis: how the gap shrinks, where it is, and what it depends on, each showing the noise."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ FAR = 25.0
 """Ratio of the largest to the smallest value above which an axis is logarithmic."""
 
 HOLD = 16
-"""Fewest samples with the drive at rest for errors to be drawn over the time since it stopped."""
+"""Minimum number of samples at rest for errors to be drawn over the time since the drive stopped."""
 
 WINDOWS = 12
 """Number of stretches of a record whose rms is drawn over the session."""
@@ -276,7 +276,7 @@ def frequency(found: Diagnosis, width: float) -> Figure:
 
 
 def _sides(found: Diagnosis) -> list[tuple[str, str, str]]:
-    """The errors to draw: key, colour and name; those before only if there are effects."""
+    """The errors to draw: key, colour and name; the errors before are included only if there are effects."""
     before = [("before", BEFORE, "refitted")] if found.result.effects else []
     return [*before, ("after", AFTER, "with the effects" if found.result.effects else "refitted model")]
 
@@ -328,7 +328,7 @@ CAPTIONS = {
 
 ALTERNATIVES = {
     "gap": "The held-out error after each step, down to the noise.",
-    "overlay": "Measured and predicted displacement along time, and below it the error before and after.",
+    "overlay": "Measured and predicted displacement over time, and below it the error before and after.",
     "records": "Points for the rms error of every record before and after, with the noise as a line.",
     "time": "rms error before and after along the session, with the noise as a line.",
     "against": "Six panels of binned errors before and after against drive, rate, displacement, loop centre, session "

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 BINS, FEWEST = 40, 5
-"""Bins of the residual's mean, and the fewest samples in a bin that is shown."""
+"""Number of bins of the residual's mean, and the fewest samples in a bin that is drawn."""
 
 TAIL, FAR = 0.002, 3.0
 """[quantiles, times] An axis ends at these quantiles if the extremes lie this many times farther out."""
@@ -49,7 +49,7 @@ class Shown:
 
     @cached_property
     def drive(self) -> Array:
-        """The drive, wrong samples bridged."""
+        """The drive, with faulty samples bridged."""
         wrong = np.zeros(len(self.record), dtype=bool)
         wrong[self.used.bridged] = True
         return faults.bridged(self.record.v, wrong)
@@ -75,7 +75,7 @@ class Shown:
 
     @cached_property
     def rate(self) -> Array:
-        """Drive per second, over stretches in which the drive typically moves by half a percent of its range."""
+        """Drive rate over stretches in which the drive typically moves by half a percent of its range."""
         steps = float(np.mean(np.abs(np.diff(self.drive))))
         reach = int(np.clip(round(0.0025 * float(np.ptp(self.drive)) / steps), 1, max(1, len(self.drive) // 50)))
         rate = np.full(len(self.drive), np.nan)
@@ -89,15 +89,15 @@ class Shown:
     def noise(self) -> float | None:
         """Standard deviation of white noise in y; None if the residual is not white on the scale of samples.
 
-        Second differences take the smooth part out of a residual and leave noise times the root of 6 (Gasser,
-        Sroka and Jennen-Steinmetz, Biometrika 73, 1986, 625-633). Only where noise is white and all else is smooth does
-        the estimate from neighbours agree with that from every other sample.
+        Second differences remove the smooth part of a residual and leave the noise times the square root of 6 (Gasser,
+        Sroka and Jennen-Steinmetz, Biometrika 73, 1986, 625-633). The estimates from adjacent samples and from every
+        other sample agree only if the noise is white and all else is smooth.
         """
         found = []
         for lag in (1, 2):
             parts = [self.residual[a:b] for a, b in self.used.parts]
             second = np.concatenate([e[2 * lag :] - 2.0 * e[lag:-lag] + e[: -2 * lag] for e in parts])
-            # ignoring the few kinks at reversals, which are not noise
+            # the median ignores the few kinks at reversals, which are not noise
             found.append(1.4826 * float(np.nanmedian(np.abs(second))) / np.sqrt(6.0))
         if not 0.0 < max(found) <= AGREE * min(found):
             return None
@@ -105,7 +105,7 @@ class Shown:
 
 
 def of_fit(fit: Fit, records: Sequence[Record]) -> list[Shown]:
-    """The records of a fit as they are drawn, held-out records last, as in `fit.used`."""
+    """The records of a fit as drawn, held-out records last, as in `fit.used`."""
     if len(records) != len(fit.used):
         raise ValueError(f"the fit compared {len(fit.used)} records, including the held-out ones, not {len(records)}")
     return [Shown(record, used, fit.along(record, used)) for record, used in zip(records, fit.used, strict=True)]
@@ -258,7 +258,7 @@ def _limits(x: Array) -> tuple[float, float]:
 
 
 def weight_panel(axes: Axes, fit: Fit, units: AxisUnits, places: Sequence[int]) -> None:
-    """Some of the weights as bars, named by their thresholds, with their intervals."""
+    """Some of the weights as bars labelled with their thresholds, with intervals."""
     part = fit.parameters.model.pi
     at = np.arange(len(places))
     axes.bar(at, [part.weights[k] for k in places], width=0.7, color=drawing.OTHER, alpha=0.75)
@@ -412,4 +412,4 @@ def weights(fit: Fit, _shown: Sequence[Shown], wide: bool) -> Figure:
 FIGURES: dict[str, Callable[[Fit, Sequence[Shown], bool], Figure]] = {
     "loop": loop, "time": time, "residual": residual, "loading": loading, "weights": weights,
 }
-"""All figures by the name of their file."""
+"""All figures, by file name."""

@@ -70,7 +70,7 @@ class Section:
 
 
 def page(title: str, lead: Sequence[Text], sections: Sequence[Section]) -> str:
-    """The page: `title`, a `lead` with the main result in a few words, the sections."""
+    """The page: `title`, a `lead` with the main result in a few words, and the sections."""
     template = _environment().get_template("report.html.j2")
     return template.render(title=title, lead=lead, sections=sections)
 

@@ -49,7 +49,7 @@ identify = _with_pictures(identification.identify)
 
 
 def names() -> list[str]:
-    """Names of the files of a report."""
+    """Names of the files in a report."""
     return [PAGE, *(f"{name}.{kind}" for name in fit_figures.FIGURES for kind in ("svg", "png"))]
 
 
@@ -72,9 +72,9 @@ def report_fit(
 ) -> Path:
     """Write the report of a fit: `report.html`, which is self-contained, and its pictures. Returns the page's path.
 
-    `records`, `holdout`: as given to `identify`, in the same order; records read with options such as `columns` have to
-    be given as `Record`s. Needs matplotlib, of the extra `plot`. Other files in the folder are left alone. Raises
-    ValueError for other records, RecordError, OSError.
+    `records`, `holdout`: as given to `identify`, in the same order; records read with options such as `columns` must be
+    given as `Record`s. Needs matplotlib (extra `plot`). Other files in the folder are left alone. Raises ValueError for
+    other records, RecordError, OSError.
     """
     if not isinstance(fit, Fit):
         raise TypeError(f"fit is what hystgen.identify returns, not {arguments.kind(fit)}")
@@ -130,7 +130,7 @@ def _kind(fit: Fit) -> str:
 
 
 def held_out_row(fit: Fit) -> ErrorRow | None:
-    """The row that judges the model; None if nothing was held out."""
+    """The row with the held-out error; None if nothing was held out."""
     return next((row for row in fit.rows if row.part == "held out"), None)
 
 
@@ -243,7 +243,7 @@ def _data(shown: Sequence[Shown]) -> list[Text | HtmlTable | Listing]:
 
 
 def _masks(each: Shown) -> tuple[Sequence[int], ...]:
-    """The counts of a record, in the order of the table."""
+    """The samples of a record that the table counts, in its order."""
     used = each.used
     outputs = used.skipped, used.ignored, used.outliers, used.stretches
     return tuple(found.tolist() for found in (*outputs, used.bridged, used.gaps, used.left_out))
@@ -297,7 +297,7 @@ def _provenance(fit: Fit, shown: Sequence[Shown]) -> list[Text | HtmlTable]:
 
 
 def _fingerprint(record: Record) -> str:
-    """Digest of the numbers as read, independent of the file's format."""
+    """Digest of the values as read, independent of the file format."""
     digest = hashlib.sha256()
     for values in (record.t, record.v, record.y):
         assert values is not None
@@ -371,8 +371,8 @@ def _residual_caption(fit: Fit, shown: Sequence[Shown]) -> str:
     some = f" ({drawing.MOST_POINTS} of {compared} are drawn)" if compared > drawing.MOST_POINTS else ""
     return (
         f"The residual of {said}: samples{some}, their mean and scatter in {fit_figures.BINS} bins. If the mean stays "
-        f"at zero, the residual does not depend on the quantity of that axis. {level} The axis of the drive rate shows "
-        f"{100 * (1 - fit_figures.TAIL):.3g} % of the samples if a few lie far out."
+        f"at zero, the residual does not depend on the quantity on that axis. {level} The axis of the drive rate shows "
+        f"{100 * (1 - fit_figures.TAIL):.3g} % of the samples if a few lie far outside."
     )
 
 

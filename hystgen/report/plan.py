@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 P = ParamSpec("P")
 
 WIDE, NARROW = (9.0, 5), (4.2, 3)
-"""Width in inches and number of panels side by side."""
+"""Width in inches, and number of panels side by side."""
 
 FIT, JUDGE = drawing.MEASURED, drawing.MODEL
 
@@ -120,7 +120,7 @@ def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
         f"rests {plan.rest:g} s before each.",
         f"Record drive and displacement throughout into one file, {home}/{RECORDING}, with columns t, v and y, at "
         "this rate or another. It may start before the drive; the first rise aligns the two.",
-        f"{SESSION} says at which sample each record begins, and which are held out; it is used to cut the recording.",
+        f"{SESSION} says at which sample each record begins and which are held out; diagnose cuts the recording there.",
         "Let v be the drive as measured at the time of y. A converter that holds each value until the next is half a "
         "sample late, and a commanded v would show that as a delay.",
     ]
@@ -131,7 +131,7 @@ def _played(plan: Plan, home: str, top: str, bottom: str) -> list[str]:
             f"{CODES} has the same drive as one code per line: {samples} codes, {size / 1e6:.3g} MB of memory at "
             f"{counted(plan.dac.bytes, 'byte')} each. The files of the single records have their codes in the column "
             f"code. For firmware, {header.file(plan.parameters)} has the {len(corners)} codes between which the drive "
-            f"is straight, {len(corners) * plan.dac.bytes / 1e3:.3g} kB.",
+            f"is linear, {len(corners) * plan.dac.bytes / 1e3:.3g} kB.",
         )
     return said
 
@@ -173,7 +173,7 @@ def _limits(plan: Plan) -> list[str]:
     if fast > 1.5 * plan.sample_time:
         said.append(
             f"Fast records are sampled every {fast:.3g} s, not every {plan.sample_time:g} s, because of the time it "
-            "takes to cross the range at this rate limit. A larger --max-rate shows more in less time."
+            "takes to cross the range at this rate limit. A higher --max-rate shows more in less time."
         )
     return said
 

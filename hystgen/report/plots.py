@@ -1,4 +1,4 @@
-"""Pictures of a fit and of a compensator along records."""
+"""Pictures of a fit, and of a compensator's tracking over records."""
 
 from __future__ import annotations
 

@@ -15,10 +15,10 @@ from hystgen.front.dead_zone.model import DeadZone
 from hystgen.model import SETTLED, Model
 
 HARD_RATIO = 1e6
-"""Slope ratio from which a warning is given: a rounding of float32, 6e-8, is then 6 % of the drive."""
+"""Slope ratio above which a warning is given: a float32 rounding error, 6e-8, becomes 6 % of the drive."""
 
 WIDE = 0.05
-"""Share of the drive's range above which an error of the inverse is mentioned."""
+"""Share of the drive range above which an error of the inverse is mentioned."""
 
 UP = decimal.Context(prec=3, rounding=decimal.ROUND_CEILING)
 
@@ -26,7 +26,7 @@ UP = decimal.Context(prec=3, rounding=decimal.ROUND_CEILING)
 def properties(model: Model, within: float = SETTLED) -> str:
     """The text of `hystgen show`: ranges, slopes, loop width, settling, whether there is an inverse, error bounds.
 
-    `within`: error of settling, share of a step.
+    `within`: error within which the output counts as settled, share of a step.
     """
     c, p = model.cascade, model.parameters
     pi = c.pi
@@ -74,14 +74,14 @@ def properties(model: Model, within: float = SETTLED) -> str:
             )
         lines += _fixed(model, drive, output)
         if c.branches_differ:
-            lines.append("branches           the errors of the inverse hold while it is on the exact model's branch")
+            lines.append("branches           the inverse's error bounds hold while it is on the exact model's branch")
     if not model.effects and (words := cost(model)):
         lines.append(f"cost of the C      {words}")
     return "\n".join(lines)
 
 
 def facts(model: Model, within: float = SETTLED) -> dict[str, object]:
-    """The same for programs, without error bounds and cost: `hystgen show --json`."""
+    """The same properties as data, without error bounds and cost: `hystgen show --json`."""
     c, p = model.cascade, model.parameters
     problems = c.inverse_problems()
     try:
@@ -113,8 +113,7 @@ def settling(model: Model, within: float = SETTLED) -> str:
 
 
 def cost(model: Model) -> str:
-    """Cost of the C that `emit` would write, or of the forward operator if there is no inverse; "" if `emit` refuses
-    it."""
+    """Cost of the C that `emit` would write, for the forward operator if there is no inverse; "" if `emit` refuses."""
     try:
         options = emit_options(model, operator="forward" if model.cascade.inverse_problems() else None)
         found = module.of(model.parameters, model.cascade, options).cost
@@ -149,7 +148,7 @@ def _effects(model: Model) -> list[str]:
 
 
 def _reading(model: Model) -> list[str]:
-    """How the inverse treats the reference, in the words of the C banner; empty if `emit` refuses it."""
+    """How the inverse treats the reference, in the words of the C banner; empty if `emit` refuses the model."""
     try:
         options = emit_options(model, operator="inverse")
         return interface.reading(module.compensator(model.parameters, model.cascade, options))
@@ -165,7 +164,7 @@ def _shown(value: object) -> str:
 
 
 def _fixed(model: Model, drive: str, output: str) -> list[str]:
-    """Resolution and bounds of fixed point in physical units, or the reason for a refusal."""
+    """Resolution and error bounds of fixed point in physical units, or why it is not available."""
     lines = []
     for arithmetic in FIXED:
         try:
@@ -203,7 +202,7 @@ def warnings(model: Model) -> list[str]:
     unit, finer, whole = model.parameters.units.input, ARITHMETICS[arithmetic].finer, "the drive's range"
     return [
         f"the inverse in {arithmetic} may be off by {_most(error)}{f' {unit}' if unit else ''}, "
-        f"{percent(share, '.0f', whole)}: {f'take {finer}, ' if finer else ''}raise p_0 or narrow input_range"
+        f"{percent(share, '.0f', whole)}: {f'use {finer}, ' if finer else ''}raise p_0 or narrow input_range"
     ]
 
 

@@ -19,13 +19,13 @@ from hystgen.verification.targets import Board
 SECONDS = 120
 HERTZ = "16000000"  # simavr needs a clock; the firmware does not
 REPORT = "selftest returned"
-STACK = 512  # bytes for firmware stack and serial port; with a full RAM, two branches in q31 failed below 264
-CONSTANTS = (".data", ".rodata")  # both are in RAM, and in flash with the data that initialises it
+STACK = 512  # bytes for stack and serial port of the firmware; in full RAM, two branches in q31 failed below 264
+CONSTANTS = (".data", ".rodata")  # both are in RAM, and their initial values in flash
 
 
 @dataclass(frozen=True)
 class Size:
-    """The number of plays of a model, and the memory that it should take."""
+    """The number of plays of a model, and the memory that it is expected to take."""
 
     plays: int
     memory: cost.Memory
@@ -56,8 +56,8 @@ def rows(
     folder: Path,
     progress: Callable[[str], None],
 ) -> list[Row]:
-    """One row: result of the self-test on the emulated board, and memory of the module. `size`: decides whether a model
-    is too large for the board; None if the model cannot be built for one.
+    """One row: result of the self-test on the emulated board, and memory of the module. `size`: shows whether a model
+    is too large for the board; None if it cannot be built for one.
     """
     if compiler and "gcc" not in compiler:
         words = f"does not build for {board.name}; use gcc"
@@ -91,8 +91,8 @@ def _too_large(board: Board, built: Built, size: Size) -> str:
     fit = size.plays - -(-(built.ram - board.ram) // size.memory.play)
     return (
         f"{built.ram} bytes of RAM are needed, {built.constants} of them for constants, which are in RAM on an AVR; "
-        f"{board.name} has {board.ram}: at {size.memory.play} bytes for each play not more than {fit} of the "
-        f"{size.plays} plays fit, fewer beside a stack and other firmware; reduce the plays, or emit one operator"
+        f"{board.name} has {board.ram}: at {size.memory.play} bytes per play, at most {fit} of the "
+        f"{size.plays} plays fit, fewer with a stack and other firmware; use fewer plays, or emit one operator"
     )
 
 

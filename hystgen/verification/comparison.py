@@ -1,4 +1,4 @@
-"""The records that are verified, with the output of the bit reference, and how compiled output differs from it."""
+"""The records for verification, with the output of the bit reference, and how compiled output differs from it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Expected:
 
 @dataclass(frozen=True)
 class Mismatch:
-    """Number of samples compared and number that differ, largest difference (None: infinite), first that differs."""
+    """Number of samples compared, number that differ, largest difference (None: infinite), and first to differ."""
 
     samples: int
     different: int
@@ -39,7 +39,7 @@ class Mismatch:
 def expected_record(
     numbers: Tables | FixedTables | ChainTables, real: np.dtype[np.number], inverse: bool, calls: signals.Calls
 ) -> Expected:
-    """A record of calls, in numbers of type `real`, with the output of the bit reference."""
+    """A record of calls, with values of type `real`, and the output of the bit reference."""
     name, op, values = calls
     x = values.astype(real).astype(numbers.threshold.dtype)
     answer, status = reference.answers(numbers, inverse, op, x)

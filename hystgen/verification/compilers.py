@@ -25,9 +25,8 @@ WARNINGS = [
 ]
 C_WARNINGS = [*WARNINGS, "-Wmissing-prototypes", "-Wstrict-prototypes"]
 
-# The strict build, and a user's build without flags: in their default dialect, gcc and clang may
-# contract a * b + c to one rounding. If the CPU's baseline has no such instruction, its instruction set has to be
-# enabled
+# The strict build, and a user's build without flags: in their default dialect, gcc and clang may contract a * b + c to
+# one rounding. If the CPU's baseline has no such instruction, the native instruction set must be enabled
 STRICT = ["-std=c99", "-O2", "-ffp-contract=off"]
 USER = ["-std=gnu11", "-O2"]
 DEFAULTS = [*USER, *(["-march=native"] if platform.machine() in ("x86_64", "AMD64") else [])]
@@ -44,11 +43,11 @@ DEBIAN = {
 
 
 class CompileError(RuntimeError):
-    """The compiler failed; the message holds its output."""
+    """The compiler failed; the message contains its output."""
 
 
 class MissingError(CompileError):
-    """A requested tool that is not usable on this machine; the message says what to install."""
+    """A requested tool cannot be used on this machine; the message says what to install."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +92,7 @@ def find(name: str) -> Compiler | None:
             return Compiler("zig", (sys.executable, "-m", "ziglang", "cc"))
         path = shutil.which("zig")
         return Compiler("zig", (path, "cc")) if path else None
-    path = shutil.which(name)  # first unsplit: a path may have spaces
+    path = shutil.which(name)  # unsplit first: a path may have spaces
     if path:
         return Compiler(name, (path,))
     try:
@@ -131,11 +130,11 @@ def none_found() -> MissingError:
 
 @functools.cache
 def _own(name: str) -> dict[str, str]:
-    """Environment that a compiler needs; for zig a cache folder, if it cannot be in the home folder."""
+    """Environment variables that a compiler needs: for zig, a cache folder if it cannot be in the home folder."""
     if not name.startswith("zig") or "ZIG_GLOBAL_CACHE_DIR" in os.environ:
         return {}
     home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-    # zig creates this folder, or waits for ever if that fails (under /proc, say), which permissions alone do not show
+    # zig creates this folder, or hangs if that fails (under /proc, say), which permissions alone do not reveal
     with contextlib.suppress(OSError):
         os.makedirs(os.path.join(home, "zig"), exist_ok=True)
         with tempfile.TemporaryFile(dir=os.path.join(home, "zig")):

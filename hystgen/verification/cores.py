@@ -13,7 +13,7 @@ from hystgen.verification.report import Row, failed, selftest
 from hystgen.verification.sources import Sources
 from hystgen.verification.targets import Target
 
-_fresh = itertools.count()  # zig's cache answers for an output path that it knows; these are always new
+_fresh = itertools.count()  # zig's cache may answer for an output path that it knows; these are always new
 
 
 def rows(
@@ -24,9 +24,9 @@ def rows(
     folder: Path,
     progress: Callable[[str], None],
 ) -> Iterator[Row]:
-    """One row per operator, compiler and build. If the core has an FPU, it is also built without flags, which lets
-    compilers contract a product and a sum, with a row for the self-test; if qemu is installed, the self-test also runs
-    as a whole firmware.
+    """One row per operator, compiler and build. For a core with an FPU, there is also a build without flags, in which
+    compilers may contract a product and a sum, with a row for the self-test; if qemu is installed, the self-test also
+    runs as a whole firmware.
     """
     try:
         cross.check_wheels()

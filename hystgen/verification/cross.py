@@ -101,7 +101,7 @@ def find(target: Target, name: str) -> CrossCompiler:
 def chosen(target: Target, compiler: Sequence[str]) -> tuple[str, ...]:
     """Names of the compilers to use: the requested ones, else zig and, if installed, gcc.
 
-    A compiler that only builds for the host is skipped if another is requested too.
+    A requested compiler that builds only for the host is skipped if one for cores is requested too.
     """
     if compiler:
         return tuple(name for name in compiler if name in NAMES) or tuple(compiler)

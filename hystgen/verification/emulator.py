@@ -1,4 +1,4 @@
-"""An emulated core: runs functions of a flat image, counts the instructions of every step, measures its stack."""
+"""An emulated core: runs functions of a flat image, counts the instructions of every step, measures stack use."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from hystgen.verification.targets import Target
 RECORDS = 0x6000_0000  # address of a record's arrays
 STACK = 0x0000_8000  # bytes below the top of RAM that are painted
 PAINT = 0xA5
-SECONDS = 600  # instructions after which a call is aborted
+SECONDS = 600  # seconds after which a call is aborted
 PAGE = 0x1000
 
 
@@ -111,7 +111,7 @@ class _Registers:
 
 
 class Core:
-    """A core with an image loaded. Use it for one image; `counts` holds the instructions of every step so far."""
+    """A core with an image loaded, for that image only; `counts` holds the instructions of every step so far."""
 
     def __init__(self, target: Target, image: Image, layout: MemoryMap = MemoryMap()) -> None:  # noqa: B008  frozen
         self._image = image
@@ -158,7 +158,7 @@ class Core:
 
     @property
     def stack(self) -> int:
-        """Bytes below the harness's frame that the deepest call used: where the painted stack was overwritten."""
+        """Bytes that the deepest call used below the harness's frame, by where the painted stack was overwritten."""
         painted = bytes(self._uc.mem_read(self._top - STACK, STACK))
         untouched = len(painted) - len(painted.lstrip(bytes([PAINT])))
         return self._stack_at_step - (self._top - STACK + untouched)
@@ -195,7 +195,7 @@ class Core:
     def run(
         self, name: str, op: str, call: Bytes, x: NDArray[np.number], counted: str = "step"
     ) -> tuple[NDArray[np.number], Bytes]:
-        """Let the harness of operator `op` make the calls of a record; counts the instructions of NAME_OP_step, or of
+        """Let the harness of operator `op` make the calls of a record; counts the instructions of NAME_OP_step or
         NAME_OP_commit."""
         sizes = (len(x), x.nbytes, x.nbytes, len(x))
         places, end = [], RECORDS
@@ -235,7 +235,7 @@ class Core:
         def run(action: Callable[[], object]) -> None:
             handle = uc_hook_h()
             hook = ctypes.cast(_hook(), ctypes.c_void_p)
-            # The binding's own hook_add would wrap a Python function; here the address of compiled code is passed
+            # The binding's own hook_add would wrap a Python function; here, the address of compiled code is passed
             # directly
             failed = uclib.uc_hook_add(
                 self._uc._uch, ctypes.byref(handle), UC_HOOK_CODE, hook, ctypes.addressof(counter), 1, 0

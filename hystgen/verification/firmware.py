@@ -15,7 +15,7 @@ from hystgen.verification.targets import Machine, Target
 
 QEMU = "qemu-system-arm"
 SECONDS = 120
-SIZES = {"flash_size": 0x0004_0000, "ram_size": 0x0000_4000}  # those of the smallest board
+SIZES = {"flash_size": 0x0004_0000, "ram_size": 0x0000_4000}  # of the smallest board
 FAULT = 255
 
 
@@ -38,7 +38,7 @@ def build(
 def run(machine: Machine, image: Path) -> int:
     """The self-test's result (0, or 1 + first failing index, at most 253). Raises EmulatorError.
 
-    The exit code is one more: 0 would mean that the emulator ran nothing.
+    The exit code is one higher: 0 would mean that the emulator ran nothing.
     """
     command = [
         QEMU, "-M", machine.name, "-nographic", "-monitor", "none", "-serial", "none",

@@ -13,11 +13,10 @@ from hystgen.verification.loading import load
 
 
 class CompiledInstance:
-    """An instance driven by NAME_OP_init and NAME_OP_step in the C that a model emits, with numbers as the C takes
-    them.
+    """An instance driven by NAME_OP_init and NAME_OP_step in the C that a model emits, with values as the C takes them.
 
-    `options`: those of `emit`, for a single operator. `compiler`: `gcc`, `clang` or `zig`, else the first that is
-    installed; it is called as users call it, in its default dialect. The files are in a temporary folder. Raises
+    `options`: those of `emit`, for a single operator. `compiler`: `gcc`, `clang` or `zig`; by default, the first that
+    is installed. It is called as users call it, in its default dialect. The files are in a temporary folder. Raises
     CompileError, also if there is no compiler, LoadError, and ValueError for another name.
     """
 

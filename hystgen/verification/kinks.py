@@ -1,4 +1,4 @@
-"""Calls that lead from one kink of a model to the next, where its searches and roundings have to be right."""
+"""Calls that lead from one kink of a model to the next, where searches and roundings are most easily wrong."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 
 POINTS = 2000
-"""Points of a path; following the plays one by one in Python takes about 0.1 s for this number."""
+"""Number of points of a path: following the plays one by one in Python takes about 0.1 s for this many."""
 
-# Kinds of points on the path: a drive at which a play starts to follow, one at which a play would start after a turn
-# here, a limit of the drive, or any
+# Kinds of points on the path: a drive at which a play starts to follow, one at which a play would start to follow after
+# a turn here, a limit of the drive, or any drive
 FOLLOWS, TURNS, LIMIT, ANY = range(4)
 SHARES = (0.6, 0.1, 0.2, 0.1)
 
-# Share of the inverse's points after which a drive is committed, and the share of these with the point's own drive
+# Share of the inverse's points after which a drive is committed, and share of these with the point's own drive
 COMMITTED, THERE = 0.6, 0.7
 
 
 @dataclass(frozen=True)
 class Path:
-    """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` the forward operator's
-    after it (meaningless for init), `risen` whether the move to it rose."""
+    """Points in order: `op` is init, reset or step, each `drive` inside the range, `output` that of the forward
+    operator after the call (meaningless for init), `risen` whether the move to it rose."""
 
     op: Bytes
     drive: NDArray[np.float64]
@@ -55,12 +55,12 @@ class _Textbook:
         self.drive, self.rising = np.nan, 1
 
     def drive_at(self, w: float, branch: int) -> float:
-        """The drive that gives the plays the input w, or one beyond the range."""
+        """The drive that gives the plays the input w, or a drive beyond the range."""
         with plain():
             return float(self.front.front_inverse(self.tables, self.kind(w), branch if self.tables.branches else 1)[0])
 
     def move(self, drive: float) -> None:
-        """Move the drive there."""
+        """Move to a drive."""
         if drive != self.drive and not np.isnan(self.drive):
             self.rising = int(drive > self.drive)
         self.drive = drive
@@ -70,7 +70,7 @@ class _Textbook:
 
 
 def path(tables: Tables | FixedTables, real: np.dtype[Any], length: int, rng: np.random.Generator) -> Path:
-    """A path of kinks, to within a last bit, for the current memory and for that of init and reset."""
+    """A path of kinks, each met to within one last bit, for the current memory and for that of init and reset."""
     whole = real.kind == "i"
     low, high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
     memory = _Textbook(tables)
@@ -113,12 +113,12 @@ def _outputs(tables: Tables | FixedTables, op: Bytes, drive: NDArray[np.float64]
 def along(
     path: Path, least: Any, inverse: bool, special: NDArray[np.float64], length: int, rng: np.random.Generator
 ) -> tuple[Bytes, NDArray[np.float64]]:
-    """Operations and arguments that follow a path over and over, each time with different last bits.
+    """Operations and arguments that follow a path repeatedly, each time with different last bits.
 
-    Some points are approached to within last bits or a little more, from the move's side, and passed; some are
-    requested again, or beyond a limit. For the inverse the references are the outputs along the path, and the drive of
-    a point is mostly committed, so that its memory stays on the path. Between init and the first sample there may be a
-    commit, and one of the `special` values. `least(x)`: the least step of the type at x.
+    Some points are approached to within one or more last bits, from the side of the move, and passed; some are
+    requested again, or followed by a value beyond a limit. For the inverse, the references are the outputs along the
+    path, and usually the drive of a point is committed, so that its memory stays on the path. Between init and the
+    first sample there may be a commit and one of the `special` values. `least(x)`: smallest step of the type at x.
     """
     argument = path.output if inverse else path.drive
     span, room = float(np.ptp(argument)), float(np.ptp(path.drive))

@@ -1,4 +1,4 @@
-"""The results of a verification, as a table for people, JSON for programs and JUnit XML for CI."""
+"""The results of a verification: a table for people, JSON for programs, JUnit XML for CI."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from hystgen.verification.compilers import MissingError
 
 @dataclass(frozen=True)
 class Row:
-    """One operator in one build: how many samples were compared, the result, and on emulated cores its cost.
+    """One operator in one build: the number of samples compared, the result and, on emulated cores, its cost.
 
-    Instructions are counted from the first of a call of `step` to its return, over the samples compared. `flash` is the
-    bytes of code and constants of the emitted module, `library` the bytes of library code linked to it (soft float, and
-    anything else the image called), `ram` the size of an instance, `stack` the bytes that the deepest call used below
-    the caller's frame, as measured. On an AVR, where constants are in RAM, `ram` includes them as well as an instance
-    of each operator. `note`: a remark on the figures. `missing`: nothing was compared, since a tool is not usable on
+    Instructions are counted from the entry of `step` to its return, over the samples compared. `flash` is the bytes of
+    code and constants of the emitted module, `library` the bytes of library code linked to it (soft float, and anything
+    else the image called), `ram` the size of an instance, `stack` the bytes that the deepest call used below the
+    caller's frame, as measured. On an AVR, where constants are in RAM, `ram` includes them as well as an instance of
+    each operator. `note`: a remark on the figures. `missing`: nothing was compared, because a tool cannot be used on
     this machine.
     """
 
@@ -45,7 +45,7 @@ class Row:
 
     @property
     def ok(self) -> bool:
-        """Equal bits everywhere."""
+        """Whether all bits are equal."""
         return not self.error and not self.different
 
     @property
@@ -181,7 +181,7 @@ class Report:
 
 @dataclass(frozen=True)
 class Reports:
-    """The reports of several models as one; a single report looks as it does alone."""
+    """The reports of several models as one; a single report keeps its own form."""
 
     reports: Sequence[Report]
 

@@ -36,9 +36,9 @@ def verify(
     `source`: a model, a parameter file, or a result of `identify` or `diagnose`. On the host it uses every compiler
     that is installed (or those named in `compiler`: 'gcc', 'clang', 'zig'), each under the strict flags and under its
     own default dialect, over records of `length` calls. On the cores of `verification.targets` it uses zig and, if
-    installed, Debian's cross gcc, emulated, over records of `target_length` calls (default: as many as that core is
-    fast enough for), and counts the instructions of every sample. On the AVR only the emitted self-test runs. Names
-    given twice are used once. A requested tool that is missing on this machine makes a row that is `missing`.
+    installed, Debian's cross gcc, emulated, over records of `target_length` calls (default: as many as the speed of
+    that core allows), and counts the instructions of every sample. On the AVR only the emitted self-test runs. Names
+    given twice are used once. A requested tool that is missing on this machine gives a row marked `missing`.
     `hystgen.verification.Reports` joins the reports of several models. Raises what `emit` raises, and ValueError for a
     target that does not exist.
 

@@ -1,4 +1,4 @@
-"""The calls that verification makes: those that an ISR may make, and those that it never should."""
+"""The calls that verification makes: those that an ISR may make, and those that it should never make."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from hystgen.plays import slots
 from hystgen.plays.slots import Bytes
 from hystgen.verification import kinks
 
-# In each part of a record of this many calls, the status of this share of them stays unread
+# In each part of this many calls, one of these shares of the calls leaves the status unread
 PART, UNREAD = 100, (0.0, 0.5, 0.9)
 
 Calls = tuple[str, Bytes, NDArray[np.float64]]
@@ -36,7 +36,7 @@ def _through(points: NDArray[np.float64], length: int) -> NDArray[np.float64]:
 def _onto_the_plays(
     levels: NDArray[np.float64], least: Any, low: float, high: float, length: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Turns that end where another play starts to follow, give or take last bits; most are requested again."""
+    """Turns that end where another play starts to follow, give or take a few last bits; many are requested again."""
     turns = (rng.random(length) < 0.5).tolist()
     ways = (2 * rng.choice(levels, length) * rng.choice([-1.0, 1.0], length)).tolist()
     others = rng.uniform(low, high, length).tolist()
@@ -62,7 +62,7 @@ def _coincidences(
     """Turns right where plays start to follow, from other such turns and from the ends of the range.
 
     With round thresholds several corners end at the same drive, exactly or to within a last bit: no search may depend
-    on what it checks first.
+    on the order of its checks.
     """
     drive_low, drive_high = (float(a) for a in tables.limits[slots.DRIVE_MIN : slots.DRIVE_MAX + 1])
     finer = 2.0 ** int(tables.limits[slots.FINE]) if isinstance(tables, FixedTables) else 1.0
@@ -100,7 +100,7 @@ def _onto_the_bends(
     bends: NDArray[np.float64], least: Any, tables: Tables | FixedTables, inverse: bool, length: int,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Drives at bends of the memoryless part, or references that lead there, give or take last bits.
+    """Drives at bends of the memoryless part, or references that lead there, give or take a few last bits.
 
     A piece between two bends can be as short as one code.
     """
@@ -117,10 +117,10 @@ def _onto_the_bends(
 def suite(
     tables: Tables | FixedTables | ChainTables, real: np.dtype[Any], inverse: bool, length: int = 100_000
 ) -> Iterator[Calls]:
-    """Records of `length` calls: name, operations and arguments, numbers of type `real`; the same every time.
+    """Records of `length` calls: name, operations, and arguments with values of type `real`; the same every time.
 
     For a model with effects: the records of its plays, mixed with calls of its settings. Status is read after each call
-    in some parts, elsewhere after one of several, since its bits have to stay until they are read.
+    in some parts and after only some calls in others, since its bits must stay until they are read.
     """
     plays = tables.plays._replace(limits=tables.limits) if isinstance(tables, ChainTables) else tables
     records = _suite(plays, real, inverse, length)
@@ -177,9 +177,9 @@ def _settings(tables: ChainTables, inverse: bool, length: int) -> Iterator[Calls
 
 
 def _settled(tables: ChainTables, low: float, high: float, length: int) -> tuple[Bytes, NDArray[np.float64]]:
-    """From init to a reference, sometimes 0, held long enough for a quiet drive to stop, and settled at that drive;
-    often with another drive committed right after it, and a move on. The drive's resting place shows how much of the
-    past settling leaves."""
+    """From init to a reference, sometimes 0, held until a quiet drive stops; then a settle at that drive, often with
+    another drive committed right after it, and a further move. The drive at which it comes to rest shows how much of
+    the past a settle leaves."""
     rng = np.random.default_rng(20261204)
     steps = max(4, 2 * tables.quiet + 4)
     count = -(-length // (2 * steps + 3))

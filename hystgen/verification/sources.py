@@ -56,7 +56,7 @@ def harness(
 def _chain_calls(name: str, op: str, more: Sequence[str], arithmetic: Arithmetic) -> Iterator[tuple[int, str]]:
     """The number and the statement of each call that only models with effects have.
 
-    In fixed point travels have more bits than codes: values set are multiples of 2^TRAVEL_BITS, and the last bits are
+    In fixed point, travels have more bits than codes: those set are multiples of 2^TRAVEL_BITS, and the low bits are
     compared.
     """
     own = f"{name}_{op}"

@@ -16,7 +16,7 @@ class Machine(NamedTuple):
 
 
 class Target(NamedTuple):
-    """A core: how compilers name it, and which processor of the emulator it is.
+    """A core: its names for compilers, and the emulator's processor.
 
     `fpu`: floating point in hardware, where a user's flags can contract a product and a sum to one rounding. `calls`:
     calls per verification record; a core without FPU needs hundreds of instructions where others need one.
@@ -34,9 +34,9 @@ class Target(NamedTuple):
 
 
 class Board(NamedTuple):
-    """A controller whose core the emulator of `Target` lacks: only gcc builds, another emulator runs the firmware.
+    """A controller whose core the emulator of `Target` lacks: gcc alone builds it, and another emulator runs it.
 
-    8-bit with a 16-bit `int`: this exposes expressions that rely on a wider one. `ram` in bytes.
+    It is 8-bit with a 16-bit `int`, which exposes expressions that rely on a wider one. `ram`: in bytes.
     """
 
     name: str

@@ -1,1 +1,1 @@
-"""Faults of the records, and the records as the fits take them."""
+"""Faults in the records, and the records as the fits use them."""

@@ -1,7 +1,7 @@
-"""Disturbances in the errors of a model: lines over time, a ripple over the position, stick-slip.
+"""Disturbances in the errors of a model: spectral lines, a ripple over the position, stick-slip.
 
-Lines and ripples that rule the errors are taken out of the records: hum hides effects, and a ripple would be taken for
-effects and for stick-slip. Stick-slip is reported with place and count, but never named as an effect.
+Lines and ripples that dominate the errors are removed from the records: hum hides effects, and a ripple would be
+mistaken for effects or stick-slip. Stick-slip is reported with its location and count, but never named as an effect.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MAINS = (50.0, 60.0)
 """Hz: the world's mains frequencies."""
 
 MAINS_HARMONICS = (1, 2, 3, 5)
-"""Those that are found in supplies: 2 comes from rectifiers, 3 and 5 from the cores of transformers."""
+"""Harmonics found in power supplies: 2 comes from rectifiers, 3 and 5 from transformer cores."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Removed:
 
 
 def removed_share(before: Sequence[Array], after: Sequence[Array]) -> float:
-    """Share of the power of the errors `before` that is gone in those `after`."""
+    """Share of the power of the errors `before` that is absent from the errors `after`."""
     total = _power(before)
     return 1.0 - _power(after) / total if total > 0.0 else 0.0
 
@@ -52,7 +52,7 @@ def _power(errors: Sequence[Array]) -> float:
 
 
 def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
-    """The strongest line that is in most of the records long enough for it, or that rules the errors of a few."""
+    """The strongest line that enough sufficiently long records show, or that dominates the errors of a few."""
     found: list[tuple[float, float, int]] = []
     for k, (item, error) in enumerate(zip(items, errors, strict=True)):
         found += [(share, frequency, k) for share, frequency in peaks(item, error)]
@@ -71,7 +71,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
         common = len(seen) >= max(2, acceptance.SEEN_IN * len(able)) or len(able) == len(seen)
         rules = min(p[0] for p in near) > acceptance.RULING_SHARE
         if (common or rules) and (best is None or strength > best[0]):
-            longest = max(near, key=lambda p: lengths[p[2]])  # the frequency is most exact there
+            longest = max(near, key=lambda p: lengths[p[2]])  # it gives the most accurate frequency
             best = strength, longest[1], seen, able
     if best is None:
         return None
@@ -79,7 +79,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
     frequency = _refined(items, errors, frequency, seen, lengths)
     after, sizes, has = [], [], []
     for k, (item, error) in enumerate(zip(items, errors, strict=True)):
-        if lengths[k] * frequency < 2.0:  # fewer than two periods are no line
+        if lengths[k] * frequency < 2.0:  # fewer than two periods do not make a line
             after.append(error)
             continue
         e, size = _without(error, _phase(item, frequency))
@@ -101,7 +101,7 @@ def in_time(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
 
 
 def _mains(frequency: float, width: float) -> float | str | None:
-    """The mains frequency of a line, or the harmonic of it that the line is; `width`: the line's uncertainty, Hz."""
+    """The mains frequency that a line matches, or the harmonic in words; `width`: the line's uncertainty, Hz."""
     for mains in MAINS:
         for n in MAINS_HARMONICS:
             if abs(frequency - n * mains) < max(width, acceptance.MAINS_TOLERANCE * frequency):
@@ -110,11 +110,10 @@ def _mains(frequency: float, width: float) -> float | str | None:
 
 
 def steady(items: Sequence[Item], errors: Sequence[Array]) -> Removed | None:
-    """The strongest line, if one half of a record predicts the line of the other half, in most of the records that have
-    it.
+    """The strongest line, if in most records that show it, each half predicts the line in the other half.
 
-    Lines from the actuator are not steady: it answers with the lines of its drive, which are excluded, or its ringing
-    decays.
+    The actuator makes no steady lines of its own: it responds at the lines of its drive, which are excluded, and its
+    ringing decays.
     """
     line = in_time(items, errors) if all(item.timed for item in items) else None
     if line is None or not isinstance(line.finding, Line):
@@ -159,7 +158,7 @@ def _phase(item: Item, frequency: float) -> Array:
 
 
 def _without(error: Array, phase: Array) -> tuple[Array, float]:
-    """The error without its sine and cosine over a phase, and their amplitude."""
+    """The error minus its best-fitting sinusoid over a phase, and the amplitude of that sinusoid."""
     known = np.isfinite(error)
     table = np.column_stack([np.cos(phase[known]), np.sin(phase[known]), np.ones(int(np.count_nonzero(known)))])
     solution = np.linalg.lstsq(table, error[known], rcond=None)[0]
@@ -172,19 +171,19 @@ def _without(error: Array, phase: Array) -> tuple[Array, float]:
 
 
 MOST_SAMPLES = 20_000
-"""Samples that a pitch is refined with: it is then as fine as the noise allows."""
+"""Approximate number of samples used to refine a pitch: with these, only noise limits the accuracy."""
 
 FINER = 4
-"""Zero padding of the spectrum over position, so that pitches between integer fractions of the range have a bin."""
+"""Zero-padding factor of the spectrum over position: pitches between integer fractions of the range get bins."""
 
 
 @dataclass(frozen=True)
 class _Motion:
-    """The motion of a record, at the samples `at` that are compared.
+    """The motion of a record at the compared samples, selected by `at`.
 
-    `places`: predicted positions; `errors`: at those; `moves`: the change of the prediction since the sample before,
-    NaN while the drive holds, since a hold measures one position repeatedly and the model has been fitted to it. Places
-    are predicted, not measured: over the measured position a ripple that is large against its pitch is no sine.
+    `places`: predicted positions; `errors`: the errors there; `moves`: change of the prediction since the previous
+    sample, NaN during holds, which measure one position repeatedly and to which the model has been fitted. Places are
+    predicted, not measured: over the measured position, a ripple that is large relative to its pitch is not sinusoidal.
     """
 
     at: NDArray[np.bool_]
@@ -273,9 +272,9 @@ def _pitch(motions: Sequence[_Motion], pitch: float) -> float:
 def _ripple(
     items: Sequence[Item], errors: Sequence[Array], motions: Sequence[_Motion], pitch: float
 ) -> Removed | None:
-    """The ripple, if most passes up and down over several pitches show the ripple of all other passes.
+    """The ripple, if most passes, up or down over several pitches, show the ripple that all other passes predict.
 
-    The error by a lag or a loop differs between passes up and down.
+    The error due to a lag or a loop differs between passes up and passes down.
     """
     tables = [
         np.column_stack([np.cos(2.0 * np.pi * motion.places / pitch), np.sin(2.0 * np.pi * motion.places / pitch)])
@@ -330,7 +329,7 @@ def lines(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | R
 
 
 def ruling(items: Sequence[Item], errors: Sequence[Array]) -> tuple[list[Line | Ripple], list[Array]]:
-    """The same for lines that rule the errors and do not come from the actuator: steady lines and ripples."""
+    """As `lines`, for those that dominate the errors and do not come from the actuator: steady lines and ripples."""
     return _strongest_first(items, errors, (steady, in_position), acceptance.RULING_SHARE)
 
 
@@ -348,26 +347,26 @@ def _strongest_first(
     return found, remaining
 
 
-# Records without the lines and ripples that rule their errors ------------------------------------------------
+# Records without the lines and ripples that dominate their errors --------------------------------------------
 
 
 Fitted = TypeVar("Fitted", bound=FittedLike)
 
 ROUNDS = 3
-"""Rounds of removal: a model fitted to a ripple is wrong about the positions over which the ripple appears, and becomes
-better without it."""
+"""Maximum number of rounds of removal: a model fitted to a ripple predicts wrong positions for it, and improves once
+the ripple is removed."""
 
 
 @dataclass(frozen=True)
 class Cleaned:
-    """Records as measured, the same without their lines, and these lines."""
+    """Records as measured, the same records without their lines, and these lines."""
 
     measured: Prepared
     clean: Prepared
     lines: tuple[Line | Ripple, ...] = ()
 
     def seen_by(self, fitted: FittedLike) -> Cleaned:
-        """The measured records without the lines in a model's errors, over the positions that it predicts."""
+        """The measured records without the lines in a model's errors, with ripples over its predicted positions."""
         measured, clean = _items(self.measured), _items(self.clean)
         errors = [
             error + (item.y - without.y)
@@ -383,7 +382,7 @@ class Cleaned:
         return replace(self, clean=replace(self.measured, to_fit=items[:number], held=items[number:]), lines=lines)
 
     def left_by(self, fitted: FittedLike) -> bool:
-        """Whether a model's errors show further such lines."""
+        """Whether a model's errors over the clean records still show lines to remove."""
         clean = _items(self.clean)
         return bool(ruling(clean, fitted.errors(clean))[0])
 
@@ -403,7 +402,7 @@ def taken_out(found: Cleaned, fitted: Fitted, refit: Callable[[Prepared], Fitted
 
 
 def _moving(ready: Prepared) -> Prepared:
-    """The records without their holds, in which a ripple is an offset that the fit would take over unnoticed."""
+    """The records without their holds, in which a ripple is an offset that the fit would absorb unnoticed."""
 
     def without_holds(item: Item) -> Item:
         y = item.y.copy()
@@ -415,7 +414,7 @@ def _moving(ready: Prepared) -> Prepared:
 
 
 def is_known(line: Line | Ripple, others: Sequence[Line | Ripple]) -> bool:
-    """Whether a line is the remainder of one that is known already."""
+    """Whether a line is the remainder of one that is already known."""
     return any(
         each.kind == line.kind and abs(line.place / each.place - 1.0) < acceptance.SAME_LINE for each in others
     )
@@ -435,10 +434,10 @@ def stick_slip(items: Sequence[Item], errors: Sequence[Array], noise: float) -> 
 
 
 def _stick_slip(item: Item, error: Array, noise: float) -> StickSlip | None:
-    """Judge stretches in which the prediction moves by a few times the noise: how often the output stands, and leaps.
+    """Judge, over stretches of predicted motion well above the noise, how often the output stands still or leaps.
 
-    The error by a lag or by ringing is smooth: it continues from one stretch to the next, while a leap makes up for the
-    standstill before it. And before and after a jump the output hardly moves, whatever a model predicts.
+    The error due to a lag or ringing is smooth: it continues from one stretch to the next, whereas a leap makes up for
+    the standstill before it. Also, the output hardly moves before and after a jump, whatever the model predicts.
     """
     known = np.isfinite(error) & np.isfinite(item.y)
     e, y = error[known], item.y[known]
@@ -471,7 +470,7 @@ def _stick_slip(item: Item, error: Array, noise: float) -> StickSlip | None:
 
 
 def _alone(moves: Array, at: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """Whether moves at some samples are far larger than those around them; a filter may spread them to the next one."""
+    """Whether moves at some samples far exceed those nearby, except adjacent ones: a filter may spread a jump."""
     beside = np.array([-5, -4, -3, -2, 2, 3, 4, 5])
     around = moves[np.clip(at[:, None] + beside, 0, len(moves) - 1)]
     return np.asarray(moves[at] > acceptance.SLIP_ALONE * np.median(around, axis=1))

@@ -1,7 +1,7 @@
 """Records as a diagnosis compares them: a record with its compared samples, and the same with fewer of them.
 
-A stretch in which drive and plays are straight needs no samples inside: plays depend only on turning points, and
-filters are exact on straight lines.
+Inside a stretch over which drive and plays are linear, no samples are needed: plays depend only on turning points, and
+filters are exact for linear inputs.
 """
 
 from __future__ import annotations
@@ -25,35 +25,35 @@ Samples = slice | NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 MOVEMENTS = 5, 2**25
-"""Number of play movements remembered for a record, and their bytes in all."""
+"""Maximum number of play movements cached for a record, and their total size in bytes."""
 
 DIFFERENCES = 12, 2**25
-"""The same for errors before the free offsets are fitted: hypotheses of a round are compared with each other."""
+"""The same for errors before the free offsets are fitted: each hypothesis of a round is compared with others."""
 
 COMPARISONS = 40, 2**23
-"""The same for errors with the free offsets and start states fitted."""
+"""The same for errors after the free offsets and start states are fitted."""
 
 
 ROUNDED = float(np.finfo(np.float64).eps) ** 0.5
-"""Least change of a number, as a share of it, by which a slope is found: half of the digits are left for it."""
+"""Smallest relative change of a value for a difference quotient: it leaves half of the digits for the slope."""
 
 
 class Recent:
-    """A cache of the arrays used last, by key: at most `most` of them, of `most_bytes` in all."""
+    """A cache of the most recently used arrays, by key: at most `most` arrays, of `most_bytes` in total."""
 
     def __init__(self, most: int, most_bytes: int) -> None:
         self._most, self._most_bytes = most, most_bytes
         self._arrays: dict[object, Array] = {}
 
     def recalled(self, by: object) -> Array | None:
-        """The array under a key, None without one."""
+        """The array under a key, or None."""
         if by not in self._arrays:
             return None
-        self._arrays[by] = found = self._arrays.pop(by)  # moved to the end as the one used last
+        self._arrays[by] = found = self._arrays.pop(by)  # moved to the end: most recently used
         return found
 
     def kept(self, by: object, make: Callable[[], Array]) -> Array:
-        """The array under a key, made if there is none; those unused for the longest time give way."""
+        """The array under a key, made if there is none; the least recently used arrays are dropped for it."""
         found = self.recalled(by)
         if found is not None:
             return found
@@ -67,13 +67,12 @@ class Recent:
 
 @dataclass(frozen=True)
 class Item:
-    """A record as it is compared: `y` is NaN where it is not; `history`: the drive before it, None if unknown.
+    """A record as it is compared: `y` is NaN at samples left out; `history`: drive values before it, None if unknown.
 
     `timed`: whether its times are known. `turns`: drive values that lead virgin plays to the start memory found in
-    place of a history, if any.
-    `session`: all records of a session on one time axis, if they form one, and `part` this record's samples in it.
-    `moved`: recent movements of the plays, which most numbers of a search do not change; `residuals`: recent errors
-    before the free offsets are fitted; `errors`: recent errors after that.
+    place of a history, if any. `session`: all records of the session on one time axis, if they form one; `part`: this
+    record's samples in it. Three caches: `moved`, movements of the plays, which most parameters of a search leave
+    unchanged; `residuals`, errors before the free offsets are fitted; `errors`, errors after that.
     """
 
     name: str
@@ -91,7 +90,7 @@ class Item:
 
     @property
     def visited(self) -> tuple[float, ...] | None:
-        """Drive values that lead virgin plays to the start memory, known or found; None for neither."""
+        """Drive values that lead virgin plays to the start memory, known or found; None if it is neither."""
         return self.turns if self.history is None else self.history
 
     @cached_property
@@ -101,7 +100,7 @@ class Item:
 
     @cached_property
     def compared(self) -> Samples:
-        """Their indices, or a slice if they are evenly spaced, which picks them without a copy."""
+        """Indices of the compared samples, or a slice if they are evenly spaced, which avoids a copy."""
         found = np.flatnonzero(self.known)
         steps = np.diff(found)
         if not len(steps) or np.any(steps != steps[0]):
@@ -117,16 +116,16 @@ class Item:
         return Course(self.name, self.run.v, self.y, self.history, first, last, first, start=start)
 
     def step(self, h: Array) -> float:
-        """Change of a predicted output (N,) by which the slope of a map is found, output units.
+        """Step of a predicted output (N,) for the slope of a map, output units.
 
-        As small a part of the measured range as of any other number, but not lost in the rounding of the output: the
-        samples compared may be of a drive that rests, or be a single one.
+        The usual share of the measured range, but large enough to survive the rounding of the output: that range is
+        zero if the drive rests or only one sample is compared.
         """
         largest = max(float(np.max(np.abs(x), initial=0.0)) for x in (h, self.y[self.known]))
         return float(max(DIFFERENCE * self.output_range, ROUNDED * largest, 1e-300))
 
     def picked(self, rows: Array) -> Array:
-        """The compared samples of rows (k, N), contiguous."""
+        """The compared samples of rows (k, N), as a contiguous array."""
         if isinstance(self.compared, slice):
             return np.ascontiguousarray(rows[:, self.compared])
         return rows.take(self.compared, axis=1)
@@ -140,13 +139,13 @@ def rms(errors: Sequence[Array]) -> float:
 
 
 def compared(items: Sequence[Item]) -> tuple[int, int]:
-    """Numbers of samples compared and recorded."""
+    """Number of samples compared, and number recorded."""
     found = [mask for _, mask in masks(items)]
     return sum(int(np.count_nonzero(mask)) for mask in found), sum(map(len, found))
 
 
 def masks(items: Sequence[Item]) -> list[tuple[str, Mask]]:
-    """Name of each record, and a mask of its compared samples; the two ends of a record may be two items."""
+    """Name of each record, and a mask of its compared samples; its beginning and end may be two items."""
     found: dict[int, tuple[str, Mask]] = {}
     for item in items:
         _, others = found.get(id(item.run), ("", np.zeros(len(item.known), dtype=bool)))
@@ -155,23 +154,23 @@ def masks(items: Sequence[Item]) -> list[tuple[str, Mask]]:
 
 
 class FittedLike(Protocol):
-    """A fitted model, as far as the judgement of records needs it."""
+    """The part of a fitted model that checks of the records need."""
 
     @property
     def reach(self) -> float:
         """The largest threshold, input units."""
 
     def errors(self, items: Sequence[Item]) -> list[Array]:
-        """Measured less predicted, (N,) for each record, NaN where it is not compared."""
+        """Measured minus predicted, (N,) for each record; NaN at samples that are not compared."""
 
 
 # Fewer samples to search with --------------------------------------------------------------------------------
 
 
 def needed(items: Sequence[Item], errors: Sequence[Array], noise: float) -> list[Mask]:
-    """Masks of the samples without which the prediction at the others would change by a part of the noise.
+    """Masks of the samples without which the prediction at the others would change noticeably compared with the noise.
 
-    `errors`: errors of a model over the records, NaN where they are not known.
+    `errors`: errors of a model over the records, NaN where unknown.
     """
     return [_needed(item, residual, noise) for item, residual in zip(items, errors, strict=True)]
 
@@ -182,7 +181,7 @@ def _needed(item: Item, residual: Array, noise: float) -> Mask:
         return np.ones(number, dtype=bool)
     residual, predicted = (np.interp(run.t, run.t[known], x[known]) for x in (residual, item.y - residual))
     as_drive = float(np.ptp(run.v)) / max(float(np.ptp(predicted)), 1e-300)
-    bends = [  # signal, its largest distance from a straight line, and whether that is an rms or for every sample
+    bends = [  # signal, limit of its deviation from a straight line, and whether that limit is an rms or a maximum
         (predicted, acceptance.THIN_STRAIGHT * noise, False),
         (run.v, acceptance.THIN_STRAIGHT * noise * as_drive, False),
         (residual, acceptance.THIN_RESIDUAL * noise, True),
@@ -212,20 +211,20 @@ def _needed(item: Item, residual: Array, noise: float) -> Mask:
 
 
 def everything(groups: Sequence[Sequence[Item]]) -> list[list[Mask]]:
-    """Masks with which no sample is left out."""
+    """Masks that keep every sample."""
     return [[np.ones(len(item.run.t), dtype=bool) for item in group] for group in groups]
 
 
 def thinned(groups: Sequence[Sequence[Item]], most: int, masks: Sequence[Sequence[Mask]]) -> list[list[Item]]:
-    """Groups of records with fewer samples: evenly spaced ones, of which each group compares at most `most`, and the
-    needed ones.
+    """Groups of records reduced to evenly spaced samples, of which each group compares at most `most`, and the needed
+    samples.
 
-    `masks`: the needed samples of each record. Groups that are small enough are returned unchanged.
+    `masks`: the needed samples of each record. If all groups are small enough, they are returned unchanged.
     """
     every = [max(1, -(-sum(int(np.count_nonzero(item.known)) for item in group) // most)) for group in groups]
     if max(every) == 1:
         return [list(group) for group in groups]
-    kept: dict[int, Mask] = {}  # by run, since two records may be parts of one
+    kept: dict[int, Mask] = {}  # by run, since two items may be parts of one record
     for group, step, needs in zip(groups, every, masks, strict=True):
         for item, mask in zip(group, needs, strict=True):
             keep = mask.copy()

@@ -49,8 +49,8 @@ Predict = Callable[[Record], Array]
 class Against:
     """A record's output as `factor * prediction + offset`, with the correlation of the two.
 
-    `sense`: area of the measured loop over that of the predicted one, negative if the output is ahead of the drive, 0
-    if it is not significant.
+    `sense`: ratio of the measured loop's area to the predicted one's, negative if the output leads the drive, 0 if it
+    is not significant.
     """
 
     factor: float
@@ -61,8 +61,8 @@ class Against:
 def checked(records: Sequence[Record], predict: Predict) -> tuple[list[Record | None], list[Finding]]:
     """The records that can be used, None in place of the others, and the findings, at most one per record.
 
-    Exchanged columns are put right; a record in other units, or with the output of another record, is left out. Wrong
-    samples take no part in the judgement.
+    Exchanged columns are put right; a record in other units, or with the output of another record, is left out. Faulty
+    samples do not affect these checks.
     """
     kept: list[Record | None] = []
     seen: list[Record] = []
@@ -114,7 +114,7 @@ def _spread(x: Any) -> float:
 
 
 def _whole(record: Record) -> bool:
-    """Whether nearly all samples have values of drive and output; other faults are reported later."""
+    """Whether nearly all samples have a drive and an output value; other faults are reported later."""
     v, y = record.v, record.y
     if y is None or len(y) != len(v) or not (np.isfinite(y).all() and np.isfinite(v).all()):
         return False
@@ -122,7 +122,7 @@ def _whole(record: Record) -> bool:
 
 
 def _moves(record: Record) -> bool:
-    """Whether drive and output of a whole record move."""
+    """Whether a record is whole, and its drive and output move."""
     return _whole(record) and bool(np.ptp(np.asarray(record.y)) > 0.0 and np.ptp(record.v) > 0.0)
 
 
@@ -131,7 +131,7 @@ def _against(record: Record, predicted: Array) -> Against:
     y, v = np.asarray(record.y, dtype=np.float64), np.asarray(record.v, dtype=np.float64)
     factor, correlation, scatter = _line(predicted, y)
     own, model = _area(v, y), _area(v, predicted)
-    # the standard deviation of the area by white noise of the output
+    # standard deviation of the area due to white noise in the output
     around = scatter * float(np.sqrt(np.sum((v[2:] - v[:-2]) ** 2))) / 2.0
     expected = abs(factor) * model
     significant = abs(own) > acceptance.LOOP_SIGMAS * around and expected > 0.0
@@ -139,7 +139,7 @@ def _against(record: Record, predicted: Array) -> Against:
 
 
 def _line(x: Array, y: Array) -> tuple[float, float, float]:
-    """Slope, correlation and scatter of y over x, without the few samples that lie far off."""
+    """Slope, correlation and scatter of y over x, ignoring the few samples far off the line."""
     inside = np.ones(len(x), dtype=bool)
     slope, scatter = 0.0, 0.0
     for _ in range(4):
@@ -160,12 +160,12 @@ def _line(x: Array, y: Array) -> tuple[float, float, float]:
 
 
 def _area(v: Array, y: Array) -> float:
-    """Area that (v, y) encloses counterclockwise, as it does if the output is late."""
+    """Area enclosed by (v, y), positive if counterclockwise, as it is if the output lags."""
     return 0.5 * float(np.sum(v[:-1] * y[1:] - v[1:] * y[:-1]) + v[-1] * y[0] - v[0] * y[-1])
 
 
 def _right_way_round(record: Record, predict: Predict) -> tuple[Record, Array, Against]:
-    """A record, with its columns exchanged back if they were, its prediction, and how the two compare."""
+    """A record with exchanged columns put right, its prediction, and how the two compare."""
     predicted = predict(record)
     found = _against(record, predicted)
     if found.sense <= 0.0:
@@ -179,10 +179,9 @@ def _right_way_round(record: Record, predict: Predict) -> tuple[Record, Array, A
 
 
 def _better(swapped: Against, found: Against) -> bool:
-    """Whether a record's columns are exchanged: with the output as drive, the model predicts the drive.
+    """Whether a record's columns are exchanged: given the output as its drive, the model predicts the drive.
 
-    Its loop then runs in the right direction and is as wide as expected; if no loop is visible, the sensitivity
-    decides.
+    The loop then has the right direction and about the expected size; if none is visible, the sensitivity decides.
     """
     if swapped.correlation < acceptance.FOLLOWS:
         return False
@@ -195,7 +194,7 @@ def _better(swapped: Against, found: Against) -> bool:
 
 
 def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found: dict[int, Against]) -> int | None:
-    """The record whose prediction the output of record k follows, if it does not follow its own."""
+    """The record whose prediction the output of record k follows in place of its own, or None."""
     if abs(found[k].correlation) > acceptance.OWN_CORRELATION:
         return None
     y = np.asarray(records[k].y)
@@ -204,23 +203,23 @@ def _other(k: int, records: Sequence[Record], predicted: dict[int, Array], found
     return best[0] if best[1] > acceptance.FOREIGN_CORRELATION else None
 
 
-# Whether the records begin in the memory that the given history leaves ---------------------------------------
+# Whether the records start with the memory that the given history leaves -------------------------------------
 
 
 def contradicted(items: Sequence[Item], fitted: FittedLike) -> OtherHistory | None:
-    """A finding if the starts, which depend on the history, are off by far more than the rest, else None.
+    """A finding if the starts, which depend on the history, have far larger errors than the rest, else None.
 
-    `items`: fitted records; held-out ones decide nothing about a fit, and may go where it is a guess. The history
-    precedes each of them, even in a session.
+    `items`: fitted records only, since held-out ones may reach drives at which the fit is a guess. The history precedes
+    each of them, even in a session.
     """
     return _off(*_parts(items, fitted, False))
 
 
 def bends(items: Sequence[Item], fitted: FittedLike, free: FittedLike) -> OtherHistory | None:
-    """The same if a model fitted with the history can follow the starts, but only at the cost of the rest.
+    """The same if a model fitted with the history can follow the starts only at the cost of the other samples.
 
-    `free`: the model fitted to the samples that do not depend on the history, which predicts the right starts. Starts
-    that are off without a cost for the rest may be an effect that fades.
+    `free`: the model fitted only to samples that do not depend on the history; it predicts the starts correctly. Starts
+    that are off at no cost to the other samples may show an effect that fades.
     """
     starts, rest = _parts(items, free, True)
     _, bent = _parts(items, fitted, True)
@@ -228,7 +227,7 @@ def bends(items: Sequence[Item], fitted: FittedLike, free: FittedLike) -> OtherH
 
 
 def _parts(items: Sequence[Item], fitted: FittedLike, own: bool) -> tuple[list[Array], list[Array]]:
-    """Errors that depend on the history, and errors that do not; `own`: both less the mean of the latter."""
+    """Errors that depend on the history, and those that do not; `own`: with the latter's mean subtracted."""
     first, later = [], []
     for item, e in zip(items, fitted.errors(items), strict=True):
         if item.history is None:
@@ -274,10 +273,10 @@ def prepare(
     rest: float,
     skip: float = 0.0,
 ) -> Prepared:
-    """Items for the fits; if no held-out record can judge, every third record is held out, or the end of each.
+    """Items for the fits; without a usable held-out record, every third record is held out, or the end of each.
 
-    `skip`: seconds at the start of every record that are not compared. Raises IdentificationError, also if there are
-    too few samples to compare.
+    `skip`: seconds at the start of every record that are not compared. Raises IdentificationError, for example if too
+    few samples can be compared.
     """
     notes: list[str] = []
     held_courses, held_rails = _courses(holdout, history, skip)
@@ -289,7 +288,7 @@ def prepare(
         holdout = [records[k] for k in aside]
         records = [record for k, record in enumerate(records) if k not in aside]
         names = ", ".join(record.name for record in holdout)
-        notes.append(f"no record was given that can judge: {names} set aside")
+        notes.append(f"no usable held-out record was given: {names} set aside")
         held_courses, held_rails = _courses(holdout, history, skip)
     fit_courses, fit_rails = _courses(records, history, skip)
     if not enough(fit_courses):
@@ -322,7 +321,7 @@ def prepare(
     if not held:
         to_fit, held = parted(to_fit)
         share = f"{100 * acceptance.SET_ASIDE:g} %"
-        notes.append(f"no record was given that can judge: the last {share} of each is set aside")
+        notes.append(f"no usable held-out record was given: the last {share} of each is set aside")
     if not all(item.timed for item in (*to_fit, *held)):
         notes.append("not every record has a time: effects that depend on it are not sought; give --sample-time")
     if not any(float(np.ptp(item.y[item.known])) > 0.0 for item in to_fit if item.known.any()):
@@ -339,7 +338,7 @@ def prepare(
 def _courses(
     records: Sequence[Record], history: tuple[float, ...] | None, skip: float
 ) -> tuple[list[Course], list[Saturated]]:
-    """The records as they take part, and findings about samples left out at a converter's end."""
+    """The records as they are compared, and findings about samples left out at a converter's limit."""
     courses, saturated = [], []
     for record in records:
         course, ends = prepared.without_rails(prepared.course_of(record, history, prepared.samples_in(record, skip)))
@@ -350,12 +349,12 @@ def _courses(
 
 
 def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Course], list[Course], list[str]]:
-    """The courses, with start memories if too little of them could be compared for a name without, and notes on the
-    direction of their loops.
+    """The courses, with start memories if too few samples could be compared without them, and notes on the direction of
+    their loops.
 
-    Otherwise they get none: an effect in its first seconds may look like a start memory. Each fitted record counts by
-    itself, since a fit needs it. Held-out ones count together: a memory found without the effects that are still to be
-    named may be wrong by as much as they do, and then stands for an error that no name removes.
+    Otherwise they get none, since the first seconds of an effect may look like a start memory. Fitted records are
+    judged one by one, since the fit needs each; held-out ones are judged together, since a memory found before the
+    effects are known may be wrong by as much as these contribute, an error that no effect then removes.
     """
     low, high = min(float(c.v.min()) for c in to_fit), max(float(c.v.max()) for c in to_fit)
     largest = pi.loop_reach(high - low, pi.LEAST_VISIBLE)  # wider plays may exist, but hardly move
@@ -366,16 +365,16 @@ def _begun(to_fit: Sequence[Course], held: Sequence[Course]) -> tuple[list[Cours
 
 
 def _reach(courses: Sequence[Course]) -> float:
-    """The largest threshold of the fits: of a play that moves visibly, even at the ends of the range only.
+    """The largest threshold of the fits: that of a play that moves visibly, even if only at the ends of the range.
 
-    What wider plays do between there and a fit's usual reach would be left, and stand for an effect.
+    With only a fit's usual reach, the motion of wider plays would remain and look like an effect.
     """
     return pi.largest(courses, pi.LEAST_VISIBLE)
 
 
 def _least(courses: Sequence[Course]) -> float:
-    """Share of the samples of a held-out record below which a start memory is sought for it: none where all of them
-    together can be compared without."""
+    """Share of a held-out record's samples below which a start memory is estimated for it; 0 if enough samples of all
+    held-out records together can be compared without one."""
     known = [int(np.count_nonzero(np.isfinite(course.y[course.begin : course.last]))) for course in courses]
     used = [start.unknown(course).used for course in courses]
     able = max(used, default=0) > acceptance.COMPARED_SAMPLES
@@ -383,7 +382,7 @@ def _least(courses: Sequence[Course]) -> float:
 
 
 def _without_faults(ready: Prepared) -> Prepared:
-    """The records without samples that are plainly wrong, unless hardly any would be left."""
+    """The records without plainly faulty samples, unless hardly any samples would be left."""
     repaired = not_at_the_end(ready.repaired, [*ready.to_fit, *ready.held])
     number = len(ready.to_fit)
     items, wrong = without_faults([*ready.to_fit, *ready.held], repaired)
@@ -404,8 +403,8 @@ def _item(course: Course, record: Record, rest: float) -> Item:
 
 
 def _arrived(course: Course, edges: NDArray[np.bool_]) -> int:
-    """First sample to compare; where a step of the drive wipes the start memory, the first at which the output has come
-    within `AS_FAR` of where it settles. Behind a lag or a slew limit the plays are wiped only then."""
+    """First sample to compare; if a step of the drive wipes the start memory, the first at which the output is within
+    `AS_FAR` of where it settles, since behind a lag or a slew limit the plays are wiped only then."""
     first = course.first
     if course.start is not None or course.visited is not None or not edges[first : first + 1].any():
         return first
@@ -420,14 +419,14 @@ def _arrived(course: Course, edges: NDArray[np.bool_]) -> int:
 
 
 def _outliers(course: Course) -> NDArray[np.intp]:
-    """Samples that would be compared if their output had not been left out as isolated."""
+    """Samples left out only because their output was isolated."""
     missing = np.isnan(course.y)
     missing[: course.first] = False
     return np.flatnonzero(missing if course.stretches is None else missing & ~course.stretches)
 
 
 def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[Item]]:
-    """The items with their session, if their times follow each other."""
+    """The items with their session, if the records follow one another in time."""
     items = sorted([*to_fit, *held], key=lambda item: float(item.run.t[0]))
     apart = all(a.run.t[-1] < b.run.t[0] for a, b in itertools.pairwise(items))
     if len(items) < 2 or not apart:
@@ -440,7 +439,7 @@ def _in_session(to_fit: list[Item], held: list[Item]) -> tuple[list[Item], list[
     return first, second
 
 
-# Which records judge, and whether there is enough to compare -------------------------------------------------
+# Which records are held out, and whether there is enough to compare ------------------------------------------
 
 
 JUDGE = "judge by"
@@ -448,47 +447,47 @@ JUDGE = "judge by"
 
 
 def enough(courses: Sequence[Course], share: float = 1.0) -> bool:
-    """Whether a share of any course is enough to compare, given a start memory if one can be found."""
+    """Whether this share of any course is enough to compare, with a start memory if one can be found."""
     return any(share * _comparable(course) > acceptance.COMPARED_SAMPLES for course in courses)
 
 
 def _comparable(course: Course) -> int:
-    """Number of samples that can be compared, given a start memory if one can be found."""
+    """Number of samples that can be compared, with a start memory if one can be found."""
     known = np.isfinite(course.y[course.begin : course.last])
     return int(np.count_nonzero(known)) if start.findable(course) else course.used
 
 
 def too_little(courses: Sequence[Course], what: str, share: float = 1.0) -> str:
-    """The message if there is not enough; `what`: the purpose for which the courses are too short."""
+    """The message for courses with too few samples to compare; `what`: the purpose of these samples."""
     names = ", ".join(course.name for course in courses)
     most, least = max(course.used for course in courses), acceptance.COMPARED_SAMPLES / share
     if all(start.findable(course) for course in courses) and not enough(courses, share):
         most = max(_comparable(course) for course in courses)
         return (
-            f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record, and more than "
+            f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record, but more than "
             f"{least:.0f} are needed; record more"
         )
     return (
-        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record behind the start, "
-        f"whose memory is not known, and more than {least:.0f} are needed; give --history, "
+        f"{names}: there is too little to {what}: {counted(most, 'sample')} at most in a record after the start, "
+        f"whose memory is unknown, but more than {least:.0f} are needed; give --history, "
         "or records that sweep their range again"
     )
 
 
 def hardly_compared(items: Sequence[Item]) -> list[str]:
-    """Notes on records that show nothing beside others that do, and on those that are mostly not compared."""
+    """Notes on records with almost nothing to compare, and on those that are compared only in their second half."""
     notes = []
     for name, compared in masks(items):
         number = int(np.count_nonzero(compared))
         if number <= acceptance.COMPARED_SAMPLES:
             notes.append(
-                f"{name}: says next to nothing, {counted(number, 'sample')} compared; where its start memory is not "
-                "known give --history, or let it sweep its range again"
+                f"{name}: says next to nothing, {counted(number, 'sample')} compared; if its start memory is unknown, "
+                "give --history, or let it sweep its range again"
             )
         elif np.argmax(compared) > len(compared) // 2:
             notes.append(
-                f"{name}: {number} of {len(compared)} samples are compared, those behind the largest and the least "
-                "drive, from where its memory is known; more with --history"
+                f"{name}: {number} of {len(compared)} samples are compared, those after the largest and the smallest "
+                "drive, from where its memory is known; --history makes more usable"
             )
     return notes
 
@@ -496,7 +495,7 @@ def hardly_compared(items: Sequence[Item]) -> list[str]:
 def set_aside(records: Sequence[Record]) -> list[int]:
     """Indices of the records to hold out: every third one, shifted if that gives both sides fast and wide drives.
 
-    An effect that only shows at a fast edge cannot be found if none is fitted, nor judged if none is held out.
+    An effect that shows only at fast edges cannot be found if none are fitted, nor judged if none are held out.
     """
     rates = np.array([float(np.max(np.abs(np.diff(record.v) / np.diff(record.t)))) for record in records])
     swings = np.array([float(np.ptp(record.v)) for record in records])
@@ -512,14 +511,14 @@ def set_aside(records: Sequence[Record]) -> list[int]:
 
 
 def with_ends(ready: Prepared) -> Prepared | None:
-    """The records with the end of each fitted one held out as well; None if they already are, or are too short."""
+    """The records with the end of each fitted one held out as well; None if it already is, or is too short."""
     ends = {id(item.run) for item in ready.to_fit} & {id(item.run) for item in ready.held}
     longest = max(int(np.count_nonzero(item.known)) for item in ready.to_fit)
     if ends or acceptance.SET_ASIDE * longest <= acceptance.COMPARED_SAMPLES:
         return None
     to_fit, held = parted(ready.to_fit)
     share = f"{100 * acceptance.SET_ASIDE:g} %"
-    note = f"by the held-out records alone nothing could be named: the last {share} of each fitted record judges too"
+    note = f"the held-out records alone allow no name: the last {share} of each fitted record is held out too"
     return replace(ready, to_fit=to_fit, held=[*ready.held, *held], notes=[*ready.notes, note])
 
 
@@ -536,16 +535,16 @@ def parted(items: Sequence[Item]) -> tuple[list[Item], list[Item]]:
     return beginnings, ends
 
 
-# Samples that are plainly wrong: drop-outs, held samples, a converter at its end -----------------------------
+# Plainly faulty samples: drop-outs, held samples, a converter at its limit -----------------------------------
 
 
 Runs = Sequence[tuple[int, int]]
 
 
 def without_faults(items: Sequence[Item], repaired: Sequence[Finding]) -> tuple[list[Item], list[Finding]]:
-    """The items without wrong samples, and findings about these; `repaired`: findings so far.
+    """The items without faulty samples, and findings about the faults; `repaired`: findings so far.
 
-    A level that is a drop-out or the converter's end in one record is the same in all others.
+    A level that marks a drop-out or the converter's limit in one record does so in all others.
     """
     ends = {each.level for each in repaired if isinstance(each, Saturated) and each.level is not None}
     dropped = [faults.drop_outs(item.y, item.run.v) for item in items]

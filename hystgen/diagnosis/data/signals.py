@@ -1,4 +1,4 @@
-"""Properties of drives, outputs and errors: the noise, holds and turning points, spectral peaks."""
+"""Properties of drives, outputs and errors: noise, holds, turning points and spectral peaks."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 
-# The noise of the measurement: from holds, from differences, from repeated periods ---------------------------
+# Measurement noise: from holds, from differences, from repeated periods --------------------------------------
 
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """Noise rms in output units by each method that the records allow, the one that is used, and its name `ruled`.
+    """Noise rms in output units by each method that the records allow; `rms`: the one used, `ruled`: its method.
 
-    Holds contain all noise that is faster than they last; repeated periods contain everything that does not repeat;
-    differences only contain changes from sample to sample, which gives a lower bound if the noise is coloured. No
-    record has less than `resolution`, the rounding of its numbers or a share of the range that no sensor resolves.
+    Holds show all noise that is faster than they last; repeated periods show everything that does not repeat;
+    differences show only changes from sample to sample, a lower bound if the noise is coloured. The noise is at least
+    `resolution`: the rounding of the recorded values, or a share of the range that no sensor resolves.
     """
 
     rms: float
@@ -56,12 +56,12 @@ def noise_floor(items: Sequence[Item]) -> NoiseFloor:
 
 
 def converter_step(y: Array) -> float:
-    """The smallest step between two different outputs; infinite if there is only one output."""
+    """The smallest step between two different outputs; infinite if all are equal."""
     return float(np.min(np.diff(np.unique(y[np.isfinite(y)])), initial=np.inf))
 
 
 def _pooled(parts: Sequence[tuple[float, int]], quantile: float) -> float | None:
-    """Root of a quantile of the variances, which ignores odd parts; longer parts count more."""
+    """Square root of a quantile of the variances, which ignores outliers; longer parts count more."""
     sample = acceptance.HOLD_SAMPLES
     variances = np.array([v for v, n in parts for _ in range(max(1, min(n // sample, acceptance.HOLD_WEIGHT)))])
     return float(np.sqrt(np.quantile(variances, quantile))) if len(variances) else None
@@ -79,7 +79,7 @@ def still(v: Array, least: int) -> list[tuple[int, int]]:
 
 
 def stands_within(v: Array) -> float:
-    """Largest change of a drive from sample to sample while it stands: noise of its measurement, or one code."""
+    """Largest change from sample to sample of a drive at rest: noise of its measurement, or one code."""
     swing = float(np.ptp(v))
     code = converter_step(v)
     jitter = 1.001 * code if code <= acceptance.COARSE_DRIVE * swing else 0.0
@@ -94,7 +94,7 @@ def _holds(item: Item) -> list[tuple[float, int]]:
         y, t = item.y[begin:last], item.run.t[begin:last]
         known = np.isfinite(y)
         if np.count_nonzero(known) < acceptance.HOLD_SAMPLES // 2 or np.ptp(y[known]) == 0.0:
-            continue  # too few samples, or less than a converter's step
+            continue  # too few samples, or all equal
         y, t = y[known], t[known] - item.run.t[first]
         # creep and drift within a hold are smooth in the logarithm of time
         s = np.log(np.maximum(t, 1e-12))
@@ -108,9 +108,9 @@ def _holds(item: Item) -> list[tuple[float, int]]:
 
 
 def _rings(x: Array) -> bool:
-    """Whether a signal is mostly one oscillation that hardly decays from sample to sample: the actuator, not noise.
+    """Whether a signal is mostly one oscillation that hardly decays: ringing of the actuator rather than noise.
 
-    By linear prediction from two samples; coloured noise is predictable too, but with real or small poles.
+    Judged by linear prediction from two samples; coloured noise is predictable too, but with real or small poles.
     """
     before = np.column_stack([x[1:-1], x[:-2]])
     (a, b), *_ = np.linalg.lstsq(before, x[2:], rcond=None)
@@ -120,7 +120,7 @@ def _rings(x: Array) -> bool:
 
 
 def _differences(item: Item) -> list[tuple[float, int]]:
-    """Variance of white noise, from the third differences of a record, and their number."""
+    """Variance of white noise, from the third differences of a record, and the number of samples."""
     y = _sampled(item.y[item.known])
     if len(y) < acceptance.HOLD_SAMPLES:
         return []
@@ -131,7 +131,7 @@ def _differences(item: Item) -> list[tuple[float, int]]:
 
 
 def _sampled(y: Array) -> Array:
-    """The samples that were really measured, if most of the others were held or interpolated between them."""
+    """The samples that were really measured, if those between them were held or interpolated; else all."""
     for order in (1, 2):
         changes = np.abs(np.diff(y, order))
         at = np.flatnonzero(changes > UNMEASURED * float(np.ptp(y))) if len(y) > order else np.empty(0, dtype=np.intp)
@@ -142,8 +142,8 @@ def _sampled(y: Array) -> Array:
 
 
 UNMEASURED = 1e-9
-"""[share of the range of the output] Smaller changes are only rounding. Interpolated samples are found in files of 12
-digits with offsets up to ten times the range, but not in files of 9; second differences of a noise-free sine are
+"""[share of the range of the output] Smaller changes count as rounding. Interpolated samples are detected in files with
+12 digits and offsets up to ten times the range, but not in files with 9; second differences of a noise-free sine are
 smaller only above 70 000 samples per period. Set by: benchmarks/chosen_numbers.py exact."""
 
 
@@ -172,20 +172,19 @@ def _periods(item: Item) -> list[tuple[float, int]]:
     return []
 
 
-# Turns of the drive, and whether all records pass one loop ---------------------------------------------------
+# Turns of the drive, and whether all records follow one loop -------------------------------------------------
 
 
 def reversals(v: Array) -> Places:
-    """Samples at which the drive turns for more than a share of its range."""
+    """Samples at which the drive reverses by more than a share of its range."""
     return _moves(v)[1]
 
 
 def unresolved_edges(v: Array) -> NDArray[np.bool_]:
-    """Samples of jumps of the drive from one level to the next, between which its course is unknown.
+    """Samples of jumps of the drive from one level to the next, whose shape between samples is unknown.
 
-    A jump within one sample, or two if the converter averages, may begin anywhere in it, held or straight. The errors
-    of its samples and of the one after them therefore depend on what is assumed about the edge, where even a small lag
-    makes a difference.
+    A jump within one sample, or two if the converter averages, may begin anywhere in that time, as a step or a ramp.
+    The errors of its samples and of the next one therefore depend on the assumed edge, where even a small lag matters.
     """
     swing = float(np.ptp(v))
     step = np.abs(np.diff(v))
@@ -226,7 +225,7 @@ def one_speed(items: Sequence[Item]) -> bool:
 
 
 def _moves(v: Array) -> tuple[Places, Places]:
-    """Samples after which the drive moves on, and those at which it turns, as seen by a play that ignores its noise."""
+    """Samples after which the drive moves, and those at which it turns, as seen by a play that ignores its noise."""
     z = operators.plays(v, np.array([0.5 * acceptance.REVERSAL * float(np.ptp(v))]), np.array([v[0]]))[0]
     steps = np.diff(z)
     moved = np.flatnonzero(steps)
@@ -246,7 +245,7 @@ BESIDE = 2
 
 
 def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
-    """Share and frequency (Hz) of narrow peaks of an error that are neither lines nor harmonics of the drive."""
+    """Share and frequency (Hz) of narrow peaks of an error that are neither lines of the drive nor its harmonics."""
     filled = _filled(item, error)
     if filled is None:
         return []
@@ -270,7 +269,7 @@ def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
     carrier = _carrier(drive)
     found: list[tuple[float, float]] = []
     for k, beside, share in narrow:
-        # a line of the drive, which may be a small one of many harmonics
+        # a line of the drive itself, which may be a weak one among many harmonics
         own = float(np.sum(drive[beside])) >= acceptance.DRIVE_LINE_SHARE * driven
         if own and drive[k] > acceptance.PEAK_HEIGHT * _around(drive, k, acceptance.SURROUNDINGS):
             continue
@@ -288,7 +287,7 @@ def peaks(item: Item, error: Array) -> list[tuple[float, float]]:
 
 
 def ringing(items: Sequence[Item], errors: Sequence[Array], most: int) -> tuple[float, ...]:
-    """Frequencies (Hz) of narrow peaks in any record and of fading ringing, the strongest first, without close ones."""
+    """Frequencies (Hz) of narrow peaks and fading ringing in any record, strongest first, near duplicates dropped."""
     each = ([*peaks(item, error), *_fading(item, error)] for item, error in zip(items, errors, strict=True))
     found = sorted(itertools.chain(*each), reverse=True)
     kept: list[float] = []
@@ -327,7 +326,7 @@ def _fading(item: Item, error: Array) -> list[tuple[float, float]]:
 
 
 def repetition(v: Array) -> int | None:
-    """Samples after which the drive repeats itself for at least as long again; None if it does not."""
+    """Period of the drive in samples, if it repeats for at least one more period; else None."""
     n = len(v)
     swing = float(np.ptp(v))
     if n < acceptance.LINE_SAMPLES or swing == 0.0:
@@ -371,7 +370,7 @@ def _around(power: Array, k: int, reach: int) -> float:
 
 
 def _carrier(power: Array) -> float | None:
-    """Place (bins) of the line that holds most of a windowed drive's power; None if none holds enough of it."""
+    """Position (bins) of the line with most of a windowed drive's power; None if no line has enough of it."""
     k = int(np.argmax(power))
     near = np.arange(max(k - BESIDE, 0), min(k + BESIDE + 1, len(power)))
     held = float(np.sum(power[near]))

@@ -36,8 +36,8 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 ONE_LOOP = (
-    "all records pass one loop, which shows little more than one effect: add smaller loops inside it, other speeds and "
-    "holds"
+    "all records follow one loop, which shows little more than one effect: add smaller loops inside it, other speeds "
+    "and holds"
 )
 """Advice about records of only one loop."""
 
@@ -55,7 +55,7 @@ def result_of(
     """The whole result.
 
     `as_given`: errors of the nominal model before it was refitted; `odd`: findings about whole records; `one_loop`:
-    whether all records pass the same loop.
+    whether all records follow the same loop.
     """
     before = [found.refitted.errors(group) for group in (ready.to_fit, ready.held)]
     after = [found.fitted.errors(group) for group in (ready.to_fit, ready.held)]
@@ -96,12 +96,12 @@ def _contender(ranked: Ranked, unit: str | None) -> Contender:
 
 
 def reason(refused: Refusal, unit: str | None) -> str:
-    """Why an effect has no name, in words."""
+    """Why an effect is not named, in words."""
     return REFUSALS[refused.why].format(value=refused.value, limit=refused.limit, unit=f" {unit}" if unit else "")
 
 
 def _withdrawn(found: Outcome, unit: str | None) -> Withdrawn | None:
-    """What the withdrawn effects would leave."""
+    """The error that the withdrawn effects would leave."""
     them = found.withdrawn
     if them is None:
         return None
@@ -118,28 +118,28 @@ def _withdrawn(found: Outcome, unit: str | None) -> Withdrawn | None:
 
 
 REFUSALS = {
-    "one_loop": "it leaves {value:.0%} of the gap above the noise, and of one loop at most {limit:.0%} supports a name",
+    "one_loop": "it leaves {value:.0%} of the gap above the noise; records of one loop allow at most {limit:.0%}",
     "little": "on equal terms it removes {value:.3g}{unit} rms, and {limit:.3g}{unit} is needed",
     "chance": "chance explains what it removes from held-out records (p = {value:.1g}, at most {limit:g} is needed)",
-    "unsure": "neither held-out nor fitted records are sure of it (p = {value:.1g}, at most {limit:g} is needed)",
-    "small": "it removes {value:.0%} of the gap, and a name needs {limit:.0%}",
-    "most": "the effects found leave {value:.3g}{unit} rms, most of {limit:.3g}{unit}",
-    "above": "the effects found leave {value:.3g}{unit} rms, and of one loop at most {limit:.3g}{unit} supports a name",
-    "given": "the effects found leave {value:.3g}{unit} rms, and the model as given {limit:.3g}{unit}",
-    "identified": "the effects found leave {value:.3g}{unit} rms, and the model of `identify` {limit:.3g}{unit}",
-    "few": "{value:.0%} of the samples were compared, and a name needs {limit:.0%}",
-    "end": "it acts on {value:.1%} of the drive range at an end, and a limit needs {limit:.1%}",
-    "range": "with a number at an end of its range the effects found leave {value:.0%} of the gap above the noise, and "
-    "then at most {limit:.0%} supports a name",
-    "forgets": "hysteresis that is no play sum explains the error better or as well, and leaves {value:.3g}{unit} rms",
+    "unsure": "neither held-out nor fitted records confirm it (p = {value:.1g}, at most {limit:g} is needed)",
+    "small": "it removes {value:.0%} of the gap, but a name needs {limit:.0%}",
+    "most": "the effects found leave {value:.3g}{unit} rms, most of the former {limit:.3g}{unit}",
+    "above": "the effects found leave {value:.3g}{unit} rms; records of one loop allow at most {limit:.3g}{unit}",
+    "given": "the effects found leave {value:.3g}{unit} rms, but the model as given only {limit:.3g}{unit}",
+    "identified": "the effects found leave {value:.3g}{unit} rms, but the model of `identify` only {limit:.3g}{unit}",
+    "few": "only {value:.0%} of the samples were compared, but a name needs {limit:.0%}",
+    "end": "it acts on {value:.1%} of the drive range at an end, but a limit needs {limit:.1%}",
+    "range": "with a parameter at an end of its range, the effects found leave {value:.0%} of the gap above the noise, "
+    "but may then leave at most {limit:.0%}",
+    "forgets": "hysteresis other than a play sum explains the error as well or better and leaves {value:.3g}{unit} rms",
     "wild": "its inverse moves the output of the plain model by {value:.3g}{unit} rms, more than {limit:.3g}{unit}",
-    "other": "another shape does better, or as well with fewer numbers",
+    "other": "another shape does better, or as well with fewer parameters",
 }
-"""Why an effect that was tried has no name, in words."""
+"""Why an effect that was tried is not named, in words."""
 
 
 def _in_digits(value: object) -> object:
-    """The value with eight digits in all its numbers, so that the same input gives the same text."""
+    """The value with all numbers rounded to eight digits, so that the same input gives the same text."""
     if is_dataclass(value) and not isinstance(value, type):
         return type(value)(**{each.name: _in_digits(getattr(value, each.name)) for each in fields(value)})
     if isinstance(value, Mapping):
@@ -156,12 +156,12 @@ def _in_digits(value: object) -> object:
 def _unexplained(
     ready: Prepared, after: Sequence[list[Array]], noise: float, usual: float, odd: Sequence[Finding]
 ) -> list[Finding]:
-    """The remaining error that is neither noise nor a fault of the recording; `usual`: error of a fitted record."""
+    """The remaining error that is neither noise nor a fault of the recording; `usual`: error on fitted records."""
     everything, errors = [*ready.to_fit, *ready.held], [*after[0], *after[1]]
     lines, errors = disturbances.lines(everything, errors)
     known = [each for each in odd if isinstance(each, Line | Ripple)]
     new = [line for line in lines if not disturbances.is_known(line, known)]
-    # like noise, a ripple hides jumps if the position is not predicted well enough to take it out
+    # like noise, a ripple hides jumps if the position is not predicted well enough to remove it
     jumping = max([noise, *(each.amplitude for each in (*known, *new) if isinstance(each, Ripple))])
     sticking = preparing.merged(disturbances.stick_slip(everything, errors, jumping))
     remaining = [each for each in odd if not isinstance(each, Fault)] + new + sticking
@@ -211,7 +211,7 @@ def _twice(times: Sequence[float]) -> bool:
 
 
 def _advice(one: str, other: str) -> str:
-    return f"{one} and {other} cannot be separated by these records; hystgen diagnose --plan writes drives that can"
+    return f"these records do not separate {one} and {other}; hystgen diagnose --plan writes drives that do"
 
 
 def _evidence(each: Found, refitted: float, noise: float) -> str:
@@ -223,7 +223,7 @@ def _evidence(each: Found, refitted: float, noise: float) -> str:
 
 
 def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:
-    """The entry's keys without the name, or the stage of a front. `later`: number of that name found after it."""
+    """An effect's keys without the name, or the front's stage; `later`: number of effects of that name after it."""
     k = fits.place(fitted, name, later)
     if k is None:
         return fits.stage(fitted, fitted.shape)
@@ -234,16 +234,16 @@ def _parameters_of(fitted: Fitted, name: str, later: int) -> dict[str, Any]:
 
 
 DESCRIBED_PLAYS = np.array([0.02, 0.05, 0.1, 0.2, 0.35, 0.6])
-"""Thresholds of the plays that represent the memory, as shares of the drive range."""
+"""Thresholds of the plays that represent memory, as shares of the drive range."""
 
 MEMORIES = (3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)
-"""Time constants of the averages of the drive that represent rates and creep, in samples."""
+"""Time constants, in samples, of the averages of the drive that represent rates and creep."""
 
 
 LENGTHS = (0.02, 0.05, 0.15, 0.5, 1.5, 5.0)
-"""[share of the drive range] Distances of the averages of the drive over its travel: six, like the times above, each
-about three times the one before, from the smallest play up to five ranges. They explain 0.55 of the error that plays
-leave for a Bouc-Wen plant; four explain 0.34, eleven 0.59; for creep none explains more than 0.09. Set by:
+"""[share of the drive range] Lengths of travel over which the drive is averaged: six, like the times above, each about
+three times the previous one, from the smallest play up to five ranges. They explain 0.55 of the error that plays leave
+on a Bouc-Wen plant; four explain 0.34, eleven 0.59; for creep they never explain more than 0.09. Set by:
 benchmarks/chosen_numbers.py lengths."""
 
 
@@ -261,7 +261,7 @@ def rate(item: Item) -> Array:
 
 
 def displacement(item: Item) -> Array:
-    """The measured output, interpolated where it is not compared."""
+    """The measured output, interpolated over samples that are not compared."""
     if not item.known.any():
         return np.zeros(len(item.y))
     return np.interp(item.run.t, item.run.t[item.known], item.y[item.known])
@@ -304,7 +304,7 @@ VARIABLES = (
 def described(
     items: Sequence[Item], errors: Sequence[Array], noise: float, held_out_alone: Sequence[str]
 ) -> Structured:
-    """The remaining errors of several records, `noise` rms; `held_out_alone`: held-out records that have most of it."""
+    """What the remaining errors depend on; `noise`: rms of the noise; `held_out_alone`: as in `Structured`."""
     share, by_variable = shares(items, errors)
     total = np.concatenate([e[np.isfinite(e)] for e in errors])
     rms = float(np.sqrt(np.mean(total**2))) if len(total) else 0.0
@@ -348,7 +348,7 @@ def shares(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, dict[
 
 
 def _share(values: Sequence[Array], errors: Sequence[Array]) -> float:
-    """Cross-validated share of a function of one variable: means in bins with the same number of samples each."""
+    """Cross-validated share explained by one variable: means over bins with equal numbers of samples."""
     x = np.concatenate([v[np.isfinite(e)] for v, e in zip(values, errors, strict=True)])
     e = np.concatenate([e[np.isfinite(e)] for e in errors])
     if len(e) < acceptance.DESCRIBED_SAMPLES or np.ptp(x) == 0.0:
@@ -371,10 +371,10 @@ def _folds(n: int) -> NDArray[np.intp]:
 
 
 def together(items: Sequence[Item], errors: Sequence[Array]) -> tuple[float, float]:
-    """Cross-validated shares explained by rate-free variables (drive, plays, averages of the drive over the distance
-    that it travels), and by these together with averages over several times, which represent rates and creep.
+    """Cross-validated shares explained by rate-free variables (drive, plays, averages of the drive over its travel),
+    and by these together with averages over several times, which represent rates and creep.
 
-    The error of a hysteresis that plays cannot follow depends on both kinds of averages: only the gain by the second
+    The error of hysteresis that plays cannot follow depends on both kinds of averages; only the gain from the second
     kind is due to rates.
     """
     widest = max(float(np.ptp(item.run.v)) for item in items)
@@ -410,7 +410,7 @@ def _averaged(v: Array, decay: float) -> Array:
 
 
 def _averaged_over_travel(v: Array, length: float) -> Array:
-    """The same over a distance of the drive: it does not depend on the rate, and stands still with the drive."""
+    """The same over the drive's travel: independent of the rate, and constant while the drive rests."""
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(v)))])
     if travelled[-1] == 0.0:
         return v
@@ -422,7 +422,7 @@ def _averaged_over_travel(v: Array, length: float) -> Array:
 
 
 def _regressed(x: Array, e: Array) -> float:
-    """Cross-validated share that a slightly ridged linear regression on rows x (k, N) explains of e (N,)."""
+    """Cross-validated share of e (N,) explained by a linear regression on rows x (k, N) with a small ridge."""
     fold = _folds(len(e))
     unexplained = 0.0
     for k in (0, 1):
@@ -434,7 +434,7 @@ def _regressed(x: Array, e: Array) -> float:
 
 
 def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
-    """Share of the error's variance that returns when the drive repeats itself; None if it never does."""
+    """Share of the error's variance that recurs when the drive repeats itself; None if the drive never does."""
     products = powers = 0.0
     count = 0
     for item, error in zip(items, errors, strict=True):
@@ -453,9 +453,9 @@ def repeatable(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
 
 
 def even_share(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
-    """Share of the mean error over drive and direction that is even: the same when drive and direction are reversed.
+    """Even share of the mean error over drive and direction: the part unchanged when both are reversed.
 
-    None if that mean is small against the error.
+    None if that mean is small compared with the error.
     """
     v = np.concatenate([item.run.v[np.isfinite(e)] for item, e in zip(items, errors, strict=True)])
     up = np.concatenate([rate(item)[np.isfinite(e)] > 0.0 for item, e in zip(items, errors, strict=True)])
@@ -484,10 +484,10 @@ def even_share(items: Sequence[Item], errors: Sequence[Array]) -> float | None:
 
 
 STRETCH_WINDOWS = 24
-"""Windows that each record is cut into; neighbours of one kind become one stretch."""
+"""Number of windows into which each record is cut; adjacent windows of one kind become one stretch."""
 
 LISTED_STRETCHES = 12
-"""Most stretches that are listed, as many as a reader will look at."""
+"""Maximum number of stretches listed: as many as a reader will look at."""
 
 
 def worst(items: Sequence[Item], errors: Sequence[Array], noise: float) -> tuple[Stretch, ...]:
@@ -497,7 +497,7 @@ def worst(items: Sequence[Item], errors: Sequence[Array], noise: float) -> tuple
 
 
 def _stretches(item: Item, error: Array, noise: float) -> list[Stretch]:
-    """The windows of a record with more than noise; neighbours of the same kind are joined."""
+    """The windows of a record with errors above the noise; adjacent ones of the same kind are joined."""
     kind_of = _Kinds(item)
     merged: list[tuple[int, int, float, str]] = []
     edges = np.linspace(0, len(error), STRETCH_WINDOWS + 1).astype(int)

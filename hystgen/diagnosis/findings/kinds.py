@@ -1,4 +1,4 @@
-"""Entries of `unexplained`: a type for each kind of observation that is not named as an effect, with its sentence."""
+"""Entries of `unexplained`: a type for each kind of observation that no named effect explains, with its sentence."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ class Finding(ABC):
 
     @abstractmethod
     def sentence(self, unit: str | None) -> str:
-        """The entry as a sentence without its full stop; `unit` of the displacement."""
+        """The entry as a sentence without a full stop; `unit`: of the displacement."""
 
     def advice(self) -> list[str]:
-        """Experiments that would show more of it, one sentence each."""
+        """Experiments that would reveal more about it, one sentence each."""
         return []
 
 
 @dataclass(frozen=True)
 class Fault(Finding):
-    """A fault of the recording that is left out of the comparison or put right; the rest of the record is sound.
+    """A recording fault that is left out of the comparison or put right; the rest of the record is sound.
 
-    `noun`: counted in a sentence; `qualifier`: the words after it.
+    `noun`: the noun counted in a sentence; `qualifier`: the words after it.
     """
 
     noun: ClassVar[str]
@@ -82,7 +82,7 @@ class ExchangedRecords(Finding):
     other: str = field(metadata={"key": "with"})
 
     def sentence(self, unit: str | None) -> str:
-        return f"{self.record}: left out, its output belongs to the drive of {self.other}"
+        return f"{self.record}: left out: its output belongs to the drive of {self.other}"
 
 
 @dataclass(frozen=True)
@@ -100,8 +100,8 @@ class Scale(Finding):
                 "or another sensitivity"
             )
         return (
-            f"{self.record}: left out, its output is {self.factor:.4g} times what the other records let expect: other "
-            "units of drive or output, another gain of the sensor, or a dead one"
+            f"{self.record}: left out: its output is {self.factor:.4g} times what the other records suggest: other "
+            "units of drive or output, another sensor gain, or a dead sensor"
         )
 
 
@@ -120,7 +120,7 @@ class OtherHistory(Fault):
         return (
             f"the output of the first {counted(self.samples, 'sample')}, which depends on the history, is off by "
             f"{self.start:.3g}{u} rms, that of all others by {self.rest:.3g}{u}: the actuator came from elsewhere, "
-            "and the history is left out"
+            "and the history is ignored"
         )
 
 
@@ -129,9 +129,9 @@ class OtherHistory(Fault):
 
 @dataclass(frozen=True)
 class Saturated(Fault):
-    """Samples at an end of the converter; `first`: time of the first one, s; `end`: `largest` or `least`."""
+    """Samples at a limit of the converter; `first`: time of the first one, s; `end`: `largest` or `least`."""
 
-    kind, noun, qualifier = "saturated", "sample", " at the converter's end"
+    kind, noun, qualifier = "saturated", "sample", " at the converter's limit"
     optional = frozenset(("first", "end", "level"))
     record: str
     first: float | None
@@ -140,7 +140,7 @@ class Saturated(Fault):
     count: int
 
     def sentence(self, unit: str | None) -> str:
-        samples = f"{counted(self.count, 'sample')} at the converter's end, {self.level:.6g}{_unit(unit)}"
+        samples = f"{counted(self.count, 'sample')} at the converter's limit, {self.level:.6g}{_unit(unit)}"
         return f"{self.record}: {samples}, not compared{_first(self.first)}"
 
 
@@ -190,7 +190,7 @@ class IsolatedSamples(Fault):
     def sentence(self, unit: str | None) -> str:
         done = "bridged" if self.channel == "v" else "not compared"
         number = counted(self.count, "isolated sample")
-        return f"{self.record}: {number} of {self.channel} far from the neighbours, {done}{_first(self.first)}"
+        return f"{self.record}: {number} of {self.channel} far from their neighbours, {done}{_first(self.first)}"
 
 
 # Disturbances ------------------------------------------------------------------------------------------------
@@ -198,7 +198,7 @@ class IsolatedSamples(Fault):
 
 @dataclass(frozen=True)
 class Line(Finding):
-    """A line over time at a frequency, Hz; `share`: of the error's variance in the `records` that have it."""
+    """A spectral line at a frequency, Hz; `share`: of the error's variance in the `records` that have it."""
 
     kind = "line"
     optional = frozenset(("mains", "repaired"))
@@ -211,7 +211,7 @@ class Line(Finding):
 
     @property
     def place(self) -> float:
-        """Its place on its axis, Hz."""
+        """Its position on the frequency axis, Hz."""
         return self.frequency
 
     def sentence(self, unit: str | None) -> str:
@@ -226,7 +226,7 @@ class Line(Finding):
 
 @dataclass(frozen=True)
 class Ripple(Finding):
-    """A line over the position with a pitch in output units; `converter_step`: whether that is the converter's step."""
+    """A periodic error over position; `pitch`: output units; `converter_step`: whether this is the converter's step."""
 
     kind = "ripple"
     optional = frozenset(("repaired",))
@@ -239,7 +239,7 @@ class Ripple(Finding):
 
     @property
     def place(self) -> float:
-        """Its place on its axis, output units."""
+        """Its position on the axis of pitches, output units."""
         return self.pitch
 
     def sentence(self, unit: str | None) -> str:
@@ -257,7 +257,7 @@ Periodic = Line | Ripple
 
 @dataclass(frozen=True)
 class StickSlip(Finding):
-    """Jumps of the output after standing still: their number, the time of the first one (s) and their median size."""
+    """Jumps of the output after a standstill: their number, the time of the first one (s) and their median size."""
 
     kind = "stick_slip"
     record: str
@@ -275,12 +275,12 @@ class StickSlip(Finding):
 
 @dataclass(frozen=True)
 class NotAPlaySum(Finding):
-    """Hysteresis that forgets on all of the drive's way, not only where minor loops close.
+    """Hysteresis that forgets all along the drive's travel, not only where minor loops close.
 
-    `before`, `after`: held-out rms that plays and named effects leave, and with an element beside them that forgets
-    over `way`, a share of the drive range; `open`: how far a minor loop over a tenth of the range is from closing, of
-    its height; `in_place_of`: effects that would explain as much, or less; `shows_speed`: whether the drive takes ways
-    of equal length in different times.
+    `before`: held-out rms that plays and named effects leave; `after`: the same with an added element that forgets over
+    `way`, a share of the drive range; `open`: gap left by a minor loop over a tenth of the range, as a share of its
+    height; `in_place_of`: effects that would explain as much, or less; `shows_speed`: whether the drive covers equal
+    distances in different times.
     """
 
     kind = "not_a_play_sum"
@@ -295,18 +295,18 @@ class NotAPlaySum(Finding):
         named = " and ".join(self.in_place_of)
         instead = (
             "" if not named else f"; {named} would explain less of it" if self.shows_speed else
-            f"; {named} would explain about as much, but the drive takes equal ways in equal times throughout"
+            f"; {named} would explain about as much, but the drive always covers equal distances in equal times"
         )
         return (
-            f"the hysteresis is no play sum: minor loops stay open, by {100.0 * self.open:.0f} % of their height where "
-            f"they pass a tenth of the drive range, and depend on what was before. A part that forgets over "
-            f"{100.0 * self.way:.2g} % of the range takes the held-out rms error from {self.before:.4g} to "
+            f"the hysteresis is not a play sum: minor loops stay open, by {100.0 * self.open:.0f} % of their height if "
+            f"they span a tenth of the drive range, and depend on what came before. A part that forgets over "
+            f"{100.0 * self.way:.2g} % of the range reduces the held-out rms error from {self.before:.4g} to "
             f"{self.after:.4g}{_unit(unit)}{instead}"
         )
 
     def advice(self) -> list[str]:
-        """What a play sum leaves of such a stage, and how speed would show."""
-        page = "docs/plants.md shows what a play sum leaves of a stage with such hysteresis"
+        """Where to read how much a play sum leaves on such a stage, and how to separate effects of speed."""
+        page = "docs/plants.md shows how much a play sum leaves on a stage with such hysteresis"
         if self.shows_speed:
             return [page]
         return [page, "record the same path at two speeds: a lag, creep and rate dependence then differ from it"]
@@ -314,11 +314,11 @@ class NotAPlaySum(Finding):
 
 @dataclass(frozen=True)
 class WildInverse(Finding):
-    """Effects that were found and are not written, since their inverse does more than the recordings bear out.
+    """Effects that were found but are not written, since their inverse does more than the recordings bear out.
 
-    `moves`: rms by which the inverse with them, over recorded outputs, moves the output of the plain model, and `other`
-    the same the other way round; `gain`: held-out rms that they explain; `wilder`: second differences of its drive over
-    those of the plain inverse's.
+    `moves`: rms by which the inverse with them, over recorded outputs, moves the output of the plain model; `other`:
+    the same with the two models exchanged; `gain`: held-out rms that they explain; `wilder`: ratio of the second
+    differences of its drive to those of the plain inverse's drive.
     """
 
     kind = "wild_inverse"
@@ -331,7 +331,7 @@ class WildInverse(Finding):
     def sentence(self, unit: str | None) -> str:
         u = _unit(unit)
         return (
-            f"{' and '.join(self.names)} would explain {self.gain:.3g}{u} rms of held-out records and is not written: "
+            f"{' and '.join(self.names)} would explain {self.gain:.3g}{u} rms of held-out records but is not written: "
             f"over the recorded outputs the inverse with it moves the output of the plain model by {self.moves:.3g}{u} "
             f"rms, with a drive {self.wilder:.2g} times as rough as the plain inverse's"
         )
@@ -350,10 +350,10 @@ VARIABLE_NAMES = {
 class Structured(Finding):
     """An error that is not noise and that no effect removes.
 
-    `share_by_variable`: shares of its variance that smooth functions of one variable explain on samples that they have
-    not seen, and `main_variable` the one with the largest, None if none matters; `rate_free`, `repeatable`: None if the
-    records cannot show it; `even_share`: the even part, about the middle of the range, of its dependence on drive and
-    direction; `held_out_alone`: held-out records that have it while the fitted ones do not.
+    `share_by_variable`: shares of its variance that smooth functions of one variable explain on samples not used to fit
+    them; `main_variable`: the variable with the largest share, None if none matters; `rate_free`, `repeatable`: None if
+    the records cannot tell; `even_share`: even part, about the middle of the range, of its dependence on drive and
+    direction; `held_out_alone`: held-out records that show it although the fitted ones do not.
     """
 
     kind = "structure"
@@ -376,14 +376,14 @@ class Structured(Finding):
         parts = []
         if self.main_variable:
             share = 100.0 * self.share_by_variable[self.main_variable]
-            parts.append(f"goes mostly with {VARIABLE_NAMES[self.main_variable]} ({share:.0f} % of its variance)")
+            parts.append(f"depends mostly on {VARIABLE_NAMES[self.main_variable]} ({share:.0f} % of its variance)")
         else:
-            parts.append("goes with none of drive, rate, displacement, memory, loop centre, time and travel alone")
+            parts.append("depends on none of drive, rate, displacement, memory, loop centre, time and travel alone")
         if self.rate_free is not None:
             parts.append("does not depend on the rate" if self.rate_free else "depends on the rate")
         if self.repeatable is not None:
-            returns = "comes back when the drive repeats itself"
-            parts.append(returns if self.repeatable else "does not come back when the drive does")
+            returns = "recurs when the drive repeats itself"
+            parts.append(returns if self.repeatable else "does not recur with the drive")
         if self.even_share is not None:
             odd = EVEN[0] > self.even_share
             parity = "even" if self.even_share > EVEN[1] else "odd" if odd else "neither even nor odd"
@@ -392,20 +392,20 @@ class Structured(Finding):
 
     def advice(self) -> list[str]:
         advice = []
-        if self.held_out_alone:  # they are never fitted, so that an effect that only they show cannot be found
+        if self.held_out_alone:  # never fitted, so an effect that only they show cannot be found
             alone = several(self.held_out_alone)
-            advice.append(f"fit {alone} too and hold out others: what is left shows in held-out records alone")
+            advice.append(f"fit {alone} too and hold out others: the remaining error shows only in held-out records")
         if self.rate_free is None:
             advice.append(
                 "record the same loops at two rates a decade apart: that shows whether the remaining error is rate-free"
             )
         if self.repeatable is None:
-            advice.append("repeat a record ten times: that separates the part that comes back from noise")
+            advice.append("repeat a record ten times: that separates the part that recurs from noise")
         return advice
 
 
 EVEN = 0.3, 0.7
-"""Even shares below and above which an error is called odd and even."""
+"""Even shares below which an error is called odd, and above which it is called even."""
 
 
 # Words -------------------------------------------------------------------------------------------------------
@@ -415,7 +415,7 @@ FAULTS = (SwappedChannels, Saturated, DropOuts, HeldSamples, IsolatedSamples, Ot
 
 
 def faults(findings: Sequence[Finding]) -> str:
-    """The kinds of faults with their counts, in a few words; empty without any."""
+    """The kinds of faults with their counts, in a few words; empty if there are none."""
     parts = []
     for fault in FAULTS:
         found = [each for each in findings if isinstance(each, fault)]
@@ -433,9 +433,8 @@ def several(names: Sequence[str]) -> str:
 
 
 MANY = 100.0
-"""[times the noise] Larger ratios are not given in figures: with two digits they end here, and the noise is only an
-estimate, which does not support more. Only wording depends on it. Changed by:
-report::test_ratios_to_the_noise_have_two_digits."""
+"""[times the noise] Larger ratios are not stated as figures: two digits end here, and the noise, which is only an
+estimate, supports no more. Only wording depends on it. Changed by: report::test_ratios_to_the_noise_have_two_digits."""
 
 
 def times_noise(ratio: float) -> str:

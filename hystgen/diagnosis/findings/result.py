@@ -46,7 +46,7 @@ class Gap:
 
 
 NO_WIDER = {
-    "limit": "farther on is no other effect",
+    "limit": "a wider range changes nothing",
     "firm": "its range is not widened",
     "noise": "only noise is left",
 }
@@ -55,13 +55,13 @@ NO_WIDER = {
 
 @dataclass(frozen=True)
 class AtEnd:
-    """A number of an effect that stands at an end of its range, or beyond it.
+    """A parameter of an effect that is at an end of its range, or beyond it.
 
     `key`, `value`: as in the parameter file; `end`: `least` or `largest`; `usual`: value at that end of the usual
-    range; `reached`: the same of the widest range that was tried, and `leaves` the held-out rms error that it left,
-    None if none was tried in vain; `why`: `beyond` the usual range, since less is left there; `no less` in a wider
-    range; `limit`, none is wider; `firm`, the range of a number of the nominal model, or of your own effect, which is
-    not widened; `noise`, none was tried, since only noise is left.
+    range; `reached`: value at that end of the widest range that was tried and failed, or None; `leaves`: held-out rms
+    error that this range left, or None; `why`: `beyond`, less error is left beyond the usual range; `no less`, a wider
+    range leaves no less; `limit`, no wider range is possible; `firm`, ranges of the nominal model and of your own
+    effects are not widened; `noise`, only noise is left, so no wider range was tried.
     """
 
     key: str
@@ -73,24 +73,24 @@ class AtEnd:
     why: str
 
     def sentence(self, name: str, unit: str | None) -> str:
-        """The number of an effect, and why it stands there, without a full stop."""
+        """The parameter and why it is there, as a sentence without a full stop."""
         what = f"{self.key.replace('_', ' ')} of {name}"
         if self.why == "beyond":
-            return f"{what} is {self.value:.4g}, beyond its usual range, which ends at {self.usual:.4g} and leaves more"
-        said = f"{what} is {self.value:.4g}, the {self.end} that is tried"
+            return f"{what} is {self.value:.4g}, beyond its usual range, which ends at {self.usual:.4g} and fits worse"
+        said = f"{what} is {self.value:.4g}, the {self.end} value tried"
         if self.why == "no less" and self.leaves is not None and self.reached is not None:
-            left = f"{self.leaves:.4g}{' ' if unit else ''}{unit or ''} rms of held-out records"
+            left = f"{self.leaves:.4g}{' ' if unit else ''}{unit or ''} rms on held-out records"
             gain = f"{100.0 * acceptance.BETTER:g} %"
-            return f"{said}: a range up to {self.reached:.4g} leaves {left}, which is not better by {gain}"
+            return f"{said}: a range up to {self.reached:.4g} leaves {left}, less than {gain} better"
         return f"{said}: {NO_WIDER[self.why]}"
 
 
 @dataclass(frozen=True)
 class Withdrawn:
-    """Effects that were accepted one by one and withdrawn in the end: what they leave, and why that gives no name.
+    """Effects that were accepted one by one but withdrawn in the end: the error they leave, and why.
 
     `before`, `after`: rms errors without and with them, on equal terms, output units; `left`: shares of the gap above
-    the noise that they leave, None if there is none.
+    the noise that they leave, None if there is no gap.
     """
 
     names: tuple[str, ...]
@@ -115,8 +115,8 @@ class NamedEffect:
     """An effect that was found: `parameters` as in its entry of a parameter file, with 95 % `intervals`.
 
     `share_of_gap`: the held-out error that it removes, as a share of the refitted model's; errors in output units;
-    `at_an_end`: whether one of its numbers is at an end of its range, or two of its parts coincide, so that its shape
-    is not certain; `ends`: those numbers.
+    `at_an_end`: whether one of its parameters is at an end of its range, or two of its parts coincide, so that its
+    shape is not certain; `ends`: those parameters.
     """
 
     name: str
@@ -133,7 +133,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of a record in which the refitted model has a large error: from and to (s), and the rms error there."""
+    """A part of a record in which the refitted model has a large error: start and end (s), and the rms error there."""
 
     record: str
     kind: str
@@ -143,7 +143,7 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Contender:
-    """A shape of an effect that was fully fitted, with its rms errors; `refused`: why it has no name, or None."""
+    """A shape of an effect that was fully fitted, with its rms errors; `refused`: why it is not named, or None."""
 
     name: str
     shape: str
@@ -164,9 +164,9 @@ class Inverse:
 class Result:
     """Everything in `diagnosis.json`, under the names of its keys; numbers have eight digits.
 
-    `noise_from`: the source of the noise floor, `holds`, `periods`, `differences` or `resolution`; `compared`: numbers
-    of samples that took part and that were recorded; `withdrawn`: effects without a name in the end, None for none;
-    `written`: the model in `params.yaml`, `extended` by the effects, `refitted`, as `given`, or as `identified`.
+    `noise_from`: the source of the noise floor, `holds`, `periods`, `differences` or `resolution`; `compared`: number
+    of samples compared, and number recorded; `withdrawn`: effects withdrawn in the end, or None; `written`: the model
+    in `params.yaml`, which is `extended` by the effects, `refitted`, `given` or `identified`.
     """
 
     verdict: str
@@ -189,7 +189,7 @@ class Result:
 
 @dataclass(frozen=True)
 class Signals:
-    """A record with the errors of the refitted model and of that with the effects; NaN where not compared."""
+    """A record with the errors of the refitted model and of the model with the effects; NaN where not compared."""
 
     name: str
     held_out: bool
@@ -205,7 +205,7 @@ class Diagnosis:
     """A finished diagnosis: its `result`, and `parameters` with the effects added.
 
     `notes`: changes to the records, one sentence each; `signals`: the records with their errors; `page`: makes
-    `report.html` from this and the text of the parameter file, None if no report is written; `figures`: functions that
+    `report.html` from this diagnosis and the text of the parameter file, None for no report; `figures`: functions that
     draw the figures of the page, by name.
     """
 
@@ -260,7 +260,7 @@ class Diagnosis:
         return self.result.verdict
 
     def sentence(self) -> str:
-        """The verdict in a few sentences: first that the hysteresis is of another kind, then its limits."""
+        """The verdict in a few sentences; hysteresis of another kind, and the verdict's limits, come first."""
         parts = [_capital(each.sentence(self.result.unit)) for each in self._of_another_kind()]
         parts += [*self._limits(), self._finding()]
         if any(effect.at_an_end for effect in self.result.effects):
@@ -271,7 +271,7 @@ class Diagnosis:
         return " ".join(f"{part}." for part in parts)
 
     def uncertain(self) -> list[str]:
-        """What is at the end of a range, and effects of which two parts coincide."""
+        """Parameters at an end of their range, and effects with two parts that coincide."""
         said = []
         for effect in self.result.effects:
             said += [each.sentence(effect.name, self.result.unit) for each in effect.ends]
@@ -283,7 +283,7 @@ class Diagnosis:
         return [each for each in self.result.unexplained if isinstance(each, NotAPlaySum)]
 
     def _limits(self) -> list[str]:
-        """Warnings that come before any name: how few samples were compared, how much error remains."""
+        """Warnings that precede any effect name: how few samples were compared, how much error remains."""
         result = self.result
         compared, recorded = result.compared
         said = []
@@ -312,7 +312,7 @@ class Diagnosis:
             return f"Nothing is missing: {whose} leaves {after} rms on held-out records, which is noise"
         where, left = "", gap.after.holdout
         if acceptance.is_noise(left, result.noise_floor):  # the held-out records do not show it
-            where, left = " of the fitted records", gap.after.fit
+            where, left = " on the fitted records", gap.after.fit
         missing = f"{self._missing()}: {self._rms(left)} rms is left{where}{self._nearest()}"
         disturbing = [each for each in seen if not isinstance(each, Fault | Structured | NotAPlaySum)]
         if not disturbing:
@@ -325,28 +325,28 @@ class Diagnosis:
         return f"{missing}. The records are disturbed too: {first}{more}"
 
     def _missing(self) -> str:
-        """The subject of a verdict without a name."""
+        """The beginning of a verdict that names no effect."""
         if self._of_another_kind():
             return "No effect is named"
         if self._closest() is None:
-            return "Something is missing that the catalogue does not hold or the records cannot show"
+            return "Something is missing that the catalogue does not contain or the records cannot show"
         return "Something is missing, and no effect is named"
 
     def _nearest(self) -> str:
-        """The candidate with the smallest error, and why it has no name; empty if none removes anything."""
+        """The candidate with the smallest error, and why it is not named; empty if none removes anything."""
         closest = self._closest()
         if closest is None or self._of_another_kind():
             return ""
         if self.result.withdrawn is not None and not self._limits():
             return f". {self._withdrawn(self.result.withdrawn)}"
-        return f". The nearest is {closest.name}, which would leave {self._rms(closest.holdout)}; {closest.refused}"
+        return f". The closest is {closest.name}, which would leave {self._rms(closest.holdout)}; {closest.refused}"
 
     def _withdrawn(self, found: Withdrawn) -> str:
-        """What effects without a name would leave, and why they have none."""
+        """The error that the withdrawn effects would leave, and why they were withdrawn."""
         named = " and ".join(found.names)
         left = [
-            f"{self._rms(after)} of {self._rms(before)} rms of {records} records"
-            + ("" if share is None else f" ({100.0 * share:.0f} % of what is above the noise)")
+            f"{self._rms(after)} of {self._rms(before)} rms on {records} records"
+            + ("" if share is None else f" ({100.0 * share:.0f} % of the part above the noise)")
             for records, before, after, share in (
                 ("held-out", found.before.holdout, found.after.holdout, found.left[0]),
                 ("fitted", found.before.fit, found.after.fit, found.left[1]),

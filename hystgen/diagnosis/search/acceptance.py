@@ -1,22 +1,22 @@
-"""Every number that decides something in a diagnosis, with its unit, its reason, and the run that set it.
+"""Every number by which a diagnosis decides, with its unit, its reason, and the run that set it.
 
 The text below a number begins with its unit, in brackets, and says what happens on either side of it. It ends with
 
-- `Set by`: the run that the number comes from;
-- `Changed by`: the run or test that would show a wrong number, if no run that set it is recorded;
+- `Set by`: the run that determined the number;
+- `Changed by`: the run or test that would reveal a wrong number, if no run that set it is recorded;
 - `Derived`: the number follows from what the text says.
 
 The runs:
 
 - blind: `make blind`, the cases of the report block, seeds from 0 (single 260, pair 80, none 200, foreign 100, poor 65,
   snr 130); `blind none` is that kind alone;
-- tune: the same commands with `--block tune`, whose cases may be looked at;
+- tune: the same commands with `--block tune`, whose cases may be inspected;
 - second_plants: `python -m benchmarks.second_plants --kind KIND --seeds SEEDS`, cases of a second simulator;
-- acceptance::x: the row x of the table in `tests/test_acceptance.py`, which answers otherwise when the number is
-  doubled or halved; selection::test_x is a test of `tests/test_selection.py` that then fails.
+- acceptance::x: the row x of the table in `tests/test_acceptance.py`, whose answer changes when the number is doubled
+  or halved; selection::test_x: a test of `tests/test_selection.py` that then fails.
 
-`docs/thresholds.csv` lists them for every number. Other modules read the numbers as attributes of this one, so that a
-test can change a number in one place. Tolerances of searches and sizes of caches, which decide nothing, are in the
+`docs/thresholds.csv` lists the rows for every number. Other modules read the numbers as attributes of this one, so that
+a test can change a number in one place. Tolerances of searches and sizes of caches, which decide nothing, are in the
 modules that use them.
 """
 
@@ -27,18 +27,18 @@ import math
 # Noise -------------------------------------------------------------------------------------------------------
 
 NOISE = 1.25
-"""[times the noise floor] An error up to this is noise even if part of it depends on something known: the floor is
-estimated from a part of the samples, which may miss slow noise. Changed by: blind none."""
+"""[times the noise floor] An error up to this is noise even if part of it depends on a known variable: the floor is
+estimated from only part of the samples, and may miss slow noise. Changed by: blind none."""
 
 FAR_ABOVE_NOISE = 2.0
-"""[times the noise floor] An error above this is not noise, whether or not it depends on anything known; coloured noise
-stays below it. Records of only one loop support no name if more than this remains, since a right name in a wrong shape
-leaves as much as a wrong name. Changed by: blind none, blind poor."""
+"""[times the noise floor] An error above this is not noise, whether or not it depends on a known variable; coloured
+noise stays below it. Records of only one loop support no name if more than this remains, since a right name in a wrong
+shape leaves as much as a wrong name. Changed by: blind none, blind poor."""
 
 STRUCTURE_SHARE = 0.15
-"""[share of the error's variance] An error is structured if one variable explains more than this of it on unseen
-samples. It is larger than `VARIABLE_SHARE`, so that a variable that makes an error structured is also reported. Changed
-by: blind none."""
+"""[share of the error's variance] An error is structured if one variable explains more than this share of it on unseen
+samples. The value exceeds `VARIABLE_SHARE`, so a variable that makes an error structured is also reported. Changed by:
+blind none."""
 
 
 def is_noise(error: float, noise: float, share: float = 1.0) -> bool:
@@ -58,41 +58,41 @@ def apart(more: float, less: float) -> float:
 
 
 def above_noise(removed: float) -> float:
-    """rms of noise plus an uncorrelated part of `removed` times its size, as a multiple of the noise."""
+    """rms of noise plus an uncorrelated part `removed` times as large, as a multiple of the noise."""
     return math.sqrt(1.0 + removed**2)
 
 
-# Whether an effect gets a name -------------------------------------------------------------------------------
+# Whether an effect is named ----------------------------------------------------------------------------------
 
 NAME_SHARE = 0.07
-"""[share of the refitted gap, rms] An effect gets a name if it removes at least this from the held-out or from the
-fitted records. After a right name in a wrong shape, a second, wrong name removes up to 0.05. Set by: tune single (seeds
-not recorded)."""
+"""[share of the refitted gap, rms] An effect is named if it removes at least this from the held-out or from the fitted
+records. After a right name in a wrong shape, a second, wrong name removes up to 0.05. Set by: tune single (seeds not
+recorded)."""
 
 NEARLY_ALL = 0.25
-"""[share of the error before it] It also gets one if it leaves at most this of the error: next to a far larger effect
-no other can reach `NAME_SHARE`. Changed by: blind pair, selection::test_nearly_all_that_is_left_is_worth_a_name."""
+"""[share of the error before it] An effect is also named if it leaves at most this share: next to a far larger one, no
+effect can reach `NAME_SHARE`. Changed by: blind pair, selection::test_nearly_all_that_is_left_is_worth_a_name."""
 
 FIRST_REMOVES = 0.6
-"""[times the remaining error or the noise, whichever is larger] A first effect removes at least this, and a difference
-between two effects counts only from this on. Changed by: blind none (false names), blind snr (missed ones)."""
+"""[times the remaining error or the noise, whichever is larger] A first effect must remove at least this, and a smaller
+difference between two effects does not count. Changed by: blind none (false names), blind snr (missed ones)."""
 
 FURTHER_REMOVES = 1.0
-"""[times the remaining error or the noise, whichever is larger] A further effect removes at least this. Leftovers of a
-right name in a wrong shape were 0.7 to 0.98 in 4 of 60 single cases, real second effects at least 1.2 in 120 cases. Set
-by: fresh single and pair cases of the report block (commit 633f8e9, seeds not recorded)."""
+"""[times the remaining error or the noise, whichever is larger] A further effect must remove at least this. Residues of
+a right name in a wrong shape amounted to 0.7 to 0.98 in 4 of 60 single cases, real second effects to at least 1.2 in
+120 cases. Set by: fresh single and pair cases of the report block (commit 633f8e9, seeds not recorded)."""
 
 NEEDLESS = 0.3
-"""[times the noise] An earlier effect is dropped if the model without it has an error larger by less than this. Half of
-`FIRST_REMOVES`, so that chance does not drop an effect that was accepted. Changed by: blind pair."""
+"""[times the noise] An earlier effect is dropped if the error without it is larger by less than this: half of
+`FIRST_REMOVES`, so that chance does not drop an accepted effect. Changed by: blind pair."""
 
 P_SURE = 1e-3
-"""[probability] The difference that an effect makes has at most this p-value. Tens of shapes are tried in a round, so
-at this level a few per cent of the cases without an effect would still pass, if nothing else were asked. Changed by:
-blind none."""
+"""[probability] The gain from an effect must have at most this p-value. Tens of shapes are tried per round, so at this
+level a few per cent of the cases without an effect would still pass if this were the only criterion. Changed by: blind
+none."""
 
 P_REPEATED = 0.05
-"""[probability] On held-out records this p-value is enough if the fitted ones show the effect with `P_SURE`: the usual
+"""[probability] On held-out records this p-value suffices if the fitted ones show the effect with `P_SURE`: the usual
 level of a single test. Changed by: blind none."""
 
 P_DIFFERENT = 0.01
@@ -103,12 +103,12 @@ BLOCK_MEMORIES = 2.0
 blocks are hardly correlated. Changed by: blind none, acceptance::blocks_are_longer_than_errors_remember."""
 
 BLOCKS = 20
-"""[blocks] A record is cut into at least this many, even if its errors are correlated over longer than that allows.
-Changed by: acceptance::blocks_are_longer_than_errors_remember."""
+"""[blocks] A record is cut into at least this many, even if its errors are correlated for longer than a block. Changed
+by: acceptance::blocks_are_longer_than_errors_remember."""
 
 SEEN_IN_BOTH = 0.25
 """[times the remaining error or the noise] An effect that removes `FIRST_REMOVES` or `FURTHER_REMOVES` from the fitted
-or the held-out records removes at least this from the others; an error that only one of them shows may belong to
+or the held-out records must remove at least this from the others; an error that only one group shows may belong to
 another effect. With 0.5 one of ten pairs loses its second name; with 0.25 or 0 none does, and 0 gives no false name in
 24 further cases. Set by: tune pair 0:10; with 0 also tune single, none and poor 0:8. Changed by: blind pair,
 acceptance::an_effect_has_to_show_in_both."""
@@ -118,72 +118,70 @@ ALIKE = 0.25
 of their difference is below `P_DIFFERENT`. Changed by: blind single (names right or among the alternatives)."""
 
 BETTER = 0.05
-"""[share of an error] An error that is lower by less than this does not justify more numbers, another effect in the
-place of an accepted one, or a longer search of a shape. Changed by: blind single,
+"""[share of an error] An error that is lower by less than this does not justify more parameters, the exchange of an
+accepted effect for another, or a longer search. Changed by: blind single,
 selection::test_all_records_decide_between_equal_numbers."""
 
 FAR_LESS = 0.5
-"""[share of an error] A fitted error of at most this share of another one outweighs a small advantage of that one on
-held-out records, whose error may mostly belong to yet another effect. Chance does not let a held-out error fall this
-far, since nothing was fitted to it: a rate dependence next to creep left a third, shown in a few steps, with p = 0.12
-by blocks. Set by (the latter): second_plants pair 2004. Changed by:
+"""[share of an error] A candidate whose fitted error is at most this share of another's wins despite a slightly larger
+held-out error, most of which may belong to a third effect. Nor can chance reduce a held-out error this far, since
+nothing was fitted to it: a rate dependence next to creep left a third, visible only in a few steps, with p = 0.12 over
+blocks. Set by (the latter): second_plants pair 2004. Changed by:
 acceptance::equal_effects_come_in_the_order_of_the_catalogue, acceptance::what_chance_does_not_explain."""
 
 EQUAL = 0.005
-"""[share of an error] Errors that differ by less than this are equal, however certain the difference is, and
+"""[share of an error] Errors that differ by less than this count as equal, however certain the difference, and
 `selection.place` decides. The last steps of a search change an error by far less. Changed by:
 acceptance::equal_effects_come_in_the_order_of_the_catalogue."""
 
 MOST_OF_GAP = 0.5
-"""[share of the gap above the noise] Records of one loop support a name only if it leaves at most this, and leave open
-every name that does: two curves, one up and one down, hardly show which shape is the right one. Set by: 180 fresh cases
-of kind poor, 7 of which had a false second name without it (commit 86e5f08, seeds not recorded)."""
+"""[share of the gap above the noise] Records of one loop support a name only if the effect leaves at most this share,
+and cannot separate effects that all do: two curves, one up and one down, hardly show which shape is right. Set by: 180
+fresh cases of kind poor, 7 of which had a false second name without this limit (commit 86e5f08, seeds not recorded)."""
 
 LEAST_EXPLAINED = 0.5
-"""[share of the variance above the noise] Names stand only if together they leave at most this of the held-out and of
-the fitted records, so that most is explained. Effects explain less of a disturbance: room temperature acting on the
-gain, and a slow crosstalk line, kept 0.74 to 0.79 of the fitted variance under false names; right names left at most
-0.28. Set by: second_plants foreign 0:10, single 0:13. Changed by:
-acceptance::names_near_the_noise_explain_half."""
+"""[share of the variance above the noise] Names stand only if together they leave at most this share of the held-out
+and of the fitted error, so that most is explained. A disturbance is explained less: for room temperature acting on the
+gain, and for a slow crosstalk line, false names left 0.74 to 0.79 of the fitted variance; right names left at most
+0.28. Set by: second_plants foreign 0:10, single 0:13. Changed by: acceptance::names_near_the_noise_explain_half."""
 
 MOSTLY_EXPLAINED = 1.0 / 3.0
 """[share of the variance above the noise] The same limit if the names leave more than `MUCH_LEFT`, as wrong names do:
-they then have to explain two thirds. Room temperature acting on the gain kept 0.39 to 0.41 under the names of ageing
-and self-heating; right names left at most 0.30, with a second effect that was not found. Set by: second_plants foreign
-300:308, single and pair 300:312. Changed by: second_plants foreign 400:410, acceptance::names_explain_most."""
+they must then explain two thirds. For room temperature acting on the gain, the wrong names ageing and self-heating left
+0.39 to 0.41; right names left at most 0.30, where a second effect was missed. Set by: second_plants foreign 300:308,
+single and pair 300:312. Changed by: second_plants foreign 400:410, acceptance::names_explain_most."""
 
 MUCH_LEFT = 3.0
-"""[times the noise floor] If the named effects leave more than this, the verdict begins with the remainder, and none
-has a name if a number of one is at an end of its range and more than `END_LEAVES` remains. Of 457 blind cases much was
-left with a number at an end for two disturbances by room temperature, and for one pair. Set by (the latter):
-second_plants foreign 11001, 11006, pair 8012, blind first 97000. Changed by: blind single,
-acceptance::what_a_verdict_says_first."""
+"""[times the noise floor] If the named effects leave more than this, the verdict begins with the remaining error; if,
+in addition, a parameter is at an end of its range and more than `END_LEAVES` remains, none is named. In 457 blind cases
+this happened for two disturbances by room temperature and for one pair. Set by (the latter): second_plants foreign
+11001, 11006, pair 8012, blind first 97000. Changed by: blind single, acceptance::what_a_verdict_says_first."""
 
 END_LEAVES = 0.105
-"""[share of the gap above the noise, rms] Where more than `MUCH_LEFT` remains and a number of an effect is at an end of
-its range, names stand only if they leave at most this of the held-out and of the fitted records, so that nine tenths
-are explained, in whole per cent as the verdict states it. A multiple of the noise alone says nothing about records with
-little noise. False names for room temperature acting on the gain left 0.62 and more. Set by: second_plants foreign
+"""[share of the gap above the noise, rms] If more than `MUCH_LEFT` remains and a parameter of an effect is at an end of
+its range, names stand only if they leave at most this share of the held-out and of the fitted error: nine tenths are
+then explained, to the whole per cent that the verdict states. A multiple of the noise alone says nothing about records
+with little noise. False names for room temperature acting on the gain left 0.62 and more. Set by: second_plants foreign
 300:308, 11000:11020. Changed by: selection::test_a_number_at_an_end_of_its_range_explains_nine_tenths."""
 
 WIDER = 1.0
-"""[times the width of a range] How far a range is widened beyond an end at which a number stands, in the coordinates of
-the search: ranges are chosen to an order of magnitude. The wider one counts if it lowers the held-out error by
+"""[times the width of a range] How far a range is widened beyond an end that a parameter has reached, in search
+coordinates: ranges are chosen only to an order of magnitude. The wider range is kept if it lowers the held-out error by
 `BETTER`. Changed by: selection::test_a_wider_range_where_a_number_is_at_its_end."""
 
 WIDENINGS = 3
-"""[searches] Most widenings of a range in a row, each by `WIDER` usual widths. Changed by: run time, and
+"""[searches] Maximum number of widenings of a range in a row, each by `WIDER` usual widths. Changed by: run time, and
 selection::test_how_often_a_range_is_widened."""
 
 FEW_COMPARED = 0.25
-"""[share of the samples] If fewer samples were compared, the verdict says so first and names nothing. Of blind records
-without a known history at least 0.5 are compared, of a test whose amplitude grows to its end 0.02 to 0.06. Set by:
-blind, all kinds, first 71000, and second_plants. Changed by: acceptance::what_a_verdict_says_first."""
+"""[share of the samples] If fewer samples were compared, the verdict says so first and names nothing. In blind records
+without a known history at least 0.5 are compared, in a test whose amplitude keeps growing 0.02 to 0.06. Set by: blind,
+all kinds, first 71000, and second_plants. Changed by: acceptance::what_a_verdict_says_first."""
 
 FLAT_END = 0.005
-"""[share of the drive range] A limit that begins closer to both ends than this is no name: the drive meets it only in
-rests at the end and in a few samples elsewhere, so that it acts as an offset of those rests, which residual creep calls
-for. Wrong ones began at 0.0016 of the range, right ones at 0.0128 and more. Set by: second_plants single 9100 and 9165,
+"""[share of the drive range] A limit that begins closer to both ends than this is not named: the drive meets it only in
+holds at the end and in a few other samples, so it acts as an offset of those holds, which residual creep calls for.
+Wrong limits began at 0.0016 of the range, right ones at 0.0128 and more. Set by: second_plants single 9100 and 9165,
 blind pair and poor first 97000. Changed by: acceptance::a_limit_at_the_very_end_of_the_drive."""
 
 MOST_EFFECTS = 5
@@ -194,8 +192,8 @@ MOST_RIVALS = 3
 """[effects] At most this many alternatives are tried in place of the latest effect. Changed by: blind pair."""
 
 MOST_EXCHANGES = 4
-"""[exchanges] In one round accepted effects are exchanged at most this often, so that two of them cannot replace each
-other forever. Changed by: run time of blind."""
+"""[exchanges] Accepted effects are exchanged at most this often in a round, so two of them cannot replace each other
+forever. Changed by: run time of blind."""
 
 HELD_OUT_ALONE = 3.0
 """[times the fitted error] A held-out record with a larger error shows something that no fitted record does. Changed
@@ -204,11 +202,12 @@ by: acceptance::held_out_records_that_are_alone."""
 # How far a search goes ---------------------------------------------------------------------------------------
 
 SCREENED = 6_000
-"""[samples] While all shapes are screened, this many of the fitted and of the held-out records are compared. Changed
+"""[samples] While all shapes are screened, this many are compared in the fitted and in the held-out records. Changed
 by: run time and names of blind."""
 
 SEARCHED = 12_000
-"""[samples] Later searches fit this many, and regressions on many variables use as many. Changed by: as before."""
+"""[samples] Later searches fit this many, and regressions on many variables use as many. Changed by: run time and names
+of blind."""
 
 PLAYS = 32
 """[plays] Number of thresholds of a fit. Half as many leave up to 1.4 times the noise in records without an effect,
@@ -218,7 +217,7 @@ FIRST_STEPS = 2
 """[steps] A search takes this many from each start while shapes are screened. Changed by: blind single."""
 
 SCREENING_STEPS = 2
-"""[steps] It then takes this many from the best start, again while the error still falls. Changed by: blind single."""
+"""[steps] It then takes this many from the best start, and again while the error falls. Changed by: blind single."""
 
 FALLING = 0.8
 """[share of the error] A search continues if `SCREENING_STEPS` bring its error below this share. The minimum of a
@@ -229,13 +228,13 @@ LONGER = 4
 """[times] `SCREENING_STEPS` are taken at most this often. Set by: as before."""
 
 TOO_FAR = 5.0
-"""[times the error of the best start] No search begins at a start whose error is larger. The best end was reached from
+"""[times the error of the best start] No search begins at a start with a larger error. The best fit was reached from
 starts with up to 3.5 (a limit of the output has no effect beyond the measured range). Set by: tune single (commit
 0f80f02, seeds not recorded)."""
 
 IDLE = 0.01
-"""[share of the error] A start that changes the error by less does nothing yet, and is left out if another start does:
-behind a large effect, every start of the next one may be worse than having none. Changed by: blind pair."""
+"""[share of the error] A start that changes the error by less has no effect yet, and is left out if another start has:
+next to a large effect, every start for a further one may be worse than none. Changed by: blind pair."""
 
 KEPT = 5
 """[shapes] After the screening, this many with the smallest held-out errors are followed up. Changed by: blind
@@ -245,14 +244,14 @@ ALSO_KEPT = 2
 """[shapes] Of the others, this many with the smallest fitted errors are followed up too. Changed by: blind single."""
 
 SHAPES_OF_ONE = 2
-"""[shapes] At most this many of those belong to one effect, so that other effects have the remaining places. Changed
-by: blind single."""
+"""[shapes] At most this many of those belong to one effect, which leaves places for other effects. Changed by: blind
+single."""
 
 TWIN = 0.02
 """[share of the errors] An effect whose fitted and held-out errors are within this of a kept one's is followed up too;
-otherwise chance would decide whether a lag or a delay is dropped. So is a shape with fewer numbers than the kept shapes
-of its effect: a front that bends one way left 1 % more than one that bends both ways, and was dropped for it. Set by
-(the latter): second_plants single 8001. Changed by: acceptance::a_twin_follows."""
+otherwise chance would decide whether a lag or a delay is dropped. So is a shape with fewer parameters than the kept
+shapes of its effect: a front that bends one way was once dropped because it left 1 % more than one that bends both
+ways. Set by (the latter): second_plants single 8001. Changed by: acceptance::a_twin_follows."""
 
 PROMISING = 2.0
 """[times the error of the best shape] A shape with larger fitted and held-out errors is not searched jointly. Changed
@@ -276,29 +275,27 @@ FINER_BREAKS = 8
 """[breaks] If that sum helps, one with this many is tried next: each interval is halved. Derived."""
 
 TANH_BEND, TANH_SIDE = 0.3, 2.0
-"""[1], [half ranges] Curvature and place of the tanh envelopes that are further starts: each is bent one way over the
+"""[1], [half ranges] Curvature and position of the tanh envelopes used as further starts, each bent one way over the
 whole range. Changed by: blind single with asymmetry."""
 
 LIMITERS = (0.03, 0.1)
-"""[shares of the range] How far limiters reach in from either end, as starts. Changed by: blind single with
+"""[shares of the range] How far the limiters used as starts reach in from either end. Changed by: blind single with
 saturation."""
 
 NOMINAL_RANGE = 3.0
-"""[factor] Numbers of the nominal model's effects are refitted to at most this times their value, and at least this
-part of it: farther off, it would be a different effect. Changed by:
-acceptance::numbers_move_by_up_to_a_factor."""
+"""[factor] Parameters of the nominal model's effects are refitted within this factor of their values, up or down:
+outside, the effect would be a different one. Changed by: acceptance::numbers_move_by_up_to_a_factor."""
 
 SINGLE_FACTORS = 4
-"""[numbers] A longer list of numbers is refitted with one common factor: a factor for each would make every list a fit
-of its own. Changed by: acceptance::long_lists_have_one_factor."""
+"""[numbers] A longer list is refitted with one common factor: a factor for each number would make every list a fit of
+its own. Changed by: acceptance::long_lists_have_one_factor."""
 
 TOUCHING = 1e-6
 """[share of the slack] A nominal front may violate its constraints by this: files round to ten digits. Derived."""
 
 START_SPAN = 2.0
-"""[times the recorded drive range] The drive that the start state comes from lies within a range at most this wide:
-from farther off, the response to it would explain a drift. Changed by:
-acceptance::what_limits_the_start_of_an_effect."""
+"""[times the recorded drive range] The drive that led to the start state lies within a range at most this wide: from
+farther away, the response to it could explain a drift. Changed by: acceptance::what_limits_the_start_of_an_effect."""
 
 # What a front is called --------------------------------------------------------------------------------------
 
@@ -311,25 +308,25 @@ LIMITER_NEAR = 0.1
 acceptance::what_a_front_is_called."""
 
 LIMITER_SLOPE = 0.6
-"""[times the middle slope] A front whose slope at an end is smaller than this is a limit for certain. Changed by:
+"""[times the middle slope] A front whose slope at an end is smaller than this is certainly a limit. Changed by:
 acceptance::what_a_front_is_called."""
 
 ODD_FRONT = 2.0
-"""[times] A front saturates if its odd bend has more than this times the power of its even bend. Changed by:
-acceptance::what_a_front_is_called."""
+"""[times] A front counts as saturation if its odd bend has more than this many times the power of its even bend.
+Changed by: acceptance::what_a_front_is_called."""
 
 # Which records are fitted and held out -----------------------------------------------------------------------
 
 COMPARED_SAMPLES = 20
-"""[samples] A record fits or judges only if more than this are compared: `BLOCKS` of one sample. Quasi-static tests
-taken point by point have hardly more. Changed by: acceptance::enough_to_compare."""
+"""[samples] A record can be fitted or held out only if more than this are compared: `BLOCKS` of one sample.
+Quasi-static tests taken point by point have hardly more. Changed by: acceptance::enough_to_compare."""
 
 SET_ASIDE = 0.3
-"""[share of a record] If no whole record can be held out, this share at the end of one is: nearly the third that is
-held out of several records. Changed by: acceptance::the_end_of_a_record."""
+"""[share of a record] If no whole record can be held out, this share at the end of each is: nearly the third that is
+otherwise held out. Changed by: acceptance::the_end_of_a_record."""
 
 FAST_RECORD = 0.5
-"""[share of the largest] A record counts as fast, or as wide, if its rate, or its swing, is at least this share of the
+"""[share of the largest] A record counts as fast (or wide) if its rate (or swing) is at least this share of the
 largest. Changed by: acceptance::a_fast_record."""
 
 THIN_STEPS = 32
@@ -338,15 +335,15 @@ acceptance::the_longest_stretch."""
 
 THIN_STRAIGHT = 0.3
 """[times the noise] A stretch may be left out if the prediction deviates from a straight line over it by at most this,
-and the drive by no more than moves the output that far. Changed by: acceptance::a_bump_of_the_prediction."""
+and the drive by no more than it takes to move the output that far. Changed by: acceptance::a_bump_of_the_prediction."""
 
 THIN_TURNING = 0.03
-"""[times the noise] The same limit at a turning point, which the plays remember: a tenth of it. Changed by:
+"""[times the noise] The same limit at a turning point, a tenth as large because the plays remember it. Changed by:
 acceptance::a_small_turn_of_the_drive."""
 
 THIN_RESIDUAL = 1.6
 """[times the noise, rms] The same limit for the remaining error: white noise deviates from the line between two of its
-samples by sqrt(1 + 2/3) = 1.3, and an unlucky stretch of it by a quarter more. Derived."""
+samples by sqrt(1 + 2/3) = 1.3, and an unlucky stretch by a quarter more. Derived."""
 
 THIN_COLUMN = 0.01
 """[share of its range, rms] The same limit for a further column of the record. Changed by:
@@ -359,15 +356,15 @@ acceptance::a_jump."""
 
 EDGE_SAMPLES, EDGE_STANDS = 2, 4
 """[samples], [samples] The longest jump that is not resolved, from one sample to the next or with an averaged sample
-between, and the least number of samples for which the drive rests before and after it. While such samples were
-compared, a lag, a delay or a rate dependence left 2 to 8 times the noise; without them, 1.0 to 1.1. Set by:
-second_plants single 0:13, pair 0:6."""
+between, and the minimum number of samples for which the drive rests before and after it. With such samples compared, a
+lag, a delay or a rate dependence left 2 to 8 times the noise; without them, 1.0 to 1.1. Set by: second_plants single
+0:13, pair 0:6."""
 
 # Noise floor -------------------------------------------------------------------------------------------------
 
 HOLD_SAMPLES = 40
-"""[samples] A hold measures noise if it has at least this many: its trend has four numbers, and 24 samples remain after
-`HOLD_SETTLING`. Changed by: acceptance::jitter_of_the_drive."""
+"""[samples] A hold measures noise if it has at least this many: its trend has four coefficients, and 24 samples remain
+after `HOLD_SETTLING`. Changed by: acceptance::jitter_of_the_drive."""
 
 HOLD_DRIVE = 2e-4
 """[share of the drive range] The drive holds while it stays within this: three codes of a 14-bit converter. Changed by:
@@ -379,23 +376,23 @@ is no larger than this: ten bits. Coarser steps are levels of the drive. Changed
 acceptance::a_coarse_drive."""
 
 HOLD_SETTLING = 0.4
-"""[share of a hold] Its beginning, which is left out because the output still settles there. Changed by:
+"""[share of a hold] The beginning of a hold, left out because the output is still settling. Changed by:
 acceptance::jitter_of_the_drive."""
 
 HOLD_WEIGHT = 50
-"""[times] A long hold counts as at most this many. Changed by: blind none."""
+"""[times] A long hold counts as at most this many short ones. Changed by: blind none."""
 
 QUIET_HOLDS = 0.25
 """[quantile of the variances] The quietest holds up to this quantile measure the noise: in the others something may
 still ring or creep. Changed by: blind."""
 
 RING_DECAY = 0.9
-"""[share of the amplitude] A hold rings if its oscillation keeps more than this from one sample to the next. Changed
-by: acceptance::a_hold_that_rings."""
+"""[share of the amplitude] A hold rings if its oscillation keeps more than this share from one sample to the next.
+Changed by: acceptance::a_hold_that_rings."""
 
 RING_UNPREDICTED = 0.3
-"""[share of the variance] It rings only if two samples leave at most this of the next one unpredicted. Changed by:
-acceptance::a_hold_that_rings."""
+"""[share of the variance] A hold rings only if a prediction from two samples misses at most this share of the next one.
+Changed by: acceptance::a_hold_that_rings."""
 
 PERIOD_REPEATS = 2e-3
 """[share of the drive range, rms] Periods of a drive measure noise if they differ by less than this: the response to
@@ -403,13 +400,13 @@ the difference adds as large a share of the output range to the noise. Changed b
 acceptance::periods_of_a_jittering_drive."""
 
 HELD_SHARE = 0.55
-"""[share of the changes] Samples of an output were held or interpolated if at most this share of its changes is not 0:
-half of the changes are not if every other sample was. Changed by: acceptance::samples_between."""
+"""[share of the changes] Samples of an output count as held or interpolated if at most this share of its changes is
+nonzero: if every other sample was held, half of them are. Changed by: acceptance::samples_between."""
 
 LEAST_NOISE = 1e-5
-"""[share of the output range] Every record is assumed to have this noise: 17 bits, more than sensors of a stage resolve
-in a single sample. Without it, records of a simulation would have a noise floor of 0, and any error would be far above
-it. Changed by: acceptance::records_without_noise."""
+"""[share of the output range] Every record is assumed to have at least this noise: 17 bits, more than sensors of a
+stage resolve in a single sample. Without it, records of a simulation would have a noise floor of 0, and any error would
+be far above it. Changed by: acceptance::records_without_noise."""
 
 # Faults of whole records and samples -------------------------------------------------------------------------
 
@@ -426,8 +423,8 @@ WIDE_DRIVE = 0.3
 acceptance::a_narrow_record_shows_no_scale."""
 
 OTHER_UNIT = 30.0
-"""[times the median width] A drive wider than this is in another unit, and is no measure for the others. It lies
-between the ratio of a large swing to small loops and a factor of 1000 between units. Changed by:
+"""[times the median width] A drive wider than this is in another unit, and is not used to judge the others. The value
+lies between the ratio of a large swing to small loops and a factor of 1000 between units. Changed by:
 acceptance::a_drive_in_another_unit_is_no_measure."""
 
 DEAD_SENSOR = 0.1
@@ -435,8 +432,8 @@ DEAD_SENSOR = 0.1
 Changed by: acceptance::a_dead_sensor."""
 
 FOLLOWS = 0.9
-"""[correlation] A scale means something only if the output correlates with the prediction at least this well. Changed
-by: acceptance::an_output_follows_its_drive."""
+"""[correlation] A scale is meaningful only if the output correlates with the prediction at least this well. Changed by:
+acceptance::an_output_follows_its_drive."""
 
 FOREIGN_CORRELATION, OWN_CORRELATION = 0.95, 0.5
 """[correlation] An output belongs to another record if it correlates with that record's prediction better than the
@@ -448,17 +445,16 @@ LOOP_AREA = 0.3
 Changed by: acceptance::an_output_follows_its_drive."""
 
 LOOP_SIGMAS = 5.0
-"""[standard deviations] The area of a loop counts if it exceeds that of white noise by this factor: noise does so once
-in a million. Derived."""
+"""[standard deviations] The area of a loop counts if it exceeds the standard deviation due to white noise by this
+factor: noise does so once in a million. Derived."""
 
 OFF_LINE, ON_LINE = 6.0, 0.8
-"""[scatters], [share of the samples] Samples that are farther off a line than the first number do not count if the
-others are at least the second number's share. Changed by:
-acceptance::a_few_samples_far_off_do_not_count."""
+"""[scatters], [share of the samples] Samples farther off a line than the first number are ignored if the others make up
+at least the second. Changed by: acceptance::a_few_samples_far_off_do_not_count."""
 
 RAIL_PASSED = 0.01
-"""[share of the output range] A value is still the end of a converter if another record passes it by at most this: two
-records differ by an offset. Changed by: acceptance::a_converter_ends_at_its_end."""
+"""[share of the output range] A value is still the limit of a converter if another record exceeds it by at most this:
+records may differ by an offset. Changed by: acceptance::a_converter_ends_at_its_end."""
 
 HISTORY_COSTS = 1.5
 """[times the error] If a history raises the error of samples that do not depend on it by more than this, it has bent
@@ -468,49 +464,49 @@ acceptance::a_history_that_costs_the_rest."""
 # Lines and ripples -------------------------------------------------------------------------------------------
 
 LINE_SHARE = 0.03
-"""[share of the error's variance] A line has at least this: smaller ones are not worth a sentence. Changed by:
-acceptance::share_of_a_line."""
+"""[share of the error's variance] A line must have at least this share: smaller ones are not worth reporting. Changed
+by: acceptance::share_of_a_line."""
 
 RULING_SHARE = 0.3
-"""[share of the error's variance] A line is taken out before the search for effects, or counts though only few records
-have it, if it has at least this: the error of a missing effect may look like a weaker line. Changed by: blind foreign,
+"""[share of the error's variance] A line with at least this share is removed before the search for effects, and counts
+even if few records have it; a weaker line may be the error of a missing effect. Changed by: blind foreign,
 acceptance::a_line_rules."""
 
 LINE_HEIGHT = 30.0
-"""[times the median power around it] A line is at least this high: the highest of 10000 bins of noise reaches 13.
+"""[times the median power around it] A line must be at least this high: the highest of 10000 bins of noise reaches 13.
 Changed by: blind none."""
 
 PEAK_HEIGHT = 10.0
-"""[times the median power around it] A line of the drive is at least this high, and so is ringing in averaged spectra,
-whose noise scatters less. Changed by: acceptance::height_of_a_line_of_the_drive."""
+"""[times the median power around it] A line of the drive must be at least this high, and so must ringing in averaged
+spectra, whose noise scatters less. Changed by: acceptance::height_of_a_line_of_the_drive."""
 
 DRIVE_LINE_SHARE = 1e-6
-"""[share of the drive's power] A peak of the drive is a line of its own if it has at least this: a thousandth of the
-amplitude. Changed by: acceptance::a_line_of_the_drive."""
+"""[share of the drive's power] A peak of the drive is a line of its own if it has at least this share: a thousandth of
+the amplitude. Changed by: acceptance::a_line_of_the_drive."""
 
 CARRIER_SHARE = 0.5
-"""[share of the drive's power] A drive that has at least this in one line makes harmonics, even if its swing changes.
-Changed by: acceptance::harmonics_of_a_carrier."""
+"""[share of the drive's power] A drive with at least this share in one line causes harmonics of it, even if its
+amplitude varies. Changed by: acceptance::harmonics_of_a_carrier."""
 
 HARMONICS = 10
-"""[harmonics] The actuator's response has this many multiples of that line. Changed by:
+"""[harmonics] This many multiples of that line are expected in the actuator's response. Changed by:
 acceptance::harmonics_of_a_carrier."""
 
 LINE_PERIODS = 8
-"""[periods] A record shows a line, and its travel a ripple, if it has at least this many periods, or pitches: trends
+"""[periods] A record can show a line, and its travel a ripple, if it has at least this many periods or pitches: trends
 fill the bins below. Changed by: acceptance::periods_of_a_line."""
 
 LINE_SAMPLES = 64
-"""[samples] A record shows a line or a period if it has at least this many: eight for each of `LINE_PERIODS`.
+"""[samples] A record can show a line or a period if it has at least this many: eight for each of `LINE_PERIODS`.
 Derived."""
 
 SPECTRUM_SAMPLES = 256
-"""[samples] A spectrum, and a search for a ripple, takes at least this many: three times the surroundings of a peak.
+"""[samples] A spectrum, and a search for a ripple, needs at least this many: three times the surroundings of a peak.
 Changed by: acceptance::samples_of_a_spectrum."""
 
 SPECTRUM_PARTS = (8, 64)
-"""[parts of a record] Numbers of parts whose mean spectra show ringing that fades: of 0.4 to 3 % damping after steps
-every five seconds. Set by: disturbances (commit 8380866)."""
+"""[parts of a record] Numbers of parts whose mean spectra show ringing that fades, found at 0.4 to 3 % damping after
+steps every five seconds. Set by: disturbances (commit 8380866)."""
 
 SURROUNDINGS, SURROUNDINGS_OF_PARTS = 40, 12
 """[bins] A peak is compared with this many on either side, in the spectrum of a record and in the mean spectrum of its
@@ -521,7 +517,7 @@ SAME_BINS = 1.5
 Derived."""
 
 SAME_RINGING = 0.02
-"""[share of the frequency] Frequencies of ringing closer than this are one start for a resonance. Changed by: blind
+"""[share of the frequency] Ringing frequencies closer than this give a single start for a resonance. Changed by: blind
 single."""
 
 SAME_LINE = 0.05
@@ -532,14 +528,14 @@ MOST_LINES = 4
 """[lines] At most this many are searched for: mains, two harmonics and a ripple. Changed by: blind foreign."""
 
 CRESTS = 5
-"""[bins] This many of the highest bins of a spectrum are examined: `MOST_LINES` and one of the drive. Derived."""
+"""[bins] This many of the highest bins of a spectrum are examined: `MOST_LINES` and one for the drive. Derived."""
 
 SEEN_IN = 0.4
 """[share of the records that are long enough] A line counts if at least this share of the records has it, or if it has
 `RULING_SHARE`. Changed by: acceptance::a_line_in_many_records."""
 
 COMMON_SHARE = 0.6
-"""[share of the records, or of the passes] A line is common, and a ripple confirmed, if it holds in at least this
+"""[share of the records, or of the passes] A line is steady, and a ripple confirmed, if the test holds in at least this
 share: most. Changed by: acceptance::pitches_of_a_pass."""
 
 STEADY_SHARE = 0.5
@@ -555,7 +551,7 @@ MAINS_TOLERANCE = 0.002
 within which the grid is held. Derived."""
 
 RIPPLE_RESOLVED = 0.25
-"""[pitches per sample] A sample shows a ripple if the position moves by less than this from one to the next: four
+"""[pitches per sample] A sample resolves a ripple if the position moves by less than this from one to the next: four
 samples per period. Derived."""
 
 CONVERTER_STEP = 0.02
@@ -570,7 +566,7 @@ PITCHES = 3
 """[pitches] This many of the strongest are examined. Changed by: acceptance::pitches_that_are_examined."""
 
 PASS_SAMPLES, PASS_PITCHES = 32, 3.0
-"""[samples], [pitches] A pass, up or down, that confirms a ripple has at least these. Changed by:
+"""[samples], [pitches] A pass, up or down, must have at least these to confirm a ripple. Changed by:
 acceptance::pitches_of_a_pass."""
 
 DRIVE_REPEATS = 0.01
@@ -578,8 +574,8 @@ DRIVE_REPEATS = 0.01
 more than the noise of a measured drive. Changed by: acceptance::a_noisy_drive_repeats."""
 
 DRIVE_AWAY = 0.25
-"""[share of the drive range, rms] It has a period only if it differed by more than this before it returned; a drive
-that mostly rests is otherwise always like itself. Changed by:
+"""[share of the drive range, rms] A drive has a period only if it differs from itself by more than this at some shorter
+shift; otherwise, one that mostly rests would seem to repeat at any shift. Changed by:
 acceptance::a_drive_that_mostly_rests."""
 
 # Stick-slip --------------------------------------------------------------------------------------------------
@@ -593,28 +589,28 @@ SLIP_STRETCH = 0.5, 3.0
 acceptance::how_much_stands."""
 
 SLIP_OFF = 0.6
-"""[share of the predicted motion] The output stands still if its motion is smaller than predicted by this, and leaps if
-it is larger by this. Changed by: acceptance::how_much_stands."""
+"""[share of the predicted motion] The output stands still if it moves less than predicted by at least this, and leaps
+if it moves more by this. Changed by: acceptance::how_much_stands."""
 
 SLIP_STANDS, SLIP_LEAPS = 0.15, 0.05
-"""[share of the stretches] Stick-slip stands still in at least the first share of them, and leaps in at least the
-second. Changed by: blind foreign, acceptance::how_much_stands."""
+"""[share of the stretches] With stick-slip, the output stands still in at least the first share and leaps in at least
+the second. Changed by: blind foreign, acceptance::how_much_stands."""
 
 SLIP_CONTINUES = 0.3
 """[correlation] Neighbouring stretches of stick-slip correlate at most this much: a lag continues from one to the next,
 whereas a leap makes up for the standstill before it. Changed by: acceptance::what_goes_on."""
 
 SLIP_MOVING = 0.25
-"""[share of the upper quartile of moves] A drive that moves less than this rests. Changed by:
+"""[share of the upper quartile of moves] A prediction that moves less than this is at rest. Changed by:
 acceptance::samples_that_hardly_move_do_not_count."""
 
 SLIP_JUMPS = 5
-"""[jumps] Stick-slip has at least this many; at least ten times as many samples and five times as many stretches have
-to move. Changed by: acceptance::how_many_jumps."""
+"""[jumps] Stick-slip has at least this many; at least ten times as many samples and five times as many stretches must
+move. Changed by: acceptance::how_many_jumps."""
 
 SLIP_ALONE = 3.0
-"""[times the moves around it] A jump is larger by this factor than the moves two to five samples away: those of a
-smooth output, however fast, are about as large. Most jumps of stick-slip are of this kind. Changed by:
+"""[times the moves around it] A jump is larger by this factor than the moves two to five samples away; in a smooth
+output, however fast, these are about as large. Most jumps of stick-slip are of this kind. Changed by:
 acceptance::a_fast_output_does_not_jump."""
 
 # What drives are like ----------------------------------------------------------------------------------------
@@ -630,18 +626,18 @@ LOOP_SPEEDS = 1.5
 """[ratio of times] Loops are at one speed if their times differ by at most this factor. Changed by: blind poor."""
 
 LOOP_STANDS = 0.3
-"""[share of the time between turns] A drive that rests for longer holds, and does not make a loop. Changed by:
+"""[share of the time between turns] A drive that rests for longer makes a hold, not a loop. Changed by:
 acceptance::a_loop_that_stands_is_none."""
 
 # How the remaining error is described ------------------------------------------------------------------------
 
 MAIN_SHARE = 0.5
-"""[share of the error's variance] A disturbance with at least this is the subject of the verdict's sentence: it is most
-of the error. Derived."""
+"""[share of the error's variance] The verdict is about a disturbance if it has at least this share: it is then most of
+the error. Derived."""
 
 STRETCH_ABOVE_NOISE = 1.5
-"""[times the noise floor] A stretch with a larger error is listed. It has a 24th of the samples of a record, and the
-rms of coloured noise scatters more over so few. Changed by: blind none."""
+"""[times the noise floor] A stretch with a larger error is listed. A stretch has a 24th of the samples of a record, and
+over so few the rms of coloured noise scatters more. Changed by: blind none."""
 
 FAST_QUANTILE = 0.9
 """[quantile of the rates] A stretch is fast if its mean rate is above this quantile. Changed by:
@@ -649,7 +645,7 @@ acceptance::above_the_noise."""
 
 RANGE_END, RANGE_END_SHARE = 0.1, 0.6
 """[share of the drive range], [share of a stretch] A stretch is at the ends of the range if at least the second share
-of it lies within the first of one of them. Changed by: acceptance::ends_of_the_range."""
+of it lies within the first share of either end. Changed by: acceptance::ends_of_the_range."""
 
 VARIABLE_SHARE = 0.1
 """[share of the error's variance] A variable that explains less is not reported. Changed by:
@@ -666,15 +662,15 @@ DESCRIBED_SAMPLES = 200
 """[samples] An error is described if it has at least this many: about eight in each of `VARIABLE_BINS`. Derived."""
 
 MEMORY_WINS = 1.25
-"""[times] Memory is reported in place of a single variable if it explains at least this times as much. Changed by:
+"""[times] Memory is reported in place of a single variable if it explains at least this many times as much. Changed by:
 acceptance::memory_in_place_of_one_variable."""
 
 RATE_FREE_SHARE = 0.75
-"""[share] An error does not depend on rates if drive and memory alone explain at least this share of the part that they
-explain together with rates. Changed by: acceptance::rate_free."""
+"""[share] An error does not depend on rates if drive and memory alone explain at least this share of what they explain
+together with rates. Changed by: acceptance::rate_free."""
 
 REPEATABLE_SHARE = 0.5
-"""[share of the error's variance] An error is repeatable if at least this returns with the drive: most of it.
+"""[share of the error's variance] An error is repeatable if at least this share recurs with the drive: most of it.
 Derived."""
 
 PARITY_BINS, PARITY_SAMPLES = 20, 10
@@ -682,16 +678,17 @@ PARITY_BINS, PARITY_SAMPLES = 20, 10
 many samples. Changed by: acceptance::parity."""
 
 PARITY_SHARE = 0.05
-"""[share of the error's variance] Parity means something only if the mean over drive and direction has at least this:
-half of `VARIABLE_SHARE`. Derived."""
+"""[share of the error's variance] Parity is meaningful only if the mean over drive and direction has at least this
+share: half of `VARIABLE_SHARE`. Derived."""
 
 # Whether an inverse does more than records bear out ------------------------------------------------------------
 
 WILDER = 2.0
-"""[times] An inverse whose drive has second differences up to this times the plain inverse's counts as calm: hysteresis
-alone turns a drive that often. Changed by: acceptance::a_drive_that_is_rougher."""
+"""[times] An inverse counts as calm if the second differences of its drive are up to this times those of the plain
+inverse's drive: hysteresis alone turns a drive that often. Changed by: acceptance::a_drive_that_is_rougher."""
 
 BEYOND_GAIN = 3.0
-"""[times the gain] Largest change that an inverse with effects makes to the plain model's output, in held-out rms that
-the effects explain, or in noise if that is larger. It was 0.85 to 0.97 times that for creep, a lag and relaxing plays
-at three speeds, with noise at 0.1 % of the output. Changed by: acceptance::an_output_that_moves_further."""
+"""[times the gain] Largest change that an inverse with effects makes to the plain model's output, as a multiple of the
+held-out rms that the effects explain or, if larger, of the noise. The multiple was 0.85 to 0.97 for creep, a lag and
+relaxing plays at three speeds, with noise at 0.1 % of the output. Changed by:
+acceptance::an_output_that_moves_further."""

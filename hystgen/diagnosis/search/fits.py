@@ -1,8 +1,7 @@
-"""Fits of hypotheses to records: weights and all other numbers together, on the free-run error of whole records.
+"""Fits of hypotheses to records: weights and all other parameters together, on the free-run error of whole records.
 
-The output is linear in the weights unless an output map bends it, so that each step solves for the weights and for the
-change of all other numbers at once (`identification.joint`). The linear system at the fit gives intervals for the
-numbers.
+The output is linear in the weights unless an output map bends it, so each step solves for the weights and for the
+change of all other parameters at once (`identification.joint`). The linear system at the fit gives their intervals.
 """
 
 from __future__ import annotations
@@ -30,31 +29,31 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 POLISHED = 1e-5
-"""A search ends after a step that lowers the error by a smaller share: far below any difference that decides."""
+"""A search ends after a step that lowers the error by a smaller share: far below any difference that matters."""
 
 COARSE = 1e-3
-"""[share of the error] The same for a search that only ranks shapes, or shows whether to go on: far below `BETTER`.
-With 1e-4 to 1e-2 eight cases of `benchmarks.second_plants` (seeds 29000 on) have the same names, and errors
-within 0.5 %."""
+"""[share of the error] The same for a search that only ranks shapes, or shows whether to go on: far below `BETTER`. For
+any value from 1e-4 to 1e-2, eight cases of `benchmarks.second_plants` (seeds 29000 on) yield the same effect names, and
+errors within 0.5 %."""
 
 CROSSINGS = 2
-"""[changes of side] A start component that moves from one limit past the other is then measured from the other; the
-second time it stays there, so that the search for components at a limit ends. With 1, 3 of 600 pairs of records, with
-two time constants that are nearly equal, ended up to 8e-4 above the least error; with 2, 4 and 8 none did by more than
+"""[changes of side] A start component that moves from one limit past the other is then measured from the other; after
+the second change it stays there, so that the search for components at a limit ends. With 1, fits to 3 of 600 pairs of
+records with two nearly equal time constants ended up to 8e-4 above the smallest error; with 2, 4 and 8, none more than
 1e-6 (`test_start_transients::test_nearly_equal_responses`, seeds 0 to 599)."""
 
 RESTARTS = 4
-"""[searches] Most for start memories with the same effects. Another follows only if one lowers the error by `BETTER`,
-so this only bounds the time."""
+"""[searches] Maximum number for start memories with the same effects. Another follows only if the last lowered the
+error by `BETTER`, so this only bounds the time."""
 
 
 class _Block:
     """A record's part of the system linearised about a shape and weights: plays and measured output, then derivatives.
 
-    The factors of the free components are between the limits of `Actuator.largest`, which are a share `most` of the sum
-    of the weights. A component that would exceed them is written as `side most (sum p - slack)` with `slack >= 0`, so
+    The factors of the free components are within the limits of `Actuator.largest`, each a share `most` of the sum of
+    the weights. A component that would exceed its limit is written as `side most (sum p - slack)` with `slack >= 0`, so
     that the limit follows the weights in the same linear system. The reflections of the reduction are kept, so that the
-    derivatives can be reduced later by themselves. `like`: the actuator whose components are free, if not `here`.
+    derivatives can be reduced separately later. `like`: the actuator whose components are free, if not `here`.
     """
 
     def __init__(self, here: Actuator, item: Item, p: Array, like: Actuator | None = None) -> None:
@@ -116,7 +115,7 @@ class _Block:
         return self._behind(_stacked([part.extended(columns) for part, columns in parts]), self.held)
 
     def _of(self, other: Actuator, sums: Sums) -> Array:
-        """The prediction with other numbers, and the same weights and offset."""
+        """The prediction with other parameters, and the same weights and offset."""
         rows, constant = other.columns(self._item, self._p, sums)
         moved = rows[0] + constant
         if other.bends:
@@ -124,7 +123,7 @@ class _Block:
         return np.asarray(moved + other.added(self._item.run)[self._item.compared])
 
     def _begun(self, other: Actuator) -> Array:
-        """The response to the start state with other numbers: a factor at its limit follows it, the others stay."""
+        """The response to the start state with other parameters; a factor at its limit follows the limit."""
         free = other.nuisances(self._item, self._offset)
         if len(free) != self._free:  # a spectrum with another number of states
             return self._begun(self._here)
@@ -160,7 +159,7 @@ class _Block:
         return bool(np.any(beyond | opposite))
 
     def _behind(self, whole: Array, limited: Bools) -> Array:
-        """The triangle without the free components; the plays carry the others, which follow their weights."""
+        """The triangle without the free components; those at a limit follow the weights and are added to the plays."""
         n = self._free
         if limited.any():
             carried = whole[:, :n][:, limited] @ (self._side * self._most)[limited]
@@ -178,8 +177,8 @@ def _stacked(triangles: Sequence[Array]) -> Array:
 def _solved(blocks: Sequence[_Block], plays: int) -> tuple[Array, Array]:
     """The system of all records and its best weights, with the free components of each record within their limits.
 
-    Components that are found beyond a limit get a slack from it, which is solved for with the weights (nnls), until
-    none is beyond. This terminates, since each keeps its slack until it has changed sides `CROSSINGS` times.
+    A component found beyond a limit gets a slack from it, solved for with the weights (nnls), until none is beyond.
+    This terminates, since each keeps its slack until it has changed sides `CROSSINGS` times.
     """
     whole = reduction.triangle(*(block.system() for block in blocks))
     solution = pi.non_negative(whole, np.arange(plays))
@@ -196,7 +195,7 @@ def _solved(blocks: Sequence[_Block], plays: int) -> tuple[Array, Array]:
 
 
 def _open(blocks: Sequence[_Block], plays: int) -> Array:
-    """The best weights, and behind them the slacks of one record after the other."""
+    """The best weights, followed by the slacks of each record in turn."""
     opened = [block.opened() for block in blocks]
     last, parts = plays + sum(each.shape[1] - plays - 1 for each in opened), []
     at = plays
@@ -226,7 +225,7 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
         return Reduced(structure.thresholds, whole[:, measured_last], (), (samples,))
 
     whole, best = _solved(blocks, n1)
-    if not np.isfinite(whole).all():  # the numbers are far from reasonable
+    if not np.isfinite(whole).all():  # the parameters are far from reasonable
         return LocalFit(shape, p, math.inf, p, samples, derived)
     rms = root_mean_square(pi.residual(whole, np.arange(n1), best), samples)
     return LocalFit(shape, p, rms, best, samples, derived)
@@ -234,7 +233,7 @@ def linear(structure: Structure, items: Sequence[Item], shape: Array, p: Array) 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A structure with its numbers and weights, and the rms error of the fit."""
+    """A structure with its parameters and weights, and the rms error of the fit."""
 
     structure: Structure
     shape: Array
@@ -264,14 +263,14 @@ class Fitted:
 
 
 def part_at_an_end(fitted: Fitted, k: int) -> bool:
-    """Whether a number of a part is at an end of its usual range or beyond it."""
+    """Whether a parameter of a part is at an end of its usual range or beyond it."""
     return bool(ends_of(fitted.structure.parts[k].ordinary, fitted.structure.pieces(fitted.shape)[1][k]))
 
 
 def ends_of(candidate: Candidate, numbers: Array) -> list[tuple[int, bool]]:
-    """Indices of the numbers at an end of a candidate's range or beyond it, and whether that is the largest value.
+    """Indices of the parameters at or beyond an end of a candidate's range, and whether that is the upper end.
 
-    A least value of 0 does not count as an end: one of several parts may be absent.
+    A lower end of 0 does not count, since one of several parts may be absent.
     """
     low, high = (numbers <= candidate.low) & (candidate.low != 0.0), numbers >= candidate.high
     return [(j, bool(high[j])) for j in np.flatnonzero(low | high).tolist()]
@@ -279,7 +278,7 @@ def ends_of(candidate: Candidate, numbers: Array) -> list[tuple[int, bool]]:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """The state of a search for the numbers of a structure, from which it can continue."""
+    """The state of a search for the parameters of a structure, from which it can continue."""
 
     structure: Structure
     items: Sequence[Item]
@@ -299,7 +298,7 @@ class Search:
         return replace(self, now=now, damping=damping)
 
     def found(self, otherwise: Array) -> Fitted:
-        """The fit; `otherwise`: its weights if no weights can be solved for with these numbers."""
+        """The fit; `otherwise`: its weights if no weights can be solved for with these parameters."""
         best = self.now.best if math.isfinite(self.now.rms) else otherwise
         return Fitted(self.structure, self.now.shape, best, self.now.rms)
 
@@ -315,7 +314,7 @@ def fit(structure: Structure, items: Sequence[Item], start: Array, p: Array) -> 
 
 
 def on_equal_terms(fitted: Fitted, other: Fitted, items: Sequence[Item]) -> Fitted:
-    """A fit whose weights are solved for again, with the same free start states as in another one."""
+    """A fit whose weights are solved for again, with the free start states of another fit."""
     here, like = fitted.actuator, other.actuator
     blocks = [_Block(here, item, fitted.weights, like) for item in items if item.known.any()]
     whole, best = _solved(blocks, len(fitted.weights))
@@ -328,9 +327,9 @@ def on_equal_terms(fitted: Fitted, other: Fitted, items: Sequence[Item]) -> Fitt
 def restarted(fitted: Fitted, items: Sequence[Item], quick: Sequence[Item]) -> Fitted:
     """The fit with start memories found in the presence of its effects, for records with a memory but no history.
 
-    A memory found without the effects includes part of their response. The plays only have to explain the output less
-    that response, and their weights are known in the search for a memory (`start.of_model`). The numbers are then
-    refitted to `quick`, again and again until the error no longer falls by `BETTER`.
+    A memory found without the effects includes part of their response. Here, the plays with their known weights only
+    have to explain the output minus that response (`start.of_model`). The parameters are then refitted to `quick`, and
+    both steps are repeated until the error no longer falls by `BETTER`.
     """
     if not any(map(restarts, items)):
         return fitted
@@ -369,7 +368,7 @@ def _turns(fitted: Fitted, item: Item) -> Turns | None:
 def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fitted, pi.Weights]:
     """A hypothesis with p_0 raised to a share `floor` of the sum of weights if the records allow it, and its weights.
 
-    As in `identify` (`pi.fit_weights`); all other numbers stay.
+    As in `identify` (`pi.fit_weights`); all other parameters stay.
     """
     p, here = fitted.weights, fitted.actuator
     kept = pi.Weights(p, fitted.rms)
@@ -385,24 +384,24 @@ def invertible(fitted: Fitted, items: Sequence[Item], floor: float) -> tuple[Fit
     return replace(fitted, weights=made.p, rms=made.rms), replace(made, free_p0=float(p[0]))
 
 
-# 95 % intervals for the numbers, from the system linearised at the fit ---------------------------------------
+# 95 % intervals for the parameters, from the system linearised at the fit ------------------------------------
 
 
 DRAWS = 400
-"""Random shapes per interval, whose ends then scatter by 0.13 standard deviations."""
+"""Random shapes per interval; its ends then scatter by 0.13 standard deviations."""
 
 HALVINGS = 20
 """Bisections between the fitted shape and an inadmissible one, down to a millionth of an interval's width."""
 
 WEAKEST = 1e-9
-"""Singular values below this share of the largest are raised to it, since their directions are not determined."""
+"""Singular values below this share of the largest are raised to it, since their directions are undetermined."""
 
 Numbers = Mapping[str, object]
 
 
 @dataclass(frozen=True)
 class Sure:
-    """Low and high end of every number, keyed as in the entries, for the front's stage and for each part."""
+    """Low and high end of every parameter, keyed as in the entries, for the front's stage and for each part."""
 
     front: dict[str, object]
     parts: tuple[dict[str, object], ...]
@@ -420,11 +419,11 @@ def place(fitted: Fitted, name: str, later: int) -> int | None:
 
 
 def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
-    """95 % intervals of the numbers of the effects and of the front.
+    """95 % intervals of the parameters of the effects and of the front.
 
     The covariance is `s^2 tau (J^T J)^-1` (Seber and Wild, Nonlinear Regression, 1989, section 2.1), with J the
-    Jacobian of the free-run error with respect to weights and numbers together, zero weights kept at zero; `tau`, the
-    correlation time of the residuals in samples, turns their number into the effective one. The intervals come from
+    Jacobian of the free-run error with respect to weights and parameters together, zero weights kept at zero; `tau`,
+    the correlation time of the residuals in samples, turns their number into the effective one. The intervals come from
     shapes drawn with this covariance and kept within the bounds.
     """
     shape, p = fitted.shape, fitted.weights
@@ -436,8 +435,8 @@ def intervals(fitted: Fitted, items: Sequence[Item]) -> Sure:
     active = np.flatnonzero(np.append(p > 0.0, np.ones(len(shape), dtype=bool)))
     _, singular, right = np.linalg.svd(system[:, active], full_matrices=False)
     inverse = 1.0 / np.maximum(singular, WEAKEST * singular[0])
-    # only the numbers' part of the covariance is needed; its triangular root with a positive diagonal is unique, unlike
-    # singular vectors, whose signs and order depend on the library and would lead to other draws
+    # only the parameters' part of the covariance is needed; its triangular root with a positive diagonal is unique,
+    # unlike singular vectors, whose signs and order depend on the library and would lead to other draws
     root = np.asarray(np.linalg.qr((right.T * inverse)[np.count_nonzero(active < n1) :].T, mode="r"))
     root = root * np.where(np.diag(root) < 0.0, -1.0, 1.0)[:, None]
     errors = fitted.errors(items)

@@ -1,9 +1,9 @@
-"""Whether the hysteresis itself is not a play sum: its minor loops stay open and depend on the past, at any speed.
+"""Whether the hysteresis departs from a play sum: minor loops stay open and depend on the past, at any speed.
 
 A play sum forgets a minor loop when it closes, and nothing else. Friction, Bouc-Wen and Duhem plants forget a little
-all along the drive's way. Such an element is fitted beside the plays like an effect, and judged by the same rules; it
-is not in the catalogue and never written to a file. At one speed, way and time are equivalent: it can then replace
-creep, a lag or a rate dependence, and they can replace it.
+all along the drive's travel. An element that does so is fitted beside the plays like an effect, and judged by the same
+rules; it is not in the catalogue and never written to a file. At a single speed, travel and time are equivalent: the
+element can then replace creep, a lag or a rate dependence, and they can replace it.
 """
 
 from __future__ import annotations
@@ -34,30 +34,30 @@ Array = NDArray[np.float64]
 NAME = "forgetting"
 
 BALANCE = 0.9
-"""Balance from which a search starts: between Dahl's element, 1, and one that returns the way it came, 0.5."""
+"""Balance from which a search starts: between Dahl's element, 1, and one that unloads in a straight line, 0.5."""
 
 WEIGHT = 5.0
-"""[mean slopes of the records] Largest weight of the element, which lags at positive ones: a friction of five times the
-stage's stiffness has no inverse. A leading element would be plays of negative weight, which a play sum lacks."""
+"""[mean slopes of the records] Largest magnitude of the weight: friction of five times the stage's stiffness has no
+inverse. It is negative, so that the output lags; with a positive one, it would lead."""
 
 LOOP = 0.1
-"""[share of the drive range] Width of the minor loop that is said to stay open, as in `docs/plants.md`."""
+"""[share of the drive range] Width of the minor loop that is reported to stay open, as in `docs/plants.md`."""
 
 WITHIN = 0.01, 1.0
-"""[shares of the drive range] Least and largest way over which the element forgets: below, plays of the smallest
-thresholds act alike; above, it is a straight line and a memory of the start."""
+"""[shares of the drive range] Smallest and largest distance over which the element forgets: below, it acts like plays
+of the smallest thresholds; above, like a straight line and a memory of the start."""
 
 STARTS = 5
-"""[widths] Number from which a search starts, each about three times the one before."""
+"""[widths] Number of widths from which a search starts, each about three times the previous one."""
 
 STEPS = 12
-"""[steps] For the search from the best width: most searches settle three numbers and linear weights in six."""
+"""[steps] Maximum for the search from the best width: six usually settle three parameters and the linear weights."""
 
 
 class Forgetting(Effect):
     """Bouc-Wen's element beside the plays: `y + weight z`, `dz = dv (1 - (b sgn(z dv) + 1 - b) |z|/width)`.
 
-    With the balance b = 1 it is Dahl's friction element, the average over the drive's way of its direction.
+    With the balance b = 1 it is Dahl's friction element, the average of the drive's direction over its travel.
     """
 
     name: Literal["forgetting"] = "forgetting"
@@ -78,11 +78,11 @@ class Forgetting(Effect):
 
 
 def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
-    """The element, if the records support it in addition to the effects found, or better than them; else None.
+    """The element, if the records support it in addition to the effects found, or rather than them; else None.
 
-    The element is first tried in place of all names of the `outcome`, then of those that depend on time, then in
-    addition to all. Names that explain more stand. Where only chance separates the two, the names stand if the drive
-    takes equal ways in different times, since effects of time and of way then differ.
+    The element is first tried in place of all effects of the `outcome`, then of those that depend on time, then in
+    addition to all. Effects that explain more are kept. If only chance separates the two, the effects are kept if the
+    drive covers equal distances in different times, since effects of time and of travel then differ.
     """
     none, now = outcome.refitted, outcome.fitted
     if records.one_loop or not selection.leaves_enough(none, records):
@@ -100,10 +100,10 @@ def forgets(outcome: Outcome, records: Records) -> NotAPlaySum | None:
 
 
 def _bases(outcome: Outcome, records: Records) -> Iterator[tuple[Fitted, tuple[str, ...]]]:
-    """The models to which the element is added, with the names that it would replace.
+    """The models to which the element is added, with the effects that it would replace.
 
-    The refitted one; then one with the effects found that do not depend on time or, if none was found, with the best
-    one tried, since the forgetting of a Duhem plant shows only next to its bent middle line.
+    First the refitted model; then the model with only the effects found that do not depend on time or, if none were
+    found, with the best such effect tried: a Duhem plant's forgetting shows only once its bent middle line is modelled.
     """
     now = outcome.fitted
     names = tuple(dict.fromkeys(each.name for each in outcome.found))
@@ -131,7 +131,7 @@ def _without(now: Fitted, names: Sequence[str], records: Records) -> Fitted:
 
 
 def withheld(outcome: Outcome, found: NotAPlaySum | None, records: Records) -> Outcome:
-    """The outcome without the names that the element replaces."""
+    """The outcome without the effects that the element replaces."""
     if found is None or not found.in_place_of:
         return outcome
     ranked = selection.refused(outcome.rankings, Refusal("forgets", found.after))
@@ -145,7 +145,7 @@ def withheld(outcome: Outcome, found: NotAPlaySum | None, records: Records) -> O
 
 
 def shows_speed(items: Sequence[Item]) -> bool:
-    """Whether the drive takes ways of about the same length, from one turn to the next, in different times."""
+    """Whether the drive covers about equal distances from one turn to the next in different times."""
     moves = []
     for item in items:
         at = signals.reversals(item.run.v)
@@ -163,7 +163,7 @@ def shows_speed(items: Sequence[Item]) -> bool:
 
 
 def _element(now: Fitted, records: Records) -> Tried:
-    """The hypothesis with the element, from the best of several widths, fitted as far as ranking needs."""
+    """The hypothesis with the element, started at the best of several widths and fitted as far as ranking needs."""
     low, high = records.known.drive
     wide, slope = high - low, records.known.output_range / (high - low)
 
@@ -225,7 +225,7 @@ def _found(now: Fitted, tried: Tried, names: tuple[str, ...], shown: bool, recor
 
 
 def _open(fitted: Fitted, element: Forgetting, low: float, high: float) -> float:
-    """How far a minor loop in the middle of the drive is from closing, as a share of its height; plays close it."""
+    """Gap left by a minor loop in the middle of the drive range, as a share of its height; 0 with plays alone."""
     begin = 0.5 * (low + high)
     end = begin + LOOP * (high - low)
     v = np.array([low, high, low, end, begin, end])

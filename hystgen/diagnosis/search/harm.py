@@ -2,7 +2,7 @@
 
 Each inverse gets the recorded outputs as its reference. The drive of the inverse with effects goes into the plain
 model, and the plain inverse's drive into the model with effects: if either model were the stage, this would be the
-error under the other's compensator. A right effect changes the output by about as much as it explains.
+error under the other's compensator. A correct effect changes the output by about as much as it explains.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from hystgen.model import Model
 Array = NDArray[np.float64]
 
 SAMPLES = 6_000
-"""Most of a record that is taken, from its start: as many as the screening of effects compares."""
+"""Maximum number of samples used from the start of a record: as many as the screening of effects compares."""
 
 SMOOTHED = 5
-"""[samples] A recorded output becomes a reference by averaging over this many twice; residual noise is subtracted."""
+"""[samples] A recorded output is averaged over this many, twice, to make a reference; residual noise is subtracted."""
 
 SEED = 1
-"""Seed of the noise through the inverses, whose effect is subtracted, so that the same records give the same answer."""
+"""Seed of the noise passed through the inverses, fixed so that the same records give the same answer."""
 
 
 @dataclass(frozen=True)
 class Wild:
     """An inverse that does more than the recordings support.
 
-    `moves`: rms of the plain model's output for its drive, less the reference, and `other` with the two models
-    exchanged; `gain`: held-out rms that the effects explain, all in output units; `wilder`: rms second differences of
-    its drive over those of the plain inverse's drive.
+    `moves`: rms difference between the reference and the plain model's output for its drive; `other`: the same with the
+    two models exchanged; `gain`: held-out rms that the effects explain, all in output units; `wilder`: rms second
+    difference of its drive over that of the plain inverse's drive.
     """
 
     moves: float
@@ -60,7 +60,7 @@ def wild(extended: Model, plain: Model, held: Sequence[Item], gain: float, noise
 
 
 def _over(extended: Model, plain: Model, item: Item, gain: float, noise: float) -> Wild | None:
-    """The two inverses over one record; None where one of them has no answer."""
+    """The two inverses over one record; None if one of them fails or too few samples are compared."""
     end = min(len(item.run.t), SAMPLES)
     compared = np.arange(len(item.run.t))[item.compared]
     at = compared[compared < end]
@@ -92,12 +92,12 @@ def _moved(model: Model, v: Array, t: Array, extra: dict[str, Array]) -> Array:
 
 
 def _drive(model: Model, u: Array, t: Array, extra: dict[str, Array]) -> Array:
-    """The drive for a reference, without limits of its range."""
+    """The drive for a reference, not limited to its range."""
     return model.compensator.drives(model.run(u, t, extra), (-math.inf, math.inf))
 
 
 def _smooth(y: Array) -> Array:
-    """Means over a few neighbours, twice, so that noise hardly shows in second differences."""
+    """Moving average over a few samples, applied twice, so that noise hardly shows in second differences."""
     n = SMOOTHED
     kernel = np.ones(n) / n
     for _ in range(2):

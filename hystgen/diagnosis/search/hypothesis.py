@@ -1,6 +1,6 @@
-"""Hypotheses: thresholds, a front and effects whose numbers a fit may change, and their forward model over a record.
+"""Hypotheses: thresholds, a front and effects with parameters that a fit may change, and their forward model.
 
-The `Structure` of a hypothesis turns numbers into an `Actuator`; the nominal model is the first structure.
+The `Structure` of a hypothesis turns parameters into an `Actuator`; the nominal model is the first structure.
 """
 
 from __future__ import annotations
@@ -41,15 +41,15 @@ Sums = dict[object, Array]
 ALL = slice(None)
 
 _MOVED, _FILTERED, _RINGING, _MAPPED = range(4)
-"""Parts of the chain after which the compared samples are picked: plays, filters behind them, other filters, maps."""
+"""Parts of the chain after which the compared samples are picked: plays, filters right after, other filters, maps."""
 
 LEVEL_STEPS = 3
-"""Most Newton steps for the offset in front of a map, whose curvature is a few per cent: each squares the error."""
+"""Maximum number of Newton steps for the offset in front of a map: with its small curvature, each squares the error."""
 
 
 RANK = 1e-10
-"""[share of the largest singular value] Smaller ones are zero but for rounding: two responses of nearly the same shape.
-A reduction keeps them to 2e-16 of the largest, so that one of this size still has six digits. Set by:
+"""[share of the largest singular value] Smaller ones count as zero: two responses have nearly the same shape. A
+reduction keeps them to 2e-16 of the largest, so one of this size still has six digits. Set by:
 `test_start_transients::test_nearly_equal_responses`, seeds 0 to 39: 1e-8 and 1e-12 give the same errors to 4e-14."""
 
 
@@ -67,16 +67,16 @@ class Actuator(Ordered):
     gains: dict[tuple[int, int], tuple[Effect, Run, Array, Array]] = field(
         default_factory=dict, compare=False, repr=False
     )
-    """Gain and offset over a run, kept with the effect and the run, since the `id` of a deleted one may be reused."""
+    """Gain and offset over a run, kept with effect and run, since the `id` of a deleted object may be reused."""
     starts: Starts = ()
     """Start memories found in the presence of the effects: an item's turns, and the turns that replace them."""
 
     def columns(self, item: Item, p: Array | None = None, sums: Sums | None = None) -> tuple[Array, Array]:
-        """Rows that the weights multiply, up to the output map, and the constant that is added to them.
+        """Rows that the weights multiply, up to the output map, and the constant added to them.
 
-        Only the compared samples if nothing after them needs the others; `compared` picks them in any case. With `p`, a
-        single row, the weighted sum, for which the rest of the chain runs once. `sums`: weighted sums shared by
-        actuators that have effects in common.
+        They hold only the compared samples if no later part needs the others; `compared` picks these in any case. With
+        `p`, a single row: the weighted sum, for which the rest of the chain runs once. `sums`: weighted sums shared by
+        actuators with common effects.
         """
         run = item.run
         rows = self._slow(item) if p is None else self._slow_sum(item, p, {} if sums is None else sums)[None, :]
@@ -91,7 +91,7 @@ class Actuator(Ordered):
             rows, constant = rows * gain, constant * gain + offset
         for effect in self.at(Place.LINEAR)[len(self.filters) :]:
             rows = effect.filtered(rows, run)
-            if self.at(Place.GAIN):  # without one the constant is zero
+            if self.at(Place.GAIN):  # without a gain the constant is zero
                 constant = effect.filtered(constant, run)
         if self._needed == _RINGING:
             rows, constant = item.picked(rows), constant[item.compared]
@@ -124,7 +124,7 @@ class Actuator(Ordered):
         return item.moved.kept((self._moving, self.bending, self.filters, self._needed == _FILTERED), make)
 
     def _slow_sum(self, item: Item, p: Array, sums: Sums) -> Array:
-        """(N,) weighted sum of `_slow`; actuators that differ in one number share the part of the chain before it."""
+        """(N,) weighted sum of `_slow`; actuators that differ in one parameter share the chain before it."""
         by: object = (self._moving, self.bending)
         if by not in sums:
             sums[by] = self._summed(item, p)
@@ -155,7 +155,7 @@ class Actuator(Ordered):
     def _summed(self, item: Item, p: Array) -> Array:
         """(N,) weighted sum of the plays; those without a weight need not be computed.
 
-        The sum has the same bits with and without cached plays, since the cache depends on what a process did before.
+        The sum has the same bits with and without cached plays: it must not depend on what a process did before.
         """
         if self.bending:
             return self.bent_sum(p, self._moved(item), self.thresholds)
@@ -189,11 +189,11 @@ class Actuator(Ordered):
         return course.v, item.run, self.thresholds, start
 
     def level(self, h: Array, item: Item, p: Array) -> tuple[Array, Array, Array]:
-        """The best offset (N,) in front of a sensor and behind a limit, and the change of the output with it (N,).
+        """The best offset (N,) in front of a sensor and behind a limit, and the slope of the output over it (N,).
 
-        It includes the responses to an unknown start state, which a sensor also sees and which move it along its curve,
-        but not drift added behind the sensor. Also returns the responses' part of the output (at the compared samples),
-        to first order; their factors are within the limits of `largest`.
+        The offset includes the responses to an unknown start state, which a sensor also sees and which move it along
+        its curve, but not drift added behind the sensor. Also returns the contribution of these responses to the output
+        at the compared samples, to first order; their factors are within the limits of `largest`.
         """
         y = item.y[item.compared] - self.added(item.run)[item.compared]
         free = self._free(item) if self._needed == _MAPPED else self.nuisances(item)
@@ -227,8 +227,8 @@ class Actuator(Ordered):
     def nuisances(self, item: Item, offset: Array | None = None) -> Array:
         """(k, N) free components of a record at the compared samples: its offset, and responses to an unknown start.
 
-        A history gives the memory of the plays, but not its times, on which slow effects depend. `offset`: the change
-        of the output with the offset, if there is a map between them.
+        A history gives the memory of the plays, but not its timing, on which slow effects depend. `offset`: slope of
+        the output over the offset, if there is a map between them.
         """
         free = self._free(item)[:, item.compared]
         return free if offset is None else free * offset
@@ -251,7 +251,7 @@ class Actuator(Ordered):
         return np.where(limited, span * np.where(limited, found, 0.0), np.inf)  # inf even for a span of 0
 
     def error(self, item: Item, p: Array, like: tuple[Actuator, Array] | None = None) -> Array:
-        """Measured less predicted with the free components fitted; NaN where the record is not compared.
+        """Measured minus predicted with the free components fitted; NaN where the record is not compared.
 
         `like`: another actuator and its weights, whose `nuisances` are free in place of its own, to compare the two on
         equal terms.
@@ -281,7 +281,7 @@ class Actuator(Ordered):
         return self.thresholds.tobytes(), self.stages, effects, self.starts
 
     def _residual(self, item: Item, p: Array) -> Array:
-        """(2, N) at the compared samples: the error before a fit of free components, and its change with the offset."""
+        """(2, N) at the compared samples: error before free components are fitted, and its slope over the offset."""
 
         def make() -> Array:
             rows, constant = self.columns(item, p)
@@ -313,15 +313,15 @@ def _within(columns: Array, y: Array, low: Array, high: Array) -> Array:
     return found
 
 
-# Structures: which numbers a fit may change ------------------------------------------------------------------
+# Structures: which parameters a fit may change ---------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Part:
-    """An effect in a hypothesis: its catalogue name and the candidate whose numbers are fitted.
+    """An effect in a hypothesis: its catalogue name and the candidate whose parameters are fitted.
 
-    `usual`: the candidate with its usual range, if that was widened; `firm`: whether the range is fixed, since the
-    effect would be a different one beyond it, or since its author set it.
+    `usual`: the candidate with its usual range, if that was widened; `firm`: whether the range is fixed, because its
+    author set it or the effect would be a different one beyond it.
     """
 
     name: str
@@ -336,14 +336,14 @@ class Part:
 
 
 def kept(effect: Effect) -> Part:
-    """An effect whose numbers stay."""
+    """An effect with fixed parameters."""
     none = np.empty(0)
     return Part(effect.name, Candidate("as it is", none, none, none, lambda _: effect))
 
 
 @dataclass(frozen=True)
 class Structure:
-    """Thresholds, a front and effects; its shape is the front's, then the numbers of each effect.
+    """Thresholds, a front and effects; its shape is the front's, followed by the parameters of each effect.
 
     `starts`: as in an `Actuator`.
     """
@@ -360,7 +360,7 @@ class Structure:
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Least and largest value of every shape number."""
+        """Smallest and largest value of every shape parameter."""
         low, high = self.front.bounds
         return (
             np.concatenate([low, *(part.candidate.low for part in self.parts)]),
@@ -368,11 +368,11 @@ class Structure:
         )
 
     def slack(self, shape: Array) -> Array:
-        """Further constraints on a shape: numbers that must not be negative."""
+        """Further constraints on a shape: values that must not be negative."""
         return self.front.slack(shape[: len(self.front.straight)])
 
     def pieces(self, shape: Array) -> tuple[Array, list[Array]]:
-        """The front's shape and the numbers of each effect."""
+        """The front's shape and the parameters of each effect."""
         at = len(self.front.straight)
         found = []
         for part in self.parts:
@@ -385,7 +385,7 @@ class Structure:
         return [part.candidate.build(numbers) for part, numbers in zip(self.parts, self.pieces(shape)[1], strict=True)]
 
     def held(self, shape: Array) -> Structure:
-        """The structure without free numbers: front and effects keep the numbers of a shape."""
+        """The structure without free parameters: front and effects keep those of a shape."""
         front_shape, _ = self.pieces(shape)
         front = Kept(self.front.stages(front_shape), self.front.name)
         return replace(self, front=front, parts=tuple(map(kept, self.effects(shape))))
@@ -396,7 +396,7 @@ class Structure:
         return Actuator(self.thresholds, stages, tuple(self.effects(shape)), starts=self.starts)
 
     def varied(self, shape: Array, here: Actuator) -> list[Actuator]:
-        """The actuators of a shape with each number in turn changed by `DIFFERENCE`; the rest is shared with `here`."""
+        """The actuators of a shape with one parameter after another changed by `DIFFERENCE`; `here` shares the rest."""
         front, numbers = self.pieces(shape)
         ends = len(front) + np.cumsum([len(x) for x in numbers])
 
@@ -446,14 +446,14 @@ def front_of(stages: Sequence[Stage], drive: tuple[float, float]) -> tuple[Front
 
 
 def _inside(front: Front, shape: Array) -> bool:
-    """Whether a search may begin at a shape: if it is within the bounds. A clipped shape is not the nominal front."""
+    """Whether a search may begin at a shape, which must be within the bounds: clipped, it is not the nominal front."""
     low, high = front.bounds
     slack = front.slack(np.clip(shape, low, high))
     return bool(np.all((low <= shape) & (shape <= high)) and np.all(slack >= -acceptance.TOUCHING))
 
 
 def structure_of(cascade: Cascade, given: Sequence[Effect], found: Prepared) -> tuple[Structure, Array]:
-    """The nominal model with free weights, front and effect numbers, and the start of a search."""
+    """The nominal model with free weights, front and effect parameters, and the start of a search."""
     front, shape = front_of(cascade.stages, found.drive)
     places = found.thresholds if cascade.stages else _through(found.thresholds, cascade.pi.thresholds)
     parts = tuple(Part(effect.name, _near(effect), firm=True) for effect in given)
@@ -476,7 +476,7 @@ def nominal_weights(cascade: Cascade, structure: Structure) -> Array | None:
 
 
 def _near(effect: Effect) -> Candidate:
-    """The effect with a free factor on each of its numbers, so that zeros and signs stay."""
+    """The effect with a free factor on each of its parameters, which preserves zeros and signs."""
     sizes = {key: _size(value) for key, value in effect if key not in effect.settled}
     free = {key: size for key, size in sizes.items() if size}
     number = sum(free.values())
@@ -505,7 +505,7 @@ def _size(value: object) -> int:
 
 
 def _times(value: Any, factors: Sequence[float], effect: Effect, key: str) -> Any:
-    """The numbers times their factors, within the limits of the key."""
+    """The values times their factors, within the limits of the key."""
     if isinstance(value, tuple):
         each = factors if len(factors) == len(value) else list(factors) * len(value)
         return tuple(_times(one, [factor], effect, key) for one, factor in zip(value, each, strict=True))
@@ -519,7 +519,7 @@ def _times(value: Any, factors: Sequence[float], effect: Effect, key: str) -> An
 
 
 def _through(places: Array, nominal: Sequence[float]) -> Array:
-    """The places, with the nearest one moved to each nominal threshold, so that a right nominal model fits exactly."""
+    """The places, the nearest one moved to each nominal threshold, so that a correct nominal model fits exactly."""
     moved = places.copy()
     for r in nominal:
         near = int(np.argmin(np.abs(places - r)))
@@ -529,7 +529,7 @@ def _through(places: Array, nominal: Sequence[float]) -> Array:
 
 
 def as_given(cascade: Cascade, given: Sequence[Effect]) -> tuple[Structure, Array]:
-    """The nominal model unchanged, without free numbers, and its weights."""
+    """The nominal model unchanged, without free parameters, and its weights."""
     places = np.array(cascade.pi.thresholds)
     return Structure(places, Kept(cascade.stages), tuple(map(kept, given))), np.array(cascade.pi.weights)
 

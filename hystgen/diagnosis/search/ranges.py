@@ -1,4 +1,4 @@
-"""Numbers at an end of the range in which they are sought, and the wider range that is tried for them."""
+"""Parameters at an end of their search range, and the wider range that is tried for them."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from hystgen.identification.joint import DIFFERENCE
 Array = NDArray[np.float64]
 
 BISECTIONS = 4
-"""Bisections of the way beyond a range where the schema does not allow all of it: they find the limit to a sixteenth of
-that way, which decides only how far a search may go."""
+"""Bisections of a widening that the schema does not allow in full: they find its limit to a sixteenth of the widening,
+which decides only how far a search may go."""
 
 LEAST, LARGEST = "least", "largest"
 
 BEYOND, NO_LESS, LIMIT, FIRM, NOISE = "beyond", "no less", "limit", "firm", "noise"
-"""Why a number stands where it does: a wider range was better; a wider one was not; the schema has none; the range is
-not widened; only noise is left, so that none was tried."""
+"""Why a parameter is at an end: a wider range was better; a wider one was not; the schema allows none; the range is not
+widened; only noise is left, so none was tried."""
 
 
 @dataclass(frozen=True)
 class End:
-    """A number at an end of its range or beyond it, described by `AtEnd`; `part`: in the structure, called `name`."""
+    """A parameter at or beyond an end of its range, as `AtEnd`; `part`, `name`: index and name of its effect."""
 
     part: int
     name: str
@@ -41,7 +41,7 @@ class End:
 
 
 def wider(now: Fitted, records: Records) -> Fitted | None:
-    """The hypothesis fitted with wider ranges for the numbers at an end of theirs; None if the schema has no wider."""
+    """The hypothesis fitted with wider ranges for parameters at an end of theirs; None if the schema allows none."""
     if not _parts_at_an_end(now):
         return None
     numbers, thresholds = now.structure.pieces(now.shape)[1], tuple(now.structure.thresholds.tolist())
@@ -57,9 +57,9 @@ def _parts_at_an_end(now: Fitted) -> list[int]:
 
 
 def widened(part: Part, numbers: Array, thresholds: tuple[float, ...]) -> Part:
-    """The part with `acceptance.WIDER` times the usual width beyond each end at which a number stands.
+    """The part with its range widened by `acceptance.WIDER` usual widths beyond each end that a parameter has reached.
 
-    As far as the schema allows; the part itself if it allows nothing.
+    Only as far as the schema allows; the part itself if it allows nothing.
     """
     if part.firm:
         return part
@@ -75,9 +75,9 @@ def widened(part: Part, numbers: Array, thresholds: tuple[float, ...]) -> Part:
 
 
 def _allowed(candidate: Candidate, numbers: Array, j: int, way: float, thresholds: tuple[float, ...]) -> float:
-    """Largest share of a way from number j at which the schema allows an effect unlike the one at its beginning.
+    """Largest share of a move `way` of parameter j to which the schema allows an effect unlike the present one.
 
-    The schema has to allow a little more, for a search's slope.
+    The schema must allow a little more, for the slope that a search needs.
     """
     here = _made(candidate, numbers, thresholds)
 
@@ -98,18 +98,18 @@ def _allowed(candidate: Candidate, numbers: Array, j: int, way: float, threshold
 
 
 def _made(candidate: Candidate, numbers: Array, thresholds: tuple[float, ...]) -> dict[str, object] | None:
-    """The keys of the effect of some numbers; None if the schema does not allow it."""
+    """The keys of the effect with these parameters; None if the schema does not allow it."""
     try:
         made = candidate.build(numbers)
         checked = type(made).model_validate(made.model_dump())
-    except (ValueError, ArithmeticError):  # pydantic's errors are of the former
+    except (ValueError, ArithmeticError):  # pydantic's are ValueErrors
         return None
     return None if any(True for _ in checked.problems(thresholds)) else fits.entry(checked)
 
 
 def ends(now: Fitted, leaves: float | None, only_noise: bool) -> tuple[End, ...]:
-    """The numbers at an end of their usual range or beyond it; `leaves`: held-out rms of a wider range tried in vain,
-    None without one."""
+    """The parameters at or beyond an end of their usual range; `leaves`: held-out rms of a wider range that was tried
+    and failed, or None."""
     found = []
     for k in _parts_at_an_end(now):
         part, x = now.structure.parts[k], now.structure.pieces(now.shape)[1][k]
@@ -134,7 +134,7 @@ def ends(now: Fitted, leaves: float | None, only_noise: bool) -> tuple[End, ...]
 def _number(
     build: Callable[[Array], Effect], numbers: Array, j: int, largest: bool, value: float
 ) -> tuple[str, float]:
-    """The parameter file's key of number j, which is at an end of its range, and its entry for a `value` of j."""
+    """The parameter file's key of parameter j, which is at an end of its range, and its entry for a `value` of j."""
     at, near = numbers.copy(), numbers.copy()
     at[j], near[j] = value, numbers[j] - (DIFFERENCE if largest else -DIFFERENCE)
     here, there = build(numbers), build(near)

@@ -30,15 +30,15 @@ Array = NDArray[np.float64]
 
 
 SLOPE_PLACES = 201
-"""Drives at which the slope of a front is judged."""
+"""Number of drives at which the slope of a front is judged."""
 
 
 @dataclass(frozen=True)
 class Option:
-    """One way to extend a hypothesis. `front`: it adds a memoryless part in front, which is named after the fit.
+    """One way to extend a hypothesis. `front`: whether it adds a front, which is named after the fit.
 
-    `structure`: with all numbers free; `alone`: with only the extension's numbers free, from `starts`. `beyond`: label
-    of the simpler option that it contains and after which it is tried; `grown`: a start from the numbers of that one.
+    `structure`: with all parameters free; `alone`: with only the extension's parameters free, from `starts`. `beyond`:
+    label of the simpler option that it contains and follows; `grown`: a start from that option's parameters.
     """
 
     label: str
@@ -51,7 +51,7 @@ class Option:
     grown: Callable[[Array], Array] | None = None
 
     def joined(self, now: Fitted, numbers: Array) -> Array:
-        """The shape of the whole hypothesis with these numbers for the extension; the others stay."""
+        """The shape of the whole hypothesis with these parameters for the extension; the others stay."""
         front_shape, _ = now.structure.pieces(now.shape)
         if self.front:
             return np.concatenate([numbers, now.shape[len(front_shape) :]])
@@ -119,7 +119,7 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
     tanh = Tanh(drive)
     sides = (-acceptance.TANH_SIDE, acceptance.TANH_SIDE)
     bent = [np.array([acceptance.TANH_BEND, side]) for side in sides]  # bent one way over the whole range
-    # outside the range a limit has no effect, and neither has a small change of it: start inside
+    # outside the range, neither a limit nor a small change of it has any effect: start inside
     limiters = [np.array([share, share, -2.0]) for share in acceptance.LIMITERS]
     return [
         one("front that bends one way", one_way, [one_way.straight]),
@@ -132,7 +132,7 @@ def _fronts(structure: Structure, held: Structure, drive: tuple[float, float]) -
 
 
 def front_names(front: Front, shape: Array, drive: tuple[float, float]) -> tuple[str, ...]:
-    """`LIMIT` for a front that is straight between flatter ends, or bends alike at both; else `BEND`.
+    """`LIMIT` for a front that is linear between flatter ends, or bends alike at both; else `BEND`.
 
     Both names if only one end is a little flatter: a soft limit there and a bent actuator give the same front.
     """
@@ -175,12 +175,12 @@ class Tried:
         return self.names[0]
 
     def numbers(self, held: Sequence[Item]) -> int:
-        """Number of its free numbers, including a record's free components: a start response may explain a drift."""
+        """Number of free parameters, including a record's free components: a start response may explain a drift."""
         return free_numbers(self.fitted, held)
 
 
 def free_numbers(fitted: Fitted, held: Sequence[Item]) -> int:
-    """Number of free numbers of a hypothesis, including the free components of one record."""
+    """Number of free parameters of a hypothesis, including the free components of one record."""
     return len(fitted.shape) + max(len(fitted.actuator.nuisances(item)) for item in held)
 
 
@@ -188,8 +188,8 @@ def free_numbers(fitted: Fitted, held: Sequence[Item]) -> int:
 class Records:
     """The records of a search: in full, thinned for searches, and thinner still for the screening.
 
-    `full`: fitted records with the most samples that any fit compares; `quick`: with those that a search compares;
-    `thin`, `thin_held`: with those that the screening compares.
+    `full`: fitted records with as many samples as any fit compares; `quick`: with as many as a search compares; `thin`,
+    `thin_held`: with as many as the screening compares.
     """
 
     to_fit: Sequence[Item]
@@ -206,9 +206,9 @@ class Records:
     tick: Callable[[], None]
     jobs: int
     one_loop: bool
-    """whether all of them pass the same loop"""
+    """whether all records follow the same loop"""
     one_speed: bool
-    """whether the fitted ones pass their loops in the same time"""
+    """whether the fitted records follow their loops in the same time"""
     compared: float
     """share of the recorded samples that are compared"""
 
@@ -222,7 +222,7 @@ class Records:
         user: Sequence[type[Effect]] = (),
         tick: Callable[[], None] = lambda: None,
     ) -> Records:
-        """Records thinned according to the errors of the refitted model; a user's own effect sees all samples."""
+        """Records thinned by the errors of the refitted model; for a user's own effect, every sample is kept."""
         groups, structure = (to_fit, held), refitted.structure
         masks = everything(groups)
         if not user and not any(part.name.startswith(USER) for part in structure.parts):
@@ -238,10 +238,10 @@ class Records:
         )
 
     def terms(self, now: Fitted, other: Fitted) -> list[Fitted]:
-        """A hypothesis, and a copy whose weights are refitted with the same free start states as in another one.
+        """A hypothesis, and a copy whose weights are refitted with the free start states of another one.
 
-        Free states of an effect that is slow against the records follow any slow error. Weights that had to follow it
-        alone would be worse than with free states, and the difference would count in favour of the effect.
+        Free start states of an effect that is slow compared with the records follow any slow error. Weights that had to
+        follow it alone would do worse than with free states, and the effect would be credited with the difference.
         """
         if all(len(other.actuator.nuisances(item)) == 1 for item in self.quick):
             return [now]
@@ -273,13 +273,13 @@ def _rough(now: Fitted, thin: Sequence[Item]) -> Fitted:
     all_of_them = now.structure.thresholds
     places = np.unique([0, *range(len(all_of_them) - 1, -1, -2)])
     p = np.zeros(len(places))
-    np.add.at(p, np.searchsorted(places, np.arange(len(all_of_them))), now.weights)  # an output map needs near weights
+    np.add.at(p, np.searchsorted(places, np.arange(len(all_of_them))), now.weights)  # an output map needs good weights
     structure = replace(now.structure, thresholds=np.ascontiguousarray(all_of_them[places]))
     return fits.begun(structure, thin, now.shape, p).found(p)
 
 
 def _jobs() -> int:
-    """Number of processes; loads the compiled functions of effects, so that processes need not do so after the fork."""
+    """Number of processes; loads the compiled functions of effects, so that they are not loaded after each fork."""
     jobs = parallel.cores()
     if jobs > 1:
         effects.load_compiled()
@@ -287,7 +287,7 @@ def _jobs() -> int:
 
 
 class _Pair(NamedTuple):
-    """An option, and the same with the fewer thresholds of the screening."""
+    """An option, and the same option with the reduced thresholds of the screening."""
 
     option: Option
     rough: Option
@@ -304,12 +304,12 @@ class _Screened:
 
     @property
     def numbers(self) -> int:
-        """Number of its numbers."""
+        """Number of its parameters."""
         return len(self.option.alone.start)
 
 
 _SCREEN, _JOIN, _POLISH, _RESTART = range(4)
-"""Stages of a search: a few steps of only the option, a few of the whole hypothesis, the remaining steps, and a new
+"""Stages of a search: a few steps for the option alone, a few for the whole hypothesis, the remaining steps, and a new
 search for start memories."""
 
 
@@ -318,7 +318,7 @@ class _Trial(NamedTuple):
     k: int
     """index of the option"""
     shape: Array | None = None
-    """start of the search; for a shape that contains a simpler one, the numbers of the simpler one"""
+    """start of the search; for a shape that contains a simpler one, the parameters of that one"""
     weights: Array | None = None
     """weights close to those of the start"""
     steps: int = 0
@@ -327,7 +327,7 @@ class _Trial(NamedTuple):
 
 
 class _Numbers(NamedTuple):
-    """Numbers found by a search, its held-out rms and start memories: a process can send them, unlike candidates."""
+    """Parameters found by a search, held-out rms and start memories, which, unlike candidates, a process can send."""
 
     shape: Array
     weights: Array
@@ -336,7 +336,7 @@ class _Numbers(NamedTuple):
     starts: Starts
 
     def of(self, structure: Structure) -> Fitted:
-        """The fit of a structure with these numbers."""
+        """The fit of a structure with these parameters."""
         return Fitted(replace(structure, starts=self.starts), *self[:3])
 
 
@@ -350,7 +350,7 @@ class _Searches:
     records: Records
 
     def __call__(self, task: _Trial) -> _Numbers:
-        """The numbers that one search finds."""
+        """The parameters that one search finds."""
         pair, records = self.found[task.k], self.records
         if task.what == _SCREEN:
             fitted, held = self._screen(pair.rough, task), records.thin_held
@@ -381,7 +381,7 @@ class _Searches:
         if option.grown is not None and task.shape is not None and task.weights is not None:
             begun.append(fits.begun(option.alone, thin, option.grown(task.shape), task.weights))
         if option.name.startswith(USER) and not any(math.isfinite(each.now.rms) for each in begun):
-            raise EffectsError(f"the effect {option.name} gives no finite output wherever a search for it begins")
+            raise EffectsError(f"the effect {option.name} gives no finite output at any start of its search")
         near = acceptance.TOO_FAR * min(each.now.rms for each in acting(begun))
         searches = [each.further(acceptance.FIRST_STEPS, fits.COARSE) for each in begun if each.now.rms <= near]
         best = min(acting(searches), key=lambda each: each.now.rms)
@@ -409,8 +409,8 @@ class _Searches:
 def _while_falling(search: Search, steps: int) -> Search:
     """The search after `steps` steps, and as many again for as long as they lower the error by enough (`FALLING`).
 
-    Steps that all fail are not the end: each damps the next one more, and one that is short enough lowers the error. A
-    strongly cubic sensor was once judged at the start of its search.
+    Failed steps do not end it: each increases the damping of the next, until one is short enough to lower the error.
+    Ending there once judged a strongly cubic sensor at the start of its search.
     """
     for _ in range(acceptance.LONGER):
         before, search = search.now, search.further(steps, fits.COARSE)
@@ -423,10 +423,10 @@ _Pool = parallel.Pool[_Trial, _Numbers]
 
 
 def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
-    """The options after a few steps on thinned records: the best on fitted records, and on held-out ones.
+    """The options after a few steps on thinned records: the best on fitted and on held-out ones.
 
-    Effects found before keep their numbers here; they are fitted jointly with the options that are followed up. A shape
-    that contains a simpler one is tried if that one helps, and kept if it helps more.
+    Effects found before keep their parameters here; they are fitted jointly with the options that are followed up. A
+    shape that contains a simpler one is tried if the simpler one helps, and kept if it helps more.
     """
     records, found = searches.records, [pair.rough for pair in searches.found]
     without = [rms(searches.rough.errors(items)) for items in (records.thin, records.thin_held)]
@@ -463,18 +463,18 @@ def _screened(searches: _Searches, pool: _Pool) -> list[_Screened]:
     contained = [simpler[each.option.beyond] for each in kept if each.option.beyond]
     labels = {each.option.label for each in kept}
     richer = [each for each in tried if each.option.beyond in labels]
-    return list(dict.fromkeys([*kept, *contained, *richer]))  # the joint fit shows whether further numbers help
+    return list(dict.fromkeys([*kept, *contained, *richer]))  # the joint fit shows whether more parameters help
 
 
 def _cost(structure: Structure, option: Option) -> int:
-    """Rough cost of a search: the longest ones go first, so that the pool is not left waiting for one at the end."""
+    """Rough cost of a search: the longest start first, so that the pool does not wait for one at the end."""
     return len(structure.start) * (1 + len(option.starts))
 
 
 def _kept(tried: Sequence[_Screened], helpful: Sequence[_Screened]) -> list[_Screened]:
-    """The best on held-out records, the best of the others on fitted ones, and helpful ones that are twins of these.
+    """The best options on held-out records, the best of the others on fitted ones, and helpful twins of these.
 
-    A twin of an effect that is kept already has to have fewer numbers than its kept shapes; the one with the fewest is
+    If its effect is already kept, a twin must have fewer parameters than the kept shapes; that with the fewest is
     taken.
     """
     kept: list[_Screened] = []
@@ -522,7 +522,7 @@ def _followed_up(searches: _Searches, kept: Sequence[_Screened], pool: _Pool) ->
 
     def all_of(tasks: Sequence[_Trial]) -> dict[int, _Numbers]:
         order = sorted(tasks, key=lambda task: _cost(found[task.k].structure, found[task.k]), reverse=True)
-        return {task.k: numbers for task, numbers in pool.each(order, records.tick, then)}  # the latest of each
+        return {task.k: numbers for task, numbers in pool.each(order, records.tick, then)}  # the last of each
 
     done = all_of([join(each) for each in kept])
     hopeful = acceptance.HOPEFUL * min((numbers.residual for numbers in done.values()), default=0.0)

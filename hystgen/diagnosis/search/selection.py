@@ -1,6 +1,6 @@
-"""Grey-box forward selection: the effects that remove the gap on records that took no part in the fit.
+"""Grey-box forward selection: the effects that remove the gap on records not used in the fit.
 
-Held-out errors decide, and fitted ones have to confirm. The thresholds, and the reasons for them, are in `acceptance`.
+Held-out errors decide, and fitted ones must confirm. The thresholds, and the reasons for them, are in `acceptance`.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ EXTENDED, REFITTED, GIVEN, IDENTIFIED = "extended", "refitted", "given", "identi
 
 @dataclass(frozen=True)
 class Merit:
-    """Merit of an effect: the rms that it removes from held-out and from fitted records, and how certain that is."""
+    """Merit of an effect: the rms that it removes from held-out and from fitted records, and its significance."""
 
     removed: float
     fitted: float
@@ -50,7 +50,7 @@ class Merit:
     p_value: float
 
     def worth(self, gap: float, records: Records) -> bool:
-        """Whether it removes a share of the gap, or of the error before it, that deserves a name."""
+        """Whether it removes enough of the gap, or of the error before it, to deserve a name."""
         of_gap = acceptance.NAME_SHARE
         return (
             self.removed >= of_gap * gap
@@ -61,12 +61,12 @@ class Merit:
 
 @dataclass(frozen=True)
 class Refusal:
-    """Why an effect that was tried has no name: a number, and the limit that it missed.
+    """Why an effect that was tried is not named: a value, and the limit that it missed.
 
     `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
-    fitted ones], `small` [share of the gap], `most` [rms left], `above` [rms left of records of one loop], `given` and
+    fitted ones], `small` [share of the gap], `most` [rms left], `above` [rms left on records of one loop], `given` and
     `identified` [rms left], `few` [share of samples], `end` [share of the drive range], `range` [share of the gap
-    left], `forgets` [rms left by hysteresis that is no play sum], `wild` [rms by which the inverse moves the plain
+    left], `forgets` [rms left by hysteresis other than a play sum], `wild` [rms by which the inverse moves the plain
     model's output], `other`: another shape was chosen.
     """
 
@@ -76,7 +76,7 @@ class Refusal:
 
 
 def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = None) -> Merit | None:
-    """Merit of a tried effect, or None where `judged` refuses it."""
+    """Merit of a tried effect, or None if `judged` refuses it."""
     found = judged(now, best, records, least)
     return found if isinstance(found, Merit) else None
 
@@ -84,10 +84,10 @@ def merit_of(now: Fitted, best: Tried, records: Records, least: float | None = N
 def judged(now: Fitted, best: Tried, records: Records, least: float | None = None) -> Merit | Refusal:
     """Merit of a tried effect, or why it has none.
 
-    It has none if chance explains the difference, if it removes too little to stand out of the noise, if it hardly
+    It has none if chance explains the difference, if it removes too little to stand out from the noise, if it hardly
     shows in the held-out or in the fitted records, if records of only one loop do not support a name, or if it is a
     limit that hardly acts except at the very end of the drive. Chance does not halve an error to which nothing was
-    fitted, however few events show it.
+    fitted, however few events show the effect.
 
     `least`: the rms to be removed, as a multiple of the remaining error or the noise; by default the threshold for a
     first or a further effect.
@@ -142,16 +142,16 @@ def _removed(now: Fitted, best: Tried, records: Records) -> tuple[_Removed, _Rem
 
 
 def _enough(held: _Removed, fitted: _Removed, needed: float, noise: float) -> bool:
-    """Whether an effect removes enough from held-out or from fitted records, and shows in the others.
+    """Whether an effect removes enough from held-out or from fitted records, and shows in both.
 
-    Held-out records may be of a kind in which it is small, however much of the fitted ones it explains.
+    In the kind of records held out, an effect may be small, however much of the fitted error it explains.
     """
     shares = [each.removed / max(noise, each.left) for each in (held, fitted)]
     return max(shares) >= needed and min(shares) >= acceptance.SEEN_IN_BOTH
 
 
 def removes(now: Fitted, best: Tried, records: Records, least: float | None = None) -> bool:
-    """Whether an effect removes enough on equal terms, by chance or not; `least` as in `merit_of`."""
+    """Whether an effect removes enough on equal terms, whether or not by chance; `least`: as in `merit_of`."""
     return _enough(*_removed(now, best, records), _least(now) if least is None else least, records.noise)
 
 
@@ -160,31 +160,31 @@ def _least(now: Fitted) -> float:
 
 
 def leaves_enough(now: Fitted, records: Records) -> bool:
-    """Whether an effect that removed all but the noise of the held-out or of the fitted error could have a name."""
+    """Whether an effect that removed all of the held-out or of the fitted error except noise could be named."""
     most = max(records.residual(now), rms(now.errors(records.to_fit)))
     return most > acceptance.above_noise(_least(now)) * records.noise
 
 
 def _without_merit(terms: Sequence[Fitted], best: Tried, items: Sequence[Item]) -> list[Array]:
-    """Errors of a hypothesis with the start states and offset free that an effect leaves free: they are not its merit.
+    """Errors of a hypothesis with the free start states and offset of an effect, which do not count as its merit.
 
-    Or with those that the hypothesis itself leaves free, if the error is then smaller. `terms`: from `Records.terms`.
+    Or with the hypothesis's own free start states, if the error is then smaller. `terms`: from `Records.terms`.
     """
     now = terms[0]
     return min(now.errors(items), *(each.errors(items, best.fitted) for each in terms), key=rms)
 
 
 def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
-    """All candidates tried: first the best and those about as good, ordered by their number of parameters.
+    """All candidates tried: first the best and those about as good, ordered by number of parameters.
 
     A candidate is about as good in two cases. With the same start states free, its held-out error is no larger, however
     much better the best one fits (two shapes of one effect each have their own free states, which are part of the
-    effect). Or its held-out error is within a few per cent, and its fitted error is equal, or larger by chance, or, if
-    a number of the best is at an end of its range, larger by less than an effect is worth. Where an amount of the best
-    is the largest that is tried, all that are alike are about as good: so much creep can follow a lag as well. With
-    equal numbers of parameters, all records decide, then the held-out ones if the errors hardly differ, then `place`: a
-    lag, which every amplifier has, before a delay. A candidate with a far larger fitted error than another is not the
-    best because of a small lead on held-out records, which may consist mostly of yet another effect.
+    effect). Or its held-out error is within a few per cent, and its fitted error is equal, larger by chance or, if a
+    parameter of the best is at an end of its range, larger by less than an effect is worth. If an amount of the best is
+    the largest that is tried, all alike candidates are about as good: so much creep can also follow a lag. With equal
+    numbers of parameters, the error over all records decides; if it hardly differs, the held-out error; then `place`: a
+    lag, which every amplifier has, before a delay. A small lead on held-out records, whose error may belong mostly to a
+    third effect, does not make a candidate the best if its fitted error is far larger than another's.
     """
     if not tried:
         return []
@@ -235,7 +235,7 @@ def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:
 
 
 def place(name: str) -> tuple[int, float]:
-    """Place among equal effects, of which the first is named: effects with a rank, then a bent front, since an
+    """Order among equal effects, of which the first is named: effects with a rank, then a bent front, since an
     asymmetric actuator comes before a nonlinear sensor, then the rest of the catalogue, then the user's own."""
     if name not in effects.CATALOGUE:
         return (1 if name == effects.BEND else 3), 0
@@ -244,7 +244,7 @@ def place(name: str) -> tuple[int, float]:
 
 
 def _at_an_end(fitted: Fitted) -> bool:
-    """Whether any number is at an end of its range."""
+    """Whether any parameter is at an end of its range."""
     low, high = fitted.structure.bounds
     return bool(np.any((fitted.shape <= low) | (fitted.shape >= high)))
 
@@ -308,7 +308,7 @@ def _explains_most(now: Fitted, tried: Tried, records: Records) -> bool:
 
 
 def takes_most(residual: float, gap: float, noise: float) -> bool:
-    """Whether a residual is a small part of a gap, each without the noise."""
+    """Whether a residual is a small enough part of a gap, both without the noise."""
     return apart(residual, noise) <= acceptance.MOST_OF_GAP * apart(gap, noise)
 
 
@@ -333,8 +333,8 @@ class Explained:
 
 
 def explained(now: Fitted, none: Fitted, records: Records) -> tuple[Explained, Explained]:
-    """The part of the held-out and of the fitted error that effects explain, with the start states and offsets free
-    that they leave free; `none`: the model without them."""
+    """The parts of the held-out and of the fitted error that effects explain; `none`: the model without them, compared
+    with the same free start states and offsets."""
     held, to_fit = (
         Explained(rms(none.errors(group, now)), rms(now.errors(group)), records.noise)
         for group in (records.held, records.to_fit)
@@ -343,12 +343,12 @@ def explained(now: Fitted, none: Fitted, records: Records) -> tuple[Explained, E
 
 
 def borne_out(now: Fitted, none: Fitted, records: Records) -> Refusal | None:
-    """Why the names that were found are withdrawn, or None: together they have to explain most of the gap.
+    """Why the effects found are withdrawn, or None: together they must explain most of the gap.
 
-    Both for held-out and for fitted records. Many effects can remove a part of a disturbance; the remaining error
-    distinguishes it from a real effect. Records of one loop support no name if more than noise remains, and too few
-    compared samples none at all. Where much remains, no number of an effect may be at an end of its range unless nine
-    tenths are explained: an effect so strong, slow or fast can follow part of any error, but not nearly all of it.
+    This applies to held-out and to fitted records. Many effects can remove part of a disturbance; the remaining error
+    tells it from a real effect. Records of one loop support no name if more than noise remains; too few compared
+    samples never do. If much remains, no parameter of an effect may be at an end of its range unless nine tenths are
+    explained: an effect so strong, slow or fast can follow part of any error, but not nearly all of it.
     """
     if records.compared < acceptance.FEW_COMPARED:
         return Refusal("few", records.compared, acceptance.FEW_COMPARED)
@@ -372,14 +372,14 @@ def _supported(now: Fitted, best: Tried, records: Records) -> bool:
 
 
 def no_worse(residual: float, least: float, noise: float) -> bool:
-    """Whether an error exceeds the least one by so little that the difference would not count as an effect."""
+    """Whether an error exceeds the smallest by so little that the difference would not count as an effect."""
     return apart(residual, least) < acceptance.FIRST_REMOVES * max(noise, least)
 
 
 def difference(before: Sequence[Array], after: Sequence[Array]) -> float:
-    """One-sided p-value for smaller squared errors after than before, over blocks longer than the errors' memory.
+    """One-sided p-value for squared errors that fall, over blocks longer than the errors are correlated.
 
-    Wilcoxon's signed-rank test: an effect may show in a few events, so that the mean by itself is no measure.
+    Wilcoxon's signed-rank test: an effect may show in a few events, so the mean alone is not a good measure.
     """
     from scipy.stats import wilcoxon
 
@@ -416,7 +416,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Ranked:
-    """An effect that was tried in a round, and why it was refused; None for the one that was accepted."""
+    """An effect that was tried in a round, and why it was refused; None for the accepted one."""
 
     tried: Tried
     refused: Refusal | None
@@ -437,8 +437,8 @@ class Withdrawal:
 class Outcome:
     """The refitted nominal model, the model to be written, its effects, and the ranking of each round.
 
-    `ends`: its numbers at an end of their ranges; `written`: which model is written, `extended` by effects, `refitted`,
-    as `given`, or as `identified` without the nominal one.
+    `ends`: its parameters at an end of their ranges; `written`: which model is written: `extended` by effects,
+    `refitted`, `given`, or `identified` independently of the nominal one.
     """
 
     refitted: Fitted
@@ -467,10 +467,10 @@ def as_given(cascade: Cascade, given: Sequence[Effect]) -> Fitted:
 
 
 def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array | None = None) -> Fitted:
-    """The nominal structure with weights, front and numbers of its effects refitted.
+    """The nominal structure with its weights, front and effect parameters refitted.
 
-    From the shape `start` and linear weights; if an output map bends the output, also from the `nominal` weights, since
-    samples beyond a limit hide the error of the weights.
+    The fit begins at the shape `start` and linear weights; if an output map bends the output, also at the `nominal`
+    weights, since samples beyond a limit hide the error of the weights.
     """
     quick = _quick(to_fit)
     starts = [_first_weights(base, quick, start)]
@@ -483,8 +483,8 @@ def refit(base: Structure, to_fit: Sequence[Item], start: Array, nominal: Array 
 def no_worse_than(other: Fitted, outcome: Outcome, records: Records, written: str = GIVEN) -> Outcome:
     """The outcome, or another model if that predicts held-out records better.
 
-    The model as given replaces a refit that predicts worse; if effects were named, it has to be better by `BETTER`. The
-    model that `identify` finds by itself has to be better by `EQUAL`.
+    The model as given replaces a refit that predicts worse; if effects were named, it must be better by `BETTER`. The
+    model that `identify` finds independently must be better by `EQUAL`.
     """
     least, left = records.residual(other), records.residual(outcome.fitted)
     named = acceptance.BETTER if outcome.found else 0.0
@@ -497,7 +497,7 @@ def no_worse_than(other: Fitted, outcome: Outcome, records: Records, written: st
 
 
 def refused(rankings: Sequence[Sequence[Ranked]], why: Refusal) -> tuple[tuple[Ranked, ...], ...]:
-    """The rankings without an accepted effect."""
+    """The rankings, with accepted effects now refused for this reason."""
     return tuple(tuple(replace(each, refused=each.refused or why) for each in tried) for tried in rankings)
 
 
@@ -584,9 +584,9 @@ def select(records: Records, refitted: Fitted, until: Callable[[Fitted], bool] =
 
 
 def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found], float | None]:
-    """The effects fitted to all samples, without any that this makes needless.
+    """The effects fitted to all samples, without any that thereby become needless.
 
-    Also returns the held-out rms with wider ranges that were tried in vain, None without any.
+    Also returns the held-out rms with wider ranges that were tried and failed, or None.
     """
     now = fits.fit(now.structure, records.full, now.shape, now.weights)
     kept, rest, _ = _without_needless(now, found, records)
@@ -599,10 +599,10 @@ def _finished(now: Fitted, found: list[Found], records: Records) -> tuple[Fitted
 
 
 def _widened(now: Fitted, records: Records) -> tuple[Fitted, float | None]:
-    """The hypothesis with wider ranges for numbers at an end of theirs, as long as held-out errors fall.
+    """The hypothesis with wider ranges for parameters at an end of theirs, as long as held-out errors fall.
 
-    Also returns the held-out rms with the widest range tried in vain, None without one. If only noise remains, none is
-    tried.
+    Also returns the held-out rms with the widest range that was tried and failed, or None. If only noise remains, none
+    is tried.
     """
     for _ in range(acceptance.WIDENINGS):
         if is_noise(records.residual(now), records.noise):
@@ -652,9 +652,9 @@ def _step(
 ) -> _Step | None:
     """The best extension of a hypothesis and those it was chosen from; None if there is none to try.
 
-    `start`: the same hypothesis with other numbers, from which extensions are searched for; `least`: as in `merit_of`.
-    An extension may explain most only by its free start states and have no merit on equal terms; then the next one is
-    judged. If another one explains far more on equal terms, but in too few places to be certain, none is named.
+    `start`: the same hypothesis with other parameters, from which extensions are searched for; `least`: as in
+    `merit_of`. An extension may explain most only through its free start states and have no merit on equal terms; then
+    the next one is judged. If another explains far more, but in too few places for certainty, none is named.
     """
     tried = records.extensions(start or now, worth)
     if not tried:
@@ -679,13 +679,13 @@ def _explained(step: _Step, records: Records) -> bool:
 def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
     """The latest step with a rival in place of its best, and the step that this makes possible; None to keep the best.
 
-    Which of several alike effects is present shows with the next one: if nothing more qualifies after the accepted one,
-    or the remaining error is larger then, or the same error takes more numbers, it was the wrong one. If the next
-    effect is itself a rival, `_exchanged` examines what else fits beside it.
+    The next step shows which of several alike effects is present: the accepted one is wrong if nothing more qualifies
+    after it although it does after a rival, or if more error then remains, or the same error takes more parameters. If
+    the next effect is itself a rival, `_exchanged` examines what else fits beside it.
 
-    If nothing more qualifies, the accepted effect may be the right one in a wrong shape: a simpler one that is about as
-    good takes part of the place of the next effect, which then spoils the held-out records. `_exchanged` finds the
-    shape only once the next effect is in.
+    If nothing more qualifies, the accepted effect may be the right one in a wrong shape: a simpler shape, about as
+    good, absorbs part of the next effect, which then makes held-out errors worse. `_exchanged` finds the right shape
+    only once the next effect is included.
     """
     alike = rivals(latest.best, latest.tried, records)
     if step.merit is None and any(_hidden(step.now, each, records) for each in step.tried):
@@ -717,9 +717,9 @@ def _with_rival(latest: _Step, step: _Step, gap: float, records: Records) -> tup
 def _beside_another(latest: _Step, failed: _Step, gap: float, records: Records) -> tuple[_Step, _Step] | None:
     """A step to another effect that the accepted one hides, and the step from there to the accepted one, or None.
 
-    An effect of many numbers also follows other effects, as a fast state of creep follows relaxing plays. In its
-    presence the other has nothing left to explain, although it follows the other only roughly. The two are tried in the
-    other order if the accepted one leaves so much that a verdict would begin with it.
+    An effect with many parameters also follows other effects, as a fast state of creep follows relaxing plays. Next to
+    it, little is left for the other to explain, although it is followed only roughly. The two are tried in the opposite
+    order if the accepted one leaves so much error that a verdict would begin with it.
     """
     left = records.residual(failed.now)
     if left <= acceptance.MUCH_LEFT * records.noise:
@@ -744,11 +744,11 @@ def _hidden(now: Fitted, tried: Tried, records: Records) -> bool:
 
 
 def _together(failed: _Step, gap: float, records: Records) -> tuple[Found, _Step] | None:
-    """Two effects that hide each other: neither qualifies by itself, but each does with the other.
+    """Two effects that hide each other: neither qualifies alone, but each does next to the other.
 
     Returns the first, and the step from it to both. The search begins with the effect that explains most on held-out
-    records, and with each that is certain on fitted ones. Without the first, the other may leave less of the gap than
-    before; then the first has no share of it.
+    records, and with each that is certain on fitted ones. Alone, the first may even raise the error; it is then
+    credited with none of the gap.
     """
     one_of_each = {each.name: each for each in reversed(failed.tried)}  # the best one of each name
     fitted = failed.now.errors(records.to_fit)
@@ -781,7 +781,7 @@ def _found(step: _Step, records: Records) -> Found:
 
 
 def _first_weights(base: Structure, to_fit: Sequence[Item], start: Array) -> Array:
-    """Weights from a linear fit without the effects, then with them: a sensor's curve misleads far from its outputs."""
+    """Weights from a linear fit without the effects, then with them: a sensor's curve misleads far from its range."""
     alone, front = replace(base, parts=()), base.pieces(start)[0]
     near = fits.begun(alone, to_fit, front, np.ones(len(base.thresholds))).now.best
     return fits.begun(base, to_fit, start, near).now.best
@@ -809,11 +809,11 @@ def _without_needless(
 def _exchanged(
     now: Fitted, found: list[Found], less: dict[str, Fitted], names: Collection[str], records: Records
 ) -> tuple[Fitted, list[Found]]:
-    """Replace earlier effects by others, or other shapes, that are better with the later ones.
+    """Replace earlier effects by other effects or shapes that do better with the later ones.
 
-    The first of two was chosen while the second was missing, and may have taken part of its place; the second was
-    chosen next to a wrong first one. Rivals, too, are judged together with all the others. `less`: the model without an
-    effect, if known; `names`: effects that were among the best in some round, the only ones worth another search.
+    The first of two was chosen while the second was missing, and may have absorbed part of it; the second was then
+    chosen next to a wrong first one. Rivals, too, are judged with all other effects. `less`: the models without one
+    effect, as far as known; `names`: effects among the best of some round, the only ones worth another search.
     """
     latest = found[-1].name
     for _ in range(acceptance.MOST_EXCHANGES):
@@ -821,7 +821,7 @@ def _exchanged(
             fitted = None if old.name == latest else less.get(old.name) or without_effect(now, old.name, records)
             if fitted is None:
                 continue
-            start = _without_refit(now, old.name, records)  # a refit without it could move the others' numbers far
+            start = _without_refit(now, old.name, records)  # a refit could move the others' parameters far
             step = _step(fitted, 0.0, records, lambda option: option.name in names, start, acceptance.FIRST_REMOVES)
             if step is None or step.merit is None:
                 continue
@@ -845,10 +845,10 @@ def _exchanged(
 
 
 def _that_replaces(now: Fitted, name: str, step: _Step, records: Records) -> _Step | None:
-    """The step with the effect that replaces the named one, or None: its best, or an equally good one of fewer numbers.
+    """The step with the effect that replaces the named one, or None: its best, or one as good with fewer parameters.
 
-    The best of a step is chosen by errors that differ by a few per cent, which no records bear out near the noise. A
-    shape of the effect itself is preferred to another effect of as many numbers, unless that leaves less.
+    The best of a step is chosen by differences of a few per cent, which records near the noise do not bear out. A shape
+    of the effect itself is preferred to another effect with as many parameters, unless the latter leaves less error.
     """
     every = [*records.to_fit, *records.held]
     fitted, found = now, None
@@ -868,13 +868,13 @@ def _that_replaces(now: Fitted, name: str, step: _Step, records: Records) -> _St
 
 
 def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
-    """Whether an effect gives way to a better one: one with a smaller error, one with fewer numbers and no larger error
-    on equal terms, or an equal one with an earlier `place`.
+    """Whether an effect gives way to a better one: one with a smaller error, one with fewer parameters and no larger
+    error on equal terms, or an equal one with an earlier `place`.
 
-    With no more numbers, all records decide if they differ and held-out ones hardly do; between two effects of equally
-    many numbers, the order of `simplest_first` decides. Of two effects that the records do not separate the one with
-    fewer numbers stands, since more can follow another effect; of two shapes of one effect, whose name is no question,
-    the one with the smaller error.
+    If the other has no more parameters and held-out errors hardly differ, the error over all records decides; between
+    two effects with equally many parameters, the order of `simplest_first`. Of two effects that the records do not
+    separate, the one with fewer parameters stands, since more can follow another effect; of two shapes of one effect,
+    whose name is not in question, the one with the smaller error.
     """
     held, residual = records.held, records.residual(now)
     fewer = free_numbers(now, held) - best.numbers(held)
@@ -897,8 +897,8 @@ def _gives_way(now: Fitted, name: str, best: Tried, records: Records) -> bool:
 def _both_exchanged(step: _Step, now: Fitted, found: list[Found], records: Records) -> tuple[Fitted, list[Found]]:
     """The effects with a rival in place of the latest and another shape of an earlier one, if that is better.
 
-    The shape of the earlier one was chosen while the latest was missing, and the latest next to that shape: where each
-    holds the other in its place, no exchange of a single one finds the two that belong together.
+    The shape of the earlier one was chosen while the latest was missing, and the latest next to that shape: each keeps
+    the other in place, so that exchanging only one does not find the pair that belongs together.
     """
     others = {each.name: each for each in reversed(rivals(step.best, step.tried, records))}
     follow = sorted(others.values(), key=lambda each: each.held_out)[: acceptance.MOST_RIVALS]
@@ -961,7 +961,7 @@ def without_effect(now: Fitted, name: str, records: Records) -> Fitted | None:
 
 
 def _without_refit(now: Fitted, name: str, records: Records) -> Fitted | None:
-    """The hypothesis without one effect, with the others' numbers unchanged."""
+    """The hypothesis without one effect, with the others' parameters unchanged."""
     smaller = _less(now, name)
     if smaller is None:
         return None
