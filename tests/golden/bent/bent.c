@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 6bd5db20c5b621e110f979c42b13b93fb83762d89e81dbd655bffdf38046a2a5, without this line
+ * Text: sha256 a0879adcd28ca199cbdb34ffb8da4fabc58bfab0a822c918789e7609c0f88092, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -13,7 +13,7 @@
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   pending: the last returned drive: part of the memory only when the next call absorbs it, or the
+   pending: the last returned drive: it enters the memory only when the next call absorbs it, or the
        drive committed in its place.
 */
 
@@ -187,7 +187,7 @@ static const bent_dead_zone_t bent_stage_1 = {
     bent_stage_1_slope, bent_stage_1_inverse_slope, 4
 };
 
-#define BENT_OFFSET 0.0              /* part of every output */
+#define BENT_OFFSET 0.0              /* added to every output */
 #define BENT_START 0.0               /* value of each play after init */
 #define BENT_INVERSE_INIT_DRIVE 0.0  /* drive of the start memory */
 #define BENT_INVERSE_RESET_DRIVE 0.0 /* drive of the start memory */

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 e9353afcabc0eca79ab55d749756364fb90b5393468e4d5e5ba014bcca25a501, without this line
+ * Text: sha256 f88a10b4be425fb7e7584db61af0963330acb6e49ed0008db52b6eb5d818ade4, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -14,11 +14,11 @@
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
    move: the rise or the fall of the input from one turning point to the next. Lengths are taken
-       along the move, so that a falling one is a rising one with all signs changed.
+       along the move, so a falling move is a rising one with all signs changed.
    corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
-   block: the plays that one corner holds: those with larger thresholds than the corner above it
-       has, up to its `top`.
+   block: the plays that one corner holds: those with larger thresholds than the corner above holds,
+       up to its `top`.
    way: distance of the input from a turning point.
    reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
@@ -435,7 +435,7 @@ static const curved_ends_t curved_back_ends = {
 };
 
 #define CURVED_START 0      /* value of each play after init */
-#define CURVED_START_STEP 0 /* entries from play to play; reset takes 0 for each */
+#define CURVED_START_STEP 0 /* entries from one play to the next; reset starts each at 0 */
 #define CURVED_FRACTION 31u /* bits of a sum below an output code */
 #define CURVED_DEGREE 3u    /* of the polynomials of every curve */
 #define CURVED_FRONT_PIECES 42u

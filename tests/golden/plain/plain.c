@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 2742a14fc651931f511e519956db148cb0ab80ccd73ee33c21977a74161ce7c2, without this line
+ * Text: sha256 2c87efd5c6f1957d3b7a08e69126f43e9926e3184ee2cd674c34c330408d7b5c, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -14,11 +14,11 @@
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
    move: the rise or the fall of the input from one turning point to the next. Lengths are taken
-       along the move, so that a falling one is a rising one with all signs changed.
+       along the move, so a falling move is a rising one with all signs changed.
    corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
-   block: the plays that one corner holds: those with larger thresholds than the corner above it
-       has, up to its `top`.
+   block: the plays that one corner holds: those with larger thresholds than the corner above holds,
+       up to its `top`.
    way: distance of the input from a turning point.
    reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
@@ -314,7 +314,7 @@ static const plain_start_t plain_inverse_start[2] = {
     {plain_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, PLAIN_BOTTOM}}
 };
 
-#define PLAIN_OFFSET 0.0f /* part of every output */
+#define PLAIN_OFFSET 0.0f /* added to every output */
 
 static plain_real_t plain_clamp_drive(plain_real_t v) {
     const plain_real_t least = v < PLAIN_DRIVE_MIN ? PLAIN_DRIVE_MIN : v;

@@ -5,27 +5,28 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 6790efbfb35b1419ea20122db6137ccaf69e45c6f953d9905ddd9912afe047c0, without this line
+ * Text: sha256 6abe08deb6bc058de0dff6cd18e36adfe08c94c5dd2edbe14c614da4fb040d80, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
  *
  * Cost (32-bit target):
- *     code at -O2       about 3580 bytes on a Cortex-M0+, 3136 on a Cortex-M4F, as measured for
- *         such a model with 10 plays
+ *     code at -O2       about 3580 bytes on a Cortex-M0+, 3136 on a Cortex-M4F, as measured for a
+ *         similar model with 10 plays
  *     constant tables   212 bytes
  *     inverse instance  200 bytes of RAM
- *     inverse step, worst case: 17 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)
+ *     inverse step, worst case: 17 multiplications, 24 comparisons (18 + 2 b, b = 3, the bit length
+ *         of n)
  *     inverse step, dearest: about 2477 instructions and 248 bytes of stack on a Cortex-M0+, 272
- *         and 112 on a Cortex-M4F, as measured for such a model
- * On an 8-bit AVR constants lie in RAM too: at most 384 bytes of RAM in all, 31 of them for each
+ *         and 112 on a Cortex-M4F, as measured for similar models
+ * On an 8-bit AVR constants lie in RAM too: at most 384 bytes of RAM in total, 31 of them for each
  * play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
- * memory of the parameter file; reset starts again from plays at 0. Not for targets that flush
- * denormal numbers to zero or round other than to nearest, nor for flags that reorder sums
- * (-fassociative-math) or contract products whatever the source says (clang's -ffp-contract=fast):
- * there the answers can differ from the reference in the last bits.
+ * memory of the parameter file; reset restarts with all plays at 0. Not for targets that flush
+ * denormal numbers to zero or do not round to nearest, nor for flags that reorder sums
+ * (-fassociative-math) or fuse multiply-adds whatever the source says (clang's -ffp-contract=fast):
+ * the last bits of answers could then differ from the reference.
  */
 #ifndef PLAIN_H
 #define PLAIN_H
@@ -142,9 +143,9 @@ typedef struct {
  * Sets the start memory of the parameter file.
  *
  * @param self the instance
- * @pre before every other call; at any time again
+ * @pre before every other call; may be repeated at any time
  * @note Status bits: none
- * @note Cost: once through the plays
+ * @note Cost: one pass over the plays
  */
 void plain_inverse_init(plain_inverse_t *self);
 
@@ -167,7 +168,7 @@ void plain_inverse_reset(plain_inverse_t *self, plain_real_t u);
  * @return drive, V
  * @pre after init; once every sample time, from one context
  * @note Status bits: PLAIN_STATUS_INPUT_CLAMPED, PLAIN_STATUS_HELD, PLAIN_STATUS_OUTPUT_CLAMPED
- * @note Cost: at most 17 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)
+ * @note Cost: at most 17 multiplications, 24 comparisons (18 + 2 b, b = 3, the bit length of n)
  */
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u);
 
@@ -176,7 +177,7 @@ plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u);
  *
  * @param self the instance
  * @param applied drive, V; limited to PLAIN_DRIVE_MIN .. MAX; NaN and infinite: ignored
- * @pre after a step and before the next one, any number of times; before the first step it is a
+ * @pre after a step and before the next one, any number of times; before the first step it gives a
  *     first drive
  * @note Status bits: PLAIN_STATUS_INPUT_CLAMPED, PLAIN_STATUS_HELD
  * @note Cost: at most that of a step

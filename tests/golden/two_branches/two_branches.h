@@ -5,30 +5,30 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 2c225961073d536754227b72466133cd5682b692ee1d6be5cfe5e5815d2bc728, without this line
+ * Text: sha256 f0b2b9778b46a468da16c8bc0a9b025a3e4c810ad82c8025fb9723f6daff40af, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
  * single-header
  *
  * Cost (32-bit target):
- *     code at -O2       about 5080 bytes on a Cortex-M0+, 4460 on a Cortex-M4F, as measured for
- *         such a model with 10 plays
+ *     code at -O2       about 5080 bytes on a Cortex-M0+, 4460 on a Cortex-M4F, as measured for a
+ *         similar model with 10 plays
  *     constant tables   832 bytes
  *     inverse instance  220 bytes of RAM
- *     inverse step, worst case: 32 multiplications, 58 comparisons (46 + 4 b, b = 3 the bits of n),
- *         1 tanh, 2 atanh
+ *     inverse step, worst case: 32 multiplications, 58 comparisons (46 + 4 b, b = 3, the bit length
+ *         of n), 1 tanh, 2 atanh
  *     inverse step, dearest: about 12362 instructions and 304 bytes of stack on a Cortex-M0+, 894
- *         and 120 on a Cortex-M4F, as measured for such a model
- * On an 8-bit AVR constants lie in RAM too: at most 1016 bytes of RAM in all, 31 of them for each
+ *         and 120 on a Cortex-M4F, as measured for similar models
+ * On an 8-bit AVR constants lie in RAM too: at most 1016 bytes of RAM in total, 31 of them for each
  * play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
- * memory of the parameter file; reset starts again from plays at 0. Define
+ * memory of the parameter file; reset restarts with all plays at 0. Define
  * TWO_BRANCHES_IMPLEMENTATION in one C file before including this header. Not for targets that
- * flush denormal numbers to zero or round other than to nearest, nor for flags that reorder sums
- * (-fassociative-math) or contract products whatever the source says (clang's -ffp-contract=fast):
- * there the answers can differ from the reference in the last bits.
+ * flush denormal numbers to zero or do not round to nearest, nor for flags that reorder sums
+ * (-fassociative-math) or fuse multiply-adds whatever the source says (clang's -ffp-contract=fast):
+ * the last bits of answers could then differ from the reference.
  */
 #ifndef TWO_BRANCHES_H
 #define TWO_BRANCHES_H
@@ -161,9 +161,9 @@ typedef struct {
  * Sets the start memory of the parameter file.
  *
  * @param self the instance
- * @pre before every other call; at any time again
+ * @pre before every other call; may be repeated at any time
  * @note Status bits: none
- * @note Cost: once through the plays
+ * @note Cost: one pass over the plays
  */
 void two_branches_inverse_init(two_branches_inverse_t *self);
 
@@ -187,8 +187,8 @@ void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_
  * @pre after init; once every sample time, from one context
  * @note Status bits: TWO_BRANCHES_STATUS_INPUT_CLAMPED, TWO_BRANCHES_STATUS_HELD,
  *     TWO_BRANCHES_STATUS_OUTPUT_CLAMPED, TWO_BRANCHES_STATUS_DOMAIN
- * @note Cost: at most 32 multiplications, 58 comparisons (46 + 4 b, b = 3 the bits of n), 1 tanh, 2
- *     atanh
+ * @note Cost: at most 32 multiplications, 58 comparisons (46 + 4 b, b = 3, the bit length of n), 1
+ *     tanh, 2 atanh
  */
 two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_branches_real_t u);
 
@@ -197,7 +197,7 @@ two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_
  *
  * @param self the instance
  * @param applied drive, V; limited to TWO_BRANCHES_DRIVE_MIN .. MAX; NaN and infinite: ignored
- * @pre after a step and before the next one, any number of times; before the first step it is a
+ * @pre after a step and before the next one, any number of times; before the first step it gives a
  *     first drive
  * @note Status bits: TWO_BRANCHES_STATUS_INPUT_CLAMPED, TWO_BRANCHES_STATUS_HELD
  * @note Cost: at most that of a step
@@ -228,11 +228,11 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
    move: the rise or the fall of the input from one turning point to the next. Lengths are taken
-       along the move, so that a falling one is a rising one with all signs changed.
+       along the move, so a falling move is a rising one with all signs changed.
    corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
-   block: the plays that one corner holds: those with larger thresholds than the corner above it
-       has, up to its `top`.
+   block: the plays that one corner holds: those with larger thresholds than the corner above holds,
+       up to its `top`.
    way: distance of the input from a turning point.
    reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
@@ -747,8 +747,8 @@ static const two_branches_envelope_t two_branches_stage_1_descending = {
     6.0f, 0.4f, 0.1f, 0.5f, 0.16666667f, 2.5f, 0.99999994f
 };
 
-#define TWO_BRANCHES_OFFSET 0.0f        /* part of every output */
-#define TWO_BRANCHES_HOLD 0.0030799445f /* largest step back for which the drive is held instead */
+#define TWO_BRANCHES_OFFSET 0.0f        /* added to every output */
+#define TWO_BRANCHES_HOLD 0.0030799445f /* largest step back at which the drive is held instead */
 
 /* Input of the plays: w = G[v], on the branch of the drive's direction. */
 static two_branches_real_t two_branches_front_forward(two_branches_real_t v, bool ascending) {
