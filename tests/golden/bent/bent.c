@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 a0879adcd28ca199cbdb34ffb8da4fabc58bfab0a822c918789e7609c0f88092, without this line
+ * Text: sha256 14b05417ade167a2d4968dba7eb801cd1cd65ff33d69e0d0d2c6669904eb7dfb, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -57,7 +57,7 @@ typedef struct {
     uint_least16_t n;
 } bent_dead_zone_t;
 
-/* Output at x of a dead-zone sum, by bisection for the straight piece. */
+/* Output of a dead-zone sum at x; bisects for the straight piece. */
 static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t x) {
     unsigned int low = 0;
     unsigned int high = z->n;
@@ -72,7 +72,7 @@ static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t
     return z->anchor_y[low] + (x - z->anchor_x[low]) * z->slope[low];
 }
 
-/* Input at y of a dead-zone sum, by bisection for the straight piece. */
+/* Input of a dead-zone sum at its output y; bisects for the straight piece. */
 static bent_real_t bent_dead_zone_inverse(const bent_dead_zone_t *z, bent_real_t y) {
     unsigned int low = 0;
     unsigned int high = z->n;
@@ -271,7 +271,7 @@ static inline bent_real_t bent_applied_drive(bent_real_t v) {
 }
 
 /* Input of the plays at which their sum is h. The plays are summed again if their present sum is
-   not stored, as without effects, or lacks bits, as in fixed point, where the kernel sums them. */
+   not stored (without effects) or lacks bits (in fixed point, where the kernel sums them). */
 static inline bent_real_t bent_input_of(const bent_real_t *play, bent_real_t h) {
     return bent_loop_solve(&bent_model_tables, play, bent_loop_output(&bent_model_tables, play), h);
 }

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 5ae62c5a45a8388bd6e3f22dfa0f2e544c814ec4f980af3212c95067317f1ecb, without this line
+ * Text: sha256 aba9f4bd77e1c47c631729e75b904cc8cab7fac46a164903a68f3cadc490cb78, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -121,7 +121,7 @@ typedef struct {
 void bent_forward_init(bent_forward_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with v.
+ * Sets all plays to 0, clears the status, and makes one ordinary step with v.
  *
  * @param self the instance
  * @param v drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: held
@@ -165,7 +165,7 @@ unsigned int bent_forward_status(bent_forward_t *self);
 void bent_inverse_init(bent_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with u.
+ * Sets all plays to 0, clears the status, and makes one ordinary step with u.
  *
  * @param self the instance
  * @param u reference, um; limited to BENT_OUTPUT_MIN .. MAX; NaN and infinite: held
@@ -188,7 +188,7 @@ void bent_inverse_reset(bent_inverse_t *self, bent_real_t u);
 bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u);
 
 /**
- * After a step: the drive actually applied in place of the one returned.
+ * Reports, after a step, the drive actually applied in place of the one returned.
  *
  * @param self the instance
  * @param applied drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: ignored

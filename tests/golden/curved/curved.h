@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 73757770cf1c17866397f7ada5858c08653d4d75b522566833fdfd0bd58f17fa, without this line
+ * Text: sha256 01c554dba0ea1c1318327f47c84f3a791d2aad3a1af600d0d66513e96ca4dd68, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -135,7 +135,7 @@ typedef struct {
 void curved_inverse_init(curved_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with u.
+ * Sets all plays to 0, clears the status, and makes one ordinary step with u.
  *
  * @param self the instance
  * @param u reference, in codes of CURVED_OUTPUT_LSB um; limited to CURVED_OUTPUT_MIN .. MAX
@@ -160,7 +160,7 @@ void curved_inverse_reset(curved_inverse_t *self, curved_real_t u);
 curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u);
 
 /**
- * After a step: the drive actually applied in place of the one returned.
+ * Reports, after a step, the drive actually applied in place of the one returned.
  *
  * @param self the instance
  * @param applied drive, in codes of CURVED_DRIVE_LSB V; limited to CURVED_DRIVE_MIN .. MAX

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 6abe08deb6bc058de0dff6cd18e36adfe08c94c5dd2edbe14c614da4fb040d80, without this line
+ * Text: sha256 b1a48d1a4b089fc43b3deae33f19b476b7cafda384c143972ce773d883622c93, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -150,7 +150,7 @@ typedef struct {
 void plain_inverse_init(plain_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with u.
+ * Sets all plays to 0, clears the status, and makes one ordinary step with u.
  *
  * @param self the instance
  * @param u reference, um; limited to PLAIN_OUTPUT_MIN .. MAX; NaN and infinite: held
@@ -173,7 +173,7 @@ void plain_inverse_reset(plain_inverse_t *self, plain_real_t u);
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u);
 
 /**
- * After a step: the drive actually applied in place of the one returned.
+ * Reports, after a step, the drive actually applied in place of the one returned.
  *
  * @param self the instance
  * @param applied drive, V; limited to PLAIN_DRIVE_MIN .. MAX; NaN and infinite: ignored

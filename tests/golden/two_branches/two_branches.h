@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 f0b2b9778b46a468da16c8bc0a9b025a3e4c810ad82c8025fb9723f6daff40af, without this line
+ * Text: sha256 5668fd5bf6fb4c74ce9b0726b3e069a3c5233321dc223e5ddd16643654dcb01f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -168,7 +168,7 @@ typedef struct {
 void two_branches_inverse_init(two_branches_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with u.
+ * Sets all plays to 0, clears the status, and makes one ordinary step with u.
  *
  * @param self the instance
  * @param u reference, um; limited to TWO_BRANCHES_OUTPUT_MIN .. MAX; NaN and infinite: held
@@ -193,7 +193,7 @@ void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_
 two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_branches_real_t u);
 
 /**
- * After a step: the drive actually applied in place of the one returned.
+ * Reports, after a step, the drive actually applied in place of the one returned.
  *
  * @param self the instance
  * @param applied drive, V; limited to TWO_BRANCHES_DRIVE_MIN .. MAX; NaN and infinite: ignored
@@ -267,7 +267,7 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #define TWO_BRANCHES_APART static
 #endif
 
-/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
+/* Straight segment k, and how far from a turning point it begins, where play k starts to follow. */
 typedef struct {
     /* of the input: 2 r_k in the forward operator, 2 z_k in the inverse */
     two_branches_real_t way;
@@ -277,8 +277,8 @@ typedef struct {
     two_branches_real_t slope; /* 1 / gain */
 } two_branches_segment_t;
 
-/* One operator; of two entries the first is for falling moves, with signs changed, the second for
-   rising ones. */
+/* One operator; of a pair of entries, the first is for falling moves, with its sign changed, the
+   second for rising ones. */
 typedef struct {
     const two_branches_segment_t *segment; /* plays 0 .. n, and one that never follows */
     two_branches_real_t limit[2];          /* of the output */
@@ -289,7 +289,7 @@ typedef struct {
 /* A start memory. `center`: input and output of the sum with plays 0 .. k at play k's value. */
 typedef struct {
     const two_branches_real_t (*center)[2];
-    uint_least16_t step;     /* 1: a center for each play, 0: one for all, which have one value */
+    uint_least16_t step;     /* 1: a center for each play; 0: one for all, which start alike */
     uint_least16_t risen;    /* plays up to this one were left by rising moves, others by falling */
     two_branches_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } two_branches_start_t;
@@ -318,7 +318,7 @@ typedef struct {
  * Below two_branches_tanh_knot[0], just above tanh x = 1/2: x + x z P(z) with z = x^2. Above: one
  * of
  * eight polynomials in the distance from the center of its piece; each center is a point where tanh
- * is almost a float, so that the constant term adds no error. From 9.01 on tanh rounds to 1.
+ * is almost a float, so the constant term adds no error. From 9.01 on, tanh rounds to 1.
  * fit_coefficients.py derives the numbers. Worst error over all floats: 0.78 ulp. The function is
  * odd and never decreases; it keeps subnormal numbers and the sign of zero. Infinities and NaN
  * give +-1.
@@ -537,7 +537,7 @@ static inline unsigned int two_branches_find_segment(const two_branches_segment_
     return k;
 }
 
-/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever is first. */
+/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever comes first. */
 TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t,
         two_branches_plays_t *m, const two_branches_corner_t *corner, two_branches_real_t output,
         two_branches_real_t input) {
@@ -650,7 +650,7 @@ TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t
         two_branches_plays_t *m, two_branches_real_t input) {
     const two_branches_real_t way = two_branches_along(m, input - m->from_input);
     unsigned int k = m->here.k;
-    const unsigned int many = k + 8u; /* from there on bisection is faster */
+    const unsigned int many = k + 8u; /* beyond these, bisection is faster */
     do {
         ++k;
     } while (k < many && way > t->segment[k + 1u].way);
