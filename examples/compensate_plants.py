@@ -159,7 +159,7 @@ def held_out() -> Array:
 def trajectory() -> tuple[Array, int]:
     """A reference as shares of the output range, and where errors begin to count: after a sweep of the whole range.
 
-    The sweep wipes out the start of plant and compensator. What counts is a swelling sum of three sines, and a staircase.
+    The sweep wipes out the start of plant and compensator. What counts is three swelling sines and a staircase.
     """
     k = np.arange(3 * SAMPLES) / SAMPLES
     turns = 2.0 * np.pi * k
