@@ -11,7 +11,7 @@ from hystgen.arithmetic.q31 import Q31
 FLOATING = {each.name: each for each in (FLOAT32, FLOAT64)}
 FIXED = {each.name: each for each in (Q31, Q15)}
 ARITHMETICS: dict[str, Arithmetic] = {**FLOATING, **FIXED}
-"""By the name that users give, in the order in which they are listed."""
+"""By name, in the order in which messages list them."""
 
 __all__ = [
     "ARITHMETICS", "FIXED", "FLOAT32", "FLOAT64", "FLOATING", "Q15", "Q31", "Arithmetic", "Fixed", "Floating",

@@ -56,7 +56,7 @@ def error(x: float | Fraction) -> float:
 
 
 def lifted(x: float, bits: int) -> int:
-    """By how many bits less than `bits` x has to be scaled up so that the result is still a factor."""
+    """By how many bits a scaling of x by 2^bits has to fall short for the result to be a factor."""
     return max(0, math.frexp(x)[1] + bits - (math.frexp(BEYOND)[1] - 1))
 
 

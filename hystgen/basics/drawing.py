@@ -59,7 +59,7 @@ BLOCKS = 1000
 """Number of blocks into which a line is divided for thinning; the extremes of each block are kept."""
 
 MOST_POINTS = 4000
-"""In an SVG, lines with more points that cannot be thinned become pixels; also the most points of a scatter plot."""
+"""Lines with more points that cannot be thinned become pixels in an SVG; also the maximum number in a scatter plot."""
 
 
 KINDS = (".png", ".svg")
@@ -106,7 +106,7 @@ def _import() -> None:
     """Import matplotlib. Raises ImportError.
 
     MPLBACKEND, set by a notebook, may name a backend that this environment lacks; the import would then fail. Figures
-    written to files need no backend, so it is selected only afterwards, for the user's own figures, if it exists.
+    written to files need no backend, so the named one, if it exists, is selected afterwards, for the user's figures.
     """
     backend = None if "matplotlib" in sys.modules else os.environ.pop("MPLBACKEND", None)
     try:

@@ -64,7 +64,7 @@ _samples: collections.Counter[tuple[object, np.dtype[np.generic]]] = collections
 
 @contextlib.contextmanager
 def plain() -> Iterator[None]:
-    """Context in which functions run as plain Python: short signals are not worth compiling or loading anything.
+    """Context in which functions run as plain Python, for signals too short to be worth compiling or loading code.
 
     Overflow and NaN raise no warning, as in compiled code.
     """

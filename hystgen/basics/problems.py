@@ -123,7 +123,7 @@ class NotInvertibleError(ValueError):
 class FormatError(ValueError):
     """A model whose parameters do not fit the arithmetic.
 
-    `problems`: each the path of a value in the parameter file, or `()`, and what is wrong; `str()` gives one line each.
+    `problems`: pairs of a path in the parameter file, or `()`, and what is wrong there; `str()` gives one line each.
     """
 
     def __init__(self, *problems: str | tuple[Path, str]) -> None:

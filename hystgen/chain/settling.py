@@ -43,7 +43,7 @@ MOST_SAMPLES = 2**18
 """Maximum number of samples of a response; a mode with a damping of 0.001 takes a third of it."""
 
 MOSTLY = 0.5
-"""An effect is the main reason if the answer without it settles in this share of the time or less."""
+"""An effect is the main reason if the response without it settles in this share of the time or less."""
 
 
 @dataclass(frozen=True)

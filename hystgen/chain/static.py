@@ -44,7 +44,7 @@ UNBOUNDED = (-math.inf, math.inf)
 class StaticModel:
     """The actuator: `y = PI[G[v]] + output_offset` (39), `G` the stages in order from the drive.
 
-    `input_range`: the range of drives in use (two numbers, or unbounded). `hystgen.Cascade` can also be run.
+    `input_range`: the range of drives in use (two numbers, or unbounded). `hystgen.Cascade` adds `simulate` and `inverse`.
     """
 
     pi: PlaySum
@@ -125,7 +125,7 @@ class StaticModel:
         `output_range`.
 
         Once the drive has been at the other end, references between one of these and that end of `output_range` need a
-        drive out of range. If plays that begin at 0, as after a reset, give a narrower range, it is theirs.
+        drive out of range. Plays that begin at 0, as after a reset, are used if they give a narrower range.
         """
         low, high = self.play_range
         starts = (self.pi.start, (0.0,) * (self.pi.n + 1))

@@ -59,9 +59,9 @@ class Memory:
 
 @dataclass(frozen=True)
 class Cost:
-    """Code of the module by core (`hystgen.compensator.engines`); memory on a 32-bit target and on an 8-bit AVR, where
-    tables lie in RAM too (None in float64, which an AVR lacks); and for each operator the worst-case operations of a
-    step in words and the dearest sample of similar models on each core."""
+    """Code size of the module by core (`hystgen.compensator.engines`); memory on a 32-bit target, and on an 8-bit AVR,
+    where tables lie in RAM too (None in float64, which an AVR lacks); and for each operator the worst-case operations
+    of a step in words and the dearest sample of similar models on each core."""
 
     code: Mapping[str, int]
     memory: Memory
@@ -141,7 +141,7 @@ class Data:
 def estimate(cascade: StaticModel, options: Options, numbers: AnyTables, data: Data) -> Cost:
     """Cost of the emitted model, including the parts of a shared run time that it needs."""
     corners = options.engine == "corners"
-    known = options.arithmetic != "float64"  # a double of the AVR is a float
+    known = options.arithmetic != "float64"  # on an AVR, a double is only a float
     worst = [(op, worst_case(cascade.pi.n, op, corners, numbers)) for op in options.operators]
     memory, avr = (_memory(cascade.pi.n, options, data, layout) for layout in (CORE_32, AVR))
     code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))

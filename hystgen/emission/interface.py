@@ -314,7 +314,7 @@ ORDER = {
     "travel": _FIRST,
     "set_travel": "after init and before the first step, or at any time",
     "expected": "after a step, a commit or settle",
-    "correct": "after a step, when the sensor's value belongs to the drive that was applied before it",
+    "correct": "after a step, when the sensor's value belongs to the drive that was applied before that step",
 }
 """When a call may be made."""
 

@@ -139,14 +139,14 @@ class Family(ABC):
 
     @abstractmethod
     def storage(self, corners: bool) -> dict[str, str]:
-        """Replacements of the storage-class words before functions in this arithmetic, in engine corners or loop."""
+        """What replaces the storage-class words before functions in this arithmetic, with engine corners or loop."""
 
     def corners(self, plays: int) -> int:
-        """Number of corners that the corner engine keeps for so many plays."""
+        """Number of corners that the corner engine keeps for this many plays."""
         return max(plays, 1)
 
     def alike(self, kind: str) -> str:
-        """The name of a type, or of the type that it equals here."""
+        """The name of a type, or of the type that it is equal to here."""
         return kind
 
     def meaning(self, kind: str) -> str:
@@ -320,7 +320,7 @@ class Variant:
 
     def _chain(self) -> tuple[str, ...]:
         """The files of a chain except its blocks: for a model with effects, or for engine loop."""
-        from hystgen.effects.sources import files  # late: a plain model has no effect
+        from hystgen.effects.sources import files  # imported late, since a plain model has no effects
 
         chain = "compensator/chain/"
         loops, solve, refined = self.engine == "loop", f"{chain}plays_solve.c", f"{chain}refined_input.c"
@@ -444,7 +444,7 @@ def split_pieces(source: str) -> list[Piece]:
         if not depth and not constant and line.startswith("#"):
             lines = []
             continue
-        if not depth and not inside and not line.strip():  # a comment above it belongs to the file
+        if not depth and not inside and not line.strip():  # a comment before an empty line belongs to the file
             lines = []
             continue
         lines.append(line)
@@ -598,7 +598,7 @@ def chain_types(own: Iterable[Piece], glue: str, family: Family) -> list[Piece]:
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
-    """Prototypes of an operator: those of every model, and of those for models with effects the ones in `more`."""
+    """Prototypes of an operator: those of every model, and those named in `more` of models with effects."""
     prefix = f"hystgen_{operator}_"
     usual = [piece for piece in _pieces(["compensator/api.h"], ()) if piece.name.startswith(prefix)]
     chain = {prefix + each for each in more}
@@ -695,7 +695,7 @@ def api(
 
 
 def verbatim(files: Iterable[str], owner: str, family: Family, name: str) -> str:
-    """Whole files without their first paragraph, for the module `name`; `owner` is named in messages."""
+    """Whole files without their first paragraph, for the module `name`; their messages name `owner`."""
     whole = [chosen(_read(file).partition("\n\n")[2], family.facts) for file in files]
     text = "\n".join(whole).replace('"hystgen: ', f'"{owner}: ')
     return _named(text, name, family, name)
@@ -741,7 +741,7 @@ def types(pieces: Iterable[Piece], prefix: str, family: Family) -> str:
 
 
 def all_types(files: Iterable[str], prefix: str, family: Family) -> str:
-    """Every type definition of headers of the run time."""
+    """Every type definition in these headers of the run time."""
     return types(_pieces(files, family.facts), prefix, family)
 
 

@@ -42,7 +42,7 @@ first."""
 _CHOICE = ("? ", ": ")
 """Beginnings of lines whose continuation is indented further."""
 _GOOD = 7
-"""So many of these, the first, come before the rest; among them, the place with the fewest open parentheses wins."""
+"""The first so many of these come before the rest; among them, the place with the fewest open parentheses wins."""
 
 
 def literal(x: Number) -> str:
