@@ -44,7 +44,7 @@ UNBOUNDED = (-math.inf, math.inf)
 class StaticModel:
     """The actuator: `y = PI[G[v]] + output_offset` (39), `G` the stages in order from the drive.
 
-    `input_range`: the range of drives in use (two numbers, or unbounded). `hystgen.Cascade` adds `simulate` and `inverse`.
+    `input_range`: the drive range in use (two numbers, or unbounded). `hystgen.Cascade` adds `simulate` and `inverse`.
     """
 
     pi: PlaySum

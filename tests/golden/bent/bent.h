@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 aba9f4bd77e1c47c631729e75b904cc8cab7fac46a164903a68f3cadc490cb78, without this line
+ * Text: sha256 46f19583b4b156fc4fd16cd81038df330352c75065ca77c6a43784376ce09c6f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
@@ -40,10 +40,10 @@
 
 /* Build settings that floating-point code requires. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
-#error "bent: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
+#error "bent: build without -ffast-math and -ffinite-math-only, which delete the NaN checks"
 #endif
 #ifdef __ASSOCIATIVE_MATH__
-#error "bent: build without -fassociative-math, the order of additions is part of the answer"
+#error "bent: build without -fassociative-math: the order of additions is part of the answer"
 #endif
 /* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's
    own macro stays. */
@@ -56,7 +56,7 @@
 #define BENT_EVAL_METHOD 0
 #endif
 #if BENT_EVAL_METHOD != 0 && BENT_EVAL_METHOD != 16
-#error "bent: this target computes in another precision than bent_real_t has"
+#error "bent: this target does not compute in the precision of bent_real_t"
 #endif
 
 #if DBL_MANT_DIG != 53

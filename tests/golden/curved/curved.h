@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 01c554dba0ea1c1318327f47c84f3a791d2aad3a1af600d0d66513e96ca4dd68, without this line
+ * Text: sha256 d1ad733c9bb0db9aca8b4ae686f9ca88b78cb19652040e2b20545d3cc6e4fbd1, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -40,7 +40,7 @@
 #include <stdint.h>
 
 #if (-1 >> 1) != -1
-#error "curved: right shifts of negative numbers have to keep the sign here"
+#error "curved: right shifts of negative numbers must keep the sign; here they do not"
 #endif
 
 #ifdef __cplusplus

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 b1a48d1a4b089fc43b3deae33f19b476b7cafda384c143972ce773d883622c93, without this line
+ * Text: sha256 2af3f0e7a663e258a8a77c92effbeaf69f7ade7091dc11e42f7d96bbd365bcb3, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
@@ -38,10 +38,10 @@
 
 /* Build settings that floating-point code requires. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
-#error "plain: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
+#error "plain: build without -ffast-math and -ffinite-math-only, which delete the NaN checks"
 #endif
 #ifdef __ASSOCIATIVE_MATH__
-#error "plain: build without -fassociative-math, the order of additions is part of the answer"
+#error "plain: build without -fassociative-math: the order of additions is part of the answer"
 #endif
 /* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's
    own macro stays. */
@@ -54,7 +54,7 @@
 #define PLAIN_EVAL_METHOD 0
 #endif
 #if PLAIN_EVAL_METHOD != 0 && PLAIN_EVAL_METHOD != 16
-#error "plain: this target computes in another precision than plain_real_t has"
+#error "plain: this target does not compute in the precision of plain_real_t"
 #endif
 
 #if FLT_MANT_DIG != 24

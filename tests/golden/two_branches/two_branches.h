@@ -5,7 +5,7 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 5668fd5bf6fb4c74ce9b0726b3e069a3c5233321dc223e5ddd16643654dcb01f, without this line
+ * Text: sha256 2cd1f0494dcef757da30fdf3ba544be7e505e59f34963b63bd539d879c2ff182, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
@@ -40,10 +40,10 @@
 
 /* Build settings that floating-point code requires. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
-#error "two_branches: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
+#error "two_branches: build without -ffast-math and -ffinite-math-only, which delete the NaN checks"
 #endif
 #ifdef __ASSOCIATIVE_MATH__
-#error "two_branches: build without -fassociative-math, the order of additions is part of the " \
+#error "two_branches: build without -fassociative-math: the order of additions is part of the " \
        "answer"
 #endif
 /* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's
@@ -57,7 +57,7 @@
 #define TWO_BRANCHES_EVAL_METHOD 0
 #endif
 #if TWO_BRANCHES_EVAL_METHOD != 0 && TWO_BRANCHES_EVAL_METHOD != 16
-#error "two_branches: this target computes in another precision than two_branches_real_t has"
+#error "two_branches: this target does not compute in the precision of two_branches_real_t"
 #endif
 
 #if FLT_MANT_DIG != 24
