@@ -49,7 +49,7 @@ FINE = {
     "HYSTGEN_FINE_MIN": "HYSTGEN_DRIVE_MIN", "HYSTGEN_FINE_MAX": "HYSTGEN_DRIVE_MAX",
     "hystgen_clamp_fine": "hystgen_clamp_drive",
 }
-"""Names of numbers finer than a drive code in such a model, and their meaning elsewhere."""
+"""Names of numbers finer than a drive code in a model with effects, and their meaning elsewhere."""
 
 SUMS = ("play_t", "reach_t", "sum_t")
 """Types of plays; in floating point every number has the same type."""
