@@ -102,7 +102,7 @@ def declared(name: str, members: Iterable[str], word: Any) -> type[Struct]:
 
 
 def memory_of(kind: type[Any]) -> Callable[[Any, DTypeLike], Any]:
-    """A function of blocks' tables and the type of `Real` that makes the blocks' memory, all 0.
+    """Return a function that makes the memory of blocks, all 0, from their tables and the type of `Real`.
 
     `kind`: a structure, made once per entry of the tables; or a NamedTuple of structures, each made once per entry of
     the tables' field of the same name.

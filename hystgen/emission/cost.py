@@ -175,8 +175,8 @@ class Counts:
 
     `factor`: multiplications in a product with a factor; `words`: qualify a multiplication; `plays`: by operator and
     engine, for plays, checks and limits: multiplications, comparisons, and further comparisons per play and per bit of
-    n, where engine `fast` is corners without a front; `both`: the same for corners that are solved for and then follow
-    the applied drive, which may differ; `solved`: multiplications per play of an inverse in engine loop; `chained`: of
+    n, where engine `fast` is corners without a front; `both`: the same for corners that are solved and then follow an
+    applied drive that may differ; `solved`: multiplications per play of an inverse in engine loop; `chained`: of
     an inverse with effects, multiplications, comparisons, and both per play; `braked`: multiplications of a lag behind
     a slew limit, and per halving of its search.
     """
