@@ -107,7 +107,7 @@ def words(name: str, value: object, example: str) -> tuple[str, ...]:
 
 
 def real(name: str, value: object, unit: str) -> float:
-    """Any real number, infinities and NaN included. Raises TypeError."""
+    """A real number of any value, infinities and NaN included. Raises TypeError."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise TypeError(f"{name} is a number of {unit}, not {kind(value)}")
     return float(value)
