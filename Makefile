@@ -3,20 +3,20 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-# Seeds of each kind that `make blind` takes from the report block, the first of them, and where it works
+# How many seeds of each kind `make blind` takes, the first of them (a block kept for reports), and its working folder
 FIRST := 0
 BLIND := single=260 pair=80 none=200 foreign=100 poor=65 snr=130
 BLIND_DIR := build/blind
 JOBS := 2
 
-# Modules are compiled once, not by each of some hundred processes that tests start
+# Modules are compiled once, not by each of the hundred or so processes that tests start
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test check prove lint fuzz check-bounds blind track docs links clean
 
-# What the demo needs of the package, and a compiler in case there is none
+# What the demo needs from the package, and a compiler in case there is none
 $(VENV)/demo: pyproject.toml
-	@echo "installing hystgen with what it fits, plots and compiles with, into $(VENV) .."
+	@echo "installing hystgen and what it needs to fit, plot and compile, into $(VENV) .."
 	@test -e $(VENV)/bin/python || $(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --disable-pip-version-check --editable '.[fit,plot,zig]'
 	@touch $@
@@ -37,16 +37,16 @@ demo: $(VENV)/demo
 	@echo examples/out/stage.png
 	@echo examples/out/report/report.html
 
-# Every feature once, without what is marked thorough; each file in one process, which compiles its functions once
+# Every feature once, without tests marked thorough; each file in one process, which compiles its functions once
 test: $(VENV)/ready
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m "not thorough"
 
-# All that CI runs; each file in one process too, whose tests share what they compute
+# Everything CI runs; each file in one process too, whose tests share what they compute
 check: $(VENV)/ready lint
 	$(BIN)/python tests/static_checks.py
 	$(BIN)/python -m pytest -n 2 --dist worksteal
 
-# All proofs of Frama-C, which has to be there; `make check` does a third of them
+# All proofs by Frama-C, which has to be installed; `make check` does a third of them
 prove: $(VENV)/ready
 	CI=true HYSTGEN_WHOLE=1 $(BIN)/python -m pytest -n 2 tests/test_proof.py
 
@@ -58,11 +58,11 @@ lint: $(VENV)/ready
 fuzz: $(VENV)/ready
 	HYSTGEN_FUZZ_SECONDS=300 $(BIN)/python -m pytest -n 2 tests/test_fuzz.py -k nothing
 
-# Ten times the random models of `make check`, against an exact model; those with faults are kept in build/oracle
+# Ten times as many random models as in `make check`, against an exact model; build/oracle keeps those with faults
 check-bounds: $(VENV)/ready
 	$(BIN)/python -m tests.oracle --models 3000
 
-# Makes the cases with their labels, has them diagnosed and counts; a case whose result is there is not run again
+# Makes the cases with their labels, diagnoses them and counts; a case that already has a result is not run again
 blind: $(VENV)/ready
 	set -e; for part in $(BLIND); do $(BIN)/python -m benchmarks.plants generate --block report --kind $${part%=*} \
 	    --seeds $(FIRST):$$(($(FIRST) + $${part#*=})) -o $(BLIND_DIR) --jobs $(JOBS); done
@@ -70,7 +70,7 @@ blind: $(VENV)/ready
 	$(BIN)/python -m benchmarks.plants score $(BLIND_DIR)/cases $(BLIND_DIR)/labels $(BLIND_DIR)/results \
 	    --json $(BLIND_DIR)/score.json
 
-# Blind plants behind compensators made from their records, four an effect
+# Blind plants behind compensators made from their records, four per effect
 track: $(VENV)/ready
 	$(BIN)/python -m benchmarks.plants track --seeds 0:5 --jobs $(JOBS)
 
@@ -78,7 +78,7 @@ track: $(VENV)/ready
 docs: $(VENV)/ready
 	$(BIN)/python -m sphinx -W --keep-going -b html docs build/docs
 
-# Links of the pages and the site, those to other sites too; `make check` tries all others
+# All links of the pages and the site; `make check` skips only those to other sites
 links: docs
 	$(BIN)/lychee --no-progress --include-fragments=anchor-only --max-retries 3 *.md docs build/docs
 

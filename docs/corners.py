@@ -1,4 +1,4 @@
-"""The figure of docs/corners.md: a drive with its corners, the loop they are on, and the curve that is read.
+"""The figure of docs/corners.md: a drive with its corners, the loop they lie on, and the curve that serves them all.
 
     python docs/corners.py
 """

@@ -1,6 +1,6 @@
 """What the site takes from the program itself: keys of the parameter file, effects, status bits, cores, the C header.
 
-A directive a table, so that no page can say anything else than the program does.
+Each table has a directive, so no page can differ from what the program does.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ MODELS = {
     {name: thermal, source: logged, gain_per_degree: 0.001, offset_per_degree: 0.01, reference: 20}]}
 """,
 }
-"""Parameter files of the headers that are shown: of plays alone, and of effects with every call that there is."""
+"""Parameter files of the headers shown: one with plays alone, and one whose effects need every call."""
 
 ENVELOPE = PLAYS + ", memoryless: {kind: tanh, ascending: {a0: 60, a1: 0.01, a2: 0, a3: 0}}}"
 
@@ -66,12 +66,12 @@ def cell(text: object) -> str:
 
 
 def code(text: object) -> str:
-    """The same as code; nothing for nothing."""
+    """Text as code in a table; an empty cell stays empty."""
     return f"`{cell(text)}`" if text not in ("", None) else ""
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of Markdown, each cell text of Markdown already."""
+    """A table of Markdown; cells are Markdown already."""
     lines = [header, ["---"] * len(header), *rows]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n"
 
@@ -133,7 +133,7 @@ class Generated(SphinxDirective):
 
 
 class ParameterKeys(Generated):
-    """Every key of the parameter file, a section each mapping."""
+    """Every key of the parameter file, with a section for each mapping."""
 
     sections: ClassVar = {
         "Units": "units", "ModelParameters": "model", "PIParameters": "pi", "DensityParameters": "density",
@@ -154,7 +154,7 @@ class ParameterKeys(Generated):
 
 
 class EffectKeys(Generated):
-    """Every effect of the catalogue with the keys of each shape, and how a compensator takes it out."""
+    """Every effect of the catalogue with the keys of each shape, and how a compensator removes it."""
 
     def lines(self) -> Iterator[str]:
         definitions = hystgen.schema()["$defs"]
@@ -211,7 +211,7 @@ class Arithmetics(Generated):
 
 
 def for_doxygen(header: str) -> str:
-    """What a header declares, its comments marked as Doxygen wants them, but those above a group of macros."""
+    """What a header declares, with its comments marked for Doxygen, except those above a group of macros."""
     declared = header[header.index('extern "C" {') + len('extern "C" {') :]
     marked = re.sub(r"^( *)/\* (?!.*\*/\n#define)", r"\1/** ", declared, flags=re.MULTILINE)
     marked = re.sub(r"(?<=\S)( +)/\* ", r"\1/**< ", marked)
@@ -240,7 +240,7 @@ def doxygen(app: Sphinx, config: Config) -> None:
 
 
 def escaped(_app: Sphinx, _context: object, lines: list[str]) -> None:
-    """Help of the command line as reStructuredText, where a star alone begins something."""
+    """Help of the command line as reStructuredText, in which a bare star would begin markup."""
     lines[:] = [line.replace("*", "\\*") for line in lines]
 
 

@@ -44,9 +44,9 @@ PLAYS = np.array([[0.0, 4.0, 9.0, 16.0, 26.0], [0.10, 0.03, 0.025, 0.02, 0.015]]
 
 @dataclass(frozen=True)
 class Case:
-    """A plant, the drive range it is used in, whether it leads, and the model that `hystgen.identify` fits.
+    """A plant, its drive range, whether it leads, and the model that `hystgen.identify` fits.
 
-    The output of a leading plant runs ahead of its input. As a play sum it would need negative weights, which
+    The output of a leading plant runs ahead of its input. A play sum for it would need negative weights, which
     `identify` never returns; but its inverse lags. So input and output of the records are exchanged, and the identified
     model itself is the compensator: its forward operator is emitted.
     """
@@ -91,7 +91,7 @@ def bell(alpha: Array, beta: Array) -> Array:
 
 
 def cases() -> list[Case]:
-    """The plants, starting with those that suit a play sum; then some of them again, with other models."""
+    """The plants, those that suit a play sum first; then some of them again, with other models."""
     slip = MaxwellSlip([1.0, 0.8, 0.6, 0.5], [0.4, 0.9, 1.5, 2.6], spring=1.0)
     hardening = BoucWen(alpha=1.6, k=0.1, D=8.0, beta=0.6, gamma=0.3, n=1.0)
     softening = BoucWen(alpha=0.4, k=0.1, D=8.0, beta=0.6, gamma=0.3, n=1.0)
@@ -104,12 +104,12 @@ def cases() -> list[Case]:
     plays = Case("Preisach, surface of a play sum", Preisach(play_surface, *volts).simulate, volts)
     blocks = Case("Maxwell-slip", slip.simulate, (-6.0, 6.0), leads=True)
     inside = tuple(slip.play_sum().inverse().thresholds[1:])
-    apart = "minor loops stay open and depend on what was before"
-    place = "congruent, but loops depend on the place, for which the front stands"
+    apart = "minor loops stay open and depend on the history"
+    place = "congruent, but loops depend on where they lie, which the front models"
     open_loops = [
         Case("Dahl friction in a positioner", lambda v: 0.1 * v - friction.simulate(v), volts, remark=apart),
         Case("Bouc-Wen, alpha = 1.6", hardening.simulate, volts, remark=apart),
-        Case("Bouc-Wen, alpha = 0.4", softening.simulate, volts, leads=True, remark=apart + "; by exchange"),
+        Case("Bouc-Wen, alpha = 0.4", softening.simulate, volts, leads=True, remark=apart + "; axes exchanged"),
         Case("Duhem, Coleman-Hodgdon", lagging.simulate, volts, remark=apart),
     ]
     others = [
@@ -119,10 +119,10 @@ def cases() -> list[Case]:
     ]
     given = tuple(PLAYS[0][1:].tolist())
     return [
-        replace(plays, remark="a PI model, but for the thresholds that were chosen"),
-        replace(plays, model="pi", thresholds=given, remark="a PI model, its thresholds given"),
-        replace(blocks, remark="a PI model by exchange of input and output, but for the thresholds"),
-        replace(blocks, model="pi", thresholds=inside, remark="a PI model by exchange, its thresholds given"),
+        replace(plays, remark="a PI model, except for the chosen thresholds"),
+        replace(plays, model="pi", thresholds=given, remark="a PI model, thresholds given"),
+        replace(blocks, remark="a PI model with the axes exchanged, except for the thresholds"),
+        replace(blocks, model="pi", thresholds=inside, remark="a PI model with the axes exchanged, thresholds given"),
         *open_loops,
         *others,
         *(replace(case, model="pi", thresholds=32, remark="32 plays") for case in open_loops),
@@ -133,7 +133,7 @@ def cases() -> list[Case]:
 
 
 def moves(corners: list[float]) -> Array:
-    """Half cosines from corner to corner, in shares of the drive range; longer moves take longer."""
+    """Half cosines from corner to corner, as shares of the drive range; longer moves take longer."""
     parts = []
     for start, stop in itertools.pairwise(corners):
         count = max(round(0.25 * SAMPLES * abs(stop - start)), 12)
@@ -142,7 +142,7 @@ def moves(corners: list[float]) -> Array:
 
 
 def training() -> Array:
-    """Two full sweeps, loops of three sizes at three heights, and a sine that fades out, in shares of the range."""
+    """Two full sweeps, loops of three sizes at three heights, and a sine that fades out, as shares of the range."""
     loops = [0.5, 0.0, 1.0, 0.0, 1.0, 0.2, 0.8, 0.35, 0.65, 0.45, 0.55, 0.1, 0.4, 0.15, 0.35, 0.05, 0.95, 0.6, 0.9,
              0.65, 0.85, 0.0, 1.0, 0.5]
     k = np.arange(3 * SAMPLES) / SAMPLES
@@ -150,16 +150,16 @@ def training() -> Array:
 
 
 def held_out() -> Array:
-    """One full sweep, then two sines with no common period, in shares of the range."""
+    """One full sweep, then two sines with no common period, as shares of the range."""
     k = np.arange(2 * SAMPLES) / SAMPLES
     two = 0.5 + 0.3 * np.sin(2.0 * np.pi * 2.3 * k) + 0.17 * np.sin(2.0 * np.pi * 7.9 * k)
     return np.concatenate([moves([0.5, 1.0, 0.0, float(two[0])]), two])
 
 
 def trajectory() -> tuple[Array, int]:
-    """A reference in shares of the output range, and where errors begin to count: after a sweep of the whole range.
+    """A reference as shares of the output range, and where errors begin to count: after a sweep of the whole range.
 
-    The sweep wipes the start of plant and compensator. The part that counts is three swelling sines and a staircase.
+    The sweep wipes out the start of plant and compensator. What counts is three swelling sines and a staircase.
     """
     k = np.arange(3 * SAMPLES) / SAMPLES
     turns = 2.0 * np.pi * k
@@ -183,7 +183,7 @@ def in_c(model: hystgen.Model, operator: str, arithmetic: str, x: Array) -> Arra
 
 
 def memory(case: Case) -> tuple[float, float, float]:
-    """Three figures that are 0 for a play sum, for loops over a tenth of the drive range, in % of such a loop's height.
+    """Three figures of loops over a tenth of the drive range, in % of such a loop's height; all are 0 for a play sum.
 
     How much the height differs between three places; how much it differs in one place depending on the history; how far
     apart a loop's start and end are. The plants do not depend on time, so a drive is fully described by its corners.
@@ -300,7 +300,7 @@ def main() -> None:
     out = Path(__file__).resolve().parent / "out"
     parser.add_argument("-o", "--output", type=Path, default=out, help="folder of the table and the figure")
     names = dict.fromkeys(case.name for case in cases())
-    parser.add_argument("--plant", default="", choices=names, metavar="NAME", help="this plant alone")
+    parser.add_argument("--plant", default="", choices=names, metavar="NAME", help="only this plant")
     given = parser.parse_args()
     print(table(make(given.output, given.plant)))
 

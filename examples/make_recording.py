@@ -3,9 +3,9 @@
 These are SIMULATED, not measured. The plant is a Preisach relay plane: a continuum of two-position relays that switch
 up at drive alpha and down at drive beta, with a density that is bell-shaped in the relay's centre and falls off with
 its half width, plus a reversible part that stiffens slightly towards the ends. A Prandtl-Ishlinskii model would need a
-density that does not depend on the centre, and a straight reversible part, so it can only approximate this plant;
-nothing here comes from hystgen. The sensor adds noise of 6 nm rms, and both drive and sensor pass through 16-bit
-converters. The noise comes from a fixed seed, so the files have the same bytes wherever they are made.
+density that does not depend on the centre, and a linear reversible part, so it can only approximate this plant; nothing
+here comes from hystgen. The sensor adds noise of 6 nm rms, and both drive and sensor pass through 16-bit converters.
+The noise comes from a fixed seed, so the files have the same bytes wherever they are made.
 
 Usage: python examples/make_recording.py [FOLDER]
 """
@@ -30,7 +30,7 @@ NOISE = 0.006  # um rms
 CODES = 65535
 
 CENTRE, CENTRE_SPREAD = 55.0, 35.0  # V, relay centres: mean and standard deviation
-HALF_WIDTH = 25.0  # V, scale on which relays become rarer with their half width
+HALF_WIDTH = 25.0  # V, over which the density of relays falls by a factor of e as their half width grows
 IRREVERSIBLE = 8.0  # um, all relays from down to up
 REVERSIBLE = 11.0  # um at full drive
 STIFFENING = 0.03  # share of the reversible part
@@ -46,7 +46,7 @@ def everett_table() -> Array:
     density = np.exp(-0.5 * ((centre - CENTRE) / CENTRE_SPREAD) ** 2 - np.abs(half) / HALF_WIDTH)
     density = np.where(half > 0.0, density, np.where(half == 0.0, 0.5 * density, 0.0))
     table = np.zeros((GRID + 1, GRID + 1))
-    # Summed up to alpha, and from the drive's top down to beta
+    # Summed up to alpha, and from the top of the drive range down to beta
     table[1:, :GRID] = np.cumsum(np.cumsum(density, axis=0)[:, ::-1], axis=1)[:, ::-1]
     return np.asarray(table / table[GRID, 0])
 
@@ -101,8 +101,8 @@ class Relays:
 
 
 def bell_noise(seed: int, count: int) -> Array:
-    """Nearly normal noise of unit variance: twelve words per sample from a raw generator whose stream numpy
-    guarantees."""
+    """Nearly normal noise of unit variance: twelve words per sample from a raw generator whose stream numpy promises
+    not to change."""
     words = np.random.PCG64(seed).random_raw(12 * count).reshape(count, 12)
     return np.asarray(((words >> np.uint64(11)).astype(np.float64) * 2.0**-53).sum(axis=1) - 6.0)
 
@@ -122,7 +122,7 @@ def measure(drive: list[float], seed: int) -> list[tuple[float, float, float]]:
 
 
 def ramps(corners: list[float], samples: list[int]) -> Iterator[float]:
-    """Straight lines from corner to corner, each in the number of samples given."""
+    """Straight lines from corner to corner, each with the given number of samples."""
     for (start, stop), count in zip(itertools.pairwise(corners), samples, strict=True):
         for k in range(count):
             yield start + (stop - start) * k / count

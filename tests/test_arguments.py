@@ -49,11 +49,11 @@ class Frame:
 # A call, the error it ends in, and what its message says
 SIGNALS: dict[str, tuple[Callable[[], Any], type[Exception], str]] = {
     "two dimensions": (lambda: MODEL.simulate(np.zeros((5, 2))), ValueError, r"v has .*\(N,\), not shape \(5, 2\)"),
-    "a column": (lambda: MODEL.simulate(np.zeros((5, 1))), ValueError, r"give .ravel\(\)"),
+    "a column": (lambda: MODEL.simulate(np.zeros((5, 1))), ValueError, r"pass its .ravel\(\)"),
     "two, float32": (lambda: MODEL.simulate(np.zeros((5, 2)), "float32"), ValueError, r"v has .* not shape \(5, 2\)"),
     "two, inverse": (lambda: INVERSE.simulate(np.zeros((5, 2))), ValueError, r"u has .* not shape \(5, 2\)"),
     "two, session": (lambda: MODEL.session().run([[1.0]]), ValueError, r"not shape \(1, 1\)"),
-    "a table": (lambda: MODEL.simulate(Frame()), ValueError, "give one of its columns"),
+    "a table": (lambda: MODEL.simulate(Frame()), ValueError, "pass one of its columns"),
     "ragged": (lambda: MODEL.simulate([[1, 2], [3]]), ValueError, "rows of different lengths"),
     "a file": (lambda: MODEL.simulate("fit.csv"), TypeError, "real numbers .* not 'fit.csv'"),
     "texts": (lambda: MODEL.simulate(["a", "b"]), TypeError, "v is an array of real numbers"),
@@ -117,7 +117,7 @@ OPTIONS: dict[str, tuple[dict[str, Any], type[Exception], str]] = {
     "units as a pair": ({"units": ("V", "nm")}, TypeError, r"units is a mapping .* not a tuple; give {'input': 'V'"),
     "units as text": ({"units": "V,nm"}, TypeError, "not 'V,nm'; give {'input'"),
     "units of the drive": ({"units": {"drive": "V"}}, ValueError, "units has no drive; its keys are input, output"),
-    "units of a number": ({"units": {"input": 3}}, TypeError, "3 is in it"),
+    "units of a number": ({"units": {"input": 3}}, TypeError, "it contains 3"),
     "name of an option": ({"threshold": 3}, TypeError, r"\(\) has no option threshold; did you mean thresholds\?"),
     "history of one": ({"history": 5}, TypeError, r"history is a list .* not 5; give a list .* \[100, -100\]"),
     "history as text": ({"history": "100,-100"}, TypeError, "not '100,-100'; give a list"),

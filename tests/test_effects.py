@@ -1249,7 +1249,7 @@ def test_one_effect_says_how_the_plays_move(tmp_path: Path) -> None:
     assert [p.path for p in caught.value.problems] == ["model.effects[1].name"]
     (own,) = effects.load_user_effects(tmp_path / "own.py")
     both = [make("rate_dependence", betas=(0.1, 0.1, 0.1)), own.model_validate({"name": "user:own"})]
-    with pytest.raises(EffectsError, match="one effect says how the plays move, not rate_dependence and user:own"):
+    with pytest.raises(EffectsError, match="effect can set how the plays move, not rate_dependence and user:own"):
         Chain(CASCADE, both)
 
 
@@ -1298,7 +1298,7 @@ def test_simulate_warns_outside_the_range_and_needs_its_columns(
     t, v = drive(300)
     v = 3 * v
     code, _, err = run("simulate", path, written(tmp_path, "a.csv", t, v))
-    assert (code, err) == (2, "error: the effect thermal needs the column temperature, which a record does not have")
+    assert (code, err) == (2, "error: the effect thermal needs the column temperature, which a record lacks")
     code, _, err = run("simulate", path, written(tmp_path, "a.csv", t, v, temperature=20 + t))
     outside = int(np.count_nonzero(np.abs(v) > 4))
     assert (code, err) == (

@@ -323,7 +323,7 @@ def test_unknown_precision_is_refused_and_says_why(tmp_path: Path) -> None:
     run = functools.partial(gcc.run, ["-std=gnu89", "-c", "-o", tmp_path / "one.o", tmp_path / "plain.c"])
     for flag, words in (
         ("-U__FLT_EVAL_METHOD__", "compile as C99 or C[+][+]11 or later"),
-        ("-D__FLT_EVAL_METHOD__=2", "another precision than plain_real_t"),
+        ("-D__FLT_EVAL_METHOD__=2", "compute in the precision of plain_real_t"),
     ):
         with pytest.raises(compilers.CompileError, match=words):
             gcc.run(["-w", flag, *run.args[0]])

@@ -239,8 +239,8 @@ def test_the_figure_of_the_noise_is_that_of_the_drive(arithmetic: str) -> None:
     one = of("name: lag, time_constant: 0.004")
     (said, *_) = told(one, arithmetic=arithmetic)
     found = re.match(
-        r"Noise of the reference reaches the drive ([0-9.]+) times as large as slow motion, most at ([0-9.]+) Hz: "
-        r"([0-9.e-]+) um rms of it there (?:is ([0-9.e-]+) V rms|dither the drive by one code rms)",
+        r"Noise in the reference is amplified up to ([0-9.]+) times as much as slow motion, most at ([0-9.]+) Hz: "
+        r"there, ([0-9.e-]+) um rms of it moves the drive by (?:([0-9.e-]+) V rms|one code rms)",
         said,
     )
     assert found, said

@@ -181,7 +181,7 @@ def test_elements_that_cannot_be() -> None:
             element([1.0], 0.0, 1.0)
         with pytest.raises(ValueError, match="a yield stress is a number that is not negative"):
             element([1.0], 1.0, -1.0)
-        with pytest.raises(ValueError, match="an input has to consist of finite"):
+        with pytest.raises(ValueError, match="all samples of an input have to be finite"):
             element([0.0, float("nan")], 1.0, 1.0)
         with pytest.raises(ValueError, match="strain has to be a finite number, not nan"):
             element([1.0], 1.0, 1.0, float("nan"))

@@ -112,7 +112,7 @@ def test_a_drive_that_may_not_come_to_rest_is_warned_of(tmp_path: Path) -> None:
     """Between two branches, which only the catalogue's lag arrives at from one side."""
     path = written(tmp_path, FOLLOWER)
     path.write_text(path.read_text().replace("  output_offset", BRANCHES + "  output_offset"))
-    with pytest.warns(UserWarning, match=r"go to and fro at rest, by up to [0-9.]+ V; make the effect a lag"):
+    with pytest.warns(UserWarning, match=r"may swing between them, by up to [0-9.]+ V; make the effect a lag"):
         emitted_files(hystgen.load(path, [outside(tmp_path)]))
 
 
@@ -307,18 +307,18 @@ RATES = "hystgen_number_t rate;\n    hystgen_number_t inverse_rate;"
 BAD_C = {
     "number": (STEP, f"0.5f * {STEP}", ":39: a number with a fraction; put it in the table"),
     "division": ("y - self->reached)", "y / self->reached)", ":32: a division; put the reciprocal in the table"),
-    "directive": (SECOND, f"#include <math.h>\n{SECOND}", ":8: a line of the preprocessor; only #include"),
-    "call": ("return self->reached;", "return sin(self->reached);", ":40: sin is called, and is not in the file"),
+    "directive": (SECOND, f"#include <math.h>\n{SECOND}", ":8: a preprocessor line; only #include"),
+    "call": ("return self->reached;", "return sin(self->reached);", ":40: sin is called but not in the file"),
     "type": (MEMORY, "double reached;", ":9: double; write hystgen_signal_t"),
-    "field": (MEMORY, "hystgen_real_t seen;", ":8: hystgen_user_follower_t is declared otherwise; write typedef"),
-    "swapped": (RATES, RATES.replace("rate", "other_rate", 1), f":3: {TABLE} is declared otherwise"),
-    "global": (SECOND, f"static int count;\n{SECOND}", ":8: 'static int count;' belongs to no type"),
+    "field": (MEMORY, "hystgen_real_t seen;", ":8: hystgen_user_follower_t is declared differently; write typedef"),
+    "swapped": (RATES, RATES.replace("rate", "other_rate", 1), f":3: {TABLE} is declared differently"),
+    "global": (SECOND, f"static int count;\n{SECOND}", ":8: 'static int count;' is not part of a type"),
     "verb": ("follower_absorb(", "follower_absrb(", ":1: has no hystgen_user_follower_absorb; write static"),
     "comment": (VOID, "    (void)t; /* open\n    self", ":16: a comment that does not end"),
     "slashes": (VOID, "    (void)t; // unused\n    self", ":16: a comment with //; write /* */"),
     "long": (VOID, f"    (void)t; /* {95 * 'x'} */\n    self", ":16: 114 columns, more than 100"),
     "letters": (VOID, "    (void)t; /* \u00e9 */\n    self", ":16: '\u00e9' is not printable ASCII"),
-    "end": ("    return self->reached;\n}\n", "    return self->reached;\n}\nint x", ":42: 'int x' belongs to no type"),
+    "end": ("    return self->reached;\n}\n", "    return self->reached;\n}\nint x", ":42: 'int x' is not part of"),
     "bare": ("hystgen_product(&t->rate, x - self->reached)", "t->rate * (x - self->reached)", ":39: t->rate by itself"),
     "foreign": ("self->reached = x;", "self->reached = hystgen_tanh(x);", ":17: hystgen_tanh is not in the file"),
     "joined": (VOID, "    (void)t; /* hidden *\\\n/ (void)system(0); /* */\n    self", ":16: a backslash, which joins"),
@@ -328,15 +328,15 @@ BAD_C = {
     "trigraph": (VOID, "    (void)t; /* hidden *?" "?/\n/ (void)system(0); /* */\n    self", ":16: two question marks"),
     "digraph": (VOID, "    (void)t; self<:0:>.reached = x;\n    self", ":16: <:, a digraph"),
     "directive digraph": (SECOND, f"%:include <math.h>\n{SECOND}", ":8: %:, a digraph"),
-    "comment in a text": (VOID, '    (void)"/*"; system(0); (void)"*/";\n    self', ":16: a text or a character"),
-    "comment in a character": (VOID, "    (void)'/*'; system(0);\n    (void)'*/';\n    self", ":16: a text or a char"),
+    "comment in a text": (VOID, '    (void)"/*"; system(0); (void)"*/";\n    self', ":16: a string or a character"),
+    "comment in a character": (VOID, "    (void)'/*'; system(0);\n    (void)'*/';\n    self", ":16: a string or"),
     "comment in slashes": (VOID, "    // /*\n    system(0);\n    // */\n    self", ":16: a comment with //"),
     "call beside a comment": ("return self->reached;", "return sin/* of */\n(self->reached);", ":40: sin is called"),
     "call in parentheses": ("return self->reached;", "return ((sin)) (self->reached);", ":40: (sin) is called"),
     "call of a pointer": ("return self->reached;", "return (*self->reached)(x);", ":40: *self->reached is called"),
-    "call of an answer": ("y - self->reached);", "y - self->reached)(x);", ":32: what hystgen_product returns is"),
-    "late include": (SECOND, f'#include "hystgen_runtime.h"\n{SECOND}', ":8: a line of the preprocessor"),
-    "other characters": (VOID, "    (void)t; a$b = x;\n    self", ":16: $ is no character of C"),
+    "call of an answer": ("y - self->reached);", "y - self->reached)(x);", ":32: the result of hystgen_product is"),
+    "late include": (SECOND, f'#include "hystgen_runtime.h"\n{SECOND}', ":8: a preprocessor line"),
+    "other characters": (VOID, "    (void)t; a$b = x;\n    self", ":16: $ is not a character of C"),
     "return": (VOID, "    (void)t;\r    self", r":16: '\\r' is not printable ASCII"),
     "escape": ("    (void)t;\n    return y;", "    (void)t; }\nint y(void) {\n    return 0;", ":25: 'int y(void)"),
 }  # fmt: skip

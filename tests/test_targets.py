@@ -363,7 +363,7 @@ def test_constants_count_as_ram_on_the_avr(name: str, arithmetic: str, engine: s
     report = hystgen.verify(model(name), targets=[targets.AVR.name], **options)
     (row,) = report.rows
     assert report.ok, report.table()
-    said = re.search(r"at most (\d+) bytes of RAM in all", emitted_files(model(name), **options)[f"{name}.h"])
+    said = re.search(r"at most (\d+) bytes of RAM in total", emitted_files(model(name), **options)[f"{name}.h"])
     assert said
     assert 0.8 * int(said[1]) < row.ram <= int(said[1])
     assert row.flash > 1000

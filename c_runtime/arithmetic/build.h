@@ -3,15 +3,15 @@
 
 #ifdef HYSTGEN_FIXED
 #if (-1 >> 1) != -1
-#error "hystgen: right shifts of negative numbers have to keep the sign here"
+#error "hystgen: right shifts of negative numbers must keep the sign; here they do not"
 #endif
 #else
 /* Build settings that floating-point code requires. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
-#error "hystgen: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
+#error "hystgen: build without -ffast-math and -ffinite-math-only, which delete the NaN checks"
 #endif
 #ifdef __ASSOCIATIVE_MATH__
-#error "hystgen: build without -fassociative-math, the order of additions is part of the answer"
+#error "hystgen: build without -fassociative-math: the order of additions is part of the answer"
 #endif
 /* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's
    own macro stays. */
@@ -24,7 +24,7 @@
 #define HYSTGEN_EVAL_METHOD 0
 #endif
 #if HYSTGEN_EVAL_METHOD != 0 && HYSTGEN_EVAL_METHOD != 16
-#error "hystgen: this target computes in another precision than hystgen_real_t has"
+#error "hystgen: this target does not compute in the precision of hystgen_real_t"
 #endif
 
 #ifdef HYSTGEN_REAL_IS_DOUBLE

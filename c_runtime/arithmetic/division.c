@@ -1,4 +1,4 @@
-/* Long products and quotients without library calls: an output is divided by a slope to give an
+/* Long products and quotients without library calls, for dividing an output by a slope to get an
    input. Called by the plays of both engines in fixed point. */
 #include "arithmetic/fixed.h"
 #include "hystgen_runtime.h"
@@ -26,7 +26,7 @@ HYSTGEN_API uint64_t hystgen_wide(uint32_t a, uint32_t b) {
 }
 
 /* d / slope to the nearest integer, d >= 0: the upper bits of d times the reciprocal
-   2^(32 + shift) / slope. A slope is at least 16, so that `shift` is 2 .. 29. */
+   2^(32 + shift) / slope. A slope is at least 16, so `shift` is 2 .. 29. */
 HYSTGEN_API int64_t hystgen_divide_by_slope(int64_t d, uint32_t reciprocal, unsigned int shift) {
     const uint64_t low = hystgen_wide((uint32_t)d, reciprocal) >> HYSTGEN_WORD;
     const uint64_t quotient =

@@ -1,4 +1,4 @@
-/* First include of a file for float64 alone, so that the file compiles when opened in an editor. */
+/* Included first by files for float64 only, so that they compile when opened in an editor. */
 #ifndef HYSTGEN_REAL_IS_DOUBLE
 #define HYSTGEN_REAL_IS_DOUBLE
 #endif

@@ -1,5 +1,5 @@
-/* First include of a file for fixed point alone, so that the file compiles (in q31) when opened in
-   an editor. */
+/* Included first by files for fixed point only, so that they compile (in q31) when opened in an
+   editor. */
 #ifndef HYSTGEN_FIXED
 #define HYSTGEN_FIXED
 #endif

@@ -10,7 +10,7 @@
 #include "arithmetic/build.h"
 #include "arithmetic/soft_float.h"
 
-/* Types of a model's numbers: all the same in floating point, integers as wide as necessary in
+/* Types of a model's numbers: a single one in floating point, integers as wide as necessary in
    fixed point. play: inputs of the plays; reach: inputs at which plays start to follow; sum:
    outputs before rounding; low: the lower part of the sum stored in a corner. */
 #if defined(HYSTGEN_FIXED)
@@ -41,8 +41,8 @@ typedef hystgen_real_t hystgen_sum_t;
 #endif
 
 /* In a model with effects, signal: a value between blocks, in fixed point wider than a code; fine:
-   the output of the drive side, in fixed point with bits below a code; travel: the distance covered
-   by the drive. Without effects, and in floating point, all of them have the caller's type, except
+   the output of the drive side, in fixed point finer than a code; travel: the distance covered by
+   the drive. Without effects, and in floating point, all of them have the caller's type, except
    that signals of engine loop are sums of its plays. */
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
 typedef hystgen_sum_t hystgen_signal_t;
@@ -63,7 +63,7 @@ typedef hystgen_real_t hystgen_number_t;
 #endif
 
 /* Storage classes of functions in emitted files: a model's own copies of kernels are static; some
-   of them are not inlined, to need less stack. */
+   of them are not inlined, to save stack. */
 #include "arithmetic/storage.h"
 #define HYSTGEN_API
 #define HYSTGEN_KERNEL

@@ -1,4 +1,4 @@
-/* Functions that compilers must not inline, to need less stack. */
+/* Functions that compilers must not inline, to save stack. */
 
 #if defined(__GNUC__)
 #define HYSTGEN_APART __attribute__((noinline)) static /* has several callers, or rarely runs */

@@ -5,7 +5,7 @@
 
 /* Sets the start memory of the parameter file. */
 void hystgen_operator_init(hystgen_operator_t *self);
-/* All plays 0, status cleared, then one ordinary step with operator_x. */
+/* Sets all plays to 0, clears the status, and makes one ordinary step with operator_x. */
 void hystgen_operator_reset(hystgen_operator_t *self, hystgen_real_t operator_x);
 #ifdef HYSTGEN_FORWARD
 /* One sample: drive v in, output out. Cannot fail. */
@@ -13,7 +13,7 @@ hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t v)
 #else
 /* One sample: reference u in, drive out, inside HYSTGEN_DRIVE_MIN .. MAX. Cannot fail. */
 hystgen_real_t hystgen_operator_step(hystgen_operator_t *self, hystgen_real_t u);
-/* After a step: the drive actually applied in place of the one returned. */
+/* Reports, after a step, the drive actually applied in place of the one returned. */
 void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied);
 #endif
 /* HYSTGEN_STATUS_* bits since the last call; reading clears them. */

@@ -14,7 +14,7 @@ static hystgen_real_t hystgen_inverse_clamp(hystgen_reach_t u) {
 }
 
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
-/* Output of the drive side in a model with effects, limited to that of the drive range. */
+/* Output of the drive side in a model with effects, limited to what the drive range allows. */
 static hystgen_fine_t hystgen_clamp_fine(hystgen_reach_t a) {
     if (a < HYSTGEN_FINE_MIN) {
         return (hystgen_fine_t)HYSTGEN_FINE_MIN;

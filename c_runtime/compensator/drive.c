@@ -40,13 +40,13 @@ static hystgen_reach_t hystgen_inverse_drive(hystgen_inverse_t *self, hystgen_re
 }
 #elif defined(HYSTGEN_CHAIN) && defined(HYSTGEN_HAS_TWO_BRANCHES)
 #ifdef HYSTGEN_HAS_STEADY_LAG
-/* Whether a drive that should go back by `back` changes to the other branch, at the distance `way`:
-   only if the error of holding exceeds that of the lag over `way` in the first sample of a turn. */
+/* Whether a drive that should move back by `back` turns to the other branch, a distance `way` away:
+   only if holding costs a larger error than the lag does over `way` in the first sample. */
 static inline bool hystgen_turns(hystgen_signal_t back, hystgen_signal_t way) {
     return back - HYSTGEN_HOLD > hystgen_inverse_missed(way < 0 ? -way : way);
 }
 #else
-/* Whether a drive that should go back by `back` changes to the other branch. */
+/* Whether a drive that should move back by `back` turns to the other branch. */
 static inline bool hystgen_turns(hystgen_signal_t back, hystgen_signal_t way) {
     (void)way;
     return back > HYSTGEN_HOLD;

@@ -1,6 +1,6 @@
-/* Text that emission writes for each model, before the operators: constants, tables and, for a
+/* What emission writes for each model, before the operators: constants, tables and, for a
    memoryless part in floating point, functions. Those below belong to a small model, so that each
-   file compiles when opened in an editor. With HYSTGEN_CONFIGURED a real model replaces them.
+   file compiles when opened in an editor. With HYSTGEN_CONFIGURED, a real model replaces them.
 
    A function whose name begins with hystgen_operator_ is the same in the forward and in the inverse
    operator: emission writes a copy for each. In an editor the operator is the inverse, or the

@@ -11,9 +11,9 @@ HYSTGEN_API int64_t hystgen_nearest(int64_t x, unsigned int bits) {
     return (x + ((int64_t)1 << (bits - 1u)) - (x < 0 ? 1 : 0)) >> bits;
 }
 
-/* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece:
-   the arguments are the beginnings of the pieces, the left shifts that scale their lengths to 2^31,
-   and their coefficients from degree 0. */
+/* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece.
+   Arguments: where the pieces begin, the left shifts that scale their lengths to 2^31, and their
+   coefficients from degree 0. */
 HYSTGEN_API int64_t hystgen_curve(const int32_t *knot, const uint8_t *scale,
                                   const int32_t *coefficient, unsigned int pieces,
                                   unsigned int degree, int32_t x) {

@@ -2,11 +2,11 @@
 
     python c_runtime/front/fit_coefficients.py [--format float32|float64]
 
-Every polynomial interpolates f(d) - f(0) at Chebyshev nodes in d, the one nearest to d = 0 moved onto it, where the
-error then is that of the rounded f(0) alone. Coefficients are rounded to the format one by one from the lowest, and
-the higher ones are fitted again each time, so that they make up for the rounding. Centers of pieces are moved a
-little until f(0) is almost a number of the format (S. Gal, "Computing elementary functions: a new approach for
-achieving high accuracy and good performance", 1986). `tanh_error` and `atanh_error` bound the error of the kernels.
+Every polynomial interpolates f(d) - f(0) at Chebyshev nodes in d, with the node nearest to 0 moved to 0, where the only
+error is then that of the rounded f(0). Coefficients are rounded to the format one by one, the lowest first, and the
+higher ones are refitted each time to make up for the rounding. Centers of pieces are moved a little until f(0) is
+almost a number of the format (S. Gal, "Computing elementary functions: a new approach for achieving high accuracy and
+good performance", 1986). `tanh_error` and `atanh_error` bound the error of the kernels.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def worst(f: Function, coefficients: list[mp.mpf], low: mp.mpf, high: mp.mpf, po
 
 
 def center(f: Function, low: mp.mpf, high: mp.mpf, shape: Shape) -> mp.mpf:
-    """The point nearest to the middle, on the grid, at which f is within ulp/64 of a multiple of the ulp below 1."""
+    """The grid point nearest to the middle at which f is within ulp/64 of a multiple of the ulp below 1."""
     middle = mp.nint(mp.ldexp((low + high) / 2, shape.grid))
     for i in itertools.count():
         for step in (i, -i):
@@ -115,7 +115,7 @@ def odd_polynomial(f: Function, terms: int, end: mp.mpf, bits: int) -> list[mp.m
 
 
 def tanh_reach(low: mp.mpf, last: mp.mpf, degree: int, tolerance: mp.mpf) -> mp.mpf:
-    """How far a piece that begins at `low` reaches within `tolerance`, at most to `last`."""
+    """Where a piece that begins at `low` ends if its error stays within `tolerance`, at most `last`."""
 
     def good(high: mp.mpf) -> bool:
         middle = (low + high) / 2
@@ -136,7 +136,7 @@ def tanh_reach(low: mp.mpf, last: mp.mpf, degree: int, tolerance: mp.mpf) -> mp.
 
 
 def tanh_knots(shape: Shape, last: mp.mpf) -> list[mp.mpf]:
-    """PIECES starting points, the first just above where tanh is 1/2, such that the pieces err about equally."""
+    """PIECES starting points, the first just above where tanh is 1/2, so that all pieces have about equal errors."""
     tolerance = mp.mpf(2) ** (-shape.bits - 4.5)
     while True:
         knots = [mp.mpf(141) / 256]
@@ -212,7 +212,7 @@ class Rounded(NamedTuple):
 
 
 def half_ulp(x: mp.mpf, bits: int) -> mp.mpf:
-    """Most that rounding to a result about x can be off."""
+    """Maximum error of rounding a result near x."""
     return mp.ldexp(1, mp.frexp(x)[1] - 1 - bits) if x else mp.mpf(0)
 
 
@@ -242,7 +242,7 @@ def odd_error(f: Function, coefficients: list[mp.mpf], x: mp.mpf, bits: int) -> 
 
 
 def tanh_error(name: str, points: int = 200) -> float:
-    """Bound on the error of tanh in ulp if every rounding is as bad as can be, on `points` arguments a piece."""
+    """Bound on the error of tanh in ulp with the worst possible roundings, at `points` arguments per piece."""
     bits, degree, t = SHAPES[name].bits, SHAPES[name].tanh_degree, tanh_tables(name)
     out = max(odd_error(mp.tanh, t["odd"], t["knot"][0] * i / points, bits) for i in range(1, points + 1))
     for i, (low, high) in enumerate(itertools.pairwise([*t["knot"], t["bound"][1]])):
@@ -254,7 +254,7 @@ def tanh_error(name: str, points: int = 200) -> float:
 
 
 def atanh_error(name: str, points: int = 200) -> float:
-    """As `tanh_error`, on `points` arguments up to 1/2 and in each octave of 1 - x down to 2^-bits."""
+    """As `tanh_error`, at `points` arguments up to 1/2 and in each octave of 1 - x down to 2^-bits."""
     bits, degree, t = SHAPES[name].bits, SHAPES[name].atanh_degree, atanh_tables(name)
     out = max(odd_error(mp.atanh, t["odd"], mp.mpf(i) / (2 * points), bits) for i in range(1, points + 1))
 
@@ -289,7 +289,7 @@ def literal(x: mp.mpf, name: str) -> str:
 
 
 def wrapped(words: list[str], indent: str) -> str:
-    """Words between commas, in lines of at most 110 columns."""
+    """Words separated by commas, in lines of at most 110 columns."""
     return textwrap.fill(", ".join(words), 110, initial_indent=indent, subsequent_indent=indent)
 
 

@@ -1,5 +1,5 @@
 /* From a drive to the input of the plays and back: the curves of a memoryless part in fixed point,
-   or the drive itself where there is none. In floating point emission writes these functions from
+   or the drive itself where there is none. In floating point, emission writes these functions from
    the stages. Called by the operators. */
 #ifndef HYSTGEN_FRONT_FRONT_C
 #define HYSTGEN_FRONT_FRONT_C
@@ -63,7 +63,7 @@ HYSTGEN_APART hystgen_reach_t hystgen_front_inverse(hystgen_reach_t w, bool asce
     return (hystgen_reach_t)hystgen_nearest(v, HYSTGEN_BELOW);
 }
 #elif defined(HYSTGEN_HAS_FINE_PLAYS)
-/* Input of the plays, with HYSTGEN_FINE bits below a drive code, so that thresholds are exact. */
+/* Input of the plays, HYSTGEN_FINE bits finer than a drive code, so that thresholds are exact. */
 static inline hystgen_play_t hystgen_front_forward(hystgen_real_t v) {
     return (hystgen_play_t)v * ((hystgen_play_t)1 << HYSTGEN_FINE);
 }

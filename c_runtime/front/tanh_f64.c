@@ -8,7 +8,7 @@
  *
  * Below hystgen_tanh_knot[0], just above tanh x = 1/2: x + x z P(z) with z = x^2. Above: one of
  * eight polynomials in the distance from the center of its piece; each center is a point where tanh
- * is almost a double, so that the constant term adds no error. From 19.06 on tanh rounds to 1.
+ * is almost a double, so the constant term adds no error. From 19.06 on, tanh rounds to 1.
  * fit_coefficients.py derives the numbers and the bound on the error: 0.86 ulp. The function is
  * odd; it keeps subnormal numbers and the sign of zero. Infinities and NaN give +-1.
  */

@@ -5,7 +5,7 @@
 #include "arithmetic/fixed.h"
 #include "hystgen_runtime.h"
 
-#define HYSTGEN_HIGH_STEP ((int64_t)1 << HYSTGEN_LOW_BITS) /* of a corner's `high`, in sums */
+#define HYSTGEN_HIGH_STEP ((int64_t)1 << HYSTGEN_LOW_BITS) /* one step of a corner's `high` */
 
 /* Field by field: for a whole structure a compiler may call memcpy. */
 HYSTGEN_API void hystgen_copy_place(hystgen_place_t *to, const hystgen_place_t *from) {
@@ -45,7 +45,7 @@ static inline int64_t hystgen_begins(const hystgen_place_t *here, const hystgen_
     return held + (c->rose == here->rising ? 0 : whole);
 }
 
-/* Turns the move back, and leaves a corner if plays have followed. */
+/* Reverses the move, and leaves a corner if plays have followed. */
 HYSTGEN_APART void hystgen_turn_back(hystgen_place_t *here, hystgen_corner_t *corner) {
     if (here->k > 0) {
         hystgen_leave_corner(here, corner);
@@ -99,7 +99,7 @@ HYSTGEN_APART void hystgen_find(const hystgen_curve_t *t, const hystgen_place_t 
     }
 }
 
-/* The same for a move to any input. May turn the move back, but moves no play. */
+/* The same for a move to any input. May reverse the move, but moves no play. */
 static inline void hystgen_find_input(const hystgen_curve_t *t, hystgen_place_t *here,
                                       hystgen_corner_t *corner, int32_t to, hystgen_kink_t *kink) {
     if (here->rising ? to < here->input : to > here->input) {
@@ -174,8 +174,8 @@ HYSTGEN_APART int64_t hystgen_solved(const hystgen_curve_t *t, const hystgen_pla
     return hystgen_along(here, x > most ? most : x);
 }
 
-/* Input for `output`, at most slightly out of range, and the last kink before this input. May turn
-   the move back, but moves no play. Up to the output `next`, along the move, the same plays are
+/* Input for `output`, at most slightly out of range, and the last kink before this input. May
+   reverse the move, but moves no play. Up to the output `next`, along the move, the same plays are
    known to follow. */
 HYSTGEN_API int64_t hystgen_solve(const hystgen_curve_t *t, hystgen_place_t *here,
                                   hystgen_corner_t *corner, int64_t output, int64_t next,
@@ -221,8 +221,8 @@ HYSTGEN_API int64_t hystgen_move_to_solution(const hystgen_curve_t *t, hystgen_p
     return next;
 }
 
-/* Start memory: a value for each play (step 1), or one for all (step 0). Each play is a block of
-   its own, with a corner where it begins to follow. */
+/* Start memory: a value for each play (step 1), or one value for all (step 0). Each play is a block
+   of its own, with a corner where it begins to follow. */
 HYSTGEN_KERNEL void hystgen_start(const hystgen_curve_t *t, hystgen_place_t *here,
                                   hystgen_corner_t *corner, const int32_t *play,
                                   unsigned int step) {

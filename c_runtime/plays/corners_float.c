@@ -74,7 +74,7 @@ static inline unsigned int hystgen_find_segment(const hystgen_segment_t *segment
     return k;
 }
 
-/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever is first. */
+/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever comes first. */
 HYSTGEN_KERNEL void hystgen_stop_in_block(const hystgen_curve_t *t, hystgen_plays_t *m,
                                           const hystgen_corner_t *corner, hystgen_real_t output,
                                           hystgen_real_t input) {
@@ -186,7 +186,7 @@ HYSTGEN_KERNEL bool hystgen_move_in_block(const hystgen_curve_t *t, hystgen_play
                                           hystgen_real_t input) {
     const hystgen_real_t way = hystgen_along(m, input - m->from_input);
     unsigned int k = m->here.k;
-    const unsigned int many = k + 8u; /* from there on bisection is faster */
+    const unsigned int many = k + 8u; /* beyond these, bisection is faster */
     do {
         ++k;
     } while (k < many && way > t->segment[k + 1u].way);

@@ -1,4 +1,4 @@
-/* The plays of engine loop follow their input, in every arithmetic. Called by the operators of
+/* How the plays of engine loop follow their input, in every arithmetic. Called by the operators of
    engine loop and by the plays of effects. */
 #include "hystgen_runtime.h"
 

@@ -1,4 +1,4 @@
-/* The plays of engine loop solved for their input, in floating point. Called by the operators of
+/* Solves the plays of engine loop for their input, in floating point. Called by the operators of
    engine loop. */
 #include "hystgen_runtime.h"
 

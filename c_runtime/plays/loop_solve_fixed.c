@@ -1,9 +1,9 @@
-/* The plays of engine loop solved for their input, in fixed point: to the nearest input. Called by
-   the operators of engine loop. */
+/* Solves the plays of engine loop for their nearest input, in fixed point. Called by the operators
+   of engine loop. */
 #include "arithmetic/fixed.h"
 #include "hystgen_runtime.h"
 
-/* Input of the plays at which their sum has moved on by d from w, within `least` .. `most`. */
+/* Input of the plays at which their sum has moved by d since w, limited to `least` .. `most`. */
 static hystgen_reach_t hystgen_input_further(const hystgen_tables_t *t, hystgen_reach_t w,
                                              hystgen_sum_t d, unsigned int k, bool rising) {
     const hystgen_sum_t step = hystgen_divide_by_slope(d, t->reciprocal[k], t->shift[k]);
@@ -14,8 +14,8 @@ static hystgen_reach_t hystgen_input_further(const hystgen_tables_t *t, hystgen_
 }
 
 /* Input of the plays at which their sum is `output`. The plays follow one by one until the next one
-   would overshoot. The remaining output, `left`, only shrinks, so that no sum exceeds the first
-   one, whatever the values of the plays. */
+   would overshoot. The remaining output, `left`, only shrinks, so no sum exceeds the first one,
+   whatever the values of the plays. */
 HYSTGEN_API hystgen_reach_t hystgen_loop_solve(const hystgen_tables_t *t,
                                                const hystgen_play_t *play, hystgen_sum_t output) {
     const hystgen_sum_t here = hystgen_loop_output(t, play);

@@ -8,7 +8,7 @@
 #define HYSTGEN_LARGEST 2147483647     /* the largest input of the plays */
 #define HYSTGEN_MOST_PLAYS 0x7fffu     /* the largest index of a play that a corner can store */
 
-/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
+/* Straight segment k, and how far from a turning point it begins, where play k starts to follow. */
 typedef struct {
     int64_t reach;       /* of the output: 2 z_k */
     uint32_t way;        /* of the input: 2 r_k */
@@ -20,7 +20,7 @@ typedef struct {
 /* The plays of one model. */
 typedef struct {
     const hystgen_segment_t *segment; /* plays 0 .. n, and one that never follows */
-    int64_t offset;                   /* part of every output */
+    int64_t offset;                   /* added to every output */
     int64_t range[2]; /* limits of the input in falling moves, sign changed, and in rising ones */
     uint_least16_t n; /* number of plays, not counting play 0 */
 } hystgen_curve_t;
@@ -38,7 +38,7 @@ typedef struct {
     const int32_t *slope;            /* slope[k] = p_0 + ... + p_(k-1) */
     const uint32_t *reciprocal;      /* 2^(32 + shift[k]) / slope[k]; entry 0 is not used */
     const uint8_t *shift;
-    hystgen_reach_t least; /* limits of the input that a solution may have */
+    hystgen_reach_t least; /* limits of the input in a solution */
     hystgen_reach_t most;
     uint_least16_t n; /* number of plays, not counting r_0 */
 } hystgen_tables_t;
@@ -47,7 +47,7 @@ typedef struct {
 typedef struct {
     int64_t envelope_least; /* limits of the input of the plays that an envelope can reach */
     int64_t envelope_most;
-    hystgen_reach_t least; /* inputs outside first .. last but within these: off by rounding only */
+    hystgen_reach_t least; /* inputs between these and first .. last are out by rounding only */
     hystgen_reach_t most;
     int32_t first; /* inputs of the plays at the ends of the drive range */
     int32_t last;

@@ -3,7 +3,7 @@
 #ifndef HYSTGEN_TABLES_FLOAT_H
 #define HYSTGEN_TABLES_FLOAT_H
 
-/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
+/* Straight segment k, and how far from a turning point it begins, where play k starts to follow. */
 typedef struct {
     hystgen_real_t way;   /* of the input: 2 r_k in the forward operator, 2 z_k in the inverse */
     hystgen_real_t reach; /* of the output: 2 z_k in the forward operator, 2 r_k in the inverse */
@@ -11,8 +11,8 @@ typedef struct {
     hystgen_real_t slope; /* 1 / gain */
 } hystgen_segment_t;
 
-/* One operator; of two entries the first is for falling moves, with signs changed, the second for
-   rising ones. */
+/* One operator; of a pair of entries, the first is for falling moves, with its sign changed, the
+   second for rising ones. */
 typedef struct {
     const hystgen_segment_t *segment; /* plays 0 .. n, and one that never follows */
     hystgen_real_t limit[2];          /* of the output */
@@ -23,7 +23,7 @@ typedef struct {
 /* A start memory. `center`: input and output of the sum with plays 0 .. k at play k's value. */
 typedef struct {
     const hystgen_real_t (*center)[2];
-    uint_least16_t step;     /* 1: a center for each play, 0: one for all, which have one value */
+    uint_least16_t step;     /* 1: a center for each play; 0: one for all, which start alike */
     uint_least16_t risen;    /* plays up to this one were left by rising moves, others by falling */
     hystgen_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } hystgen_start_t;

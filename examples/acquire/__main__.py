@@ -1,7 +1,7 @@
 """From a plan to a diagnosis in one run: plan the drives, play and record them, cut the recording, diagnose.
 
-hardware.py has the two functions that touch hardware, here a simulated bench; put your own in their place. Nothing is
-known about the stage except the range of its drive: the first record gives the model that the diagnosis starts from.
+hardware.py has the two functions that touch hardware, here a simulated bench; replace them with your own. Nothing is
+known about the stage except the range of its drive: the first record gives the model from which the diagnosis starts.
 
 Writes plan, recording, model and diagnosis into the folder, and prints what a model of plays alone is missing.
 
@@ -32,7 +32,7 @@ model: {pi: {thresholds: [0], weights: [0.1]}}
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, default=Path(__file__).parent / "out")
-    parser.add_argument("--rate", type=float, default=200.0, help="of DAC and ADC, Hz")
+    parser.add_argument("--rate", type=float, default=200.0, help="sample rate of DAC and ADC, Hz")
     options = parser.parse_args()
     folder: Path = options.output
     folder.mkdir(parents=True, exist_ok=True)

@@ -1,7 +1,7 @@
 """Your hardware: fill in these two functions with calls to your DAQ device, and describe its converters.
 
-Here they drive the simulated bench of stage.py. Both channels have to share one clock: start recording first, then the
-output, or let the output trigger it.
+Here they drive the simulated bench of stage.py. Both channels have to share one clock: start the recording before the
+output, or let the output trigger the recording.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from stage import BITS, HIGH, LOW, MONITOR, SENSOR, Bench
 Array = NDArray[np.float64]
 
 DAC = {"dac_bits": BITS, "dac_range": (LOW, HIGH), "dac_coding": "twos-complement"}
-"""Drive, including the amplifier: the one at the lowest code, and one code above the highest."""
+"""The DAC; its range, including the amplifier: the drive at the lowest code, and one code above the highest."""
 
 BENCH = Bench()
 PLAYED: list[NDArray[np.int64]] = []
@@ -25,7 +25,7 @@ def write_drive(codes: NDArray[np.int64]) -> None:
 
 
 def read_position(rate: float) -> tuple[Array, Array]:
-    """Play the loaded codes at this rate, Hz, and read at the same time: drive (V) and displacement (um), (N,) each.
+    """Play the loaded codes at this rate, Hz, and meanwhile read drive (V) and displacement (um), (N,) each.
 
     The drive is the amplifier's monitor, read at the same time as the position. Without a monitor, return the drive
     that the codes give; the half sample by which a holding converter is late then shows as a delay.

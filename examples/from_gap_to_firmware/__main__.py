@@ -1,8 +1,8 @@
 """From a recording that a model does not explain to firmware that tracks: identify, diagnose, emit, run the C.
 
 A stage with hidden creep and a bent transducer (stage.py, which shares no code with hystgen) is recorded. A model is
-identified and the gap between model and stage is diagnosed. The C of the models before and after is emitted, compiled
-on this machine and put in front of the same stage for a motion that is in no recording.
+identified, and the gap between model and stage is diagnosed. The C of the models before and after the diagnosis is
+emitted, compiled on this machine and run in front of the same stage for a motion that is in no recording.
 
 Writes recordings, models, C and the picture `tracking.png` into the folder, and prints the table.
 
@@ -27,8 +27,8 @@ from hystgen.parameters.files import dump_parameters
 Array = NDArray[np.float64]
 
 SECONDS = 7.5 * DAMPERS[-1][0]
-"""Length of the recording to fit, s: the slowest damper comes to rest several times, since creep has to show to be
-identified."""
+"""Length of the recording to fit, s: long enough for the slowest damper to come to rest several times, since only creep
+that shows can be identified."""
 
 
 def write(path: Path, drives: Array) -> Path:

@@ -1,8 +1,8 @@
-"""The stage that nobody tells hystgen about: stick and slip, a bent transducer, creep, a noisy sensor. SIMULATED.
+"""The stage that hystgen knows nothing about: stick and slip, a bent transducer, creep, a noisy sensor. SIMULATED.
 
-Sliders that stick behind springs until they slip take up part of the drive, a transducer bends it, and two springs with
-dampers go on moving after it. Nothing here comes from hystgen: it has no plays, no dead zones and no filters of
-hystgen's. Time advances in steps far finer than the samples.
+A transducer bends the drive, sliders that stick behind springs until they slip take up part of it, and two springs with
+dampers keep moving afterwards. Nothing here comes from hystgen: the simulation uses none of its plays, dead zones or
+filters. Time advances in steps far finer than the samples.
 """
 
 from __future__ import annotations

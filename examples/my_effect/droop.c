@@ -1,8 +1,8 @@
 #include "hystgen_runtime.h"
 
-/* The functions of `model.py`, operation for operation, in the same order: only then are the bits
-   the same as Python's, in every arithmetic. In emitted files the prefix hystgen_ is replaced by
-   the model's name. */
+/* The functions of `model.py`, operation for operation, in the same order: only then do they give
+   the same bits as Python, in every arithmetic. In emitted files the model's name replaces the
+   prefix hystgen_. */
 
 typedef struct {
     hystgen_number_t inverse_slope;

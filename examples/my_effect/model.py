@@ -11,9 +11,9 @@ In the parameter file it is
       effects:
         - {name: user:droop, share: 0.05, time_constant: 2.0}
 
-A class is an effect: a name `user:..`, a place in the chain, the method of that place, and a field for each key of the
-parameter file. `candidates` tells a fit what to try. These alone are enough for `simulate` forwards and for `diagnose`.
-An inverse and C need a `block`: four functions, here and again in `droop.c`.
+An effect is a class: a name `user:..`, a place in the chain, the method for that place, and a field for each key of the
+parameter file. `candidates` tells a fit what to try. This is enough for `simulate` forwards and for `diagnose`. An
+inverse and C need a `block`: four functions, here and again in `droop.c`.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from pydantic import Field
 
 from hystgen.effects import About, Candidate, Effect, OwnBlock, Place, Run, decays, follow, product
 
-# The block: y = h - X, where X follows share * h. With h a straight line between two samples, X_k = X_(k-1) + (early
-# h_(k-1) + late h_k - rate X_(k-1)), of which everything but late h_k is known beforehand.
+# The block: y = h - X, where X follows share * h. With h linear between two samples, X_k = X_(k-1) + (early h_(k-1) +
+# late h_k - rate X_(k-1)), of which everything but late h_k is known beforehand.
 INVERSE_SLOPE, REST, INVERSE_REST, SHARE, RATE, EARLY, LATE = range(7)
 LEAKED, BEFORE = range(2)
 
@@ -62,11 +62,11 @@ class Droop(Effect):
     """A `share` of the displacement leaks away with a time constant: `y = h - X`, `tau X' = share h - X`."""
 
     name: Literal["user:droop"] = Field(description="name of the effect")
-    share: Annotated[float, Field(ge=0, lt=1)] = Field(description="of the displacement that leaks away in the end")
+    share: Annotated[float, Field(ge=0, lt=1)] = Field(description="share of the displacement that finally leaks away")
     time_constant: Annotated[float, Field(gt=0, allow_inf_nan=False)] = Field(description="tau, s")
 
     place: ClassVar[Place] = Place.LINEAR
-    compensation: ClassVar[str] = "solved with the charge that has leaked known; nothing remains"
+    compensation: ClassVar[str] = "solved, since the charge that has leaked is known; nothing remains"
     block: ClassVar[OwnBlock] = OwnBlock(
         "droop.c",
         table=("inverse_slope", "rest", "inverse_rest", "share", "rate", "early", "late"),

@@ -3,7 +3,7 @@
     python examples/note [-o FOLDER]
 
 runs `make` of every module in this folder. If a number differs from the printed one, or from the correct one where the
-note has a misprint (docs/note.md lists them), it says which, and the exit code is 1.
+note has a misprint (docs/note.md lists them), the command names it, and the exit code is 1.
 """
 
 from __future__ import annotations

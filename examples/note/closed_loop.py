@@ -3,11 +3,11 @@
     python examples/note/closed_loop.py [-o FOLDER]
 
 The note runs three cases and finds either inverse "greatly improved" over none. With its own plant (38), gains and
-reference, the largest error says the opposite: the hysteresis has a gain above 1, which simply raises that of the loop.
-A linear scale in place of the inverse takes that gain out; compared with it, the inverse has the smaller largest error
-(but not the smaller rms: the hysteresis mostly lags, and so does the loop). The price of the gain shows in the error
-over time: where two plays or more follow, the uncompensated loop is beyond its stability limit and rings near the
-plant's resonance, and so does the one with the scale on its steepest pieces.
+reference, the largest error says the opposite: the hysteresis has a gain above 1, which simply raises the loop gain. A
+linear scale in place of the inverse takes that gain out; compared with the scale, the inverse has the smaller largest
+error (but not the smaller rms: the hysteresis mostly lags, and so does the loop). The price of the gain shows in the
+error over time: where two plays or more follow, the uncompensated loop is beyond its stability limit and rings near the
+plant's resonance; so does the loop with the scale, on its steepest segments.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ HERE = Path(__file__).resolve().parent
 PLANT = ([8.8e16], [1.0, 1.6e4, 6.6e8, 5.3e12, 8.8e16])
 CONTROLLER = PIController(kp=0.185, ki=185.0)
 MEAN_GAIN = 2.05  # output over drive of Example 1's loop at a drive of +-4; in this control loop the drive is smaller
-PERIOD = 1.0  # s; the first period is left out, since it still shows the start memory
+PERIOD = 1.0  # s; the first period is left out, since the start memory still affects it
 BLOCK = 200  # each drawn point is the largest of this many samples
 
 # Largest error in the second period, as measured with another simulation of the same loop
@@ -61,16 +61,16 @@ def make(folder: Path) -> None:
         print("  {:42}{:9.4f}{:9.4f}{:10.4f}".format(name, *numbers))
     print(
         'The note: with either inverse "greatly improved" over no compensator. The largest error says the opposite:\n'
-        f"the hysteresis has a mean gain of {gain(alone):.2f} here ({MEAN_GAIN} at a drive of +-4), no compensator\n"
-        "leaves it in the loop. Against a linear scale that takes the same gain out, both inverses have the smaller\n"
-        "largest error, though not the smaller rms. Where the slope is beyond the stability limit the loop rings,\n"
-        f"without a compensator (at {ringing(alone)[1]:.0f} Hz) and with that scale, but not with an inverse."
+        f"the hysteresis has a mean gain of {gain(alone):.2f} here ({MEAN_GAIN} at a drive of +-4), which stays in\n"
+        "the loop without a compensator. Against a linear scale that takes the same gain out, both inverses have the\n"
+        "smaller largest error, though not the smaller rms. Where the slope is beyond the stability limit, the loop\n"
+        f"rings without a compensator (at {ringing(alone)[1]:.0f} Hz) and with that scale, but not with an inverse."
     )
 
     for name, expected in EXPECTED.items():
         found = cases[name].max_error(PERIOD)
         if round(found, 3) != expected:
-            raise MismatchError(f"{name}: the largest error is {found:.4f}, {expected} is expected")
+            raise MismatchError(f"{name}: the largest error is {found:.4f} instead of {expected}")
     folder.mkdir(parents=True, exist_ok=True)
     with drawing.styled():
         save(folder, "figure_15", paths(cases))
@@ -107,10 +107,10 @@ def paths(cases: dict[str, Response]) -> object:
         # the case without a compensator is drawn below those with a scale
         rest.plot(u / np.max(np.abs(u)), h - gain(response) * u, color=colour,
                   **({"linewidth": 4.0, "alpha": 0.4} if name == "no compensator" else {"linewidth": 1.2}))  # fmt: skip
-    loops.set(title="From demand to displacement", xlabel="demand $u$ (output units)",
+    loops.set(title="Displacement over demand", xlabel="demand $u$ (output units)",
               ylabel="displacement $h$ (output units)")  # fmt: skip
-    rest.set(title="Less the nearest straight line", xlabel="demand over its largest",
-             ylabel="rest (output units)")  # fmt: skip
+    rest.set(title="Minus the best straight line", xlabel="demand over its maximum",
+             ylabel="deviation (output units)")  # fmt: skip
     figure.legend(loc="outside lower center", ncols=5)
     return figure
 

@@ -46,7 +46,7 @@ def _numbers() -> None:
     printed = "0 1.906 3.179 3.809 4.241 4.524 4.704 4.816 4.885 4.928 4.954 4.97"
     note.check("Example 4, tau_j (53)", zone.thresholds[11:], printed, off[:12])
     note.check("Example 4, tau_-j (55)", [-tau for tau in zone.thresholds[11::-1]], printed, off[:12])
-    # mu from the printed eta; the note's own, up to 10.226, are within what the rounding of eta allows
+    # mu from the printed eta; the note's mu, up to 10.226, differ by no more than the rounding of eta allows
     right = "0.210 0.065 0.122 0.182 0.306 0.510 0.847 1.407 2.303 3.852 6.590 11.384"
     note.check("Example 4, mu_j (54)", zone.weights[11:], right)
     note.check("Example 4, mu_-j (56)", zone.weights[11::-1], right)
@@ -54,7 +54,7 @@ def _numbers() -> None:
     note.check("Example 4, printed mu_j", zone.weights[11:], printed, off[12:])
     x = np.linspace(-5.5, 5.5, 111)
     back = note.ENVELOPE_6.inverse(x)
-    # either way a quotient, the same, an inverse tanh and a quotient or product
+    # on either side two quotients, an inverse tanh, and a quotient or product
     off_by = note.rounded(2 * kernels.ATANH_MAX_ULP["float64"] + 4, back)
     note.close("Example 6, inverse envelope 2.5 atanh(x/6) (58)", back, 2.5 * np.arctanh(x / 6.0), off_by)
 

@@ -1,4 +1,4 @@
-"""Figures 11 to 14: the inverse of the play sum, its effect, and the effect of one with wrong parameters."""
+"""Figures 11 to 14: the inverse of the play sum, its effect, and the effect of an inverse with wrong parameters."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _inverse(folder: Path) -> None:
     note.describe(loop, "c", "Loop and first rise", note.REFERENCE, note.DRIVE)
     x = np.linspace(0.0, 10.0, 401)
     phi = inverse.loading_curve(x)
-    # sums of 7 terms, each with a difference and a product, of weights and thresholds that are such sums themselves
+    # sums of 7 terms, each with a difference and a product; the weights and thresholds are such sums themselves
     largest = note.EXAMPLE_1.slopes[-1] * 10.0 * np.sum(np.abs(inverse.weights))
     off_by = note.rounded(3 * 7 * 7, largest)
     note.close("the inverse's loading curve is the model's, reflected", note.EXAMPLE_1.loading_curve(phi), x, off_by)

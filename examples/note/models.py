@@ -1,4 +1,4 @@
-"""Figures 5, 6 and 8 to 10, the play sum and its properties, and one of our own, a density and the plays for it."""
+"""Figures 5, 6 and 8 to 10, the play sum and its properties, and a figure of our own, plays for a density."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def _draw_width(axes: Any, model: PI, v_max: float) -> None:
     """The loop, and the distance between its rising and falling halves where the output is zero."""
     v, y = _full_loop(model, v_max)
     right, left = float(np.interp(0.0, y[:2001], v[:2001])), float(np.interp(0.0, y[:2000:-1], v[:2000:-1]))
-    # both crossings move by the output error divided by the slope there
+    # both crossings shift by the output error divided by the slope there
     off_by = 2.0 * note.summed(model, v) / model.slopes[0] + note.rounded(8, v_max)
     note.close("width of the loop (32), corrected", right - left, model.width, off_by)
     axes.plot(v, y, color=note.FIRST)
@@ -82,7 +82,7 @@ def _width_and_slopes(folder: Path) -> None:
         turns = 2.0 * ends[i : i + 2] - v_max
         inside = (v[:2001] > turns[0] + 0.01) & (v[:2001] < turns[1] - 0.01)
         slopes = np.diff(y[:2001][inside]) / np.diff(v[:2001][inside])
-        # a step takes two outputs and two inputs
+        # a step involves two outputs and two inputs
         step = 2.0 * v_max / 2000
         off_by = 2.0 * (note.summed(model, v) + model.slopes[i] * note.rounded(2, v_max)) / step
         note.close(f"slope S_{i + 1} of a segment (33)", slopes, model.slopes[i], off_by)
@@ -155,7 +155,7 @@ def _starts(folder: Path) -> None:
 
 
 def _example_1_width_and_slopes(folder: Path) -> None:
-    # Slopes from the printed weights, for the note's 0.71 1.33 1.8 2.16 2.4 2.51 2.53
+    # Slopes from the printed weights, instead of the note's 0.71 1.33 1.8 2.16 2.4 2.51 2.53
     note.check("Example 1, slopes S_i (33)", note.EXAMPLE_1.slopes, "0.72 1.32 1.80 2.16 2.40 2.52 2.532")
     note.check("Example 1, width (32), corrected", note.EXAMPLE_1.width, "1.5")
     note.check("Example 1, width (32), corrected", note.EXAMPLE_1.width, "1.518")
@@ -180,7 +180,7 @@ def _density(folder: Path) -> None:
     # 6 products and sums against three quotients, an exponential and three sums of the larger terms
     off_by = note.rounded(2 * 6 + 2, exact) + note.rounded(12, 0.8 * np.max(x) / 0.3)
     if not (np.min(gap) >= -off_by and np.max(gap) <= plays.error):
-        raise note.MismatchError("density: the loading curve leaves its bound")
+        raise note.MismatchError("density: the loading curve exceeds its error bound")
     drawn, (curve, error) = note.panels(2)
     curve.plot(x, exact, label="density (19)", **drawing.LINES["measured"])
     curve.plot(x, model.loading_curve(x), label="6 plays (22)", **drawing.LINES["model"])
@@ -190,5 +190,5 @@ def _density(folder: Path) -> None:
     error.text(10.0, plays.error, "bound", color=note.SECOND, ha="right", va="bottom", fontsize=9)
     title = "Initial loading curve"
     note.describe(curve, "a", title, f"$r$ ({note.INPUT})", rf"$\varphi(r)$ ({note.OUTPUT})", legend=True)
-    note.describe(error, "b", "What the plays leave", f"$r$ ({note.INPUT})", f"difference ({note.OUTPUT})")
+    note.describe(error, "b", "Error of the plays", f"$r$ ({note.INPUT})", f"difference ({note.OUTPUT})")
     note.save(folder, "density", drawn)

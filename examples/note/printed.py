@@ -32,7 +32,7 @@ EXAMPLE_6 = Cascade(PI_4, (ENVELOPE_6,), 0.0, (-5.0, 5.0))
 TIME = np.linspace(0.0, 2.0, 2001)
 """Seconds; two periods of 1 Hz."""
 ROUNDING = 2.0**-53
-"""Largest error of one rounding, as a share of its result."""
+"""Maximum error of one rounding, as a share of its result."""
 INPUT, OUTPUT = "input units", "output units"
 DRIVE, ANSWER, REFERENCE = f"input $v$ ({INPUT})", f"output $y$ ({OUTPUT})", f"reference $u$ ({OUTPUT})"
 FIRST, SECOND, THIRD, DIM = drawing.MEASURED, drawing.MODEL, drawing.RESIDUAL, drawing.IGNORED
@@ -60,44 +60,43 @@ def check(what: str, values: ArrayLike, printed: str, off: ArrayLike = 0.0) -> N
         half = 0.5 * 10.0 ** -len(text.partition(".")[2])
         # the printed number and the difference are rounded, too
         if not abs(value - float(text)) <= half + 2.0 * ROUNDING * abs(float(text)) + more:
-            raise MismatchError(f"{what}, entry {k}: {value:.6g} is computed, {text} is printed")
+            raise MismatchError(f"{what}, entry {k}: computed {value:.6g}, printed {text}")
 
 
 def close(what: str, values: ArrayLike, expected: ArrayLike, tolerance: float) -> None:
     """Raise MismatchError unless the values are the expected ones to the (absolute) tolerance."""
     worst = float(np.max(np.abs(np.asarray(values) - np.asarray(expected))))
     if not worst <= tolerance:
-        raise MismatchError(f"{what}: off by {worst:.3g}, {tolerance:.3g} is allowed")
+        raise MismatchError(f"{what}: off by {worst:.3g}, more than {tolerance:.3g}")
 
 
 def coarse(x: ArrayLike) -> Array:
-    """The nearest multiples of 2^-20, of which sums and differences are exact."""
+    """The nearest multiples of 2^-20, whose sums and differences are exact."""
     return np.asarray(np.round(np.asarray(x) * 2.0**20) / 2.0**20)
 
 
 def rounded(count: float, size: ArrayLike) -> float:
-    """Largest sum of `count` roundings of numbers up to `size`."""
+    """Maximum error of `count` roundings of numbers up to `size`."""
     return float(count * 2.0**-53 * np.max(np.abs(size)))
 
 
 def summed(pi: PI, v: ArrayLike) -> float:
-    """Largest difference that rounding makes between two sums of plays: each term has a difference, a product and a
-    sum."""
+    """Maximum difference between two sums of plays due to rounding: each term has a difference, a product and a sum."""
     return rounded(2 * 3 * (pi.n + 1), pi.slopes[-1] * np.max(np.abs(v)))
 
 
 def inverted(pi: PI, u: ArrayLike) -> float:
-    """Largest error that rounding makes in the inverse of a play sum: each term has a difference, a product and a sum,
-    and as many in its weight and threshold."""
+    """Maximum error of the inverse of a play sum due to rounding: each term has a difference, a product and a sum, and
+    so do its weight and threshold."""
     return rounded(6 * (pi.n + 1), np.sum(np.abs(pi.inverse().weights)) * np.max(np.abs(u)))
 
 
 def cancelled(model: PI | Cascade, u: ArrayLike, v: ArrayLike) -> float:
-    """How far rounding may keep the composition of a model and its inverse from the identity, for the reference u and
+    """How far rounding may take the composition of a model and its inverse from the identity, for the reference u and
     the drive v.
 
-    No output moves by more than the last slope times the error of the input of the plays; a front and its inverse add
-    roundings of the input times the largest slope, and of the output.
+    No output changes by more than the last slope times the error of the plays' input; a front and its inverse add
+    roundings of the input, times the largest slope, and of the output.
     """
     pi, front = (model, 0.0) if isinstance(model, PI) else (model.pi, rounded(8, model.front(v)))
     if isinstance(model, Cascade):
@@ -107,7 +106,7 @@ def cancelled(model: PI | Cascade, u: ArrayLike, v: ArrayLike) -> float:
 
 
 def spread(function: Callable[[Array], ArrayLike], numbers: Sequence[float], half: ArrayLike) -> Array:
-    """How far the results of `function` may move, to first order, if each number moves by up to its `half`."""
+    """How far the results of `function` may change, to first order, if each number changes by up to `half`."""
     x = np.asarray(numbers, dtype=np.float64)
     middle = np.asarray(function(x))
     moved = np.broadcast_to(np.asarray(half, dtype=np.float64), x.shape)
@@ -123,7 +122,7 @@ def panels(count: int, columns: int = 2) -> tuple[Any, list[Any]]:
 
 
 def describe(axes: Any, letter: str, title: str, x: str, y: str, legend: bool = False) -> None:
-    """Title with the letter of the panel, axes with units, and the legend where it hides nothing."""
+    """Set a title with the panel's letter, axis labels with units, and the legend where it hides nothing."""
     axes.set(title=f"({letter}) {title}", xlabel=x, ylabel=y)
     if legend:
         axes.margins(y=0.12)

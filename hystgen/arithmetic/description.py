@@ -1,4 +1,4 @@
-"""The description of an arithmetic that models, tables, C text and verification need."""
+"""What models, tables, C text and verification need to know about an arithmetic."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 class Arithmetic(ABC):
     """A number format in which compensators compute.
 
-    `name`: as in the contract; `short`: as in names of the run time; `c_type`: C type of inputs and answers,
-    NAME_real_t, of `bytes` bytes, called `number_name` in numpy; `finer`: the arithmetic to use when this one is too
-    coarse, if any.
+    `name`: as users write it; `short`: as in names of the run time; `c_type`: C type of inputs and answers,
+    NAME_real_t; `number_name`, `bytes`: numpy's name and the size of that type; `finer`: the arithmetic to use if this
+    one is too coarse, if any.
 
-    The same for all of a kind: `fixed`: numbers are codes; `unused`: code sizes in the `emit` section that do not
-    apply; `includes`: C headers needed; `travels`: factor that turns an argument into a travel, where travels have more
-    bits.
+    Shared by a kind of arithmetic: `fixed`: whether numbers are codes; `unused`: keys for code sizes in the `emit`
+    section that do not apply; `includes`: C headers needed; `travels`: factor from an argument to a travel, above 1
+    where travels have more bits than codes.
     """
 
     name: str
@@ -71,4 +71,4 @@ class Arithmetic(ABC):
 
     @abstractmethod
     def share(self, part: float) -> float:
-        """The argument that represents a share."""
+        """A share between 0 and 1 as an argument of an emitted function."""

@@ -9,22 +9,22 @@ from typing import Any
 from hystgen.basics.jit import jit
 
 LOW_BITS = 20
-"""Low bits of a number that are multiplied separately, so that 31 remain: both products fit 64 bits."""
+"""Low bits of a number, which are multiplied separately; 31 bits remain, and both products fit into 64."""
 
 LARGEST = 2**51
-"""Exclusive bound of the numbers that are multiplied: the upper part then has 31 bits, like a mantissa."""
+"""Exclusive bound of numbers to be multiplied: their upper part then has 31 bits, like a mantissa."""
 
 STATE_BITS = 60
-"""Bits of a state without its sign. A product takes 50 and drops ten, and no rate outgrows a factor."""
+"""Bits of a state without its sign. Ten are dropped before a product, which takes 50; factors have room for that."""
 
 GUARD = 3
-"""Extra bits of a state, below those with which its roundings add up to the last bit of a signal: they then add up to
-an eighth of it, and a slow state stalls in a dead band of at most 1/16 of it. Held by
+"""Extra low bits of a state. Without them its rounding errors would add up to the last bit of a signal; with them they
+add up to an eighth of it, and a slow state stalls in a dead band of at most 1/16 of it. Held by
 `test_slow_states_neither_stall_nor_drift`, and for a user's own effects by `test_fixed_point_stays_within_its_bounds`.
-The error bound of a mode in q31 and q15 is the same to 1e-4 with 0 to 8 bits: it is set by the factors."""
+From 0 to 8 bits, a mode's error bound in q31 and q15 changes by less than 1e-4, since the factors dominate it."""
 
 MANTISSA_BITS, LEAST_SHIFT, MOST_SHIFT = 31, LOW_BITS + 1, LOW_BITS + 62
-"""Bits of a mantissa without its sign, and range of shifts: a product drops at least one bit, to round, and at most
+"""Bits of a mantissa without its sign, and range of shifts: a product drops at least one bit, for rounding, and at most
 62."""
 
 BEYOND = 2.0 ** (MANTISSA_BITS - LEAST_SHIFT)
@@ -34,7 +34,7 @@ BEYOND = 2.0 ** (MANTISSA_BITS - LEAST_SHIFT)
 def factor(x: float | Fraction) -> tuple[int, int]:
     """Mantissa and shift of a factor, `mantissa / 2^shift`, to 31 bits; fewer only below 2^-52.
 
-    Raises OverflowError from `BEYOND` on.
+    Raises OverflowError for `BEYOND` or more.
     """
     exact = Fraction(x)
     if not exact:
@@ -50,13 +50,13 @@ def factor(x: float | Fraction) -> tuple[int, int]:
 
 
 def error(x: float | Fraction) -> float:
-    """Absolute error of a factor."""
+    """Absolute error of x when it is rounded to a factor."""
     mantissa, shift = factor(x)
     return float(abs(Fraction(mantissa) / 2**shift - Fraction(x)))
 
 
 def lifted(x: float, bits: int) -> int:
-    """How many of the `bits` of a product with x have to be dropped so that x becomes a factor."""
+    """By how many bits a scaling of x by 2^bits has to fall short for the result to be a factor."""
     return max(0, math.frexp(x)[1] + bits - (math.frexp(BEYOND)[1] - 1))
 
 

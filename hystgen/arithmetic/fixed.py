@@ -18,9 +18,9 @@ class Fixed(Arithmetic):
     """Fixed point.
 
     `reach`: C type of the input at which a play starts to follow; `code_bits`: bits of a code without its sign;
-    `degree`: degree of the polynomials of the memoryless part; `finer_plays`: whether the plays' input may have bits
-    below a drive code; `play_bits`: bits of the plays' input without its sign, if it is not the drive code itself;
-    `low_bits`: bits that a corner keeps of a sum in addition to 32.
+    `degree`: degree of the polynomials of the memoryless part; `finer_plays`: whether the plays' input may be finer
+    than a drive code; `play_bits`: bits of the plays' input without its sign, if it is not the drive code itself;
+    `low_bits`: bits of a sum that a corner keeps in addition to 32.
     """
 
     reach: str = ""

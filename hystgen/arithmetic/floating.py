@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Floating(Arithmetic):
-    """Floating point. `float_h`: the name of the type in <float.h>."""
+    """Floating point. `float_h`: the prefix of the type's macros in <float.h>."""
 
     float_h: str = ""
 

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 def kind(value: object) -> str:
-    """A value as named in messages: its type, and the shape of an array."""
+    """How messages name a value: plain values as written, others by type, arrays with their shape."""
     name = "array" if isinstance(value, np.ndarray) else type(value).__name__
     if isinstance(value, str | int | float | None):
         return f"{printable(repr(value))}"
@@ -35,7 +35,7 @@ def _article(name: str) -> str:
 
 
 def known_options(call: str, function: Callable[..., object], given: Iterable[str]) -> None:
-    """Raise TypeError for an option that `function`, which does the work of `call`, does not have."""
+    """Raise TypeError for an option that `function`, the implementation of `call`, does not have."""
     parameters = inspect.signature(function).parameters.values()
     options = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY or each.default is not each.empty]
     for name in given:
@@ -46,7 +46,7 @@ def known_options(call: str, function: Callable[..., object], given: Iterable[st
 
 
 def checked(function: Callable[P, R]) -> Callable[P, R]:
-    """The public call, which raises a TypeError with a suggestion for an unknown option."""
+    """Make a public call raise TypeError, with a suggestion, for an unknown option."""
     needed = [each.name for each in inspect.signature(function).parameters.values() if each.default is each.empty]
 
     @functools.wraps(function)
@@ -58,8 +58,8 @@ def checked(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def taking(options_of: Callable[..., object], name: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """The same for a call that passes its `**options` to `options_of`; they appear in its signature; `name`: for
-    messages."""
+    """As `checked`, for a call that passes its `**options` on to `options_of`, which its signature then lists; `name`:
+    the call's name in messages."""
     handed = [
         each.replace(kind=inspect.Parameter.KEYWORD_ONLY)
         for each in inspect.signature(options_of).parameters.values()
@@ -107,7 +107,7 @@ def words(name: str, value: object, example: str) -> tuple[str, ...]:
 
 
 def real(name: str, value: object, unit: str) -> float:
-    """A number of any value. Raises TypeError."""
+    """A real number of any value, infinities and NaN included. Raises TypeError."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise TypeError(f"{name} is a number of {unit}, not {kind(value)}")
     return float(value)
@@ -145,12 +145,12 @@ def numbers(name: str, value: object, example: str) -> tuple[float, ...]:
 
 
 def texts(name: str, value: object, keys: Sequence[str], example: str) -> dict[str, str]:
-    """A mapping of some of `keys` to text. Raises TypeError and ValueError."""
+    """A mapping from some of `keys` to text. Raises TypeError and ValueError."""
     if not isinstance(value, Mapping):
         raise TypeError(f"{name} is a mapping of text to text, not {kind(value)}; give {example}")
     strange = [x for entry in value.items() for x in entry if not isinstance(x, str)]
     if strange:
-        raise TypeError(f"{name} is a mapping of text to text, but {kind(strange[0])} is in it; give {example}")
+        raise TypeError(f"{name} is a mapping of text to text, but it contains {kind(strange[0])}; give {example}")
     unknown = [key for key in value if key not in keys] if keys else []
     if unknown:
         raise ValueError(f"{name} has no {printable(unknown[0])}; its keys are {', '.join(keys)}, as in {example}")
@@ -158,7 +158,7 @@ def texts(name: str, value: object, keys: Sequence[str], example: str) -> dict[s
 
 
 def signal(name: str, value: object) -> NDArray[Any]:
-    """Samples (N,) of real numbers, of any type. Raises TypeError, and ValueError for another shape."""
+    """Real samples (N,), of any numeric type. Raises TypeError, and ValueError for any other shape."""
     try:
         found = np.atleast_1d(np.asarray(value))
     except ValueError:  # lists of different lengths
@@ -166,7 +166,7 @@ def signal(name: str, value: object) -> NDArray[Any]:
     if found.ndim != 1:
         hint = ""
         if found.ndim == 2:
-            hint = "; give .ravel() of it" if 1 in found.shape else "; give one of its columns"
+            hint = "; pass its .ravel()" if 1 in found.shape else "; pass one of its columns"
         raise ValueError(f"{name} has one number per sample, shape (N,), not shape {found.shape}{hint}")
     if found.dtype.kind == "O":
         try:
@@ -186,7 +186,7 @@ def signal(name: str, value: object) -> NDArray[Any]:
 
 
 def samples(v: ArrayLike) -> Array:
-    """Samples (N,) in double precision. Raises ValueError for another number of dimensions."""
+    """Samples (N,) in double precision. Raises ValueError unless they are one-dimensional."""
     found = np.ascontiguousarray(v, dtype=np.float64)
     if found.ndim != 1:
         raise ValueError(f"a signal has one dimension, this one has {found.ndim}")
@@ -197,7 +197,7 @@ def finite_samples(v: ArrayLike) -> Array:
     """Samples (N,) in double precision. Raises ValueError unless they are finite and one-dimensional."""
     found = samples(v)
     if not np.all(np.isfinite(found)):
-        raise ValueError("an input has to consist of finite numbers")
+        raise ValueError("all samples of an input have to be finite")
     return found
 
 
@@ -221,7 +221,7 @@ def positive(**values: float) -> None:
 
 
 def whole_from(least: int, **values: int) -> None:
-    """Raise ValueError for a parameter that is not an integer, at least `least`."""
+    """Raise ValueError for a parameter that is not an integer of at least `least`."""
     for name, value in values.items():
         if not isinstance(value, int | np.integer) or value < least:
             raise ValueError(f"{name} has to be a whole number, at least {least}, not {value!r}")

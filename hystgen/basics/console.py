@@ -14,11 +14,11 @@ from typing import IO, Any
 import click
 
 ENDING = ("SIGTERM", "SIGHUP")
-"""Names of the signals with which others end a process and expect it to clean up first; not every system has all."""
+"""Names of the signals that ask a process to clean up and exit; not every system has both."""
 
 
 class OutputError(click.ClickException):
-    """Standard output that cannot be written, as on a full disk."""
+    """Standard output cannot be written, for example because the disk is full."""
 
     exit_code = 2
 
@@ -27,12 +27,12 @@ class OutputError(click.ClickException):
         _discard(sys.stdout)
 
     def show(self, file: IO[str] | None = None) -> None:
-        """Print the message in the format of all others."""
+        """Print the message in the format of all other messages."""
         note(f"error: {self.message}", file)
 
 
 def say(result: str | bytes) -> None:
-    """Print a line, or raw data, on standard output.
+    """Print a line, or raw data, to standard output.
 
     Raises OutputError, and BrokenPipeError if the reader is gone.
     """
@@ -41,7 +41,7 @@ def say(result: str | bytes) -> None:
 
 
 def note(words: str, file: IO[str] | None = None) -> None:
-    """Print remarks on standard error, as far as it can be written; nothing depends on it."""
+    """Print a remark to standard error; failing to write it does no harm and is ignored."""
     try:
         click.echo(words, file=file, err=True)
     except OSError:
@@ -61,7 +61,7 @@ def _output() -> Iterator[None]:
 
 
 def _discard(stream: IO[str]) -> None:
-    """Discard the remaining output of a stream; otherwise the interpreter tries again when it ends."""
+    """Discard the remaining output of a stream, which the interpreter would otherwise try to flush at exit."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, stream.fileno())
@@ -69,14 +69,14 @@ def _discard(stream: IO[str]) -> None:
 
 
 class Commands(click.Group):
-    """A command line that exits cleanly, for any kind of output and whatever ends it.
+    """A command line that exits cleanly, wherever its output goes and whatever ends it.
 
-    SIGTERM and SIGHUP end it like an exception, so that nothing unfinished is left behind, with the exit code of a
-    process ended by that signal. Characters missing from the terminal's code page are escaped.
+    SIGTERM and SIGHUP act like an exception, so nothing unfinished is left behind; the exit code is that of a process
+    ended by the signal. Characters missing from the terminal's code page are escaped.
     """
 
     def main(self, *arguments: Any, **options: Any) -> Any:
-        """Run the command given by the words, and exit."""
+        """Run the command that the arguments name, then exit."""
         with _ended_by_signals(), _any_character():
             try:
                 return super().main(*arguments, **options)
@@ -87,12 +87,12 @@ class Commands(click.Group):
                 sys.exit(2)
 
     def invoke(self, ctx: click.Context) -> object:
-        """Run the command; an operating system error that it does not catch concerns the output."""
+        """Run the command; an OSError that it does not catch, and that names no file, comes from its output."""
         with _output():
             return super().invoke(ctx)
 
     def make_context(self, *arguments: Any, **options: Any) -> click.Context:
-        """Parse the words; help is printed here."""
+        """Parse the arguments; click prints help from here."""
         with _output():
             return super().make_context(*arguments, **options)
 
@@ -119,7 +119,7 @@ def _ended_by_signals() -> Iterator[None]:
 
     def end(number: int, _: object) -> None:
         for each in before:
-            signal.signal(each, signal.SIG_IGN)  # once is enough; a second one would interrupt the clean-up
+            signal.signal(each, signal.SIG_IGN)  # a second signal would interrupt the clean-up
         raise SystemExit(128 + number)
 
     if threading.current_thread() is threading.main_thread():

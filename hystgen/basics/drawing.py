@@ -1,6 +1,6 @@
-"""Shared by all figures: colours, labels, thinned lines, and the same bytes for the same figure.
+"""What all figures share: colours, labels, thinned lines, and files with reproducible bytes.
 
-matplotlib is imported when a figure is drawn; its settings, and the user's, are left alone.
+matplotlib is imported only when a figure is drawn; its settings and the user's stay unchanged.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LINES: dict[str, dict[str, Any]] = {
     "measured": {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45},
     "model": {"color": MODEL, "linewidth": 0.9, "alpha": 1.0},
 }
-"""The model as a thin line over the broad one of the measurement: both stay visible."""
+"""The model is a thin line over a broad one for the measurement, so both stay visible."""
 
 STYLE = {
     "svg.hashsalt": "hystgen",
@@ -56,17 +56,17 @@ STYLE = {
 }
 
 BLOCKS = 1000
-"""Number of blocks of samples whose extremes a thinned line keeps."""
+"""Number of blocks into which a line is divided for thinning; the extremes of each block are kept."""
 
 MOST_POINTS = 4000
-"""Lines with more points than this that cannot be thinned become pixels in an SVG; also the most points of a cloud."""
+"""Lines with more points that cannot be thinned become pixels in an SVG; also the maximum number in a scatter plot."""
 
 
 KINDS = (".png", ".svg")
 
 
 class PlotError(ValueError):
-    """A plot that cannot be drawn here."""
+    """A plot that cannot be drawn or saved."""
 
 
 def check_path(path: str | os.PathLike[str]) -> None:
@@ -80,7 +80,7 @@ def check_path(path: str | os.PathLike[str]) -> None:
 
 
 def picture(draw: Callable[[], Figure], path: str | os.PathLike[str] | None = None) -> Figure:
-    """The figure that `draw` makes, in the style of all pictures; with a path also written there, all or nothing.
+    """The figure that `draw` makes, in the common style; given a path, it is also saved there, all or nothing.
 
     Raises PlotError.
     """
@@ -94,7 +94,7 @@ def picture(draw: Callable[[], Figure], path: str | os.PathLike[str] | None = No
 
 
 def require() -> None:
-    """Raise PlotError without matplotlib."""
+    """Raise PlotError if matplotlib is not installed."""
     try:
         with _quiet():
             _import()
@@ -105,8 +105,8 @@ def require() -> None:
 def _import() -> None:
     """Import matplotlib. Raises ImportError.
 
-    A notebook passes on its backend, which this environment may lack; matplotlib then cannot be imported. Pictures here
-    are files, which need no backend; for others it is the requested one, if it exists.
+    MPLBACKEND, set by a notebook, may name a backend that this environment lacks; the import would then fail. Figures
+    written to files need no backend, so the named one, if it exists, is selected afterwards, for the user's figures.
     """
     backend = None if "matplotlib" in sys.modules else os.environ.pop("MPLBACKEND", None)
     try:
@@ -121,7 +121,7 @@ def _import() -> None:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Silence matplotlib about its caches, which it moves if the home folder is read-only."""
+    """Silence matplotlib's message that it moves its caches because the home folder is read-only."""
     logger = logging.getLogger("matplotlib")
     before = logger.level
     if before == logging.NOTSET:
@@ -134,10 +134,10 @@ def _quiet() -> Iterator[None]:
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """The style of all pictures, independent of matplotlib's settings; to draw and to save in. Raises PlotError."""
+    """Context for drawing and saving in the common style, whatever matplotlib's settings. Raises PlotError."""
     require()
     with _quiet():
-        from matplotlib import figure, style  # noqa: F401  # which each fork of this process would import again
+        from matplotlib import figure, style  # noqa: F401  # or each fork of this process would import them
         from matplotlib.backends import backend_svg  # noqa: F401
 
         with style.context(["default", STYLE]):
@@ -145,7 +145,7 @@ def styled() -> Iterator[None]:
 
 
 def figure(width: float, height: float) -> Figure:
-    """An empty figure, in inches."""
+    """An empty figure; width and height in inches."""
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
@@ -169,7 +169,7 @@ def label(what: str, unit: str | None) -> str:
 
 
 def noise_lines(axes: Axes, noise: float | None) -> None:
-    """The standard deviation of the noise on both sides of zero; nothing if it is unknown."""
+    """Draw the standard deviation of the noise on both sides of zero; nothing if it is unknown."""
     if noise is None:
         return
     for side, name in ((noise, "noise, \N{PLUS-MINUS SIGN} 1 sd"), (-noise, None)):
@@ -177,7 +177,7 @@ def noise_lines(axes: Axes, noise: float | None) -> None:
 
 
 def legend_above(axes: Axes, columns: int = 3) -> None:
-    """A legend above the plot area, where it hides nothing."""
+    """Put the legend above the plot area, where it hides nothing."""
     axes.legend(
         loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.1, handlelength=1.4,
         columnspacing=1.2,
@@ -185,7 +185,7 @@ def legend_above(axes: Axes, columns: int = 3) -> None:
 
 
 def kept(start: int, stop: int, *signals: Array) -> NDArray[np.intp]:
-    """Indices from start to stop that draw the same lines: of each block of samples the extremes of every signal."""
+    """Indices from start to stop that draw the same lines: the extremes of every signal in each block of samples."""
     count = stop - start
     if count <= 4 * BLOCKS:
         return np.arange(start, stop)
@@ -194,7 +194,7 @@ def kept(start: int, stop: int, *signals: Array) -> NDArray[np.intp]:
     for signal in signals:
         part = signal[start:stop]
         for sign in (1.0, -1.0):
-            # the first sample of a block without values
+            # a block that is all NaN keeps its first sample
             values = np.where(np.isnan(part), -np.inf, sign * part)
             peak = np.maximum.reduceat(values, edges[:-1])
             at_peak = np.flatnonzero(values == np.repeat(peak, np.diff(edges)))
@@ -203,7 +203,7 @@ def kept(start: int, stop: int, *signals: Array) -> NDArray[np.intp]:
 
 
 def sampled(count: int) -> NDArray[np.intp]:
-    """Indices of a fair sample of many points, spread evenly without a period that could beat with the signal's."""
+    """Indices of a fair sample of many points, spread evenly but not periodically, to avoid beats with the signal."""
     if count <= MOST_POINTS:
         return np.arange(count)
     golden = (np.sqrt(5.0) - 1.0) / 2.0

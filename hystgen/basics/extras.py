@@ -17,13 +17,13 @@ PLOT = ("matplotlib",)
 
 
 class MissingExtraError(ImportError):
-    """Something needs an extra that is not installed; the message has the command that installs it."""
+    """A required extra is not installed; the message gives the command that installs it."""
 
 
 def require_fit(what: str, plot: bool = False) -> None:
     """Raise MissingExtraError if `what` cannot be done because packages of the extra `fit` are not installed.
 
-    `plot`: it needs the extra `plot` too, so that one command installs both.
+    `plot`: the extra `plot` is needed as well, and one command installs both.
     """
     missing = {
         extra: [name for name in packages if importlib.util.find_spec(name) is None]
@@ -37,7 +37,7 @@ def require_fit(what: str, plot: bool = False) -> None:
 
 
 def install(extra: str) -> str:
-    """The command that installs `extra` where hystgen runs: from the checkout or file that it came from, if any."""
+    """The command that installs `extra` into this Python, from the checkout or file hystgen came from, if any."""
     pip = shutil.which("pip")
     own = pip is not None and Path(pip).parent == Path(sys.executable).parent
     command = ["pip"] if own else [sys.executable, "-m", "pip"]

@@ -1,15 +1,15 @@
-"""Functions that numba compiles when they are first called, or first needed by another one.
+"""Functions that numba compiles when they are first called, or first needed by another compiled function.
 
     @jit
     def followed(state, x, r): ...
 
-`followed` is then the compiled function, wherever it is called from; inside `with plain():` it is the Python function
-`followed.interpreted`, which calls others directly; `followed.py_func` is the function as it was written. Numba is
-imported with the first call that needs it; without numba everything runs as Python, with the same bits.
+`followed` then runs compiled, wherever it is called from. Inside `with plain():` it runs as Python instead, as
+`followed.interpreted`, which calls other such functions directly; `followed.py_func` is the function as written. Numba
+is imported at the first call that needs it; without numba everything runs as Python and gives the same bits.
 
-Compiled code is cached on disk; its cache key contains the source of every function that takes part, so that a change
-in a helper can never leave a stale caller behind. The cache saves time but is not required: if no folder is writable,
-nothing is cached; unreadable cached files are rebuilt.
+Compiled code is cached on disk; its cache key contains the source of every function involved, so a change in a helper
+can never leave a stale caller behind. The cache saves time but is not required: if no folder is writable, nothing is
+cached; unreadable cached files are rebuilt.
 """
 
 from __future__ import annotations
@@ -33,20 +33,20 @@ from hystgen.basics import extras
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# Called once, with a message to the user, before the first function that is not in the cache is compiled, or runs as
-# Python because there is no numba
+# Called once, with a message for the user, before the first function missing from the cache is compiled, or runs as
+# Python for want of numba
 announce: Callable[[str], None] | None = None
 
-ONCE = "compiling Python functions for this machine, once: up to 20 s, with effects in the C up to 40 s"
+ONCE = "compiling Python functions for this machine, once: up to 20 s, or 40 s if the C has effects"
 EVERY_TIME = (
-    "compiling Python functions for this machine: up to 20 s, with effects in the C up to 40 s, and again every time, "
-    "since no folder for the result is writable; set NUMBA_CACHE_DIR to one that is"
+    "compiling Python functions for this machine: up to 20 s, or 40 s if the C has effects, and again in every run, "
+    "because no cache folder is writable; set NUMBA_CACHE_DIR to one that is"
 )
 
 
 def interpreted() -> str:
     """The message for a machine without numba."""
-    return f"computing in plain Python, which is slower than compiled code; to compile it:  {extras.install('fit')}"
+    return f"computing in plain Python, which is slower than compiled code; for compiled code:  {extras.install('fit')}"
 
 
 # The functions allocate nothing, so reference counting, which would take most of a sample's time, is disabled
@@ -55,18 +55,18 @@ OPTIONS: dict[str, object] = {"error_model": "numpy", "_nrt": False, "nogil": Tr
 _plain = contextvars.ContextVar("plain", default=False)
 
 SHORT = 10_000
-"""[samples] As many of one function and type run as Python in a process before it is compiled or loaded: 0.3 s of a
-plain model, whose functions take 8 s to compile, and 0.8 s with many effects, where that takes 80 s. Set by: `verify`
-of `mixed` and `everything` of tests/modelfiles.py, inverse, 0.028 and 0.083 ms a sample."""
+"""[samples] Number that a process computes in Python, per function and data type, before it compiles or loads the
+function: 0.3 s for a plain model, whose functions take 8 s to compile, and 0.8 s with many effects, which take 80 s.
+Set by: `verify` of `mixed` and `everything` of tests/modelfiles.py, inverse, 0.028 and 0.083 ms a sample."""
 
 _samples: collections.Counter[tuple[object, np.dtype[np.generic]]] = collections.Counter()
 
 
 @contextlib.contextmanager
 def plain() -> Iterator[None]:
-    """Inside, functions run as plain Python, for short signals: there is nothing to compile or to load.
+    """Context in which functions run as plain Python, for signals too short to be worth compiling or loading code.
 
-    Numbers overflow and become NaN without a warning, as in compiled code.
+    Overflow and NaN raise no warning, as in compiled code.
     """
     before = _plain.set(True)
     try:
@@ -79,7 +79,7 @@ def plain() -> Iterator[None]:
 def for_samples(
     function: Callable[..., object], samples: NDArray[np.generic]
 ) -> contextlib.AbstractContextManager[None]:
-    """As `plain` while `function` has been given few samples of their type in this process, and otherwise nothing."""
+    """`plain` until `function` has been given `SHORT` samples of this type in this process, then a null context."""
     key = function, samples.dtype
     if _samples[key] + len(samples) > SHORT:
         return contextlib.nullcontext()
@@ -88,13 +88,13 @@ def for_samples(
 
 
 class Jit(Generic[P, R]):
-    """A function that runs compiled; `py_func` is its Python."""
+    """A function that runs compiled; `py_func` is the original in Python."""
 
     def __init__(self, function: Callable[P, R], inline: bool) -> None:
         functools.update_wrapper(self, function)
         self.py_func = function
         self.targetoptions = {**OPTIONS, "inline": "always" if inline else "never"}
-        """numba's options, read by numba when a function is called by another"""
+        """numba's options, which numba reads when another function calls this one"""
 
     def __call__(self, *given: P.args, **named: P.kwargs) -> R:
         if _plain.get():
@@ -107,11 +107,11 @@ class Jit(Generic[P, R]):
 
     @functools.cached_property
     def interpreted(self) -> Callable[P, R]:
-        """A copy of `py_func` in which the names of jitted functions mean such copies of them, which saves half the
-        time of a record: a call of `self` looks at how to run, and a step makes some hundred calls."""
+        """A copy of `py_func` that calls the same kind of copy of other jitted functions. This halves the time of a
+        record: a step makes some hundred calls, each of which would have to decide how to run."""
         made: list[types.FunctionType] = []
         todo = [self]
-        for one in todo:  # grows meanwhile
+        for one in todo:  # grows in the loop
             if "interpreted" not in one.__dict__:
                 made.append(_copy(one.py_func, dict(one.py_func.__globals__)))
                 one.__dict__["interpreted"] = made[-1]
@@ -134,7 +134,7 @@ class Jit(Generic[P, R]):
     def inner(self) -> Any:
         """The function compiled by numba, to be called from compiled code only.
 
-        The wrapper that unpacks a model's tables would be more code than the function itself.
+        A wrapper to unpack a model's tables from Python would be more code than the function itself.
         """
         return self._dispatcher("inner", {**self.targetoptions, "no_cpython_wrapper": True, "no_cfunc_wrapper": True})
 
@@ -146,7 +146,7 @@ class Jit(Generic[P, R]):
         twin.__qualname__ = f"{twin.__name__}_{kind}_{self.mark}"
         made = numba.njit(**options)(twin)
         with contextlib.suppress(RuntimeError):  # no folder is writable
-            made._cache = _cache_class()(twin)  # as its enable_caching does with numba's own class
+            made._cache = _cache_class()(twin)  # what its enable_caching does with numba's own class
         return made
 
     @property
@@ -156,8 +156,8 @@ class Jit(Generic[P, R]):
 
     @functools.cached_property
     def mark(self) -> str:
-        """A hash of everything its compiled code depends on: its source, that of all the functions it calls, and
-        constants."""
+        """A hash of everything the compiled code depends on: constants, and the source of the function and of all
+        functions it calls."""
         text, functions = repr(OPTIONS), [self]
         for function in functions:
             text += inspect.getsource(function.py_func) + repr(function.targetoptions)
@@ -171,7 +171,7 @@ class Jit(Generic[P, R]):
 
 
 def _copy(function: Callable[..., object], names: dict[str, object]) -> types.FunctionType:
-    """The function with these globals, and with cells of its own around what its closure holds."""
+    """A copy of the function with these globals, and with new closure cells that hold the same values."""
     assert isinstance(function, types.FunctionType)
     cells = tuple(types.CellType(cell.cell_contents) for cell in function.__closure__ or ())
     made = types.FunctionType(function.__code__, names, function.__name__, function.__defaults__, cells or None)
@@ -184,8 +184,8 @@ def jit(function: Callable[P, R], /) -> Jit[P, R]: ...
 @overload
 def jit(*, inline: bool) -> Callable[[Callable[P, R]], Jit[P, R]]: ...
 def jit(function: Callable[..., object] | None = None, /, *, inline: bool = False) -> Any:
-    """Compile a function; `inline` makes it part of its callers, since passing a model's many tables costs more than a
-    short function computes."""
+    """Compile a function; `inline` inlines it into its callers, as suits a short function: passing it a model's many
+    tables would cost more than what it computes."""
     if function is None:
         return functools.partial(Jit, inline=inline)
     return Jit(function, inline)
@@ -193,18 +193,18 @@ def jit(function: Callable[..., object] | None = None, /, *, inline: bool = Fals
 
 @functools.cache
 def _cache_class() -> Any:
-    """Numba's cache of a function, which treats a file that it cannot read or write as missing."""
+    """Numba's cache of a function, changed to treat a file that it cannot read or write as missing."""
     from numba.core.caching import FunctionCache
 
     class Cache(FunctionCache):
         def _index_key(self, sig: Any, codegen: Any) -> Any:
-            # The name holds the mark of everything that the code depends on; numba would pickle what a closure holds
+            # The name contains the hash of everything the code depends on; numba would pickle the closure's contents
             return sig, codegen.magic_tuple(), self._py_func.__qualname__
 
         def load_overload(self, sig: object, target_context: object) -> object:
             try:
                 return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-            except Exception:  # any error that unpickling half a file may raise
+            except Exception:  # unpickling half a file may raise anything
                 with contextlib.suppress(OSError):
                     self.flush()  # type: ignore[no-untyped-call]
                 return None
@@ -217,7 +217,7 @@ def _cache_class() -> Any:
 
 
 def _cache_folder() -> str | None:
-    """Where compiled code of this package is kept; None if no folder is writable."""
+    """Folder in which this package's compiled code is cached; None if no folder is writable."""
     try:
         return str(_cache_class()(_cache_folder).cache_path)
     except RuntimeError:

@@ -1,4 +1,4 @@
-"""A model's name, which is the prefix of its C, and the length of unit names."""
+"""Limits on a model's name, which is the prefix of its C, and on the length of unit names."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ NAME_PATTERN = "^[A-Za-z](_?[A-Za-z0-9])*$"
 """Letters, digits and single underscores between them, starting with a letter."""
 
 MAX_UNIT = 40
-"""[characters] The longest name of a unit: anything longer in the header of a recording is not taken for a unit, since
-it would not fit a parameter file."""
+"""[characters] Maximum length of a unit name: longer text in the header of a recording is not taken for a unit, since
+a parameter file could not hold it."""
 
 
 def _words(text: str) -> frozenset[str]:
@@ -21,7 +21,7 @@ def _words(text: str) -> frozenset[str]:
 
 _NAME = re.compile(NAME_PATTERN.rstrip("$") + r"\Z")
 
-# C up to C23 and C++ up to C++23; keywords with a leading underscore are not names anyway.
+# C up to C23 and C++ up to C++23; keywords with a leading underscore cannot be model names anyway.
 KEYWORDS = _words(
     """
     alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t char8_t class
@@ -47,8 +47,8 @@ _HEADERS = _words(
 
 _DEVICES = frozenset(["con", "prn", "aux", "nul", *(f"{port}{i}" for port in ("com", "lpt") for i in range(10))])
 
-# Macros UPPER_... of a model with one of these names would clash with the macros of a standard header: the first group
-# is reserved whatever follows, the second only with names that the header itself forms.
+# The macros UPPER_... of a model with one of these names would clash with those of a standard header. The first group
+# also rules out names that continue after an underscore, the second only the names themselves.
 _MACRO_FAMILIES = dict.fromkeys(_words("dbl dec dec32 dec64 dec128 flt ldbl"), "float")
 _MACRO_NAMES = (
     dict.fromkeys(_words("ptrdiff sig_atomic size wchar wint intptr uintptr intmax uintmax"), "stdint")

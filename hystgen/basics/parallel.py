@@ -1,7 +1,7 @@
 """The same work on several items, in forked copies of this process or in its threads.
 
-A copy (fork) sees everything that this process had when it was made, so little has to be sent, and the results are
-those of a plain loop in whatever order the processes run. If processes cannot be copied safely, it is a plain loop.
+A copy (fork) starts with everything that this process had in memory, so little has to be sent. The results are those
+of a plain loop, in whatever order the processes run. Where forking is not safe, a plain loop does the work.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ T = TypeVar("T")
 R = TypeVar("R")
 
 MOST_PROCESSES = 16
-"""[processes] At most this many; each has its own results in memory."""
+"""[processes] Maximum number; each keeps its own results in memory."""
 
 _at_work: Sequence[int] | memoryview[int] = (0,)
 """Number of busy workers in this process's pool."""
 
 def cores() -> int:
-    """Largest number of processes here; 1 if they cannot be copied.
+    """Maximum number of processes here; 1 if forking is not safe.
 
     A lock held by another thread would stay locked in a copy, and some system libraries do not survive a fork.
     """
@@ -54,10 +54,10 @@ def _cores() -> int:
 def each(
     work: Callable[[T], R], items: Sequence[T], jobs: int, tick: Callable[[], None] = lambda: None
 ) -> list[R]:
-    """`[work(item) for item in items]` with `jobs` processes; results are pickled, and `tick` is called for each of
-    them.
+    """`[work(item) for item in items]` with `jobs` processes; results are pickled, and `tick` is called once for
+    each.
 
-    An item that fails or kills its worker is rerun in this process: an exception is raised as in a plain loop.
+    An item that fails or kills its worker is rerun in this process, so an exception is raised as in a plain loop.
     """
     pool: Pool[int, R] = Pool(lambda k: work(items[k]), jobs)
     with pool:
@@ -73,9 +73,9 @@ class _Pending(Generic[T, R]):
 
 
 class Pool(Generic[T, R]):
-    """Up to `jobs` processes for the same work on items that arrive one after the other; `with` ends them.
+    """Up to `jobs` processes for the same work on items that arrive one after the other; leaving `with` ends them.
 
-    They are started when the first items arrive, and see what this process had then; items and results are pickled.
+    They start when the first items arrive, with what this process has in memory then; items and results are pickled.
     """
 
     def __init__(self, work: Callable[[T], R], jobs: int) -> None:
@@ -99,10 +99,10 @@ class Pool(Generic[T, R]):
         tick: Callable[[], None] = lambda: None,
         then: Callable[[T, R], Iterable[T]] = lambda *_: (),
     ) -> list[tuple[T, R]]:
-        """All the items with their results, in the order of a plain loop; `tick` is called for each of them.
+        """All the items with their results, in the order of a plain loop; `tick` is called once for each.
 
-        `then`: further tasks that follow from a result; they go first. An item that fails or kills its worker is rerun
-        in this process: an exception is raised as in a plain loop.
+        `then`: further items that follow from a result; they are next in line. An item that fails or kills its worker
+        is rerun in this process, so an exception is raised as in a plain loop.
         """
         tasks = [_Pending[T, R](item) for item in items]
 
@@ -115,7 +115,7 @@ class Pool(Generic[T, R]):
         if self._workers or min(self._jobs, len(tasks)) > 1:
             self._elsewhere(deque(tasks), finish)
         found = []
-        for task in tasks:  # which grows
+        for task in tasks:  # grows in the loop
             if not task.done:
                 finish(task, self._work(task.item))
             tasks.extend(task.after)
@@ -125,7 +125,7 @@ class Pool(Generic[T, R]):
     def _elsewhere(
         self, waiting: deque[_Pending[T, R]], finish: Callable[[_Pending[T, R], R], list[_Pending[T, R]]]
     ) -> None:
-        """Let the processes do the tasks; those after a failure may remain undone."""
+        """Have the processes do the tasks; after a failure, tasks may remain undone."""
         from multiprocessing import connection
 
         self._gather(len(waiting))
@@ -136,7 +136,7 @@ class Pool(Generic[T, R]):
             while free and waiting and not failed:
                 reach, task = free.pop(), waiting.popleft()
                 busy[reach] = task
-                with contextlib.suppress(BrokenPipeError):  # which is noticed below
+                with contextlib.suppress(BrokenPipeError):  # noticed below
                     reach.send(task.item)
             self._at_work[0] = len(busy)
             if not busy:
@@ -156,11 +156,11 @@ class Pool(Generic[T, R]):
                     waiting.extendleft(finish(task, result))
 
     def _gather(self, most: int) -> None:
-        """Start processes while there are fewer than tasks."""
+        """Start processes up to the number of tasks, `most`, and at most `jobs`."""
         import multiprocessing
 
         fork = multiprocessing.get_context("fork")
-        # Interrupts are for this process; a copy that got one before it ignores them would report it
+        # Interrupts are for this process; a copy that gets one before it ignores them would print a traceback
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             while len(self._workers) < min(self._jobs, most):
@@ -188,7 +188,7 @@ def _serve(
     for ending in (signal.SIGTERM, signal.SIGHUP):  # the original process handles these signals
         signal.signal(ending, signal.SIG_DFL)
     gc.freeze()  # a garbage collection would copy all of the parent's memory
-    for each in others:  # its pipe ends, which would keep one copy waiting for the other after the parent is gone
+    for each in others:  # inherited pipe ends, which would keep copies waiting for each other once the parent is gone
         each.close()
     while True:
         try:
@@ -203,9 +203,9 @@ def _serve(
 
 
 def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
-    """`work(item)` for all items, in threads that end with the call; compiled work runs in parallel there.
+    """`work(item)` for all items, in threads that end with the call; only compiled work runs in parallel.
 
-    Used while other cores are idle, as when the last worker of a pool has a long task; otherwise a plain loop.
+    Threads are used while cores are idle, as when the last busy worker of a pool has a long task; otherwise a loop.
     """
     room = min(len(items), _cores() // max(1, _at_work[0]))
     if room < 2:
@@ -225,7 +225,7 @@ def in_threads(work: Callable[[T], None], items: Sequence[T]) -> None:
 def one_thread() -> contextlib.AbstractContextManager[object]:
     """Context in which linear algebra uses a single thread: on small matrices, several would wait for each other."""
     try:
-        import scipy.linalg  # noqa: F401  # has a library of its own, and one that comes later is not limited
+        import scipy.linalg  # noqa: F401  # has its own BLAS, which would not be limited if loaded later
         from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
     except ImportError:
         extras.require_fit("a fit")

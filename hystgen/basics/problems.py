@@ -1,4 +1,4 @@
-"""Problems of an input file: what is wrong, where, and what to do."""
+"""Problems in an input file: what is wrong, where, and what to do."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Path = tuple[str | int, ...]
 """Path of a value in the file: keys and list indices from the top level down."""
 
 SHOWN = 60
-"""Longest piece of a user's text repeated in a message."""
+"""[characters] Maximum length at which a message quotes a user's text."""
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Problem:
     """One thing that is wrong with a file.
 
     `path` is dotted (`model.pi.weights[2]`, empty for the file as a whole); `message` says what is wrong and, after a
-    semicolon, what to do; `line` and `column` count from 1 and are None if there is none.
+    semicolon, what to do; `line` and `column` count from 1, and are None for a problem without a position.
     """
 
     path: str
@@ -39,7 +39,7 @@ class Problem:
 class ParameterError(ValueError):
     """A parameter file that is refused, with every problem found in it.
 
-    `problems` is sorted by position, `file` is the name as the user gave it; `str()` gives one line per problem.
+    `problems` is sorted by position; `file` is the name as the user gave it; `str()` gives one line per problem.
     """
 
     def __init__(self, file: str, problems: Iterable[Problem]) -> None:
@@ -49,14 +49,14 @@ class ParameterError(ValueError):
 
 
 def printable(text: str) -> str:
-    """A user's text as repeated in messages: at most 60 characters, unprintable ones escaped."""
+    """A user's text as messages quote it: at most 60 characters, unprintable ones escaped."""
     if len(text) > SHOWN:
         text = text[: SHOWN - 3] + "..."
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in text)
 
 
 def shown(value: object) -> str:
-    """A value as named in messages: numbers as they are, text in quotes, lists and mappings by kind."""
+    """How messages name a value: numbers as they are, text in quotes, lists and mappings by kind."""
     if isinstance(value, str):
         return f'the text "{printable(value)}"'
     if value is None:
@@ -73,7 +73,7 @@ def shown(value: object) -> str:
 
 
 def path_text(path: Path) -> str:
-    """A path as named in messages: `model.pi.weights[2]`; keys that are not plain words are quoted."""
+    """How messages name a path: `model.pi.weights[2]`; keys that are not plain words are quoted."""
     text = ""
     for part in path:
         if isinstance(part, int):
@@ -109,7 +109,7 @@ class EffectsError(ValueError):
 
 
 class UnsupportedEffectsError(EffectsError):
-    """Something not yet supported for a model with effects; it names them."""
+    """Something not yet supported for a model with effects; the message names the effects."""
 
 
 class NotInvertibleError(ValueError):
@@ -121,9 +121,9 @@ class NotInvertibleError(ValueError):
 
 
 class FormatError(ValueError):
-    """A model whose numbers do not fit the arithmetic.
+    """A model whose parameters do not fit the arithmetic.
 
-    `problems`: path of the value in a parameter file, `()` for none, and what is wrong; `str()` gives one line each.
+    `problems`: pairs of a path in the parameter file, or `()`, and what is wrong there; `str()` gives one line each.
     """
 
     def __init__(self, *problems: str | tuple[Path, str]) -> None:
@@ -132,22 +132,22 @@ class FormatError(ValueError):
 
 
 class SampleWarning(UserWarning):
-    """Samples that a model limited, held or extrapolated; `str()` says how many, and what was done with them."""
+    """Samples that a model limited, held or extrapolated; `str()` says how many, and what was done to them."""
 
 
 def counted(number: int, one: str, several: str = "") -> str:
-    """`1 sample`, `2 samples`; `several`: the words after any other number, if they are not `one` with an s."""
+    """`1 sample`, `2 samples`; `several`: the plural, if it is not `one` with an s."""
     return f"{number} {one if number == 1 else several or f'{one}s'}"
 
 
 FACTOR = 10.0
-"""[times] From here on a share is given as a factor: "32 times" reads more easily than "3200 %", which is more than the
-three digits of a share. Only wording depends on it. Changed by:
+"""[times] From this value on, a share is worded as a factor: "32 times" is easier to read than "3200 %", which has more
+than a share's three digits. Only wording depends on it. Changed by:
 report::test_shares_of_ten_times_and_more_are_factors."""
 
 
 def percent(share: float, digits: str = ".3g", of: str = "") -> str:
-    """`12 % of the range`, or `32 times the range`; without `of` the number alone."""
+    """`12 % of the range`, or `32 times the range`; without `of`, only `12 %` or `32 times`."""
     if abs(share) >= FACTOR:
         return f"{share:.3g} times{f' {of}' if of else ''}"
     return f"{100.0 * share:{digits}} %{f' of {of}' if of else ''}"

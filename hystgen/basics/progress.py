@@ -14,15 +14,15 @@ PATIENCE = 1.0
 """Seconds before the bar appears."""
 
 OFTEN = 0.1
-"""Seconds between two updates of it; drawn by `tick`, since a thread for the bar would rule out forking
+"""Seconds between updates of the bar; `tick` draws it, since a thread for the bar would rule out forking
 (`parallel`)."""
 
 
 class Progress:
     """Context manager; `tick` counts work, in the unit of `total`, under a `title`.
 
-    A `total` of 0 is unknown. Silent unless `shown`, stderr is a terminal, time has passed, and rich is
-    installed.
+    A `total` of 0 means unknown. Silent unless `shown` is set, stderr is a terminal, rich is installed, and
+    `PATIENCE` has passed.
     """
 
     def __init__(self, total: float, shown: bool, title: str) -> None:

@@ -1,11 +1,11 @@
-"""Structures of named numbers, declared once: the arrays of the bit reference, and the structs of the C.
+"""Structures of named numbers, declared once for both the arrays of the bit reference and the structs of the C.
 
     class LagState(Struct):
         high: Real  # comments say what a number is, as in C
         low: Real
 
-`LagState.zeros(3, np.float32)` is the memory of three lags, one structured array. `s.high[1]` is a number of the second
-one, in Python and in compiled code, where numba takes such an array as it is.
+`LagState.zeros(3, np.float32)`, a single structured array, is the memory of three lags. `s.high[1]` is a number of the
+second lag, in Python and in compiled code alike, since numba accepts structured arrays.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ FourInt32: TypeAlias = Annotated[Numbers, "int32_t", 4]
 
 
 class Struct(np.ndarray[Any, np.dtype[Any]]):
-    """Structures of one kind, an array of them; each member is an array of numbers or structures.
+    """An array of structures of one kind; each member is an array of numbers or structures.
 
     A `Real`, `Signal` or `Narrow` has the type of the arithmetic. Others are int64 here, however narrow they are in C.
     """
@@ -48,14 +48,14 @@ class Struct(np.ndarray[Any, np.dtype[Any]]):
                 setattr(self, name, plain[name].view(kind) if isinstance(kind, type) else plain[name])
 
     def __setstate__(self, state: Any) -> None:
-        """Unpickle, which fills an array that had no members yet."""
+        """Unpickle, then add the members: the array had no fields when it was created."""
         super().__setstate__(state)
         self.__array_finalize__(None)
 
     @classmethod
     @functools.cache
     def members(cls) -> Mapping[str, tuple[type[Struct] | str, int]]:
-        """Members by name, in order: a structure or the type in C without prefix, and the length of an array or 0."""
+        """Members by name, in order: a structure or the C type without its prefix, and the length of an array or 0."""
         found: dict[str, tuple[type[Struct] | str, int]] = {}
         for name, hint in get_type_hints(cls, include_extras=True).items():
             if get_origin(hint) is Annotated:
@@ -68,7 +68,7 @@ class Struct(np.ndarray[Any, np.dtype[Any]]):
     @classmethod
     @functools.cache
     def layout(cls, real: np.dtype[np.generic]) -> np.dtype[np.void]:
-        """The structured type of numpy in an arithmetic with numbers of type `real`."""
+        """numpy's structured type in an arithmetic whose numbers have the type `real`."""
         taken = [name for name in cls.members() if hasattr(np.ndarray, name)]
         assert not taken, f"{cls.__name__}: arrays have attributes {taken}"
         fields: list[Any] = []
@@ -80,12 +80,12 @@ class Struct(np.ndarray[Any, np.dtype[Any]]):
 
     @classmethod
     def zeros(cls, count: int, real: DTypeLike = np.int64) -> Self:
-        """As many structures, with all numbers 0."""
+        """`count` structures, with all numbers 0."""
         return np.zeros(count, cls.layout(np.dtype(real))).view(cls)
 
     @classmethod
     def of(cls, rows: Iterable[Any], real: DTypeLike = np.int64) -> Self:
-        """A structure for each row, whose entries are its members in order; a structure in it is a tuple."""
+        """One structure per row; a row lists the members in order, with nested structures as tuples."""
         return np.array([tuple(row) for row in rows], cls.layout(np.dtype(real))).view(cls)
 
 
@@ -102,10 +102,10 @@ def declared(name: str, members: Iterable[str], word: Any) -> type[Struct]:
 
 
 def memory_of(kind: type[Any]) -> Callable[[Any, DTypeLike], Any]:
-    """Makes the memory of blocks, all 0, for their tables and the type of `Real`.
+    """Return a function that makes the memory of blocks, all 0, from their tables and the type of `Real`.
 
-    `kind`: a structure, one for each entry of the tables; or a NamedTuple of structures, each of them one for each
-    entry of the tables' field of that name.
+    `kind`: a structure, made once per entry of the tables; or a NamedTuple of structures, each made once per entry of
+    the tables' field of the same name.
     """
 
     def memory(t: Any, real: DTypeLike) -> Any:

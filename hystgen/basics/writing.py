@@ -1,8 +1,8 @@
 """Files that appear complete or not at all, and folders for work in progress.
 
-Everything is written in a staging folder next to its destination and then renamed. The folder is removed when the work
-ends, however it ends; the next process that writes to the same place removes the remains of a killed one. A lock in it,
-which the system releases with the process, distinguishes the two cases.
+Everything is written in a staging folder next to its destination and then renamed. That folder is removed when the work
+ends, however it ends; if a process was killed, the next one that writes to the same place removes its leftovers. A lock
+in the folder, which the system releases when its process ends, tells leftovers from a folder in use.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def temporary() -> Iterator[Path]:
 
 
 def sweep(around: Path) -> None:
-    """Remove the staging folders that killed processes left in a folder, once in each process."""
+    """Remove the staging folders that killed processes left in a folder, once per process."""
     where = os.path.realpath(around)
     if where in _swept:
         return
@@ -87,11 +87,11 @@ def _new(around: Path) -> tuple[Path, int | None]:
             return place, None
         if lock is not None:
             return place, lock
-        # Another process took it for a leftover before it was locked
+        # Another process took the folder for a leftover before it was locked
 
 
 def _hold(place: Path) -> int | None:
-    """Lock a staging folder; None if another process holds it, or is removing it. Raises OSError without locks."""
+    """Lock a staging folder; None if another process holds or removes it. Raises OSError if there are no locks."""
     if sys.platform == "win32":
         raise OSError(errno.ENOTSUP, os.strerror(errno.ENOTSUP))
     import fcntl
@@ -132,7 +132,7 @@ def place_for(path: str | os.PathLike[str]) -> Path:
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Raise the OSError that `write_atomically` would raise, found by a trial in the folder."""
+    """Raise the OSError that `write_atomically` would raise, as found by writing a trial file to the folder."""
     target = place_for(path)
     if target.is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), os.fspath(path))
@@ -141,7 +141,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def try_folder(folder: Path, path: str | os.PathLike[str]) -> None:
-    """Raise the OSError, with the name `path`, that writing into an existing folder would raise."""
+    """Raise the OSError that writing into an existing folder would raise, but naming `path`."""
     try:
         with tempfile.TemporaryFile(prefix=PREFIX, dir=folder):
             pass
@@ -150,7 +150,7 @@ def try_folder(folder: Path, path: str | os.PathLike[str]) -> None:
 
 
 def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> None:
-    """Write a file, text as UTF-8, so that it is either the old one or complete.
+    """Write a file, text as UTF-8; at any time the path holds either the old file or the complete new one.
 
     A link stays a link, and anything but a regular file (a pipe, a terminal) is written in place. Raises OSError.
     """
@@ -184,14 +184,14 @@ def check_files(folder: Path, names: Iterable[str]) -> None:
 def write_files(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
     """Write `files` (name to ASCII text or bytes) into `folder`; each appears complete, none before all are ready.
 
-    A new folder appears with all of them; in an existing one other files are left alone, and so are those that already
-    have the same bytes.
+    A new folder appears with all its files at once; in an existing folder, other files are left alone, and so are files
+    that already have the right bytes.
     """
     target = destination(folder)  # a link stays a link
     new = not target.exists()
     around = target.parent if new else target
     around.mkdir(parents=True, exist_ok=True)
-    sweep(target.parent)  # left by a call that was killed before the folder appeared
+    sweep(target.parent)  # leftovers of a call that was killed before the folder appeared
     try:
         with staging(around) as staged:
             made = staged / "made"

@@ -1,1 +1,1 @@
-"""The forward model: the static part, and effects in the order of the chain."""
+"""The forward model: the static part and the effects, in the order of the chain."""

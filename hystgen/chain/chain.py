@@ -1,4 +1,4 @@
-"""The whole actuator: static model and effects in the order of the chain, over the records of a session."""
+"""The whole actuator, static model and effects in the order of the chain, simulated over the records of a session."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from hystgen.plays import operators
 Array = NDArray[np.float64]
 
 VISIT = 10.0
-"""Seconds of the straight move to each value of a history."""
+"""Seconds of the linear move to each value of a history."""
 
 VISIT_SAMPLES = 200
-"""Samples of that move. More samples change the output after a history by at most 4e-6 of its range, with a mode of 0.5
-Hz; 25 change it by 2e-4. Set by: benchmarks/chosen_numbers.py visits."""
+"""Samples of that move. With a mode of 0.5 Hz, taking more changes the output after a history by at most 4e-6 of its
+range; taking only 25 changes it by 2e-4. Set by: benchmarks/chosen_numbers.py visits."""
 
 SESSION_GAP = 10.0
-"""Gap between records of a session, in median steps, above which the drive is held in it; below, it is straight."""
+"""Gap between records of a session, in median steps, above which the drive is held; in shorter gaps it is linear."""
 
 def rank(effect: Effect | type[Effect]) -> tuple[int, int]:
-    """Position in the chain: its place, where gains lie between linear filters of order 0 and others, and its order."""
+    """Position in the chain: place, then order; gains lie between the linear filters of order 0 and the others."""
     places = (Place.DRIVE, Place.PLAYS, Place.LINEAR, Place.GAIN, Place.LINEAR, Place.OUTPUT, Place.ADDED)
     late = effect.place is Place.LINEAR and effect.order > 0
     return 4 if late else places.index(effect.place), effect.order
@@ -51,14 +51,14 @@ class JoinedRuns:
 def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> JoinedRuns:
     """The runs of a session on one time axis.
 
-    A record whose times follow the previous record's keeps them (session time), unless a rest would not fit in between;
-    any other starts one median step after the record before and its rest. In rests, and in gaps of more than
-    `SESSION_GAP` steps, the drive holds until one step before the next record. The values of `history` are visited
-    before the first record, each by a straight move of `VISIT` seconds, and the last is held for its rest. Raises
-    ValueError for records without samples.
+    A record keeps its times (session time) if they follow the previous record's and leave room for its rest; otherwise
+    it starts one median step after the previous record plus its rest. In rests, and in gaps of more than `SESSION_GAP`
+    steps, the drive is held until one step before the next record. Before the first record the drive visits the values
+    of `history`, each by a linear move of `VISIT` seconds, and holds the last for the record's rest. Raises ValueError
+    for records without samples.
     """
     if not runs or any(len(run.t) == 0 for run in runs):
-        raise ValueError("a session has records, and each of them samples")
+        raise ValueError("a session needs at least one record, and no record may be empty")
     names = set.intersection(*(set(run.extra) for run in runs))
     t: list[Array] = []
     v: list[Array] = []
@@ -101,13 +101,13 @@ def join(runs: Sequence[Run], history: Sequence[float] | None = None) -> JoinedR
 
 
 NO_MOVE = 1e-12
-"""[share of the largest drive] A move no larger than this behind an effect of the drive is rounding and has no
-direction. A lag of a thousand samples on a resting drive moves back and forth by about 1e-13, since even times differ
-by rounding and so do its factors. Set by: tests/test_branches.py."""
+"""[share of the largest drive] Behind an effect on the drive, a move up to this size is rounding and has no direction.
+At a resting drive, a lag of a thousand samples moves back and forth by about 1e-13, since rounding makes evenly spaced
+times differ, and with them its factors. Set by: tests/test_branches.py."""
 
 
 def arriving_slack(static: StaticModel, effects: Sequence[Effect]) -> float:
-    """How far the signal in front of the memoryless part may go back without changing its branch, in drive units."""
+    """How far the signal in front of the memoryless part may move back before the branch changes, in drive units."""
     if not static.branches_differ or not any(effect.place is Place.DRIVE for effect in effects):
         return 0.0
     largest = max(abs(end) for end in static.input_range)
@@ -115,7 +115,7 @@ def arriving_slack(static: StaticModel, effects: Sequence[Effect]) -> float:
 
 
 class Ordered:
-    """Effects in the order of the chain, and their results at each place."""
+    """Effects in the order of the chain, and what they do at each place."""
 
     effects: tuple[Effect, ...]
 
@@ -132,7 +132,7 @@ class Ordered:
 
     @cached_property
     def filters(self) -> tuple[Effect, ...]:
-        """The filters right behind the plays; others are behind the gains."""
+        """The filters right behind the plays; all others are behind the gains."""
         return tuple(effect for effect in self.at(Place.LINEAR) if effect.order == 0)
 
     @cached_property
@@ -153,7 +153,7 @@ class Ordered:
         return a
 
     def moved(self, w: Array, run: Run, thresholds: Array, start: Array) -> Array:
-        """Rows (n+1, N) of the plays for their input, before an effect bends them."""
+        """Rows (n+1, N) of the plays for their input `w`, before any effect bends them."""
         if self.mover is None:
             return operators.plays(w, thresholds, start)
         return self.mover.plays(w, run, thresholds, start)
@@ -167,13 +167,13 @@ class Ordered:
         return self.mover.summed(p, w, run, thresholds, start)
 
     def bent(self, rows: Array, thresholds: Array) -> Array:
-        """The rows as all effects bend them."""
+        """The rows after every effect that bends them."""
         for effect in self.bending:
             rows = effect.bent(rows, thresholds)
         return rows
 
     def bent_sum(self, p: Array, rows: Array, thresholds: Array) -> Array:
-        """The weighted sum (N,) of the rows of `bent`; at least one effect has to bend them."""
+        """The weighted sum (N,) of the rows of `bent`; there must be an effect that bends them."""
         *first, last = self.bending
         for effect in first:
             rows = effect.bent(rows, thresholds)
@@ -208,7 +208,7 @@ class Chain(Ordered):
     def __init__(self, cascade: StaticModel, effects: Sequence[Effect]) -> None:
         movers = [effect.name for effect in effects if effect.moves_plays()]
         if len(movers) > 1:
-            raise EffectsError(f"one effect says how the plays move, not {' and '.join(movers)}")
+            raise EffectsError(f"only one effect can set how the plays move, not {' and '.join(movers)}")
         self.cascade = cascade
         self.effects = in_order(effects)
 
@@ -220,12 +220,12 @@ class Chain(Ordered):
         for name in sorted({column for effect in self.effects for column in effect.columns}):
             if any(name not in run.extra for run in runs):
                 who = next(effect.name for effect in self.effects if name in effect.columns)
-                raise EffectsError(f"the effect {who} needs the column {name}, which a record does not have")
+                raise EffectsError(f"the effect {who} needs the column {name}, which a record lacks")
         session = join(runs, history)
         y = self.output(session.run)
         if not np.isfinite(y).all() and np.isfinite(session.run.v).all():
-            names = ", ".join(effect.name for effect in self.effects) or "no effects"
-            raise EffectsError(f"the output is not finite; what do the parameters of {names} come to?")
+            names = ", ".join(effect.name for effect in self.effects) or "the model"
+            raise EffectsError(f"the output is not finite; check the parameters of {names}")
         return [y[part] for part in session.parts]
 
     def output(self, run: Run) -> Array:
@@ -252,8 +252,8 @@ class Chain(Ordered):
         return through_stages(self.cascade.stages, a, rising)
 
     def plays(self, w: Array, run: Run) -> Array:
-        """Rows (n+1, N) that the weights sum, from the start memory: plays moved by at most one effect, bent by the
-        others."""
+        """Rows (n+1, N) that the weights multiply, from the start memory on: plays, moved by at most one effect and
+        bent by the others."""
         pi = self.cascade.pi
         thresholds = np.asarray(pi.thresholds)
         return self.bent(self.moved(w, run, thresholds, np.asarray(pi.start)), thresholds)

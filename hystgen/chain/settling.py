@@ -21,39 +21,39 @@ HORIZON = 3600.0
 """[s] Duration of the computed step response: anything slower is creep."""
 
 FOREVER = 1e15
-"""[s] Time after which everything has come to rest; the filters take steps of any length."""
+"""[s] Time after which everything has come to rest; filters allow time steps of any length."""
 
 A_DECADE = 8
-"""Samples per decade of time at which the refinement starts."""
+"""Samples per decade of time with which the refinement starts."""
 
 CLOSE, FINE = 0.03, 3e-4
-"""Shares of the error and of the step by which the output may leave the straight line between two samples."""
+"""Shares of the error and of the step by which the output may deviate from a straight line between two samples."""
 
 GOLDEN = 0.381966011250105
-"""Place in an interval at which the output is compared with the straight line: halves could be whole periods."""
+"""Where in an interval the output is compared with the straight line: half-way may be whole periods from both ends."""
 
 GRADED = 4.0
-"""Largest ratio of an interval between samples to its neighbour: an oscillation that happens to cross zero at the test
-point of one interval is found from the next."""
+"""Largest ratio of an interval to its neighbour: an oscillation that happens to cross zero at the test point of one
+interval is found in the next."""
 
 NARROWEST = 1e-6
-"""Share of the time since the step below which no interval is split: an edge behind a delay stays an edge."""
+"""Share of the time since the step below which no interval is split, so that the edge behind a delay stays an edge."""
 
 MOST_SAMPLES = 2**18
-"""Most samples of a response; a mode with a damping of 0.001 takes a third of them."""
+"""Maximum number of samples of a response; a mode with a damping of 0.001 takes a third of it."""
 
 MOSTLY = 0.5
-"""An effect is the main reason if the answer without it settles in this share of the time or less."""
+"""An effect is the main reason if the response without it settles in this share of the time or less."""
 
 
 @dataclass(frozen=True)
 class Settling:
     """Time after a step of the drive over its whole range until the output stays close to its final value.
 
-    `within`: the error as a share of the final step of the output; `error`: the same in output units; `up`, `down`: s
-    after a step to the upper and to the lower end of the range, 0 if the output is there at once, inf if it was not
-    there within `followed` seconds; `because`: the effect, or the effects, that take the time; `left_out`: effects that
-    move the output independently of the drive.
+    `within`: the tolerated error as a share of the final step of the output; `error`: the same in output units; `up`,
+    `down`: s after a step to the upper and to the lower end of the range, 0 if the output settles at once, inf if not
+    within `followed` seconds; `because`: the effect or effects that take the time; `left_out`: effects that move the
+    output independently of the drive.
     """
 
     within: float
@@ -103,8 +103,8 @@ def _time(seconds: float) -> str:
 def settling(chain: Chain, within: float) -> Settling:
     """Settling of a chain after a step over its input range, in both directions.
 
-    Before the step the drive has gone over the range and back, and everything is at rest. Effects that are added to the
-    output, or that follow a column of the record, do not respond to the drive and are left out.
+    Before the step, the drive has swept the range and come back, and everything is at rest. Effects that are added to
+    the output, or that follow a column of the record, do not respond to the drive and are left out.
     """
     answering = [effect for effect in chain.effects if effect.place is not Place.ADDED and not effect.columns]
     left_out = tuple(dict.fromkeys(effect.name for effect in chain.effects if effect not in answering))
@@ -134,7 +134,7 @@ def settling(chain: Chain, within: float) -> Settling:
 
 @dataclass(frozen=True)
 class _Answer:
-    """A step response: seconds until it has settled, its final size, and the seconds for which it was followed."""
+    """A step response: seconds until it has settled, its final size, and the seconds over which it was followed."""
 
     seconds: float
     size: float
@@ -155,18 +155,18 @@ class _Answer:
             inner = -inner
         share = (outer - within * size) / (outer - inner)
         seconds = float(times[k] + share * (times[k + 1] - times[k]))
-        # until then the edge itself moves, or plays wait for its end
+        # so soon, the edge itself is still moving, or plays wait for its end
         return cls(seconds if seconds > dead + 2.0 * EDGE else dead, size, HORIZON)
 
 
 def _left(chain: Chain, begin: float, end: float, within: float, dead: float) -> tuple[Array, Array, float]:
-    """Times (N,) since the step, beginning at its arrival, the output's distance from its final value, and the size of
-    the final step.
+    """Times (N,) since the step, from its arrival on; the output's distance from its final value; and the size of the
+    final step.
 
     `dead`: s after which the step arrives.
 
-    The chain is exact for a drive that is straight between samples, but a block behind a filter also takes the filter's
-    curve as straight: every interval in which the output leaves the straight line is split, until none does.
+    The chain is exact for a drive that is linear between samples, but a block behind a filter takes the filter's curved
+    output as linear too. Every interval in which the output deviates from a straight line is therefore split.
     """
     decades = math.log10(HORIZON / EDGE)
     times = dead + np.geomspace(EDGE, HORIZON, round(A_DECADE * decades) + 1)
@@ -194,7 +194,7 @@ def _left(chain: Chain, begin: float, end: float, within: float, dead: float) ->
 
 
 def _answered(chain: Chain, begin: float, end: float, times: Array, dead: float) -> tuple[Array, float]:
-    """Distance of the output from its final value at some times after a step, and the size of the final step."""
+    """The output's distance from its final value at `times` after a step, and the size of the final step."""
     edge = [EDGE, dead] if dead > EDGE else []
     t = np.concatenate([[-3.0 * FOREVER, -2.0 * FOREVER, -FOREVER, 0.0], edge, times, [FOREVER]])
     v = np.where(t > 0.0, end, begin)

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 def directions(v: Array, ascending: bool) -> NDArray[np.bool_]:
-    """Whether the drive rises at each sample; the last direction while it stands still, `ascending` before it moves."""
+    """Whether the drive rises at each sample; its last direction while it rests, `ascending` before its first move."""
     moved = np.diff(v, prepend=v[:1])
     last = np.maximum.accumulate(np.where(moved != 0.0, np.arange(len(v)), -1))
     return np.asarray(np.where(last >= 0, moved[np.maximum(last, 0)] > 0.0, ascending))
@@ -44,7 +44,7 @@ UNBOUNDED = (-math.inf, math.inf)
 class StaticModel:
     """The actuator: `y = PI[G[v]] + output_offset` (39), `G` the stages in order from the drive.
 
-    `input_range`: the range of drives that it is used in (two numbers, or unbounded). `hystgen.Cascade` also runs it.
+    `input_range`: the drive range in use (two numbers, or unbounded). `hystgen.Cascade` adds `simulate` and `inverse`.
     """
 
     pi: PlaySum
@@ -95,7 +95,7 @@ class StaticModel:
 
     @cached_property
     def play_range(self) -> tuple[float, float]:
-        """Least and largest input of the plays, over both branches."""
+        """Smallest and largest input of the plays, over both branches."""
         ends = []
         for ascending in (True, False):
             low, high = self.input_range
@@ -108,7 +108,7 @@ class StaticModel:
     def output_range(self) -> tuple[float, float]:
         """Extremes of the output over every drive history inside `input_range` from the start memory.
 
-        A straight move to an end of the range takes every play to its extreme, so that the ends are attained.
+        A single move to an end of the range takes every play to its extreme, so the output attains both values.
         """
         low, high = (self._after(w) for w in self.play_range)
         return low, high
@@ -121,11 +121,11 @@ class StaticModel:
 
     @cached_property
     def swung(self) -> tuple[float, float]:
-        """The output at either end of `input_range` after a move from the other end: inside `output_range` or at its
-        ends.
+        """The output at each end of `input_range` after a move from the other end, which is never outside
+        `output_range`.
 
-        References between these and the ends of `output_range` need a drive out of range, once the drive has been at
-        the other end. Plays that begin at 0, as after a reset, count if their range is narrower.
+        Once the drive has been at the other end, references between one of these and that end of `output_range` need a
+        drive out of range. Plays that begin at 0, as after a reset, are used if they give a narrower range.
         """
         low, high = self.play_range
         starts = (self.pi.start, (0.0,) * (self.pi.n + 1))
@@ -135,9 +135,9 @@ class StaticModel:
         )
 
     def _after(self, *drives: float, start: Sequence[float] | None = None) -> float:
-        """The output after the plays have moved from their start memory to inputs in turn.
+        """The output after the plays have moved from their start memory to the given inputs in turn.
 
-        In fractions, since an offset may cancel most of the sum, and limits are rounded inward from the result.
+        Computed in fractions, since an offset may cancel most of the sum and limits are rounded inward from the result.
         """
         thresholds = [Fraction(r) for r in self.pi.thresholds]
         states = [Fraction(s) for s in (self.pi.start if start is None else start)]
@@ -156,9 +156,9 @@ class StaticModel:
 
     @cached_property
     def branch_gap(self) -> float:
-        """Bound of the distance between the branches of G within `input_range`; 0 with one branch.
+        """Bound on the distance between the branches of G within `input_range`; 0 with one branch.
 
-        Both rise, so that between two drives a < b they are at most L(b) - R(a) apart.
+        Both rise, so between two drives a < b they are at most L(b) - R(a) apart.
         """
         if not self.branches_differ:
             return 0.0
@@ -170,7 +170,7 @@ class StaticModel:
 
     @cached_property
     def front_slopes(self) -> tuple[float, float]:
-        """Bounds of the slope of G over `input_range`, over both branches."""
+        """Bounds on the slope of G within `input_range`, over both branches."""
         bounds = []
         for ascending in (True, False):
             least, most = 1.0, 1.0
@@ -182,7 +182,7 @@ class StaticModel:
 
     @cached_property
     def slope_ratio(self) -> float:
-        """Largest slope over smallest, the factor by which the inverse can amplify a relative error."""
+        """Ratio of the largest slope to the smallest: the factor by which the inverse can amplify a relative error."""
         least = self.front_slopes[0] * min(self.pi.slopes)
         most = self.front_slopes[1] * max(self.pi.slopes)
         return most / least if least > 0.0 else math.inf
@@ -202,7 +202,7 @@ class StaticModel:
         return list(self._inverse_problems)
 
     def _branch_problems(self) -> list[str]:
-        """Ranges in which the descending branch lies below the ascending one: the inverse would move the wrong way."""
+        """Ranges in which the descending branch lies below the ascending one: there the inverse moves the wrong way."""
         low, high = self.input_range
         if not (math.isfinite(low) and math.isfinite(high)):
             return ["with two branches the input range has to be finite"]

@@ -1,4 +1,4 @@
-"""The calls that emit: they turn models into C files in a folder, or tell how the files there differ."""
+"""The calls for emission: they turn models into C files in a folder, or report how the files there differ."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def emit_options(
 
 
 def _check_codes(model: Model, arithmetic: str, operator: str) -> None:
-    """Raise FormatError for code sizes in floating point, where only a quiet drive has one: its converter's."""
+    """Raise FormatError for code sizes in floating point, where only a quiet drive needs one, its converter's."""
     emit = model.parameters.emit
     quiet = emit.compensation.quiet and bool(model.effects) and operator != "forward"
     fixed = " or ".join(FIXED)
@@ -109,7 +109,7 @@ def emitted_files(source: Sources, **options: Any) -> dict[str, str]:
 def doubts(model: Model) -> list[str]:
     """Possible faults of an inverse: the diagnosis could not separate the stage from its sensor, or the drive may not
     come to rest."""
-    advice = "Record wide and nested loops, or with another sensor, and diagnose again"
+    advice = "Record wide and nested loops, or use another sensor, and diagnose again"
     present = {*(effect.name for effect in model.effects), *["asymmetry"] * bool(model.cascade.stages)}
     found = []
     for taken, other in model.parameters.not_separable:
@@ -118,9 +118,9 @@ def doubts(model: Model) -> list[str]:
                 found.append(f"{doubt[which]} {advice}")
     if model.effects and (reach := _swing(model)):
         found.append(
-            "an effect of your own leads the drive in front of two branches of the memoryless part, between which it "
-            f"may then go to and fro at rest, by up to {reach:.3g} {model.parameters.units.input}".rstrip()
-            + "; make the effect a lag, or give both branches the same numbers"
+            "an effect of your own gives the drive a lead in front of two branches of the memoryless part, so at rest "
+            f"it may swing between them, by up to {reach:.3g} {model.parameters.units.input}".rstrip()
+            + "; make the effect a lag, or give both branches the same parameters"
         )
     return found
 
@@ -139,7 +139,7 @@ def check_names(models: Sequence[Model]) -> None:
     names = [model.name.lower() for model in models]  # as on some file systems and in all macros
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise ValueError(f"two models are called {twice[0]}, their files would overwrite each other; rename one")
+        raise ValueError(f"two models are called {twice[0]}, so their files would overwrite each other; rename one")
 
 
 @arguments.taking(emit_options, "emit")
@@ -161,8 +161,8 @@ def emit(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) 
 def differences(source: Sources, output: str | os.PathLike[str] = ".", **options: Any) -> list[str]:
     """The files in folder `output` that are missing or differ from what `emit` would write, one sentence per file.
 
-    The sentence names the difference: options, parameters, version of hystgen, edits by hand, line ends. The list
-    includes emitted files that none of the models writes: give all models of a folder together.
+    The sentence names the difference: options, parameters, version of hystgen, edits by hand, line endings. The list
+    includes emitted files that none of the models writes, so give all models of a folder together.
     """
     from hystgen.emission import stale
 

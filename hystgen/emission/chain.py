@@ -1,5 +1,5 @@
-"""The glue of a model with effects in C: tables and memory of its blocks, and the order of their calls. The blocks
-themselves are in `c_runtime/` and in the folders of effects."""
+"""The glue of a model with effects in C: the tables and memory of its blocks, and the order in which they are called.
+The blocks themselves are in `c_runtime/` and in the folders of effects."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from hystgen.effects.kinds import Constants, Kind
 
 NUMBERS = {
-    "OUTPUT_OFFSET": "part of every displacement",
+    "OUTPUT_OFFSET": "added to every displacement",
     "FARTHEST_OFFSET": "largest additional offset that can be set",
-    "SLEW_RISING": "largest move of the drive in a step",
+    "SLEW_RISING": "largest move of the drive per step",
     "SLEW_FALLING": "",
     "SLEW_RISING_REST": "and its rounding remainder",
     "SLEW_FALLING_REST": "",
@@ -58,7 +58,7 @@ class Block:
         return found
 
     def call(self, verb: str, x: str) -> str:
-        """A call of one of its verbs with argument x."""
+        """A call of one of its verbs with the argument x."""
         own = self.kind.verb(verb)
         given = [self.table] * (own in self.kind.reading) + [f"&self->{self.name}"] * (own != "resting")
         if own in ("rest", "absorb"):
@@ -70,7 +70,7 @@ class Block:
         return f"hystgen_nearest({name}({', '.join([*given, finer])}), {bits}u)"
 
     def warming(self) -> str:
-        """The heat that rubbing plays make of a move of the drive to v."""
+        """The call for the heat that a move of the drive to v generates in rubbing plays."""
         return f"hystgen_friction_move({self.table}, &self->{self.name}, self->{self.fields[1].name}, self->applied, v)"
 
     def tables(self, writer: Writer) -> list[Table]:
@@ -111,7 +111,7 @@ def sides(t: ChainTables, operator: str) -> tuple[list[Block], list[Block]]:
 
 MOVES = ("play", "dilated", "relaxing", "dashpot")
 BENDS = ("none", "polynomial", "centre")
-"""Files of the run time for how plays move and are bent, by the codes of `hystgen.effects.plays`."""
+"""Run-time files for how plays move and how they are bent, indexed by the codes of `hystgen.effects.plays`."""
 
 
 SETTINGS = {
@@ -122,12 +122,12 @@ SETTINGS = {
     "set_gain": slots.OP_GAIN,
     "set_travel": slots.OP_TRAVEL,
 }
-"""Calls that only models with effects have, and that take a number and return none."""
+"""Calls that take a number and return nothing, which only models with effects have."""
 
 
 def plays(t: ChainTables) -> tuple[str, str]:
-    """How plays move and are bent. The first is empty if engine loop has them, the second also if they are solved one
-    by one."""
+    """How plays move and how they are bent. Both are empty for the ordinary plays of an engine, the second also for
+    plays that are solved one by one."""
     if t.moving.scanned:
         return MOVES[t.moving.moves], ""
     return (MOVES[t.moving.moves], BENDS[t.moving.bends]) if t.moving.used else ("", "")
@@ -135,9 +135,9 @@ def plays(t: ChainTables) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Shape:
-    """Properties of a chain that decide its functions and memory, besides its blocks. `effects`: whether it has any;
-    `corners`: engine corners; `taps`: samples of the reference that are summed; `waiting`: delayed drives; the others
-    as in `Variant`."""
+    """Properties of a chain, besides its blocks, that determine its functions and memory. `effects`: whether it has
+    any; `corners`: whether the engine is corners; `taps`: number of reference samples that are summed; `waiting`:
+    number of delayed drives; the others as in `Variant`."""
 
     form: Form
     effects: bool = False
@@ -160,8 +160,8 @@ class Shape:
 
 @dataclass(frozen=True)
 class Chain:
-    """The blocks of a model with effects: by operator in front of the plays and behind, and in addition its clock and
-    the plays that rub."""
+    """The blocks of a model with effects: for each operator those in front of the plays and those behind; its clock;
+    and the plays that rub."""
 
     sides: Mapping[str, tuple[list[Block], list[Block]]]
     clocks: list[Block]
@@ -190,12 +190,12 @@ def effects(
     """Tables and macros of a model's effects; `behind`: its stages of saturation."""
 
     t, chain = compiled.tables, Chain.of(compiled.tables, operators)
-    largest = max(map(chain.blocks, operators), key=len)  # the forward operator has the inverse's blocks, and modes
+    largest = max(map(chain.blocks, operators), key=len)  # the forward operator has the inverse's blocks plus modes
     tables = [table for block in largest for table in block.tables(writer)]
     numbers = {name: t.number[name.lower()][0] for name in NUMBERS}
     constants = [(name, operand(value), NUMBERS[name]) for name, value in numbers.items()]
     constants += [("LEAD", operand(row["most_ahead"]), "samples that references are ahead") for row in t.of("clock")]
-    constants.append(("WAITING", f"{t.of('wait').samples}u", "samples of the drive in the delay"))
+    constants.append(("WAITING", f"{t.of('wait').samples}u", "drive samples held in the delay"))
     if t.of("wait").samples:
         waited, share = form.waited(t, writer)
         tables += waited * ("forward" in operators)
@@ -242,7 +242,7 @@ def alone(operators: Sequence[str], plays: int, form: Form) -> Glue:
 
 
 _PLAYS = "play 0 is the input of the plays"
-_KEPT = "; after them the rounding remainder of each"
+_KEPT = "; the rounding remainder of each follows"
 _LAST = "the same, limited: the next reference moves up or down from here"
 
 
@@ -253,9 +253,9 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
     arrived = Field("fine_t", "drive", "last output of the drive side")
     answer = "drive" if inverse else "displacement" if t.effects else "output"
     length = "" if kept else "HYSTGEN_N_PLAYS + 1"
-    searched = [Field("bool", "sought", "a solution was found since the plays last followed")] * inverse
+    searched = [Field("bool", "sought", "a solution has been found since the plays last followed")] * inverse
     return [
-        *[Field("real_t", "pending", "drive sent but not yet part of the memory")] * inverse,
+        *[Field("real_t", "pending", "drive sent but not yet in the memory")] * inverse,
         Field("real_t", "applied", "last applied drive"),
         *[Field("ramp_t", "reached", "drive at a limited rate")] * t.slew,
         arrived if t.effects else Field("real_t", "drive", "last applied drive"),
@@ -263,14 +263,14 @@ def instance(op: str, t: Shape, blocks: Sequence[Block], plays: int, kept: int, 
         Field("signal_t", "level", "sum of the plays"),
         Field("signal_t", "output", "last output of the output side"),
         Field("real_t", "answer", f"last returned {answer}"),
-        Field("signal_t", "offset", "set in addition to that of the model"),
+        Field("signal_t", "offset", "set in addition to the model's"),
         *(field for block in blocks for field in block.fields),
         *[Field("quiet_t", "quiet")] * (inverse and t.quiet),
         *[Field("steady_t", "steady")] * (inverse and t.turning),
-        *[Field("signal_t", "line", "references, the newest one last", taps)] * (inverse and taps > 0),
-        *[Field("real_t", "waiting", "drives", waiting), Field("unsigned int", "oldest", "of them")] * (waiting > 0),
+        *[Field("signal_t", "line", "references, the newest last", taps)] * (inverse and taps > 0),
+        *[Field("real_t", "waiting", "drives", waiting), Field("unsigned int", "oldest", "drive")] * (waiting > 0),
         Field("bool", "ascending", "direction of the drive's last move"),
-        Field("bool", "moving", "a drive was applied"),
+        Field("bool", "moving", "a drive has been applied"),
         *[
             Field("bool", "has_pending"),
             Field("bool", "repeated", "the last returned drive is still valid for `reference`"),

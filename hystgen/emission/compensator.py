@@ -1,5 +1,5 @@
-"""A model's compensator in an arithmetic, as the source of its C: names, numbers, tables and memory. A `Form` for each
-kind of arithmetic holds the differences between floating and fixed point."""
+"""A model's compensator in an arithmetic, from which its C is written: names, numbers, tables and memory. A `Form` for
+each kind of arithmetic holds the differences between floating and fixed point."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.measured import Measured
 
 Macro: TypeAlias = tuple[str, str, str]
-"""A macro of a model: its name after the model's, its value, and a comment."""
+"""A macro of a model: its name without the model's prefix, its value, and a comment."""
 
 STANDARD = frozenset(["int32_t", "uint32_t", "uint16_t", "uint8_t"])
-"""Types of the language that appear in tables."""
+"""Types of <stdint.h> that appear in tables."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A constant; `contents`: its types, without the prefix of a run time, and how many of each there are."""
+    """A constant; `contents`: the types in it, without a run time's prefix, and how many of each it contains."""
 
     name: str
     text: str
@@ -42,8 +42,8 @@ class Table:
 
 @dataclass(frozen=True)
 class Stage:
-    """A memoryless stage: its kind, its tables, the expression for the last of them in functions, and the argument by
-    which functions report that the stage limited something."""
+    """A memoryless stage: its kind, its tables, the expression for the last table in a call, and the argument through
+    which the call reports that the stage limited its input."""
 
     kind: str
     arrays: tuple[Table, ...]
@@ -53,8 +53,8 @@ class Stage:
 
 @dataclass(frozen=True)
 class Field:
-    """A field of an instance. Its type is one of the run time without its prefix, or one of the language; with a
-    `count` it is an array, whose length in C is `length` if that is given."""
+    """A field of an instance. Its type is one of the run time's, without prefix, or a standard one; with a `count` it
+    is an array, whose length is written as `length` in C if that is given."""
 
     kind: str
     name: str
@@ -71,8 +71,8 @@ class Field:
 
 @dataclass(frozen=True)
 class Writer:
-    """Writes the constants of the model `name` with the types of the run time `prefix`. Each constant is named by the
-    model's name and `own`, and is an array if it has `sizes`."""
+    """Writes the constants of the model `name` with the types of the run time `prefix`. A constant is named after the
+    model, followed by `own`; it is an array if it has `sizes`."""
 
     name: str
     prefix: str
@@ -115,7 +115,7 @@ class Writer:
         return self._table(own, words + text, [(kind, len(values))])
 
     def columns(self, kind: str, own: str, columns: Sequence[tuple[str, Sequence[Number]]]) -> Table:
-        """Arrays of numbers in one structure, so that compilers reach all of them from one address."""
+        """Arrays of numbers in one structure, so compilers reach all of them from one address."""
         text = structure(self._typed(kind), f"{self.name}_{own}", columns)
         return self._table(own, text, [(kind, len(values)) for _, values in columns])
 
@@ -130,7 +130,7 @@ class Writer:
 
 
 def filled(entries: Iterable[str]) -> str:
-    """Entries of a table on as few lines as possible; one that fits on a line is not broken."""
+    """Entries of a table on as few lines as possible; an entry that fits on a line is not broken."""
     fitting = WIDTH - len("    ,")
     whole = ", ".join(entry.replace(" ", "\0") if len(entry) <= fitting else entry for entry in entries)
     lines = textwrap.wrap(whole, WIDTH, initial_indent="    ", subsequent_indent="    ", break_long_words=False)
@@ -160,8 +160,8 @@ AnyTables: TypeAlias = "Tables | FixedTables | ChainTables"
 
 @dataclass(frozen=True)
 class Errors:
-    """Bounds against the double model for the forward operator and the inverse, 0 for a missing one; `rounding`: the
-    inverse's while `condition`, in words, holds."""
+    """Error bounds of the forward operator and the inverse against the double model, 0 for a missing operator;
+    `rounding`: the inverse's bound while `condition`, in words, holds."""
 
     forward: Number
     inverse: Number
@@ -173,10 +173,10 @@ class Errors:
 class Numbers:
     """The numbers of a model in an arithmetic.
 
-    `drive`, `output`: limits of both; `macros`: for use by functions; `plays`: tables with an entry for each play, and
+    `drive`, `output`: their limits; `macros`: for use by functions; `plays`: tables with an entry for each play, and
     the start memory; `beside`: other tables; `stages`: of the memoryless part, if functions call them one by one;
-    `lsb`: physical units per code of drive and output, if there are codes; `precision`: sentences about both;
-    `envelopes`: whether an envelope limits its argument; the others as in `hystgen.emission.runtime.Variant`.
+    `lsb`: physical units per code of drive and output, if there are codes; `precision`: sentences about codes and their
+    error; `envelopes`: whether an envelope limits its argument; the others as in `hystgen.emission.runtime.Variant`.
     """
 
     tables: AnyTables
@@ -212,11 +212,11 @@ class Effects:
 
 
 class Form(ABC):
-    """How one kind of arithmetic writes the numbers of a model, and its own words for them if it has codes.
+    """How one kind of arithmetic writes the numbers of a model, and how it describes them if it has codes.
 
-    `apart`: words that begin functions which would cost their callers stack if inlined; `suffix`: of names of macros
-    that count codes; `held`: meaning of the status bit HELD; `warning`: about compiler flags; `settings`: arguments of
-    the calls that set something, where MODEL is the model's name.
+    `apart`: first words of functions that would cost their callers stack if inlined; `suffix`: of the names of macros
+    in codes; `held`: meaning of the status bit HELD; `warning`: about compiler flags; `settings`: descriptions of what
+    the setters take, in which MODEL stands for the model's name.
     """
 
     apart = "static"
@@ -241,7 +241,7 @@ class Form(ABC):
 
     @abstractmethod
     def moving(self, t: ChainTables, inverse: bool, writer: Writer) -> tuple[list[Table], list[Macro]]:
-        """Tables and numbers of plays that an effect moves or bends."""
+        """Tables and macros of plays that an effect moves or bends."""
 
     @abstractmethod
     def tap(self, t: ChainTables, writer: Writer) -> Table:
@@ -249,14 +249,14 @@ class Form(ABC):
 
     @abstractmethod
     def waited(self, t: ChainTables, writer: Writer) -> tuple[list[Table], list[Macro]]:
-        """The part of a step that a delay takes."""
+        """The fractional step of a delay, as tables and macros."""
 
     @abstractmethod
     def corners(self, inverse: bool, plays: int) -> list[Field]:
         """The memory of engine corners' plays in a model with effects."""
 
     def effects(self, t: ChainTables) -> list[Macro]:
-        """Numbers of a model with effects that only codes need."""
+        """Macros that a model with effects needs only in fixed point."""
         return []
 
     def code_sizes(self, t: ChainTables) -> list[Macro]:
@@ -264,7 +264,7 @@ class Form(ABC):
         return []
 
     def drive_bits(self, t: ChainTables) -> int:
-        """Bits of a signal in front of the plays below a drive."""
+        """Number of bits by which a signal in front of the plays is finer than a drive."""
         return 0
 
     @abstractmethod
@@ -276,7 +276,7 @@ class Form(ABC):
         """The number at this fraction of a range, in operations of the arithmetic."""
 
     def counted(self, side: str, unit: str) -> str:
-        """The quantity that numbers of the drive or the output count."""
+        """What the numbers of one side, drive or output, mean: a quantity in its unit, or codes."""
         return self.quantity(side, "", unit)
 
     def unit(self, unit: str, side: str = "") -> str:
@@ -284,11 +284,11 @@ class Form(ABC):
         return f" {unit}" if unit else ""
 
     def quantity(self, words: str, macro: str, unit: str) -> str:
-        """A quantity with its unit; `macro`: of the size of a code."""
+        """A quantity with its unit; `macro`: the one for the size of a code."""
         return f"{words}, {unit}" if unit else words
 
     def unless_held(self, call: str) -> str:
-        """What a call does with arguments that are not numbers."""
+        """What a call does with NaN and infinite arguments."""
         return ""
 
 
@@ -302,7 +302,7 @@ def macros(numbers: Tables | FixedTables) -> list[Macro]:
     """Macros that every arithmetic has."""
     ends = numbers.limits
     return [
-        ("OFFSET", operand(ends[slots.OFFSET]), "part of every output"),
+        ("OFFSET", operand(ends[slots.OFFSET]), "added to every output"),
         ("START", operand(numbers.start[0]), "value of each play after init"),
         *(
             (f"{op}_{call}_{what}", value, comment)
@@ -313,7 +313,7 @@ def macros(numbers: Tables | FixedTables) -> list[Macro]:
                 ("ASCENDING", truth(numbers.ascending[j]), "and the direction of its last move"),
             )
         ),
-        ("HOLD", operand(ends[slots.HOLD]), "largest step back for which the drive is held instead"),
+        ("HOLD", operand(ends[slots.HOLD]), "largest step back at which the drive is held instead"),
     ]
 
 
@@ -335,7 +335,7 @@ def units(parameters: Parameters) -> tuple[str, str]:
 
 
 def drives(numbers: Tables | FixedTables, columns: Sequence[Reals], operator: str, writer: Writer) -> Table:
-    """The drives that an operator's start memories stand for: these columns, and the direction."""
+    """The drives of an operator's start memories: these columns, and the direction of the last move."""
     first = 2 * (operator == "inverse")
     rows = (
         f"{{{', '.join([*(literal(column[j]) for column in columns), truth(numbers.ascending[j])])}}}"
@@ -346,8 +346,8 @@ def drives(numbers: Tables | FixedTables, columns: Sequence[Reals], operator: st
 
 @dataclass(frozen=True)
 class Glue:
-    """The operators of a model as a chain: the memory of an instance by operator, functions, and the calls that it adds
-    to those of every model."""
+    """The operators of a model as a chain: by operator the memory of an instance; functions; and by operator the calls
+    beyond those that every model has."""
 
     fields: Mapping[str, Sequence[Field]]
     functions: str
@@ -359,7 +359,7 @@ class Glue:
         return {op: _state(op, fields) for op, fields in self.fields.items()}
 
     def named(self, names: Mapping[str, Collection[str]]) -> Glue:
-        """A copy with only the fields that the functions of each operator name."""
+        """A copy with only the fields that each operator's functions use."""
         fields = {op: [each for each in found if each.name in names[op]] for op, found in self.fields.items()}
         return replace(self, fields=fields)
 
@@ -374,7 +374,7 @@ def _state(op: str, fields: Sequence[Field]) -> str:
 
 @dataclass(frozen=True)
 class Names:
-    """The names of a model and of its run time in C, as `NAME` and `RT` in macros."""
+    """The names of a model and of its run time in C; `NAME` and `RT` in macros."""
 
     name: str
     rt: str
@@ -405,7 +405,7 @@ class Units:
 
 @dataclass(frozen=True)
 class Compensator:
-    """A model in an arithmetic; `compiled`: only with effects; `glue`: only of a chain."""
+    """A model in an arithmetic; `compiled`: None without effects; `glue`: None unless the model is a chain."""
 
     parameters: Parameters
     cascade: StaticModel
@@ -439,7 +439,7 @@ class Compensator:
 
     @property
     def calls(self) -> dict[str, list[str]]:
-        """By operator, the functions that a model with effects adds to those of every model."""
+        """By operator, the functions that a model with effects has in addition to those of every model."""
         return {op: list(calls) for op, calls in self.glue.calls.items()} if self.glue else {}
 
     @property

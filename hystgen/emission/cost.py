@@ -1,4 +1,4 @@
-"""The cost of an emitted model, derived from the model alone so that it is the same wherever it is emitted."""
+"""The cost of an emitted model, derived from the model alone, so it is the same wherever it is emitted."""
 
 from __future__ import annotations
 
@@ -59,9 +59,9 @@ class Memory:
 
 @dataclass(frozen=True)
 class Cost:
-    """Code of the module by core (`hystgen.compensator.engines`); memory on a 32-bit target and on an 8-bit AVR, where
-    tables lie in RAM too (None in float64, which it lacks); and for each operator the worst-case operations of a step
-    in words and the most expensive sample of such models on each core."""
+    """Code size of the module by core (`hystgen.compensator.engines`); memory on a 32-bit target, and on an 8-bit AVR,
+    where tables lie in RAM too (None in float64, which an AVR lacks); and for each operator the worst-case operations
+    of a step in words and the dearest sample of similar models on each core."""
 
     code: Mapping[str, int]
     memory: Memory
@@ -76,7 +76,7 @@ class Cost:
         return f"{small} bytes on a Cortex-M0+, {large} on a Cortex-M4F"
 
     def dearest_words(self, operator: str) -> str:
-        """The most expensive sample of an operator in words."""
+        """The dearest sample of an operator in words."""
         small, large = (self.dearest[operator][core] for core in engines.CORES)
         return (
             f"{small.instructions} instructions and {small.stack} bytes of stack on a Cortex-M0+, "
@@ -89,7 +89,7 @@ Size: TypeAlias = tuple[int, int]
 
 
 def sizes(pieces: Iterable[Piece], family: Family, layout: Layout, lengths: Mapping[str, int]) -> dict[str, Size]:
-    """Sizes of a model's types, by their names without prefix, from their declarations.
+    """Sizes of a model's types, by their names without prefix, taken from their declarations.
 
     `pieces`: ordered so that a type comes before those that contain it; `lengths`: values of macros in array lengths.
     """
@@ -106,7 +106,7 @@ def sizes(pieces: Iterable[Piece], family: Family, layout: Layout, lengths: Mapp
     for piece in pieces:
         if members := piece.members:
             whole = [field(each) for each in members if not each.bits]
-            if bits := sum(each.bits for each in members):  # bit fields are packed into whole numbers at the end
+            if bits := sum(each.bits for each in members):  # bit fields are packed into bytes at the end
                 whole.append((-(-bits // 8), min(-(-bits // 8), layout.integer)))
             found[piece.name.removeprefix("hystgen_")] = layout.struct(*whole)
     return found
@@ -114,7 +114,7 @@ def sizes(pieces: Iterable[Piece], family: Family, layout: Layout, lengths: Mapp
 
 LANGUAGE = {"float": 4, "double": 8, "int64_t": 8, "int32_t": 4, "int16_t": 2, "uint32_t": 4, "uint16_t": 2,
             "uint8_t": 1, "uint_least16_t": 2, "uint_least8_t": 1}
-"""Bytes of the types of the language, which are also their alignments."""
+"""Bytes of standard types, which are also their alignments."""
 
 
 def _length(words: str, lengths: Mapping[str, int]) -> int:
@@ -123,8 +123,7 @@ def _length(words: str, lengths: Mapping[str, int]) -> int:
 
 
 def _constants(contents: Iterable[tuple[str, int]], known: Mapping[str, Size], family: Family, plays: int = 1) -> int:
-    """Bytes of constants without padding between them; with `plays`, of one entry in tables that have one for each
-    play."""
+    """Bytes of constants without padding between them; with `plays`, of one entry of tables that have one per play."""
     return sum(known[family.meaning(kind)][0] * (count // plays) for kind, count in contents)
 
 
@@ -140,9 +139,9 @@ class Data:
 
 
 def estimate(cascade: StaticModel, options: Options, numbers: AnyTables, data: Data) -> Cost:
-    """Cost of the emitted model, with the parts of a shared run time that it needs."""
+    """Cost of the emitted model, including the parts of a shared run time that it needs."""
     corners = options.engine == "corners"
-    known = options.arithmetic != "float64"  # a double of the AVR is a float
+    known = options.arithmetic != "float64"  # on an AVR, a double is only a float
     worst = [(op, worst_case(cascade.pi.n, op, corners, numbers)) for op in options.operators]
     memory, avr = (_memory(cascade.pi.n, options, data, layout) for layout in (CORE_32, AVR))
     code = dict(engines.code_bytes(cascade, options.operator, options.arithmetic, options.engine))
@@ -171,15 +170,15 @@ def selftest_bytes(real: int, memory: Memory, samples: int, layout: Layout) -> t
 
 @dataclass(frozen=True)
 class Counts:
-    """Operations of a kind of arithmetic, counted in the bit reference (`tests/test_cost.py`), and rounded up to the
-    cost of a search that bisects its whole list.
+    """Operations of a kind of arithmetic, counted in the bit reference (`tests/test_cost.py`) and rounded up to those
+    of a search that bisects its whole list.
 
-    `factor`: multiplications in a product with a factor; `words`: about a multiplication; `plays`: by operator and
+    `factor`: multiplications in a product with a factor; `words`: qualify a multiplication; `plays`: by operator and
     engine, for plays, checks and limits: multiplications, comparisons, and further comparisons per play and per bit of
-    n, where engine `fast` is corners without a front; `both`: the same for corners that are solved for and then follow
-    the applied drive, which may be elsewhere; `solved`: multiplications per play of an inverse in engine loop;
-    `chained`: of an inverse with effects, multiplications, comparisons, and both per play; `braked`: multiplications of
-    a lag behind a slew limit, and per halving of its search.
+    n, where engine `fast` is corners without a front; `both`: the same for corners that are solved and then follow an
+    applied drive that may differ; `solved`: multiplications per play of an inverse in engine loop; `chained`: of
+    an inverse with effects, multiplications, comparisons, and both per play; `braked`: multiplications of a lag behind
+    a slew limit, and per halving of its search.
     """
 
     factor: int
@@ -202,7 +201,7 @@ FLOAT = Counts(
 FIXED = Counts(
     2, " of 32 by 32 bits",
     {("forward", "loop"): (1, 11, 2, 0), ("inverse", "loop"): (3, 14, 3, 0),
-     # the corner, then the play in its block: both are bisected; clamps, the code, the look ahead
+     # bisection of the corners, then of the plays in a block; clamps, rounding to a code, looking ahead
      # the output of a corner is the sum of its parts, for the top corner and the one behind it
      ("forward", "corners"): (1, 15, 0, 2), ("inverse", "corners"): (5, 19, 0, 4),
      ("forward", "fast"): (1, 15, 0, 2), ("inverse", "fast"): (7, 22, 0, 4)},
@@ -215,7 +214,7 @@ def _counts(t: AnyTables) -> Counts:
 
 
 def _refined(t: ChainTables) -> bool:
-    """Whether an inverse's solution has a remainder, which also takes a search."""
+    """Whether an inverse's solution has a remainder, which takes another search."""
     return isinstance(t.plays, FixedTables) and bool(t.number.arriving_bits[0])
 
 
@@ -247,8 +246,8 @@ def _memory(n: int, options: Options, data: Data, layout: Layout) -> Memory:
 
 
 def worst_case(n: int, op: str, corners: bool, tables: AnyTables) -> str:
-    """The largest numbers of multiplications and comparisons in one step as functions of n, except those of tanh, atanh
-    and effects; b is the number of bits of n."""
+    """The maximum number of multiplications and comparisons in one step, as functions of n and its number of bits b,
+    without those of tanh, atanh and effects."""
     numbers: Tables | FixedTables = tables if isinstance(tables, Tables | FixedTables) else tables.plays
     counts, passes, curves = _counts(tables), 1 if op == "forward" else 2 + int(numbers.branches), 0
     engine = "loop" if not corners else "corners" if numbers.has_front else "fast"
@@ -280,18 +279,18 @@ def worst_case(n: int, op: str, corners: bool, tables: AnyTables) -> str:
         words += f" ({products} + {per_play_products} n)"
     words += f", {compares + per_play * n + per_bit * n.bit_length()} comparisons"
     if per_bit:
-        words += f" ({compares} + {per_bit} b, b = {n.bit_length()} the bits of n)"
+        words += f" ({compares} + {per_bit} b, b = {n.bit_length()}, the bit length of n)"
     elif per_play:
         words += f" ({compares} + {per_play} n)"
     return words + kernels
 
 
 def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
-    """Operations of the plays of a model with effects in engine loop: multiplications, more of them per play,
-    comparisons, more of them per play, and tanh per play.
+    """Operations of the plays of a model with effects in engine loop: multiplications, further ones per play,
+    comparisons, further ones per play, and tanh per play.
 
-    Plain plays follow and are solved for one by one. Plays that an effect moves or bends in its own way are searched
-    for: each bisection sums up all of them.
+    Ordinary plays follow and are solved one by one. Plays that an effect moves or bends take a search, each bisection
+    of which sums all of them.
     """
     from hystgen.effects import plays
 
@@ -323,7 +322,7 @@ def _worst_of_chain(op: str, t: ChainTables) -> tuple[int, int, int, int, int]:
 
 
 def _bent(m: MovingTables | FixedMovingTables) -> tuple[int, int, int, int, int]:
-    """Multiplications, comparisons and tanh of a bend per play; sums over the plays in a search, and multiplications of
+    """Multiplications, comparisons and tanh of a bend per play; sums over the plays in a search, and multiplications in
     its halvings."""
     from hystgen.effects import plays
 

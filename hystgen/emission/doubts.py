@@ -1,4 +1,4 @@
-"""Reasons why an emitted inverse of a model with effects is of little use, in the words of its banner and of stderr."""
+"""Reasons why the emitted inverse of a model with effects may be of little use, as its banner and stderr word them."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from hystgen.emission.text import comment_text
 from hystgen.parameters.files import Parameters
 
 NOISY = 4.0
-"""[times the gain at rest] Noise gain from which a doubt is reported: the drive then has two bits of noise more than
+"""[times the gain at rest] Noise gain above which a doubt is reported: the drive then has two more bits of noise than
 the reference. The inverse of a lag of one sample has 3.97. Set by: benchmarks/chosen_numbers.py noisy."""
 
 FAST = 50.0
-"""[time constants of the slowest effect] Steps from this length on are taken for a mistake: the effect then moves the
-drive by a 50th of a sample, 4e-4 of the range in the fastest sweep with a stated bound (SAMPLES_A_SWEEP). Set by:
-benchmarks/chosen_numbers.py fast."""
+"""[time constants of the slowest effect] A sample time this long or longer is taken for a mistake: the effect then
+shifts the drive by a 50th of a sample, 4e-4 of the range in the fastest sweep with a stated bound (SAMPLES_A_SWEEP).
+Set by: benchmarks/chosen_numbers.py fast."""
 
 
 def found(parameters: Parameters, compiled: Compiled) -> list[str]:
@@ -26,34 +26,34 @@ def found(parameters: Parameters, compiled: Compiled) -> list[str]:
 
 
 def _noise(parameters: Parameters, compiled: Compiled) -> list[str]:
-    """A doubt about noise of the reference that reaches the drive."""
+    """A doubt about noise in the reference that reaches the drive."""
     if compiled.noise_gain <= NOISY:
         return []
     drive, hertz = noise.loudest(compiled.gain)
     into, out = comment_text(parameters.units.input), comment_text(parameters.units.output)
     if compiled.codes is None:
-        shown = f"1 {out or 'output unit'} rms of it there is {drive:.3g} {into or 'input units'} rms of the drive"
+        shown = f"there, 1 {out or 'output unit'} rms of it moves the drive by {drive:.3g} {into or 'input units'} rms"
     else:
         least = float(compiled.codes.drive_lsb) / drive
-        shown = f"{least:.3g} {out or 'output units'} rms of it there dither the drive by one code rms"
+        shown = f"there, {least:.3g} {out or 'output units'} rms of it moves the drive by one code rms"
     asked = parameters.emit.compensation.noise_gain
-    advice = "" if asked else "; emit.compensation.noise_gain holds it by averages of the reference"
+    advice = "" if asked else "; emit.compensation.noise_gain limits it by averaging the reference"
     return [
-        f"Noise of the reference reaches the drive {compiled.noise_gain:.3g} times as large as slow motion, most at "
+        f"Noise in the reference is amplified up to {compiled.noise_gain:.3g} times as much as slow motion, most at "
         f"{hertz:.4g} Hz: {shown}{advice}"
     ]
 
 
 def _too_fast(parameters: Parameters, compiled: Compiled) -> list[str]:
-    """A doubt about effects that are over long before the next sample."""
+    """A doubt about effects that have died out long before the next sample."""
     seconds = compiled.seconds
     scale, name = max((_time_scale(effect, compiled), effect.name) for effect in parameters.model.effects)
     if not 0.0 < scale <= seconds / FAST:
         return []
     return [
-        f"Effects are over within a sample: the slowest, {name}, takes {scale:.3g} s of sample_time = {seconds:.3g} s, "
-        f"so that the inverse hardly differs from one without them; sample_time is in seconds, {1e-6 * seconds:.3g} "
-        f"for {seconds:.3g} us"
+        f"Effects are over within a sample: the slowest, {name}, takes {scale:.3g} s, and sample_time is "
+        f"{seconds:.3g} s, so the inverse hardly differs from one without effects; sample_time is in seconds, "
+        f"{1e-6 * seconds:.3g} for {seconds:.3g} us"
     ]
 
 

@@ -52,10 +52,10 @@ class Fixed(Form):
 
     apart = "HYSTGEN_APART"
     suffix = "_LSB"
-    held = "never set: every code is a number"
+    held = "never set: every code is valid"
     settings: ClassVar[Mapping[str, str]] = {
         "temperature": "temperature, in codes of MODEL_TEMPERATURE_LSB",
-        "gain": "gain over that of the parameter file, in codes of MODEL_GAIN_LSB",
+        "gain": "gain relative to the parameter file's, in codes of MODEL_GAIN_LSB",
         "share": "0 to the largest code, which stands for 1",
     }
 
@@ -189,8 +189,8 @@ class Fixed(Form):
         from hystgen.compensator.chain.fixed_tables import TEMPERATURE_BITS
 
         bits = int(31 - t.number.share_bits[0])
-        degree = ("TEMPERATURE_LSB", repr(2.0 ** -TEMPERATURE_BITS[bits]), "degC a code of set_temperature")
-        gain = ("GAIN_LSB", repr(2.0 ** (2 - bits)), "a code of set_gain; travels are in drive codes")
+        degree = ("TEMPERATURE_LSB", repr(2.0 ** -TEMPERATURE_BITS[bits]), "degC per code of set_temperature")
+        gain = ("GAIN_LSB", repr(2.0 ** (2 - bits)), "per code of set_gain; travels are in drive codes")
         return [*[degree] * ("set_temperature" in t.calls), *[gain] * ("set_gain" in t.calls)]
 
     def drive_bits(self, t: ChainTables) -> int:
@@ -228,7 +228,7 @@ def _factors(own: str, rows: Reals, writer: Writer) -> Table:
 
 
 def _errors(options: Options, bounds: tuple[float, float | None, float | None], condition: str = "") -> Errors:
-    """The bounds to a few digits, rounded up."""
+    """The bounds, rounded up to a few digits."""
     forward, inverse, rounding = (_upward(bound) if bound else 0.0 for bound in bounds)
     return Errors(forward, inverse, rounding, condition) if options.inverse else Errors(forward, 0.0, 0.0, condition)
 
@@ -244,7 +244,7 @@ def _envelopes(cascade: StaticModel) -> bool:
 
 
 def _precision(parameters: Parameters, form: fixed_tables.Format | Codes, branch: str) -> list[str]:
-    """The size of codes, and the error of answers against the exact model."""
+    """The size of codes, and the error bounds of answers against the exact model."""
     drive, output = units(parameters)
     drive_lsb, output_lsb = float(form.drive_lsb), float(form.output_lsb)
     forward, inverse = form.forward_error, form.inverse_rounding
@@ -259,11 +259,11 @@ def _precision(parameters: Parameters, form: fixed_tables.Format | Codes, branch
 
 
 def _macros(t: FixedTables) -> list[Macro]:
-    """Numbers that functions name only in fixed point."""
+    """Macros that functions use only in fixed point."""
     step = int(len(t.start) > 1)
-    shy = "output codes that rounding can add: half a drive code, and an inexact reciprocal"
+    shy = "output codes that rounding can add, by half a drive code and an inexact reciprocal"
     return [
-        ("START_STEP", str(step), "entries from play to play; reset takes 0 for each"),
+        ("START_STEP", str(step), "entries from one play to the next; reset starts each at 0"),
         ("CODE_MAX", literal(t.limits[slots.CODE_MAX]), "the largest code of either sign"),
         ("FRACTION", f"{t.limits[slots.FRACTION]}u", "bits of a sum below an output code"),
         ("FINE", f"{t.limits[slots.FINE]}u", "bits of an input of the plays below a drive code"),
@@ -317,7 +317,7 @@ def _corner_tables(t: FixedTables, options: Options, writer: Writer, chain: bool
 
 
 def _curves(t: FixedTables, options: Options, writer: Writer) -> tuple[list[Table], list[Macro]]:
-    """The curves of the memoryless part in use: forward, back for an inverse, and their sizes."""
+    """The curves in use of the memoryless part, forward and for an inverse also back, and their sizes."""
     if not t.fronts:
         return [], []
     arrays: list[Table] = []
@@ -355,7 +355,7 @@ def _names(tables: Sequence[Table]) -> str:
 
 
 def _bumps(t: FixedMovingTables, writer: Writer) -> list[Table]:
-    """The curves of bent plays less the plays themselves."""
+    """The curves of bent plays minus the plays themselves."""
     curves = [_pieces(t.bump, k, f"bump_{k + 1}", writer) for k in range(len(t.bump.pieces))]
     rows = [f"{_names(curve)}, {n}" for curve, n in zip(curves, t.bump.pieces, strict=True)]
     return [

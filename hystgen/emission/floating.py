@@ -46,20 +46,20 @@ COLUMNS = (("threshold", "threshold", True), ("inverse_slope", "reciprocal", Fal
 
 DEAD_ZONE = (("break_x", 0, True), ("break_y", 0, False), ("anchor_x", 1, True), ("anchor_y", 1, True),
              ("slope", 1, True), ("inverse_slope", 1, False))
-"""Arrays of a dead zone, their numbers of entries beyond the break points, and whether both operators read them."""
+"""Arrays of a dead zone, how many more entries each has than break points, and whether both operators read it."""
 
 class Floating(Form):
     """Floating point."""
 
     held = "NaN or infinite input: the last answer was held"
     warning = (
-        " Not for targets that flush denormal numbers to zero or round other than to nearest, nor for flags that "
-        "reorder sums (-fassociative-math) or contract products whatever the source says (clang's "
-        "-ffp-contract=fast): there the answers can differ from the reference in the last bits."
+        " Not for targets that flush denormal numbers to zero or do not round to nearest, nor for flags that "
+        "reorder sums (-fassociative-math) or fuse multiply-adds whatever the source says (clang's "
+        "-ffp-contract=fast): the last bits of answers could then differ from the reference."
     )
     settings: ClassVar[Mapping[str, str]] = {
         "temperature": "temperature, degC",
-        "gain": "gain over that of the parameter file",
+        "gain": "gain relative to the parameter file's",
         "share": "0 to 1",
     }
 
@@ -148,7 +148,7 @@ class Floating(Form):
 
 
 def _errors(t: Tables | ChainTables, options: Options, bounds: tuple[float, float, float]) -> Errors:
-    """The bounds, rounded up to numbers of the arithmetic."""
+    """The bounds, rounded up to the arithmetic's numbers."""
     forward, inverse, rounding = (float_tables.upward(bound, t.threshold.dtype.type) for bound in bounds)
     return Errors(forward, inverse, rounding) if options.inverse else Errors(forward, 0.0, 0.0)
 
@@ -205,7 +205,7 @@ def _curve_tables(curve: Curve, starts: tuple[Start, Start], operator: str, writ
     for start, memory in zip(starts, ("init", "reset"), strict=True):
         points = [f"{{{entries(point[:2])}}}" for point in start.center]
         text = points[0] if len(points) == 1 else f"\n{filled(points)}\n"
-        if text not in before:  # plays may start the same after init and after reset
+        if text not in before:  # plays may start alike after init and after reset
             before[text] = f"{writer.name}_{operator}_{memory}_center"
             found.append(writer.line("real_t", f"{operator}_{memory}_center", text, len(points), 2))
         output, falling, rising = map(literal, start.bottom)

@@ -1,9 +1,9 @@
 """Removes code without effect from the C of a model.
 
 The run time is written for every model: it calls a hook where some model has a slew limit, a preview or a front. In a
-model without them the hook returns its argument, and whatever depends on it is decided: parameters that nothing uses,
-conditions that cannot hold, fields that nothing reads. Such functions, statements and fields are removed, so that a
-reviewer reads only what the model does. No operation on numbers changes.
+model without them the hook returns its argument, which leaves parameters that nothing uses, conditions that cannot hold
+and fields that nothing reads. All of these are removed, so that a reviewer reads only what the model does. No operation
+on numbers changes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _HEAD = re.compile(r"(?P<before>(?:[\w*]+\s+\**)+?)(?P<name>hystgen_\w+)\((?P<pa
 _OWN = ("static ", "HYSTGEN_APART_IN_FLOAT ", "HYSTGEN_APART_IN_FIXED ", "HYSTGEN_APART_BUT_IN_FLOAT_LOOP ",
         "HYSTGEN_APART_IN_FLOAT_CORNERS ", "HYSTGEN_APART_IN_FIXED_CHAIN ", "HYSTGEN_APART_IN_CHAIN ",
         "HYSTGEN_APART ")
-"""Words that begin functions which only the model itself calls."""
+"""First words of functions that only the model itself calls."""
 _DELIMITED = (re.compile(r"(?:[(,?:]|(?<![=!<>])=|\breturn)\s*$"), re.compile(r"\s*[),;:]"))
 """Text before and after a whole argument, initializer or answer."""
 _MARK = re.compile(r"^ *\(void\)(\w+);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
@@ -90,8 +90,8 @@ def folded(
     apart: Sequence[str],
     meaning: Callable[[str], str] = str,
 ) -> dict[str, Function]:
-    """The functions of a model without code that does nothing. `wanted` names those that are called; the rest as in
-    `_Folding`."""
+    """The functions of a model without code that does nothing. `wanted`: the names of those still called; the rest as
+    in `_Folding`."""
     comments: list[str] = []
 
     def mask(found: re.Match[str]) -> str:
@@ -114,8 +114,8 @@ def folded(
 
 class _Folding:
     """The functions of a model's operators. `kernels`: other functions that they call, which stay unchanged; `apart`:
-    words that begin functions which are not inlined here, to save stack; `meaning`: of names of types, several of which
-    may denote the same type here."""
+    first words of functions that are not inlined here, to save stack; `meaning`: of a type name, since several may
+    denote the same type here."""
 
     def __init__(
         self, functions: Sequence[Function], kernels: Sequence[Function], apart: Sequence[str],
@@ -189,7 +189,7 @@ class _Folding:
                 yield _arguments(function.body, found.end())[1]
 
     def _fold(self, function: Function) -> None:
-        """Replace the calls of a function by its body, if that is empty or a single simple statement."""
+        """Replace the calls of a function with its body, if that is empty or a single simple statement."""
         does = function.statements
         if function.own and does == "":
             self._calls(function.name, _no_statement)
@@ -216,7 +216,7 @@ class _Folding:
             self.functions[caller] = function
 
     def _forward(self, function: Function, name: str, rest: str, answers: bool) -> None:
-        """Let callers call directly what this function only forwards to."""
+        """Let callers directly call the function to which this one only forwards."""
         other = self.functions.get(name) or self._known.get(name)
         end, given = _arguments(rest, 0)
         if other is None or end != len(rest) or len(given) != len(other.names):
@@ -328,7 +328,7 @@ _STORE = re.compile(r"^ *self->(\w+) = ([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTI
 
 
 def _pure(expression: str) -> bool:
-    """Whether an expression changes nothing: none of its calls gets a pointer to memory."""
+    """Whether an expression changes nothing: no call in it is given a pointer to memory."""
     return not re.search(r"\([^()]*(?:\bself\b(?!->)|&)", expression)
 
 
@@ -373,7 +373,7 @@ def _no_statement(body: str, start: int, end: int, _: list[str]) -> str | None:
 def _argument(
     body: str, start: int, end: int, arguments: list[str], place: int, same: bool
 ) -> str | None:
-    """The body with an argument in place of the call."""
+    """The body with the call replaced by one of its arguments."""
     argument, whole = arguments[place], _delimited(body, start, end)
     if not whole and not same:
         return None
@@ -388,7 +388,7 @@ _FLAG = re.compile(r"^ *bool (\w+)(?: = false)?;(?: */\*[^\n]*?\*/)?\n", re.MULT
 _UNUSED = re.compile(r"^ *(?:const )?(?:unsigned )?\w+ \*?(\w+) =\s([^;]*);(?: */\*[^\n]*?\*/)?\n", re.MULTILINE)
 """A local variable with its first value."""
 _ANSWERED = re.compile(r"^    const (\w+) (\w+) =\s+([^;{]*);\n    return \2;\n\Z", re.MULTILINE)
-"""A constant that is then returned; the initializer of a struct does not count, since it is no expression."""
+"""A constant that is then returned; the initializer of a struct does not count, since it is not an expression."""
 _IF = re.compile(r"^( *)(\} else )?if \(([^{};]*)\) \{\n", re.MULTILINE)
 
 
@@ -421,6 +421,6 @@ def _choices(body: str) -> str:
 
 
 def fields(functions: Collection[Function], operator: str) -> frozenset[str]:
-    """The fields of an instance that its functions name."""
+    """The fields of an instance that its functions use."""
     mine = [each.body for each in functions if each.operator == operator]
     return frozenset(field for body in mine for field in re.findall(r"self->(\w+)", body))

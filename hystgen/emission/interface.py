@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 # Banner
 
 PERIODS = (50, 200)
-"""[samples] Periods for which the header states the loss of a sine: a fast one, as long as the fastest sweep with
+"""[samples] Periods at which the header states how much a sine loses: a fast one, as long as the fastest sweep with
 stated bounds, and a slow one."""
 
 
 def banner(file: str, what: str, command: str, sha256: str, details: Sequence[str] = ()) -> str:
-    """A banner; `command`: that made the file; `sha256`: hash of the parameters; `details`: further lines."""
+    """A banner; `command`: the one that made the file; `sha256`: hash of the parameters; `details`: further lines."""
     width = WIDTH - len(" * ")
     lines = []
     for line in details:
@@ -59,7 +59,7 @@ def command(parameters: Parameters, options: Options) -> str:
 
 
 def conditions(one: Compensator) -> tuple[str, str]:
-    """The conditions of NAME_INVERSE_ROUNDING_ERROR in words: on branches and on memory; empty if there is none."""
+    """The conditions of NAME_INVERSE_ROUNDING_ERROR in words, on branches and on memory; empty if there is none."""
     branch = "both take the same branch" if one.variant.branches else ""
     return branch, one.numbers.errors.condition or UNSLEWED * one.variant.slew
 
@@ -88,38 +88,38 @@ def reading(one: Compensator) -> list[str]:
 
 
 def _averaged(compiled: Compiled) -> list[str]:
-    """The averages that hold the noise gain, the shaper or notch that keeps modes from ringing, and their cost."""
+    """The averages that limit the noise gain, the shaper or notch that keeps modes from ringing, and what they cost."""
     from hystgen.compensator.chain.layout import LEAST_LATE
 
     found = []
     if (one := compiled.smoothing) is not None:
         often = {1: "once", 2: "twice"}.get(one.times, f"{one.times} times")
-        losses = " and ".join(f"{100.0 * one.loss(period):.2g} % with {period} samples a period" for period in PERIODS)
+        losses = " and ".join(f"{100.0 * one.loss(period):.2g} % at {period} samples per period" for period in PERIODS)
         late = f", and the motion is {one.late:.3g} samples later" if one.late > LEAST_LATE else ""
         found.append(
-            f"Noise: references are averaged {often} over {one.width:.4g} samples, so that the noise gain is "
+            f"Noise: references are averaged {often} over {one.width:.4g} samples, so the noise gain is "
             f"{compiled.noise_gain:.4g} instead of {one.without:.4g}; a sine loses {losses}{late}"
         )
     if (kept := compiled.shaped) is not None:
         missed = 100.0 * kept.missed(PERIODS[-1])
         found.append(
-            f"Resonance: after a step of the reference the stage does not ring ({kept.by}). Not for tracking: it makes "
-            f"the motion {kept.late:.3g} samples late, and a sine with {PERIODS[-1]} samples a period is missed by "
-            f"{missed:.2g} % of its size"
+            f"Resonance: after a step of the reference the stage does not ring ({kept.by}). Not for tracking: this "
+            f"makes the motion {kept.late:.3g} samples late, and the error of a sine at {PERIODS[-1]} samples per "
+            f"period is {missed:.2g} % of its amplitude"
         )
     return found
 
 
 def _branches(compiled: Compiled, parameters: Parameters) -> list[str]:
-    """The error that a drive at rest in front of two branches leaves."""
+    """The error that remains when a drive in front of two branches comes to rest."""
     from hystgen.compensator.chain.bounds import kept_branch
 
     if not compiled.tables.turning:
         return []
     most = f"{kept_branch(compiled):.3g} {comment_text(parameters.units.output)}".rstrip()
     return [
-        "Branches: the drive turns to the other branch only if staying on its own would miss more than a turn does at "
-        f"first; that leaves at most {most} of a reference at rest"
+        "Branches: the drive turns to the other branch only if that misses the reference by less, at first, than "
+        f"staying on its own branch; this leaves an error of at most {most} at rest"
     ]
 
 
@@ -133,7 +133,7 @@ def _quiet(one: Compensator, compiled: Compiled) -> list[str]:
     kept = float(t.number.dither[0]) / 2.0 ** one.form.drive_bits(t)
     return [
         f"Quiet: after {t.quiet} equal references the drive stands still as long as it is within {kept:.4g}{unit} of "
-        "the drive that is needed at rest; the input of the plays is then within twice that of the one sought"
+        "the drive that is needed at rest; the input of the plays is then within twice that of its target"
     ]
 
 
@@ -142,13 +142,13 @@ def details(one: Compensator, notes: Sequence[str], estimate: Cost) -> list[str]
     parameters, options = one.parameters, one.options
     about = comment_text(parameters.description)
     avr = [] if estimate.avr is None else [
-        f"On an 8-bit AVR constants lie in RAM too: at most {estimate.avr.all} bytes of RAM in all, "
+        f"On an 8-bit AVR constants lie in RAM too: at most {estimate.avr.all} bytes of RAM in total, "
         f"{estimate.avr.play} of them for each play"
     ]
     single = f" Define {one.names.NAME}_IMPLEMENTATION in one C file before including this header."
     use = (
         "Use: one instance per actuator, init once, then step from one context only. init takes the start memory of "
-        f"the parameter file; reset starts again from plays at 0.{single * (options.layout == 'single-header')}"
+        f"the parameter file; reset restarts with all plays at 0.{single * (options.layout == 'single-header')}"
         f"{one.form.warning}"
     )
     shapes = ((effect.name, getattr(effect, "shape", "")) for effect in parameters.model.effects if effect.block)
@@ -166,12 +166,12 @@ def details(one: Compensator, notes: Sequence[str], estimate: Cost) -> list[str]
         *precision,
         "",
         "Cost (32-bit target):",
-        f"    code at -O2       about {estimate.code_words}, as measured for such a model with 10 plays"
+        f"    code at -O2       about {estimate.code_words}, as measured for a similar model with 10 plays"
         f"{uncounted}",
         f"    constant tables   {estimate.memory.tables} bytes",
         *(f"    {op} instance  {size} bytes of RAM" for op, size in estimate.memory.instances),
         *(f"    {op} step, worst case: {words}" for op, words in estimate.worst_case),
-        *(f"    {op} step, dearest: about {estimate.dearest_words(op)}, as measured for such a model{uncounted}"
+        *(f"    {op} step, dearest: about {estimate.dearest_words(op)}, as measured for similar models{uncounted}"
           for op in options.operators),
         *avr,
         "",
@@ -195,7 +195,7 @@ def selftest_cost(options: Options, found: Cost, samples: int) -> list[str]:
     lines = ["", f"Cost (32-bit target): {constants} bytes of constants, {instance} bytes of RAM for its own instance"]
     if found.avr is not None:
         both = sum(cost.selftest_bytes(real, found.avr, samples, cost.AVR))
-        lines.append(f"On an 8-bit AVR constants lie in RAM too: {both} bytes of RAM in all")
+        lines.append(f"On an 8-bit AVR constants lie in RAM too: {both} bytes of RAM in total")
     return lines
 
 
@@ -235,7 +235,7 @@ def limits(one: Compensator) -> list[str]:
     bound, suffix = "against the double model, ", form.suffix
     drive, output = form.counted("drive", units.drive), form.counted("output", units.output)
     found: list[Macro] = [("N_PLAYS", str(one.cascade.pi.n), ""), *_timing(one)]
-    words = ("physical units a code; code 0 is 0", "")
+    words = ("physical units per code; code 0 is 0", "")
     found += [
         (f"{side}_LSB", literal(lsb), comment)
         for side, lsb, comment in zip(("DRIVE", "OUTPUT"), numbers.lsb, words, strict=False)
@@ -267,19 +267,19 @@ def limits(one: Compensator) -> list[str]:
 def _timing(one: Compensator) -> list[Macro]:
     """Macros about time: the sample time, and for a model with effects its consequences."""
     kind, period, compiled = one.family.arithmetic.real, one.parameters.sample_time, one.compiled
-    found: list[Macro] = [] if period is None else [("SAMPLE_TIME", literal(kind(period)), "s, from step to step")]
+    found: list[Macro] = [] if period is None else [("SAMPLE_TIME", literal(kind(period)), "s, between steps")]
     if compiled is None:
         return found
     from hystgen.compensator.chain.layout import LEAST_LATE
 
-    ahead = "samples that the argument of step is ahead of the motion"
+    ahead = "samples by which the argument of step is ahead of the motion"
     if compiled.late > LEAST_LATE:
         ahead += f", which is {compiled.late:.4g} late"
     return [
         *found,
         ("PREVIEW", str(compiled.ahead), ahead),
-        ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest gain from reference to drive over that at rest"),
-        ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, a second, for which the errors below hold"),
+        ("NOISE_GAIN", literal(kind(compiled.noise_gain)), "largest gain from reference to drive, relative to rest"),
+        ("MAX_RATE", literal(kind(compiled.max_rate)), "fastest drive, per second, for which the errors below hold"),
         *one.form.code_sizes(compiled.tables),
     ]
 
@@ -295,7 +295,7 @@ def status(one: Compensator) -> list[str]:
         ("DOMAIN", envelope if one.numbers.envelopes else "never set: no envelope limits an argument"),
     ]
     if one.variant.chain:
-        slewed = "the drive was kept within its rate"
+        slewed = "the drive was kept within its rate limit"
         found += [
             ("SLEW_LIMITED", slewed if one.variant.slew else "never set: nothing limits the drive's rate"),
             ("LIMITED_SETTING", "an offset, gain or temperature was limited"),
@@ -307,10 +307,10 @@ def status(one: Compensator) -> list[str]:
 
 _FIRST = "after init; at any time"
 ORDER = {
-    "init": "before every other call; at any time again",
+    "init": "before every other call; may be repeated at any time",
     "reset": _FIRST,
     "step": "after init; once every sample time, from one context",
-    "commit": "after a step and before the next one, any number of times; before the first step it is a first drive",
+    "commit": "after a step and before the next one, any number of times; before the first step it gives a first drive",
     "status": _FIRST,
     "push": "after init and before the first step",
     "settle": _FIRST,
@@ -320,15 +320,15 @@ ORDER = {
     "travel": _FIRST,
     "set_travel": "after init and before the first step, or at any time",
     "expected": "after a step, a commit or settle",
-    "correct": "after a step, when the sensor's value belongs to the drive that was applied before it",
+    "correct": "after a step, when the sensor's value belongs to the drive that was applied before that step",
 }
 """When a call may be made."""
 
 _FEW = "a few operations, less than a step"
 COSTS = {
-    "init": "once through the plays",
+    "init": "one pass over the plays",
     "reset": "that of init and of a step",
-    "commit": "a few comparisons: the next step takes the drive over",
+    "commit": "a few comparisons: the next step absorbs the drive",
     "status": "one load and one store",
     "push": "less than a step",
     "settle": "at most that of two steps",
@@ -414,7 +414,7 @@ def _parameter(name: str, call: str, one: Compensator) -> str:
         "applied": drive,
         "d": _unit("output", one),
         "measured": _unit("output", one),
-        "travel": "sum of the drive's ways, in the unit of a drive",
+        "travel": "total distance that the drive has moved, in units of the drive",
     }[name]
     return what + held
 
@@ -423,7 +423,7 @@ def _answer(call: str, op: str, one: Compensator) -> str:
     if call == "status":
         return f"{one.names.NAME}_STATUS_* bits, 0 for none"
     if call == "travel":
-        return "sum of the drive's ways, in the unit of a drive"
+        return "total distance that the drive has moved, in units of the drive"
     return _unit("drive" if op == "inverse" and call == "step" else "output", one)
 
 
@@ -460,11 +460,11 @@ WORDS = (
      "holds its value until its input is a threshold away, and then follows at that distance"),
     ("move", _CORNERS,
      "the rise or the fall of the input from one turning point to the next. Lengths are taken along the move, "
-     "so that a falling one is a rising one with all signs changed"),
+     "so a falling move is a rising one with all signs changed"),
     ("corner", _CORNERS,
      "a turning point from which some plays still hold their values; corners are a stack, the newest one on top"),
     ("block", _CORNERS,
-     "the plays that one corner holds: those with larger thresholds than the corner above it has, up to its `top`"),
+     "the plays that one corner holds: those with larger thresholds than the corner above holds, up to its `top`"),
     ("way", _CORNERS, "distance of the input from a turning point"),
     ("reach", _CORNERS,
      "distance of the output from a turning point; a reach_t also holds inputs and drives beyond every code"),
@@ -476,14 +476,14 @@ WORDS = (
      "a block of the chain from drive to displacement. rest: it has settled at an input; absorb: one sample passes "
      "through it; solve: the input for an output now; resting: the input for an output at rest"),
     ("pending", r"\bpending\b",
-     "the last returned drive: part of the memory only when the next call absorbs it, or the drive committed in its "
+     "the last returned drive: it enters the memory only when the next call absorbs it, or the drive committed in its "
      "place"),
 )
 """Each word, a pattern found in texts that use it, and its meaning."""
 
 
 def overview(text: str) -> str:
-    """A comment that explains the words that a C text uses; empty if it uses none."""
+    """A comment that explains the words of `WORDS` that a C text uses; empty if it uses none."""
     found = [f"{word}: {meaning}" for word, sign, meaning in WORDS if re.search(sign, text)]
     if not found:
         return ""

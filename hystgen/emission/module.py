@@ -30,7 +30,7 @@ WHAT = {"both": "forward and inverse operator", "forward": "forward operator", "
 
 
 def compensator(parameters: Parameters, cascade: StaticModel, options: Options) -> Compensator:
-    """The compensator of a model. Raises tables.FormatError."""
+    """The compensator of a model. Raises FormatError."""
     compiled = _compiled(parameters, cascade, options)
     whole = runtime.FAMILIES[options.arithmetic]
     family = dataclasses.replace(
@@ -88,8 +88,8 @@ def _variant(
 @dataclass(frozen=True)
 class Code:
     """The C text of a model: types of its tables and of its instances (`states`), functions (`kernels`, `operators`),
-    the macros and tables that they name (`plays`: with an entry for each play, `beside`: others), and `data`, all of it
-    in memory."""
+    the macros and tables that these use (`plays`: with an entry for each play; `beside`: the others), and `data`, which
+    all of it keeps in memory."""
 
     types: str
     states: str
@@ -107,7 +107,7 @@ class Code:
 
 
 def front(one: Compensator) -> str:
-    """The functions of a model under the run time's names: those of its stages, and those that name its blocks."""
+    """A model's functions under the run time's names: those that call its stages and those that call its blocks."""
     stages = one.numbers.stages
     whole = template("front.c.j2", stages=stages, branches=one.variant.branches) if stages else ""
     return f"{whole}\n{one.glue.functions}" if one.glue else whole
@@ -163,7 +163,7 @@ def composed(one: Compensator) -> Code:
 
 
 def _named(operators: str, every: Sequence[Table]) -> Collection[str]:
-    """The tables that functions name, directly or through another table."""
+    """The tables that functions use, directly or through another table."""
     named = set(re.findall(r"\w+", operators))
     for table in reversed(every):  # a table comes before those that name it
         if table.name in named:
@@ -172,7 +172,7 @@ def _named(operators: str, every: Sequence[Table]) -> Collection[str]:
 
 
 def implementation(one: Compensator, code: Code) -> str:
-    """The operators with the parts of the run time that they need, except those in a shared run time."""
+    """The operators with the parts of the run time that they need, except what a shared run time contains."""
     family, name, single = one.family, one.names.name, one.options.layout == "single-header"
     opening, apart, closing = (
         runtime.verbatim(files, name, family, name)
@@ -188,7 +188,7 @@ def implementation(one: Compensator, code: Code) -> str:
 
 @dataclass(frozen=True)
 class Module:
-    """Everything that the files of a model show.
+    """Everything that the files of a model contain.
 
     `sha256`: hash of the parameters; `reading`: how the inverse of a model with effects reads the reference, one
     sentence per option; `doubts`: why the inverse may be of little use, in sentences.
@@ -208,14 +208,14 @@ class Module:
 
     @property
     def calls(self) -> Mapping[str, Sequence[str]]:
-        """By operator, the functions that it adds to those of every model."""
+        """By operator, the functions that it has in addition to those of every model."""
         return self.compensator.calls
 
 
 def of(parameters: Parameters, cascade: StaticModel, options: Options, sha256: str = "") -> Module:
     """The module of a model; `sha256`: hash of the parameters in the file, by default the hash of `parameters`.
 
-    Raises tables.FormatError.
+    Raises FormatError.
     """
     one = compensator(parameters, cascade, options)
     made = composed(one)
@@ -294,7 +294,7 @@ def runtime_files(arithmetic: str) -> dict[str, str]:
     command = f"hystgen emit PARAMS --arithmetic {arithmetic} --layout shared-runtime"
 
     def top(name: str, what: str) -> str:
-        return interface.banner(name, what, command, "does not depend on any")
+        return interface.banner(name, what, command, "none, the same for all")
 
     def whole(*names: str) -> str:
         return runtime.verbatim(names, file, family, prefix)

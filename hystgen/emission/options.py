@@ -15,7 +15,7 @@ OPTIONS = {
     "engine": ("corners", "loop"),
     "layout": ("self-contained", "shared-runtime", "single-header"),
 }
-"""Options of the command in a banner, and their values."""
+"""Options of the command that a banner records, and their values."""
 
 LAYOUTS = OPTIONS["layout"]
 OPERATORS = OPTIONS["operator"]
@@ -32,7 +32,7 @@ _SEAL = re.compile(r"^ \* Text: sha256 ([0-9a-f]{64}), (?:of this file )?without
 class Options:
     """The options of emission: `operator` inverse, forward or both; `engine` corners or loop; see LAYOUTS for `layout`.
 
-    `left_out`: effects that the C does not include, in words, if leaving them out is allowed.
+    `left_out`: a sentence for each effect that the C leaves out, if that is allowed.
     """
 
     operator: str
@@ -60,7 +60,7 @@ class Options:
 @dataclass(frozen=True)
 class Banner:
     """The contents of a banner: `version` of hystgen, `options` of its command, hash of the `parameters`; `edited`:
-    whether the file has changed since it was sealed; `model`: its name, empty for a shared run time."""
+    whether the file has changed since it was sealed; `model`: the model's name, empty for a shared run time."""
 
     version: str
     options: dict[str, str]
@@ -78,7 +78,7 @@ def seal(text: str) -> str:
 
 
 def read_banner(text: str) -> Banner | None:
-    """The banner of a file with line ends LF, None if it has none. Values that no option takes are left out."""
+    """The banner of a file with LF line endings, or None. Values that no option takes are left out."""
     generated, parameters, sealed = (form.search(text) for form in (_GENERATED, _PARAMETERS, _SEAL))
     if generated is None or parameters is None:
         return None

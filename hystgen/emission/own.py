@@ -1,9 +1,9 @@
-"""The C of a user's own effect: its file, checked, as pieces of the run time.
+"""The C of a user's own effect: its file, checked and split into pieces like the run time.
 
-The file is the user's code and is carried unchanged, except that its names get the model's name in front. It may
-contain what blocks of the catalogue contain: two types, one of the numbers and one of the memory, named as in Python,
-and four functions, with further static functions that they call. Written with `hystgen_product` it is the same for
-every arithmetic. The language is not checked: `hystgen verify` shows whether it compiles, and to which bits.
+The file is the user's code and stays unchanged, except that its names get the model's name as a prefix. It may contain
+what blocks of the catalogue contain: two types, one for the numbers and one for the memory, named as in Python, and
+four functions, plus static functions that these call. Written with `hystgen_product`, it serves every arithmetic. Its C
+is not checked for errors: `hystgen verify` shows whether it compiles, and whether its bits are right.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from hystgen.compensator.chain.layout import ChainTables
 
 MOST_BYTES = 1 << 16
-"""Largest C file of a user's effect; the largest block of the package itself has 6 kB."""
+"""Largest C file of a user's effect; the largest block of the package has 6 kB."""
 
 INCLUDE = '#include "hystgen_runtime.h"'
-"""The one preprocessor line in a file, so that it compiles by itself."""
+"""The only preprocessor line allowed in a file, which then compiles by itself."""
 
 CALLED = frozenset(["if", "for", "while", "switch", "return", "sizeof"])
 """Words before a parenthesis that are not calls."""
@@ -43,7 +43,7 @@ GIVEN = frozenset(["hystgen_signal_t", "hystgen_number_t", "hystgen_product"])
 
 
 def pieces(t: ChainTables) -> tuple[list[Piece], list[Piece]]:
-    """Types and functions of a model's user-defined blocks; raises as `of_effect`."""
+    """Types and functions of a model's user-defined blocks. Raises as `of_effect` does."""
     effects = dict.fromkeys(getattr(t, "own_effects", ()))
     found = [of_effect(effect) for effect in effects]
     types, functions = ([each for pair in found for each in pair[way]] for way in (0, 1))
@@ -66,7 +66,7 @@ def of_effect(effect: type[Effect]) -> tuple[list[Piece], list[Piece]]:
             f"{file}: cannot be read ({error.strerror or error}); put the C of the effect there"
         ) from None
     if len(data) > MOST_BYTES:
-        raise EffectsError(f"{file}: has {len(data)} bytes, more than {MOST_BYTES}; give the block alone")
+        raise EffectsError(f"{file}: has {len(data)} bytes, more than {MOST_BYTES}; keep only the block")
     text = data.decode("utf-8", "replace").replace("\r\n", "\n")
     problems = list(_of_lines(text))
     found: list[Piece] = []
@@ -100,13 +100,13 @@ EVERYWHERE = (
 
 IN_CODE = (
     (r"<:|:>|<%|%>|%:", "{0}, a digraph; write the character that it stands for"),
-    (r"#", f"a line of the preprocessor; only {INCLUDE} is one, in front of all else"),
+    (r"#", f"a preprocessor line; only {INCLUDE} is allowed, before anything else"),
     (r"//", "a comment with //; write /* */"),
-    (r"[\"']", "a text or a character; a block has none"),
-    (r"[$@`]", "{0} is no character of C; leave it out"),
+    (r"[\"']", "a string or a character; a block needs none"),
+    (r"[$@`]", "{0} is not a character of C; leave it out"),
     (r"= *\{", "a list of values; put them in the table"),
     (r"[/%]", "a division; put the reciprocal in the table"),
-    (r"(?<!\w)(?:\d+\.|\.\d|\d+[eE])", "a number with a fraction; put it in the table, rounded as Python has it"),
+    (r"(?<!\w)(?:\d+\.|\.\d|\d+[eE])", "a number with a fraction; put it in the table, rounded as in Python"),
 )
 """Forbidden outside comments; only the first match in a line is reported."""
 
@@ -136,7 +136,7 @@ def _of_lines(text: str) -> Iterator[tuple[int, str]]:
             if word in REFUSED:
                 yield number, f"{word}; write {REFUSED[word]}"
             elif word.startswith("_"):
-                yield number, f"{word}, a name of the compiler's; choose another one"
+                yield number, f"{word}, a name reserved for the compiler; choose another"
 
 
 _TYPE = re.compile(r"typedef struct \{([^{}]*)\} (hystgen_\w+);")
@@ -155,7 +155,7 @@ def _split(text: str, problems: list[tuple[int, str]]) -> Iterator[Piece]:
         found = _TYPE.fullmatch(whole) or _FUNCTION.match(whole)
         if not found:
             line = text.count("\n", 0, begin) + 1
-            what = f"{printable(whole)!r} belongs to no type and no static function; a block has these"
+            what = f"{printable(whole)!r} is not part of a type or a static function; a block has only these"
             problems.append((line, what))
             continue
         name = found[2] if whole.startswith("typedef") else found[1]
@@ -164,7 +164,7 @@ def _split(text: str, problems: list[tuple[int, str]]) -> Iterator[Piece]:
 
 
 def _above(text: str, behind: int, begin: int) -> int:
-    """Start of the comments directly above a piece, without an empty line; the piece's own start if there are none."""
+    """Start of the comments above a piece with no empty line in between; the piece's own start if there are none."""
     for comment in reversed(list(_COMMENT.finditer(text, behind, begin))):
         if text[comment.end() : begin].strip() or "\n\n" in text[comment.end() : begin]:
             break
@@ -184,7 +184,7 @@ def _end(code: str, begin: int) -> int:
 
 
 def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int, str]]:
-    """Problems of a block: extra content besides its types and functions, and missing ones."""
+    """Problems of a block: types and functions that are missing, wrong or too many."""
     own_name, wanted = f"hystgen_{kind.name}", dict(_declared(kind))
     names = [piece.name for piece in found]
     functions = {piece.name for piece in found if "typedef" not in piece.text}
@@ -199,28 +199,28 @@ def _of_pieces(text: str, found: list[Piece], kind: Kind) -> Iterator[tuple[int,
         whole = " ".join(code.split())
         head = whole if whole.startswith("typedef") else whole.partition(" {")[0]
         if names.count(piece.name) > 1:
-            yield line, f"{piece.name} is there {names.count(piece.name)} times; one is enough"
+            yield line, f"{piece.name} is defined {names.count(piece.name)} times; keep one"
         elif piece.name in wanted and _bare(head) != _bare(wanted[piece.name]):
-            yield line, f"{piece.name} is declared otherwise; write {wanted[piece.name]}"
+            yield line, f"{piece.name} is declared differently; write {wanted[piece.name]}"
         elif not piece.name.startswith(f"{own_name}_") or (piece.name not in wanted and piece.name not in functions):
-            yield line, f"{piece.name} is none of the block's types, and no function {own_name}_..; leave it out"
+            yield line, f"{piece.name} is neither one of the block's types nor a function {own_name}_..; leave it out"
         for place, called in _calls(code):
             if called not in CALLED and called not in functions and not _NAME.fullmatch(called):
                 line = text.count("\n", 0, at + place) + 1
-                yield line, f"{called} is called, and is not in the file; a block calls its own functions"
+                yield line, f"{called} is called but not in the file; a block calls only its own functions"
         for number, each in enumerate(code.split("\n")):
             place = text.count("\n", 0, at) + 1 + number
             for used in set(_NAME.findall(each)) - functions - wanted.keys() - GIVEN:
-                yield place, f"{used} is not in the file; a block has that, and {', '.join(sorted(GIVEN))}"
+                yield place, f"{used} is not in the file; a block uses names in it and {', '.join(sorted(GIVEN))}"
             for number in re.findall(r"(?<!&)\bt->(\w+)", each):
                 yield place, f"t->{number} by itself; write hystgen_product(&t->{number}, ..)"
 
 
 BRANCHING = frozenset(["if", "for", "while", "switch"])
-"""Words before parentheses that may be followed by an expression in parentheses."""
+"""Words whose parentheses may be followed by an expression in parentheses."""
 
 CAST = re.compile(r"\b(?:const|unsigned|int|bool|void|size_t|(?:u?int(?:8|16|32|64)|hystgen_\w+)_t)\b|\*\s*$")
-"""Words of a type in parentheses in front of a value."""
+"""Words of the type in a cast."""
 
 
 def _calls(code: str) -> Iterator[tuple[int, str]]:
@@ -235,7 +235,7 @@ def _calls(code: str) -> Iterator[tuple[int, str]]:
         called = code[begin + 1 : found.start()]
         word = re.search(r"(\w+)\s*$", code[:begin])
         if word and word[1] not in CALLED:
-            yield begin, f"what {word[1]} returns"
+            yield begin, f"the result of {word[1]}"
         elif not (word and word[1] in BRANCHING) and CAST.sub("", called).strip():
             yield begin, " ".join(called.split())
 

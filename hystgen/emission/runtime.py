@@ -1,9 +1,8 @@
 """The hand-written C of `c_runtime/` and of the folders of effects, as text for emitted files.
 
-A file is a sequence of top-level pieces (functions, tables, types, constants). Emitted files carry only the pieces that
-a model needs. Where a file has several forms of a piece, `#ifdef` on a fact of the model (`FACTS`) selects one of them,
-as a compiler would. Names defined by a run time, which models may share, get its prefix; all others get the model's
-name.
+A file is a sequence of top-level pieces (functions, tables, types, constants). Emitted files contain only the pieces
+that a model needs. Where a file has several forms of a piece, `#ifdef` on a fact of the model (`FACTS`) selects one, as
+in a compiler. Names defined by a run time, which models may share, get its prefix; all others get the model's name.
 """
 
 from __future__ import annotations
@@ -24,10 +23,10 @@ from hystgen.arithmetic import FIXED, FLOATING, Arithmetic
 from hystgen.emission import folding
 
 FACTS = re.compile(r"HYSTGEN_(FIXED|CHAIN|FORWARD|INVERSE|REAL_IS_DOUBLE|REAL_IS_SHORT|HAS_\w+)")
-"""Macros that state facts about a model. Conditions on them are decided at emission; others are carried."""
+"""Macros that state facts about a model. Conditions on them are decided at emission; others stay in the C."""
 
 OPERATORS = ("forward", "inverse")
-"""A file with functions `hystgen_operator_..` serves both operators: it is emitted once for each, under its name."""
+"""A file with functions `hystgen_operator_..` serves both operators: it is emitted once for each, with its name."""
 
 FLOAT_KERNELS = (
     "front/tanh_{bits}.c",
@@ -43,20 +42,20 @@ FIXED_CHAIN_TYPES = ("compensator/chain/tables_fixed.h", "compensator/chain/stat
 SIGNALS = {
     "hystgen_signal_t": "hystgen_sum_t", "hystgen_fine_t": "hystgen_play_t", "hystgen_travel_t": "hystgen_sum_t",
 }
-"""Types of signals between blocks in fixed point with effects; elsewhere they are the types of codes, except that in
-engine loop without effects signals are as wide as sums of the plays."""
+"""Types of signals between blocks in fixed point with effects. Elsewhere they are the types of codes, but in engine
+loop without effects signals are as wide as sums of the plays."""
 
 FINE = {
     "HYSTGEN_FINE_MIN": "HYSTGEN_DRIVE_MIN", "HYSTGEN_FINE_MAX": "HYSTGEN_DRIVE_MAX",
     "hystgen_clamp_fine": "hystgen_clamp_drive",
 }
-"""Names of numbers finer than a drive code in such a model, and their meaning elsewhere."""
+"""Names of numbers finer than a drive code in a model with effects, and their meaning elsewhere."""
 
 SUMS = ("play_t", "reach_t", "sum_t")
 """Types of plays; in floating point every number has the same type."""
 
 NUMBER = "hystgen_number_t"
-"""The type that a user's own block multiplies with; in floating point an ordinary number."""
+"""The type of factors in a user's own block; in floating point an ordinary number."""
 
 FIXED_KERNELS = (
     "arithmetic/division.c",
@@ -75,11 +74,11 @@ class Family(ABC):
     """An arithmetic in C: its run-time files and its types; `chain`: in a model with effects; `loop`: in a model
     without effects in engine loop.
 
-    `kind`: the kind of arithmetic, in names of files; `ending`: of files whose floating-point names have none;
-    `chain_types`: types of effects; `helpers`: files that several effects call; `curves`: of a memoryless part whose
-    stages are not called one by one; `codes`: of codes; `moves_apart`: whether moving and bending plays takes less
-    stack in separate functions; `opening`: headers before all code of a file, which in a single header stand between
-    `opening_apart` and `closing`, so that its user's code is compiled as before.
+    `kind`: the kind of arithmetic in file names; `ending`: of file names that have none in floating point;
+    `chain_types`: files with the types of effects; `helpers`: with functions that several effects call; `curves`: with
+    a memoryless part whose stages are not called one by one; `codes`: with codes; `moves_apart`: whether moving and
+    bending plays takes less stack in separate functions; `opening`: headers before all code of a file; in a single
+    header they stand between `opening_apart` and `closing`, so that they do not affect the code that includes it.
     """
 
     arithmetic: Arithmetic
@@ -130,7 +129,7 @@ class Family(ABC):
 
     @property
     def signals(self) -> dict[str, str]:
-        """Names in code shared by models with and without effects, and their meaning here."""
+        """Names in code that models with and without effects share, and what they stand for here."""
         return dict.fromkeys((*SIGNALS, NUMBER), "hystgen_real_t") | FINE
 
     @property
@@ -140,14 +139,14 @@ class Family(ABC):
 
     @abstractmethod
     def storage(self, corners: bool) -> dict[str, str]:
-        """Replacements of the storage-class words before functions in this arithmetic, in engine corners or loop."""
+        """What replaces the storage-class words before functions in this arithmetic, with engine corners or loop."""
 
     def corners(self, plays: int) -> int:
-        """Number of corners that the corner engine keeps for so many plays."""
+        """Number of corners that the corner engine keeps for this many plays."""
         return max(plays, 1)
 
     def alike(self, kind: str) -> str:
-        """The name of a type, or of the type that it equals here."""
+        """The name of a type, or of the type that it is equal to here."""
         return kind
 
     def meaning(self, kind: str) -> str:
@@ -166,8 +165,8 @@ class Family(ABC):
 
     @property
     def chain_blocks(self) -> tuple[str, ...]:
-        """The files of blocks, which models with effects carry themselves, even with a shared run time; callees before
-        callers."""
+        """The files of blocks, which models with effects contain themselves, even with a shared run time; callees
+        before callers."""
         from hystgen.effects import sources
 
         blocks, drives = (sources.files(use, self.ending) for use in ("blocks", "drives"))
@@ -255,14 +254,14 @@ FAMILIES: dict[str, Family] = {
 
 @dataclass(frozen=True)
 class Variant:
-    """The kind of a model, which decides the run-time files that its operators are made of.
+    """Properties of a model that determine which run-time files make up its operators.
 
     `fronts`: it has a memoryless part; `branches`: with two branches; `finer`: inputs of the plays, or with effects the
-    signals in front of them, have further bits; `saturates`: output codes are limited; `start_list`: each play starts
-    at its own value; `chain`: it has effects; `slew`: the drive's rate is limited; `braked`: a lag behind that is kept
-    from overshooting; `quiet`: the drive stands still at rest; `turning`: a lag arrives at two branches; `waits`: it
-    has a delay; `previews`: references are summed; `ages`: it has a gain that follows the travel; `moves`, `bends`: how
-    plays move and are bent, if not as in engine loop.
+    signals in front of them, are finer than codes; `saturates`: output codes are limited; `start_list`: each play
+    starts at its own value; `chain`: it has effects; `slew`: the drive's rate is limited; `braked`: a lag behind the
+    limit is kept from overshooting; `quiet`: the drive stands still at rest; `turning`: a lag leads to two branches;
+    `waits`: it has a delay; `previews`: references are summed; `ages`: it has a gain that depends on the travel;
+    `moves`, `bends`: how plays move and how they are bent, if not as ordinary plays.
     """
 
     engine: str
@@ -285,7 +284,7 @@ class Variant:
 
     @property
     def apart(self) -> tuple[str, ...]:
-        """Words that begin functions which are not inlined here."""
+        """First words of functions that are not inlined here."""
         storage = self.family.storage(self.engine == "corners")
         return (APART, *(word for word, here in storage.items() if here == APART))
 
@@ -321,7 +320,7 @@ class Variant:
 
     def _chain(self) -> tuple[str, ...]:
         """The files of a chain except its blocks: for a model with effects, or for engine loop."""
-        from hystgen.effects.sources import files  # late: a plain model has no effect
+        from hystgen.effects.sources import files  # imported late, since a plain model has no effects
 
         chain = "compensator/chain/"
         loops, solve, refined = self.engine == "loop", f"{chain}plays_solve.c", f"{chain}refined_input.c"
@@ -374,7 +373,7 @@ def template(template: str, /, **values: object) -> str:
 
 @dataclass(frozen=True)
 class Member:
-    """A member of a structure: its type without prefix, the lengths of an array, and its bits in a bit field, or 0."""
+    """A member of a structure: its type without prefix, its array lengths, and its width as a bit field, or 0."""
 
     kind: str
     pointer: bool
@@ -427,7 +426,7 @@ _NAME = re.compile(r"\b(?:hystgen|HYSTGEN)_\w+")
 
 
 def split_pieces(source: str) -> list[Piece]:
-    """The top-level pieces of a file; of preprocessor lines only constants."""
+    """The top-level pieces of a file; the only preprocessor lines among them are constants."""
     pieces = []
     lines: list[str] = []
     depth = 0
@@ -445,7 +444,7 @@ def split_pieces(source: str) -> list[Piece]:
         if not depth and not constant and line.startswith("#"):
             lines = []
             continue
-        if not depth and not inside and not line.strip():  # a comment above it belongs to the file
+        if not depth and not inside and not line.strip():  # a comment before an empty line belongs to the file
             lines = []
             continue
         lines.append(line)
@@ -478,7 +477,7 @@ _CONDITION = re.compile(r"#\s*(ifdef|ifndef|if|elif|else|endif)\b(.*)")
 def chosen(source: str, facts: Collection[str]) -> str:
     """The text of a file with its conditions on facts resolved; other conditions stay in it."""
     kept = []
-    opened: list[tuple[bool, bool, bool]] = []  # is on facts, has selected a section, takes this one
+    opened: list[tuple[bool, bool, bool]] = []  # condition on facts; a section was selected; this one is
     for line in source.splitlines(keepends=True):
         found = _CONDITION.match(line)
         if not found:
@@ -513,7 +512,7 @@ def _holds(word: str, condition: str, facts: Collection[str]) -> bool:
 
 
 def forms(source: str, facts: Collection[str]) -> list[str]:
-    """The text of a file with its conditions resolved, once for each operator if it serves both. The argument
+    """The text of a file with its conditions on facts resolved, once for each operator if it serves both. The argument
     `operator_x` is then named as in that operator's step."""
     if "hystgen_operator_" not in source:
         return [chosen(source, facts)]
@@ -547,7 +546,7 @@ def table_pieces(family: Family) -> list[Piece]:
 
 
 def memory_pieces(family: Family) -> list[Piece]:
-    """The types that an arithmetic's instances and tables are made of."""
+    """The types of which an arithmetic's instances and tables consist."""
     return _pieces(family.states, family.facts)
 
 
@@ -584,7 +583,7 @@ def operator_pieces(
 
 
 def fields(pieces: Iterable[Piece], operator: str) -> frozenset[str]:
-    """The fields of an operator's instance that these functions name."""
+    """The fields of an operator's instance that these functions use."""
     return folding.fields([found for piece in pieces if (found := folding.parsed(piece.text))], operator)
 
 
@@ -599,7 +598,7 @@ def chain_types(own: Iterable[Piece], glue: str, family: Family) -> list[Piece]:
 
 
 def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
-    """Prototypes of an operator: those of every model, and the named ones of models with effects."""
+    """Prototypes of an operator: those of every model, and those named in `more` of models with effects."""
     prefix = f"hystgen_{operator}_"
     usual = [piece for piece in _pieces(["compensator/api.h"], ()) if piece.name.startswith(prefix)]
     chain = {prefix + each for each in more}
@@ -607,7 +606,7 @@ def _calls(operator: str, more: Iterable[str]) -> list[Piece]:
 
 
 def state_pieces(variant: Variant, family: Family, operators: Iterable[str], functions: Sequence[Piece]) -> list[Piece]:
-    """The types of instances, with the fields that these functions name."""
+    """The types of instances, with the fields that these functions use."""
     made = []
     for op in operators:
         named = fields(functions, op)
@@ -638,7 +637,7 @@ def used(pieces: Iterable[Piece]) -> set[str]:
 
 
 def _joined(pieces: Iterable[Piece]) -> str:
-    """The text of pieces, separated by empty lines unless a constant shares the comment of the one before."""
+    """The text of pieces, separated by empty lines unless a constant shares the comment of the previous one."""
     text = ""
     for piece in pieces:
         shared = piece.text.startswith("#define") and text.rpartition("\n\n")[2].count("#define")
@@ -647,7 +646,7 @@ def _joined(pieces: Iterable[Piece]) -> str:
 
 
 def render(pieces: Iterable[Piece], prefix: str, family: Family, static: bool) -> str:
-    """Kernels as C text under `prefix`; `static` for files that carry them as their own."""
+    """Kernels as C text under `prefix`; `static` for files that contain them as their own."""
     text = _joined(pieces)
     text = _stored(text, family, corners=False)
     text = text.replace("HYSTGEN_API ", "static " if static else "")
@@ -663,7 +662,7 @@ def _stored(text: str, family: Family, corners: bool) -> str:
 
 
 def render_carried(pieces: Sequence[Piece], name: str, prefix: str, family: Family) -> str:
-    """Pieces of kernel files that the model `name` carries beside the shared run time `prefix`, under its own name."""
+    """Pieces of kernel files that model `name` contains besides the shared run time `prefix`, under its own name."""
     text = _joined(pieces)
     return _named(text, prefix, family, name, frozenset(piece.name for piece in pieces))
 
@@ -696,7 +695,7 @@ def api(
 
 
 def verbatim(files: Iterable[str], owner: str, family: Family, name: str) -> str:
-    """Whole files without their first paragraph, for the module `name`; `owner` is named in messages."""
+    """Whole files without their first paragraph, for the module `name`; their messages name `owner`."""
     whole = [chosen(_read(file).partition("\n\n")[2], family.facts) for file in files]
     text = "\n".join(whole).replace('"hystgen: ', f'"{owner}: ')
     return _named(text, name, family, name)
@@ -714,8 +713,8 @@ def _own(family: Family) -> frozenset[str]:
 def _named(
     text: str, prefix: str, family: Family, name: str, carried: frozenset[str] = frozenset()
 ) -> str:
-    """The text with the names of a model and of its run time; `carried`: run-time names that the model carries
-    itself."""
+    """The text with the names of a model and of its run time; `carried`: run-time names that the model itself
+    defines."""
     for shared, here in family.signals.items():
         cast = f"({shared})"
         if here == "hystgen_real_t" and not family.casts:
@@ -742,7 +741,7 @@ def types(pieces: Iterable[Piece], prefix: str, family: Family) -> str:
 
 
 def all_types(files: Iterable[str], prefix: str, family: Family) -> str:
-    """Every type definition of headers of the run time."""
+    """Every type definition in these headers of the run time."""
     return types(_pieces(files, family.facts), prefix, family)
 
 

@@ -31,11 +31,11 @@ WIDE = ("set_travel",)
 """Settings with more bits than a code, too many for fixed-point samples."""
 
 SHARE = 0.125
-"""[share of its span] How far the samples change a setting: little enough that references stay within reach."""
+"""[share of its span] How far the samples change a setting: little enough to keep references within reach."""
 
 
 def _fractions(length: int) -> list[float]:
-    """Turning points of a shrinking swing, then a fixed pseudo-random walk, in parts of the range (0 .. 1)."""
+    """A decaying swing, then a fixed pseudo-random walk, as fractions of the range (0 .. 1)."""
     points = [0.5, 1.0, 0.0]
     points += [0.5 + 0.5 * (-0.86) ** k for k in range(1, 20)]
     points += [1.05, 1.0, 1.0, -0.05, 0.5]
@@ -80,8 +80,8 @@ def operators(one: Compensator) -> list[Operator]:
 
 
 def _setting(t: ChainTables, form: Form, call: str, turn: int) -> float:
-    """An argument of a setting, in fixed point before it is rounded to a code; every third one exceeds its limits, if
-    any."""
+    """An argument of a setting, in fixed point before rounding to a code; every third one exceeds the limits, if there
+    are any."""
     from hystgen.compensator.chain.fixed_tables import setting_codes
     from hystgen.compensator.chain.parts import PARTS
 

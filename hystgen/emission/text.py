@@ -1,7 +1,7 @@
 """C text: exact literals, tables, comments, and lines of at most WIDTH characters, however long the model's name is.
 
-Statements are broken by one rule that looks only at their code, not at the lines of the file they come from: that file
-is written for the prefix `hystgen_`, which another name replaces. clang-format formats the files of `c_runtime/` and of
+Statements are broken by one rule that looks only at their code. Line breaks in the file they come from do not count:
+those suit the prefix `hystgen_`, which another name replaces. clang-format formats the files of `c_runtime/` and of
 effects but not emitted ones: its line breaks depend on its version, and the same parameters have to give the same bytes
 anywhere.
 """
@@ -37,19 +37,19 @@ _WAYS = [
         r"(?<=\w\()|(?<=_t\))(?=[\w(-])|(?<=\w) (?=[\w*])",
     )
 ]
-"""Where a line may be broken, best places first: after commas, before ? and :, after operators, those that bind least
+"""Where a line may be broken, best places first: after commas, before ? and :, after operators, the loosest binding
 first."""
 _CHOICE = ("? ", ": ")
-"""Beginnings of lines whose rest is indented further."""
+"""Beginnings of lines whose continuation is indented further."""
 _GOOD = 7
-"""As many of these ways are tried where the fewest parentheses are open, before the others."""
+"""The first so many of these come before the rest; among them, the place with the fewest open parentheses wins."""
 
 
 def literal(x: Number) -> str:
-    """The shortest C literal that gives back exactly this float32, float64 or whole number.
+    """The shortest C literal for exactly this float32, float64 or whole number.
 
-    Whole numbers keep their value in every dialect: without a suffix C90 and C++98 take one beyond `long` as unsigned,
-    and the smallest number of a type has no literal in any dialect.
+    Whole numbers keep their value in every dialect: without a suffix, C90 and C++98 take one beyond `long` as unsigned;
+    and no dialect has a literal for the smallest number of a type.
     """
     if isinstance(x, np.integer | int):
         return _whole(int(x))
@@ -101,7 +101,7 @@ def table(kind: str, name: str, values: Sequence[Number]) -> str:
 
 
 def structure(kind: str, name: str, columns: Sequence[tuple[str, Sequence[Number]]]) -> str:
-    """Constant arrays of literals in one structure, so that compilers reach all of them from one address."""
+    """Constant arrays of literals in one structure, so compilers reach all of them from one address."""
     members = [f"    {kind} {own}[{len(values)}];" for own, values in columns]
     lines = []
     for i, (own, values) in enumerate(columns):
@@ -110,7 +110,7 @@ def structure(kind: str, name: str, columns: Sequence[tuple[str, Sequence[Number
     return "\n".join(["static const struct {", *members, f"}} {name} = {{", *lines, "};"]) + "\n"
 
 
-# Accented letters by their decomposition (Latin-1 and Extended-A only: those never change with Python's Unicode).
+# Accented letters lose their accents (only Latin-1 and Extended-A, which are the same in every version of Python).
 _ASCII = {code: unicodedata.normalize("NFD", chr(code))[0] for code in range(0xC0, 0x180)} | {
     ord(sign): plain
     for sign, plain in (
@@ -196,7 +196,7 @@ def _fitted(lines: list[str]) -> Iterator[str]:
             end = next(i for i in range(at, len(lines)) if "*/" in lines[i])
             yield from _comment(lines[at : end + 1])
             at = end + 1
-        elif re.search(r"(=|enum) \{$", line):  # a table, or names one to a line
+        elif re.search(r"(=|enum) \{$", line):  # a table, or an enum with one name per line
             end = next(i for i in range(at, len(lines)) if re.search(r"\};$|^\} \w+;$", lines[i]))
             for row in lines[at : end + 1]:
                 yield from _broken(row, row[: len(row) - len(row.lstrip())])
@@ -234,8 +234,8 @@ def _statement(lines: list[str], indent: str) -> Iterator[str]:
 
 
 def _broken(code: str, indent: str) -> Iterator[str]:
-    """Code on lines of WIDTH, each broken at its best place."""
-    inside = indent + " " * (8 if code.endswith("{") else 4)  # the body of a block is at 4
+    """Code on lines of at most WIDTH, each broken at its best place."""
+    inside = indent + " " * (8 if code.endswith("{") else 4)  # a block's body is indented by 4
     text, hang = indent + code.strip(), inside
     while len(text) > WIDTH:
         start = len(text) - len(text.lstrip())
@@ -257,7 +257,7 @@ def _broken(code: str, indent: str) -> Iterator[str]:
 
 
 def _comment(lines: list[str]) -> Iterator[str]:
-    """A comment on lines of WIDTH; the excess of a line goes on lines of its own."""
+    """A comment on lines of at most WIDTH; the excess of a line goes on lines of its own."""
     indent = " " * (len(lines[0]) - len(lines[0].lstrip()))
     starred = any(line.startswith(indent + " *") for line in lines[1:])
     more = indent + (" * " if starred else "   ")
@@ -276,7 +276,7 @@ def _comment(lines: list[str]) -> Iterator[str]:
 
 
 def _directive(line: str) -> Iterator[str]:
-    """A preprocessor line; a comment after it moves above it, a message is continued."""
+    """A preprocessor line; if it is too long, a comment after it moves above it, and a message is continued."""
     macro = re.match(r"^(#define .*?) (/\* .* \*/)$", line)
     if len(line) <= WIDTH:
         yield line

@@ -10,13 +10,13 @@ from hystgen.effects.base import Effect
 from hystgen.model import Model
 
 SWEEPS = 8
-"""[sweeps] Sweeps over the whole range on which an effect is measured. The result is then within 2 % of that over 64
-sweeps for effects that settle (lag, resonance; a slew limit 16 %); creep and ageing never settle. Set by:
+"""[sweeps] Sweeps over the whole range over which an effect is measured. For effects that settle, the result is within
+2 % of that over 64 sweeps (lag, resonance; a slew limit 16 %); creep and ageing never settle. Set by:
 benchmarks/chosen_numbers.py sweeps."""
 
 
 def sentence(model: Model, effect: Effect, reason: str) -> str:
-    """The effect, why it is left out, and the rms difference that it makes over full sweeps at the fastest rate."""
+    """The effect, why it is left out, and the rms difference it makes over full sweeps at the fastest rate."""
     low, high = model.cascade.input_range
     n = SWEEPS * SAMPLES_A_SWEEP + 1
     v = low + (high - low) * np.abs((np.arange(n) / SAMPLES_A_SWEEP) % 2.0 - 1.0)
@@ -24,7 +24,7 @@ def sentence(model: Model, effect: Effect, reason: str) -> str:
     try:
         missing = model.simulate(v) - model.without([effect]).simulate(v)
     except EffectsError:  # depends on a column that only a record has
-        return f"{effect.name} ({reason}); what it is worth depends on a record's columns"
+        return f"{effect.name} ({reason}); its contribution depends on a record's columns"
     rms = float(np.sqrt(np.mean(missing**2)))
     worth = f"{rms:.3g}{f' {unit}' if unit.isascii() and unit else ''} rms"
-    return f"{effect.name} ({reason}); worth {worth} over sweeps of {SAMPLES_A_SWEEP} samples"
+    return f"{effect.name} ({reason}); contributes {worth} over sweeps of {SAMPLES_A_SWEEP} samples"

@@ -4,17 +4,17 @@
 #define HYSTGEN_CHAIN_API_H
 
 #ifdef HYSTGEN_INVERSE
-/* The next reference of the preview, without returning a drive; to be called HYSTGEN_PREVIEW times
-   before the first step. */
+/* Takes the next reference of the preview without returning a drive; to be called HYSTGEN_PREVIEW
+   times before the first step. */
 void hystgen_inverse_push(hystgen_inverse_t *self, hystgen_real_t u);
 #endif
-/* Everything comes to rest at drive v; the next step moves on from there. */
+/* Brings everything to rest at drive v; the next step moves on from there. */
 void hystgen_operator_settle(hystgen_operator_t *self, hystgen_real_t v);
 /* Sets an offset of the displacement, from the next step on. */
 void hystgen_operator_set_offset(hystgen_operator_t *self, hystgen_real_t d);
 /* Sets the temperature, degC, from the next step on. */
 void hystgen_operator_set_temperature(hystgen_operator_t *self, hystgen_real_t temperature);
-/* Sets a gain in place of the one by travel, from the next step on, until a travel is set. */
+/* Sets a gain that replaces the gain by travel, from the next step on, until a travel is set. */
 void hystgen_operator_set_gain(hystgen_operator_t *self, hystgen_real_t gain);
 /* Distance travelled by the drive: store this number where it survives a power cycle, and set it
    again after init. */

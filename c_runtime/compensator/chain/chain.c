@@ -1,7 +1,7 @@
 /* Operators of engine loop and of every model with effects: a chain of blocks from drive to
    displacement; without effects it is the plays alone. Applied drives pass forwards through all
-   blocks, references backwards, so that the memory depends only on drives that the actuator has
-   seen. The model's own functions call its blocks:
+   blocks, references backwards, so the memory depends only on drives that the actuator has seen.
+   The model's own functions call its blocks:
 
    waited, slewed   delay and slew limit; only the forward operator has the delay, since references
                     of the inverse come ahead of time
@@ -13,7 +13,7 @@
    rest: everything has settled at an input; absorb: one sample; solve: the input that gives an
    output.
 
-   moving   false  no drive has been applied yet: everything is at rest at the first one
+   moving   false  no drive has been applied yet: everything will be at rest at the first one
             true   every block has seen the previous sample
    A step leaves the returned drive pending. The next step or settle absorbs this drive, or the one
    committed in its place.
@@ -93,7 +93,7 @@ static hystgen_real_t hystgen_inverse_answer(hystgen_inverse_t *self, hystgen_re
 
 /* The present displacement. */
 static hystgen_real_t hystgen_operator_shown(const hystgen_operator_t *self) {
-    unsigned int status = 0; /* not reported: this is no step */
+    unsigned int status = 0; /* not reported, since this is not a step */
     return hystgen_output_code(hystgen_operator_displaced(self, hystgen_operator_output(self)),
                                &status);
 }

@@ -1,7 +1,7 @@
 /* Operators of a model with effects: plays of engine corners in fixed point, with the same bits as
    those of engine loop. Up to the output `next`, along the move, plays continue from the last kink
-   found, which the inverse finds when it solves for their input. Searches are called with the least
-   possible stack in use. Called by chain.c, chain_calls.c and chain_start.c. */
+   found, which the inverse finds when it solves for their input. Searches are called where the
+   least stack is in use. Called by chain.c, chain_calls.c and chain_start.c. */
 #ifndef HYSTGEN_CHAIN_CORNERS_FIXED_C
 #define HYSTGEN_CHAIN_CORNERS_FIXED_C
 #include "arithmetic/fixed.h"

@@ -5,7 +5,7 @@
 #include "compensator/chain/model.h"
 
 #if defined(HYSTGEN_FIXED) && defined(HYSTGEN_CHAIN)
-/* A drive, possibly beyond every code, as a signal. */
+/* A drive, possibly outside the range of codes, as a signal. */
 static inline hystgen_signal_t hystgen_drive_signal(hystgen_reach_t v) {
     return (hystgen_signal_t)v * ((hystgen_signal_t)1 << HYSTGEN_DRIVE_BITS);
 }

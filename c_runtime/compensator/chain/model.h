@@ -1,5 +1,5 @@
-/* Additional text that emission writes for each model with effects: numbers, tables, the types of
-   its instances, and the functions that call its blocks. Those below belong to a model with every
+/* What else emission writes for each model with effects: numbers, tables, the types of its
+   instances, and the functions that call its blocks. Those below belong to a model with every
    effect, so that each file compiles when opened in an editor; see compensator/model.h. */
 #ifndef HYSTGEN_CHAIN_MODEL_H
 #define HYSTGEN_CHAIN_MODEL_H
@@ -161,7 +161,7 @@ hystgen_signal_t hystgen_inverse_undisplaced(hystgen_inverse_t *self, hystgen_si
                                              bool *limited);
 hystgen_signal_t hystgen_inverse_ahead(hystgen_inverse_t *self, hystgen_signal_t y);
 void hystgen_inverse_repeat(hystgen_inverse_t *self);
-/* Settings from outside, and the state that follows the travel of the drive. */
+/* Settings from outside, and the state that depends on the travel of the drive. */
 void hystgen_operator_settings_init(hystgen_operator_t *self);
 void hystgen_operator_travelled(hystgen_operator_t *self, hystgen_real_t v);
 void hystgen_operator_clock_start(hystgen_operator_t *self);

@@ -1,6 +1,6 @@
 /* Operators of engine loop and of every model with effects: bits of the plays' input below a drive
    code. The inverse of some models refines its solution to these bits, since the inverse of a lag
-   would amplify the rounding to a code into noise. Called by chain_calls.c and, for engine corners,
+   would turn the rounding to a code into noise. Called by chain_calls.c and, for engine corners, by
    corners_fixed.c. */
 #ifndef HYSTGEN_CHAIN_REFINED_INPUT_C
 #define HYSTGEN_CHAIN_REFINED_INPUT_C

@@ -1,4 +1,4 @@
-/* Operators of a model with effects: the calls that other models do not have. Called by users. */
+/* Operators of a model with effects: the calls that only such models have. Called by users. */
 #include "compensator/chain/model.h"
 #include "compensator/chain/chain.c"
 #include "compensator/chain/chain_calls.c"

@@ -1,5 +1,5 @@
 /* Operators of engine loop and of every model with effects: signals between blocks. In floating
-   point they have the type of drives. In fixed point they have bits below a code; without effects,
+   point they have the type of drives. In fixed point they are finer than codes; without effects,
    drives remain codes up to the plays, and sums of the plays have HYSTGEN_FRACTION bits below an
    output code. Called by chain.c, chain_calls.c and the plays. */
 #ifndef HYSTGEN_CHAIN_SIGNALS_C
@@ -69,7 +69,7 @@ static hystgen_real_t hystgen_output_code(hystgen_signal_t y, unsigned int *stat
     return (hystgen_real_t)code;
 }
 
-/* A share of x. The largest code is the share just below 1. */
+/* A share of x. The largest code stands for the share just below 1. */
 static hystgen_signal_t hystgen_shared(hystgen_real_t share, hystgen_signal_t x) {
     const hystgen_factor_t f = {(int32_t)share * ((int32_t)1 << HYSTGEN_SHARE_BITS), 31u};
     return hystgen_times(x, &f);

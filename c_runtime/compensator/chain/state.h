@@ -12,7 +12,7 @@ typedef struct {
     hystgen_play_t rest;
 } hystgen_ramp_t;
 
-/* A number in two parts, since its steps may be far below the last bit. */
+/* A number in two parts, since its steps may be far smaller than its last bit. */
 typedef struct {
     hystgen_real_t high;
     hystgen_real_t low;
@@ -69,7 +69,7 @@ typedef struct {
     hystgen_real_t low;
     hystgen_real_t gain;
     hystgen_real_t inverse;
-    bool own; /* the gain follows the travel */
+    bool own; /* the gain depends on the travel */
 } hystgen_ageing_t;
 
 typedef struct {

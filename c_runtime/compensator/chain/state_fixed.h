@@ -75,7 +75,7 @@ typedef struct {
     int64_t high; /* travel, drive codes */
     int32_t gain;
     int32_t inverse;
-    bool own; /* the gain follows the travel */
+    bool own; /* the gain depends on the travel */
 } hystgen_ageing_t;
 
 typedef struct {

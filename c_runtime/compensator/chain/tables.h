@@ -38,9 +38,9 @@ typedef struct {
     hystgen_real_t inverse_late;
 } hystgen_lag_exact_table_t;
 
-/* Mode of the stage: in a step its two states, output minus input and the rate of this difference,
-   change by shares of themselves (keep, swing), of each other (turn), and of a change of the input
-   (lead, push). */
+/* Mode of the stage. Its two states are output minus input, and the rate of this difference; in a
+   step they change by shares of themselves (keep, swing), of each other (turn), and of a change of
+   the input (lead, push). */
 typedef struct {
     hystgen_real_t keep;
     hystgen_real_t turn;
@@ -60,7 +60,7 @@ typedef struct {
     hystgen_real_t largest;
 } hystgen_gain_table_t;
 
-/* A piece of the gain over travel: a cubic in the share of its length. */
+/* A piece of the gain over travel: a cubic in the travelled share of its length. */
 typedef struct {
     hystgen_real_t begin;
     hystgen_real_t inverse_length;

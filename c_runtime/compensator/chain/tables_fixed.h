@@ -50,8 +50,8 @@ typedef struct {
     uint8_t drop; /* and bits that products leave out */
 } hystgen_lag_table_t;
 
-/* Lag shorter than half a step: the output follows a move by `late` at once, and approaches the
-   input by `rate` in the next step. */
+/* Lag shorter than half a step: the output follows a share `late` of a move at once, and approaches
+   the input by a share `rate` in the next step. */
 typedef struct {
     hystgen_factor_t rate;
     hystgen_factor_t late;
@@ -60,9 +60,9 @@ typedef struct {
     uint8_t drop; /* and bits that products leave out */
 } hystgen_lag_exact_table_t;
 
-/* Mode of the stage: in a step its two states, output minus input and the rate of this difference,
-   change by shares of themselves (keep, swing), of each other (turn), and of a change of the input
-   (late, minus the change itself, and push). */
+/* Mode of the stage. Its two states are output minus input, and the rate of this difference; in a
+   step they change by shares of themselves (keep, swing), of each other (turn), and of a change of
+   the input (late, minus the change itself, and push). */
 typedef struct {
     hystgen_factor_t keep;
     hystgen_factor_t turn;
@@ -84,7 +84,7 @@ typedef struct {
     uint8_t bits; /* of a temperature below a code */
 } hystgen_gain_table_t;
 
-/* A piece of the gain over travel: a cubic in the share of its length. */
+/* A piece of the gain over travel: a cubic in the travelled share of its length. */
 typedef struct {
     int64_t begin;
     hystgen_factor_t
@@ -149,7 +149,7 @@ typedef struct {
     uint8_t lift; /* and bits that a value leaves out */
 } hystgen_bend_curve_t;
 
-/* Contribution of a bent play beyond its value, as a piecewise polynomial of the same form. */
+/* What bending adds to the value of a play, as a piecewise polynomial of the same form. */
 typedef struct {
     const int32_t *knot;
     const uint8_t *scale;

@@ -67,7 +67,7 @@ void hystgen_inverse_commit(hystgen_inverse_t *self, hystgen_real_t applied) {
 
 /* The part common to init and reset. */
 static void hystgen_operator_begin(hystgen_operator_t *self, bool reset) {
-    unsigned int status = 0; /* not reported: this is no step */
+    unsigned int status = 0; /* not reported, since this is not a step */
     const hystgen_drive_t *first = &hystgen_operator_first_drive[reset ? 1 : 0];
     hystgen_start(&hystgen_model_curve, &self->here, self->corner,
                   reset ? hystgen_model_zero : hystgen_model_start,

@@ -5,7 +5,7 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 6bd5db20c5b621e110f979c42b13b93fb83762d89e81dbd655bffdf38046a2a5, without this line
+ * Text: sha256 14b05417ade167a2d4968dba7eb801cd1cd65ff33d69e0d0d2c6669904eb7dfb, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "bent.h"
@@ -13,7 +13,7 @@
 /* Words of this file
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
-   pending: the last returned drive: part of the memory only when the next call absorbs it, or the
+   pending: the last returned drive: it enters the memory only when the next call absorbs it, or the
        drive committed in its place.
 */
 
@@ -57,7 +57,7 @@ typedef struct {
     uint_least16_t n;
 } bent_dead_zone_t;
 
-/* Output at x of a dead-zone sum, by bisection for the straight piece. */
+/* Output of a dead-zone sum at x; bisects for the straight piece. */
 static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t x) {
     unsigned int low = 0;
     unsigned int high = z->n;
@@ -72,7 +72,7 @@ static bent_real_t bent_dead_zone_forward(const bent_dead_zone_t *z, bent_real_t
     return z->anchor_y[low] + (x - z->anchor_x[low]) * z->slope[low];
 }
 
-/* Input at y of a dead-zone sum, by bisection for the straight piece. */
+/* Input of a dead-zone sum at its output y; bisects for the straight piece. */
 static bent_real_t bent_dead_zone_inverse(const bent_dead_zone_t *z, bent_real_t y) {
     unsigned int low = 0;
     unsigned int high = z->n;
@@ -187,7 +187,7 @@ static const bent_dead_zone_t bent_stage_1 = {
     bent_stage_1_slope, bent_stage_1_inverse_slope, 4
 };
 
-#define BENT_OFFSET 0.0              /* part of every output */
+#define BENT_OFFSET 0.0              /* added to every output */
 #define BENT_START 0.0               /* value of each play after init */
 #define BENT_INVERSE_INIT_DRIVE 0.0  /* drive of the start memory */
 #define BENT_INVERSE_RESET_DRIVE 0.0 /* drive of the start memory */
@@ -271,7 +271,7 @@ static inline bent_real_t bent_applied_drive(bent_real_t v) {
 }
 
 /* Input of the plays at which their sum is h. The plays are summed again if their present sum is
-   not stored, as without effects, or lacks bits, as in fixed point, where the kernel sums them. */
+   not stored (without effects) or lacks bits (in fixed point, where the kernel sums them). */
 static inline bent_real_t bent_input_of(const bent_real_t *play, bent_real_t h) {
     return bent_loop_solve(&bent_model_tables, play, bent_loop_output(&bent_model_tables, play), h);
 }

@@ -5,30 +5,30 @@
  *     hystgen emit bent.yaml --operator both --arithmetic float64 --engine loop \
  *         --layout self-contained
  * Parameters: sha256 9d96bb5eb695a75db58c8e5276af7c2f4587f23f34c6dab65fa912194f735ef3
- * Text: sha256 590d0a6d3af4f938936dc4112a3770f5fcf68f696f0a430c39f8f94bd40abce2, without this line
+ * Text: sha256 46f19583b4b156fc4fd16cd81038df330352c75065ca77c6a43784376ce09c6f, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind dead zone; arithmetic float64; engine loop; operator both; layout
  * self-contained
  *
  * Cost (32-bit target):
- *     code at -O2       about 3936 bytes on a Cortex-M0+, 4392 on a Cortex-M4F, as measured for
- *         such a model with 10 plays
+ *     code at -O2       about 3936 bytes on a Cortex-M0+, 4392 on a Cortex-M4F, as measured for a
+ *         similar model with 10 plays
  *     constant tables   512 bytes
  *     forward instance  72 bytes of RAM
  *     inverse instance  104 bytes of RAM
  *     forward step, worst case: 8 multiplications (2 + 1 n), 22 comparisons (10 + 2 n)
  *     inverse step, worst case: 23 multiplications (5 + 3 n), 38 comparisons (20 + 3 n)
  *     forward step, dearest: about 8260 instructions and 216 bytes of stack on a Cortex-M0+, 4409
- *         and 204 on a Cortex-M4F, as measured for such a model
+ *         and 204 on a Cortex-M4F, as measured for similar models
  *     inverse step, dearest: about 19054 instructions and 272 bytes of stack on a Cortex-M0+, 9478
- *         and 272 on a Cortex-M4F, as measured for such a model
+ *         and 272 on a Cortex-M4F, as measured for similar models
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
- * memory of the parameter file; reset starts again from plays at 0. Not for targets that flush
- * denormal numbers to zero or round other than to nearest, nor for flags that reorder sums
- * (-fassociative-math) or contract products whatever the source says (clang's -ffp-contract=fast):
- * there the answers can differ from the reference in the last bits.
+ * memory of the parameter file; reset restarts with all plays at 0. Not for targets that flush
+ * denormal numbers to zero or do not round to nearest, nor for flags that reorder sums
+ * (-fassociative-math) or fuse multiply-adds whatever the source says (clang's -ffp-contract=fast):
+ * the last bits of answers could then differ from the reference.
  */
 #ifndef BENT_H
 #define BENT_H
@@ -40,10 +40,10 @@
 
 /* Build settings that floating-point code requires. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
-#error "bent: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
+#error "bent: build without -ffast-math and -ffinite-math-only, which delete the NaN checks"
 #endif
 #ifdef __ASSOCIATIVE_MATH__
-#error "bent: build without -fassociative-math, the order of additions is part of the answer"
+#error "bent: build without -fassociative-math: the order of additions is part of the answer"
 #endif
 /* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's
    own macro stays. */
@@ -56,7 +56,7 @@
 #define BENT_EVAL_METHOD 0
 #endif
 #if BENT_EVAL_METHOD != 0 && BENT_EVAL_METHOD != 16
-#error "bent: this target computes in another precision than bent_real_t has"
+#error "bent: this target does not compute in the precision of bent_real_t"
 #endif
 
 #if DBL_MANT_DIG != 53
@@ -98,7 +98,7 @@ typedef struct {
 
 /* One inverse operator: reference in, drive out. Plain data, owned by the caller. */
 typedef struct {
-    bent_real_t pending;   /* drive sent but not yet part of the memory */
+    bent_real_t pending;   /* drive sent but not yet in the memory */
     bent_real_t drive;     /* last applied drive */
     bent_real_t reference; /* of the last step */
     bent_real_t answer;    /* last returned drive */
@@ -114,14 +114,14 @@ typedef struct {
  * Sets the start memory of the parameter file.
  *
  * @param self the instance
- * @pre before every other call; at any time again
+ * @pre before every other call; may be repeated at any time
  * @note Status bits: none
- * @note Cost: once through the plays
+ * @note Cost: one pass over the plays
  */
 void bent_forward_init(bent_forward_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with v.
+ * Sets all plays to 0, clears the status, and makes one ordinary step with v.
  *
  * @param self the instance
  * @param v drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: held
@@ -158,14 +158,14 @@ unsigned int bent_forward_status(bent_forward_t *self);
  * Sets the start memory of the parameter file.
  *
  * @param self the instance
- * @pre before every other call; at any time again
+ * @pre before every other call; may be repeated at any time
  * @note Status bits: none
- * @note Cost: once through the plays
+ * @note Cost: one pass over the plays
  */
 void bent_inverse_init(bent_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with u.
+ * Sets all plays to 0, clears the status, and makes one ordinary step with u.
  *
  * @param self the instance
  * @param u reference, um; limited to BENT_OUTPUT_MIN .. MAX; NaN and infinite: held
@@ -188,14 +188,14 @@ void bent_inverse_reset(bent_inverse_t *self, bent_real_t u);
 bent_real_t bent_inverse_step(bent_inverse_t *self, bent_real_t u);
 
 /**
- * After a step: the drive actually applied in place of the one returned.
+ * Reports, after a step, the drive actually applied in place of the one returned.
  *
  * @param self the instance
  * @param applied drive, V; limited to BENT_DRIVE_MIN .. MAX; NaN and infinite: ignored
- * @pre after a step and before the next one, any number of times; before the first step it is a
+ * @pre after a step and before the next one, any number of times; before the first step it gives a
  *     first drive
  * @note Status bits: BENT_STATUS_INPUT_CLAMPED, BENT_STATUS_HELD
- * @note Cost: a few comparisons: the next step takes the drive over
+ * @note Cost: a few comparisons: the next step absorbs the drive
  */
 void bent_inverse_commit(bent_inverse_t *self, bent_real_t applied);
 

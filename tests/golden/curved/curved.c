@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 e9353afcabc0eca79ab55d749756364fb90b5393468e4d5e5ba014bcca25a501, without this line
+ * Text: sha256 a283eb7347b70e43f20ee44e9f3de03de4fb65ffafe36eeeee9c7be88c34bbef, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "curved.h"
@@ -14,11 +14,11 @@
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
    move: the rise or the fall of the input from one turning point to the next. Lengths are taken
-       along the move, so that a falling one is a rising one with all signs changed.
+       along the move, so a falling move is a rising one with all signs changed.
    corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
-   block: the plays that one corner holds: those with larger thresholds than the corner above it
-       has, up to its `top`.
+   block: the plays that one corner holds: those with larger thresholds than the corner above holds,
+       up to its `top`.
    way: distance of the input from a turning point.
    reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
@@ -36,7 +36,7 @@
 #define CURVED_LARGEST 2147483647     /* the largest input of the plays */
 #define CURVED_MOST_PLAYS 0x7fffu     /* the largest index of a play that a corner can store */
 
-/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
+/* Straight segment k, and how far from a turning point it begins, where play k starts to follow. */
 typedef struct {
     int64_t reach;       /* of the output: 2 z_k */
     uint32_t way;        /* of the input: 2 r_k */
@@ -48,7 +48,7 @@ typedef struct {
 /* The plays of one model. */
 typedef struct {
     const curved_segment_t *segment; /* plays 0 .. n, and one that never follows */
-    int64_t offset;                   /* part of every output */
+    int64_t offset;                   /* added to every output */
     int64_t range[2]; /* limits of the input in falling moves, sign changed, and in rising ones */
     uint_least16_t n; /* number of plays, not counting play 0 */
 } curved_curve_t;
@@ -63,7 +63,7 @@ typedef struct {
 typedef struct {
     int64_t envelope_least; /* limits of the input of the plays that an envelope can reach */
     int64_t envelope_most;
-    curved_reach_t least; /* inputs outside first .. last but within these: off by rounding only */
+    curved_reach_t least; /* inputs between these and first .. last are out by rounding only */
     curved_reach_t most;
     int32_t first; /* inputs of the plays at the ends of the drive range */
     int32_t last;
@@ -91,7 +91,7 @@ static uint64_t curved_wide(uint32_t a, uint32_t b) {
 }
 
 /* d / slope to the nearest integer, d >= 0: the upper bits of d times the reciprocal
-   2^(32 + shift) / slope. A slope is at least 16, so that `shift` is 2 .. 29. */
+   2^(32 + shift) / slope. A slope is at least 16, so `shift` is 2 .. 29. */
 static int64_t curved_divide_by_slope(int64_t d, uint32_t reciprocal, unsigned int shift) {
     const uint64_t low = curved_wide((uint32_t)d, reciprocal) >> CURVED_WORD;
     const uint64_t quotient = curved_wide((uint32_t)((uint64_t)d >> CURVED_WORD), reciprocal) + low;
@@ -102,7 +102,7 @@ static int64_t curved_divide_by_slope(int64_t d, uint32_t reciprocal, unsigned i
         ((uint32_t)quotient >> (shift - 1u) & 1u));
 }
 
-#define CURVED_HIGH_STEP ((int64_t)1 << 16) /* of a corner's `high`, in sums */
+#define CURVED_HIGH_STEP ((int64_t)1 << 16) /* one step of a corner's `high` */
 
 /* Field by field: for a whole structure a compiler may call memcpy. */
 static void curved_copy_place(curved_place_t *to, const curved_place_t *from) {
@@ -142,7 +142,7 @@ static inline int64_t curved_begins(const curved_place_t *here, const curved_cor
     return held + (c->rose == here->rising ? 0 : whole);
 }
 
-/* Turns the move back, and leaves a corner if plays have followed. */
+/* Reverses the move, and leaves a corner if plays have followed. */
 CURVED_APART void curved_turn_back(curved_place_t *here, curved_corner_t *corner) {
     if (here->k > 0) {
         curved_leave_corner(here, corner);
@@ -195,7 +195,7 @@ CURVED_APART void curved_find(const curved_curve_t *t, const curved_place_t *her
     }
 }
 
-/* The same for a move to any input. May turn the move back, but moves no play. */
+/* The same for a move to any input. May reverse the move, but moves no play. */
 static inline void curved_find_input(const curved_curve_t *t, curved_place_t *here,
         curved_corner_t *corner, int32_t to, curved_kink_t *kink) {
     if (here->rising ? to < here->input : to > here->input) {
@@ -239,8 +239,8 @@ CURVED_APART int64_t curved_solved(const curved_curve_t *t, const curved_place_t
     return curved_along(here, x > most ? most : x);
 }
 
-/* Input for `output`, at most slightly out of range, and the last kink before this input. May turn
-   the move back, but moves no play. Up to the output `next`, along the move, the same plays are
+/* Input for `output`, at most slightly out of range, and the last kink before this input. May
+   reverse the move, but moves no play. Up to the output `next`, along the move, the same plays are
    known to follow. */
 static int64_t curved_solve(const curved_curve_t *t, curved_place_t *here, curved_corner_t *corner,
         int64_t output, int64_t next, curved_kink_t *kink) {
@@ -284,8 +284,8 @@ static int64_t curved_move_to_solution(const curved_curve_t *t, curved_place_t *
     return next;
 }
 
-/* Start memory: a value for each play (step 1), or one for all (step 0). Each play is a block of
-   its own, with a corner where it begins to follow. */
+/* Start memory: a value for each play (step 1), or one value for all (step 0). Each play is a block
+   of its own, with a corner where it begins to follow. */
 CURVED_APART void curved_start(const curved_curve_t *t, curved_place_t *here,
         curved_corner_t *corner, const int32_t *play, unsigned int step) {
     int64_t aside = t->offset; /* output of the plays above play k, with the offset */
@@ -315,9 +315,9 @@ static int64_t curved_nearest(int64_t x, unsigned int bits) {
     return (x + ((int64_t)1 << (bits - 1u)) - (x < 0 ? 1 : 0)) >> bits;
 }
 
-/* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece:
-   the arguments are the beginnings of the pieces, the left shifts that scale their lengths to 2^31,
-   and their coefficients from degree 0. */
+/* Value at x of a piecewise polynomial c_0 + c_1 h + c_2 h^2 + ..., h = 0 .. 1 along each piece.
+   Arguments: where the pieces begin, the left shifts that scale their lengths to 2^31, and their
+   coefficients from degree 0. */
 static int64_t curved_curve(const int32_t *knot, const uint8_t *scale, const int32_t *coefficient,
         unsigned int pieces, unsigned int degree, int32_t x) {
     unsigned int low = 0;
@@ -435,7 +435,7 @@ static const curved_ends_t curved_back_ends = {
 };
 
 #define CURVED_START 0      /* value of each play after init */
-#define CURVED_START_STEP 0 /* entries from play to play; reset takes 0 for each */
+#define CURVED_START_STEP 0 /* entries from one play to the next; reset starts each at 0 */
 #define CURVED_FRACTION 31u /* bits of a sum below an output code */
 #define CURVED_DEGREE 3u    /* of the polynomials of every curve */
 #define CURVED_FRONT_PIECES 42u

@@ -5,7 +5,7 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 53d93b9a8e5deaa50ab6a4068d95c2279c6e4f3f199a1aee4a177f30bed51b69, without this line
+ * Text: sha256 d1ad733c9bb0db9aca8b4ae686f9ca88b78cb19652040e2b20545d3cc6e4fbd1, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic q15; engine corners; operator inverse; layout
@@ -18,19 +18,19 @@
  *     inputs of plays between -21939949 and 24379209, 31 fraction bits of an output code
  *
  * Cost (32-bit target):
- *     code at -O2       about 3209 bytes on a Cortex-M0+, 2993 on a Cortex-M4F, as measured for
- *         such a model with 10 plays
+ *     code at -O2       about 3209 bytes on a Cortex-M0+, 2993 on a Cortex-M4F, as measured for a
+ *         similar model with 10 plays
  *     constant tables   2094 bytes
  *     inverse instance  168 bytes of RAM
  *     inverse step, worst case: 13 multiplications of 32 by 32 bits, 47 comparisons (35 + 4 b, b =
- *         3 the bits of n)
+ *         3, the bit length of n)
  *     inverse step, dearest: about 1904 instructions and 248 bytes of stack on a Cortex-M0+, 902
- *         and 112 on a Cortex-M4F, as measured for such a model
- * On an 8-bit AVR constants lie in RAM too: at most 2197 bytes of RAM in all, 33 of them for each
+ *         and 112 on a Cortex-M4F, as measured for similar models
+ * On an 8-bit AVR constants lie in RAM too: at most 2197 bytes of RAM in total, 33 of them for each
  * play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
- * memory of the parameter file; reset starts again from plays at 0.
+ * memory of the parameter file; reset restarts with all plays at 0.
  */
 #ifndef CURVED_H
 #define CURVED_H
@@ -40,7 +40,7 @@
 #include <stdint.h>
 
 #if (-1 >> 1) != -1
-#error "curved: right shifts of negative numbers have to keep the sign here"
+#error "curved: right shifts of negative numbers must keep the sign; here they do not"
 #endif
 
 #ifdef __cplusplus
@@ -60,7 +60,7 @@ typedef int64_t curved_sum_t;
 #define CURVED_PARAMS_SHA256 "0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e"
 
 #define CURVED_N_PLAYS 6
-#define CURVED_DRIVE_LSB 0.00012207403790398877 /* physical units a code; code 0 is 0 */
+#define CURVED_DRIVE_LSB 0.00012207403790398877 /* physical units per code; code 0 is 0 */
 #define CURVED_OUTPUT_LSB 0.0003904762291513498
 #define CURVED_DRIVE_MIN (-32767) /* drive codes */
 #define CURVED_DRIVE_MAX 32767
@@ -71,7 +71,7 @@ typedef int64_t curved_sum_t;
 /* Sticky bits of the status functions */
 #define CURVED_STATUS_INPUT_CLAMPED 1u  /* the input was out of range and was limited */
 #define CURVED_STATUS_OUTPUT_CLAMPED 2u /* inverse: the drive was limited to the drive range */
-#define CURVED_STATUS_HELD 4u           /* never set: every code is a number */
+#define CURVED_STATUS_HELD 4u           /* never set: every code is valid */
 #define CURVED_STATUS_DOMAIN 8u         /* inverse: the argument of an envelope was limited */
 
 /* The direction of a move, which indexes arrays with one entry per direction. */
@@ -128,14 +128,14 @@ typedef struct {
  * Sets the start memory of the parameter file.
  *
  * @param self the instance
- * @pre before every other call; at any time again
+ * @pre before every other call; may be repeated at any time
  * @note Status bits: none
- * @note Cost: once through the plays
+ * @note Cost: one pass over the plays
  */
 void curved_inverse_init(curved_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with u.
+ * Sets all plays to 0, clears the status, and makes one ordinary step with u.
  *
  * @param self the instance
  * @param u reference, in codes of CURVED_OUTPUT_LSB um; limited to CURVED_OUTPUT_MIN .. MAX
@@ -154,17 +154,17 @@ void curved_inverse_reset(curved_inverse_t *self, curved_real_t u);
  * @pre after init; once every sample time, from one context
  * @note Status bits: CURVED_STATUS_INPUT_CLAMPED, CURVED_STATUS_OUTPUT_CLAMPED,
  *     CURVED_STATUS_DOMAIN
- * @note Cost: at most 13 multiplications of 32 by 32 bits, 47 comparisons (35 + 4 b, b = 3 the bits
- *     of n)
+ * @note Cost: at most 13 multiplications of 32 by 32 bits, 47 comparisons (35 + 4 b, b = 3, the bit
+ *     length of n)
  */
 curved_real_t curved_inverse_step(curved_inverse_t *self, curved_real_t u);
 
 /**
- * After a step: the drive actually applied in place of the one returned.
+ * Reports, after a step, the drive actually applied in place of the one returned.
  *
  * @param self the instance
  * @param applied drive, in codes of CURVED_DRIVE_LSB V; limited to CURVED_DRIVE_MIN .. MAX
- * @pre after a step and before the next one, any number of times; before the first step it is a
+ * @pre after a step and before the next one, any number of times; before the first step it gives a
  *     first drive
  * @note Status bits: CURVED_STATUS_INPUT_CLAMPED
  * @note Cost: at most that of a step

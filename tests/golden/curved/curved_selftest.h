@@ -5,11 +5,11 @@
  *     hystgen emit curved.yaml --operator inverse --arithmetic q15 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 0c54364d1569d06235d3d2f56c45acd3681d294fab5d3400b41c952c9572e06e
- * Text: sha256 709403a69aefea45120348c8a9e16a53c7d9a077e40dfd4012add56e9ac19ea7, without this line
+ * Text: sha256 a5c1b5025109a611b66e077a82c8411173617c61782a2ba33e152e2ced940d55, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Cost (32-bit target): 2220 bytes of constants, 168 bytes of RAM for its own instance
- * On an 8-bit AVR constants lie in RAM too: 1440 bytes of RAM in all
+ * On an 8-bit AVR constants lie in RAM too: 1440 bytes of RAM in total
  */
 #ifndef CURVED_SELFTEST_H
 #define CURVED_SELFTEST_H

@@ -5,7 +5,7 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 2742a14fc651931f511e519956db148cb0ab80ccd73ee33c21977a74161ce7c2, without this line
+ * Text: sha256 f7e4503f9bb60cafb2050ba9fe2edc14f50f279a0f0ae698be7ea930c6350da8, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  */
 #include "plain.h"
@@ -14,11 +14,11 @@
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
    move: the rise or the fall of the input from one turning point to the next. Lengths are taken
-       along the move, so that a falling one is a rising one with all signs changed.
+       along the move, so a falling move is a rising one with all signs changed.
    corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
-   block: the plays that one corner holds: those with larger thresholds than the corner above it
-       has, up to its `top`.
+   block: the plays that one corner holds: those with larger thresholds than the corner above holds,
+       up to its `top`.
    way: distance of the input from a turning point.
    reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
@@ -48,7 +48,7 @@
 #define PLAIN_APART static
 #endif
 
-/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
+/* Straight segment k, and how far from a turning point it begins, where play k starts to follow. */
 typedef struct {
     plain_real_t way;   /* of the input: 2 r_k in the forward operator, 2 z_k in the inverse */
     plain_real_t reach; /* of the output: 2 z_k in the forward operator, 2 r_k in the inverse */
@@ -56,8 +56,8 @@ typedef struct {
     plain_real_t slope; /* 1 / gain */
 } plain_segment_t;
 
-/* One operator; of two entries the first is for falling moves, with signs changed, the second for
-   rising ones. */
+/* One operator; of a pair of entries, the first is for falling moves, with its sign changed, the
+   second for rising ones. */
 typedef struct {
     const plain_segment_t *segment; /* plays 0 .. n, and one that never follows */
     plain_real_t limit[2];          /* of the output */
@@ -68,7 +68,7 @@ typedef struct {
 /* A start memory. `center`: input and output of the sum with plays 0 .. k at play k's value. */
 typedef struct {
     const plain_real_t (*center)[2];
-    uint_least16_t step;   /* 1: a center for each play, 0: one for all, which have one value */
+    uint_least16_t step;   /* 1: a center for each play; 0: one for all, which start alike */
     uint_least16_t risen;  /* plays up to this one were left by rising moves, others by falling */
     plain_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } plain_start_t;
@@ -143,7 +143,7 @@ static inline unsigned int plain_find_segment(const plain_segment_t *segment, un
     return k;
 }
 
-/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever is first. */
+/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever comes first. */
 PLAIN_APART void plain_stop_in_block(const plain_curve_t *t, plain_plays_t *m,
         const plain_corner_t *corner, plain_real_t output, plain_real_t input) {
     const plain_corner_t *c = &corner[m->here.depth - 1u];
@@ -253,7 +253,7 @@ PLAIN_APART bool plain_move_to_input(const plain_curve_t *t, plain_plays_t *m,
 PLAIN_APART bool plain_move_in_block(const plain_curve_t *t, plain_plays_t *m, plain_real_t input) {
     const plain_real_t way = plain_along(m, input - m->from_input);
     unsigned int k = m->here.k;
-    const unsigned int many = k + 8u; /* from there on bisection is faster */
+    const unsigned int many = k + 8u; /* beyond these, bisection is faster */
     do {
         ++k;
     } while (k < many && way > t->segment[k + 1u].way);
@@ -314,7 +314,7 @@ static const plain_start_t plain_inverse_start[2] = {
     {plain_inverse_init_center, 0, 6, {0.0f, {-1.9224f, -1.9224f}, 7, PLAIN_BOTTOM}}
 };
 
-#define PLAIN_OFFSET 0.0f /* part of every output */
+#define PLAIN_OFFSET 0.0f /* added to every output */
 
 static plain_real_t plain_clamp_drive(plain_real_t v) {
     const plain_real_t least = v < PLAIN_DRIVE_MIN ? PLAIN_DRIVE_MIN : v;

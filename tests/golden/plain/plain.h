@@ -5,27 +5,28 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 6790efbfb35b1419ea20122db6137ccaf69e45c6f953d9905ddd9912afe047c0, without this line
+ * Text: sha256 2af3f0e7a663e258a8a77c92effbeaf69f7ade7091dc11e42f7d96bbd365bcb3, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays; arithmetic float32; engine corners; operator inverse; layout self-contained
  *
  * Cost (32-bit target):
- *     code at -O2       about 3580 bytes on a Cortex-M0+, 3136 on a Cortex-M4F, as measured for
- *         such a model with 10 plays
+ *     code at -O2       about 3580 bytes on a Cortex-M0+, 3136 on a Cortex-M4F, as measured for a
+ *         similar model with 10 plays
  *     constant tables   212 bytes
  *     inverse instance  200 bytes of RAM
- *     inverse step, worst case: 17 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)
+ *     inverse step, worst case: 17 multiplications, 24 comparisons (18 + 2 b, b = 3, the bit length
+ *         of n)
  *     inverse step, dearest: about 2477 instructions and 248 bytes of stack on a Cortex-M0+, 272
- *         and 112 on a Cortex-M4F, as measured for such a model
- * On an 8-bit AVR constants lie in RAM too: at most 384 bytes of RAM in all, 31 of them for each
+ *         and 112 on a Cortex-M4F, as measured for similar models
+ * On an 8-bit AVR constants lie in RAM too: at most 384 bytes of RAM in total, 31 of them for each
  * play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
- * memory of the parameter file; reset starts again from plays at 0. Not for targets that flush
- * denormal numbers to zero or round other than to nearest, nor for flags that reorder sums
- * (-fassociative-math) or contract products whatever the source says (clang's -ffp-contract=fast):
- * there the answers can differ from the reference in the last bits.
+ * memory of the parameter file; reset restarts with all plays at 0. Not for targets that flush
+ * denormal numbers to zero or do not round to nearest, nor for flags that reorder sums
+ * (-fassociative-math) or fuse multiply-adds whatever the source says (clang's -ffp-contract=fast):
+ * the last bits of answers could then differ from the reference.
  */
 #ifndef PLAIN_H
 #define PLAIN_H
@@ -37,10 +38,10 @@
 
 /* Build settings that floating-point code requires. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
-#error "plain: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
+#error "plain: build without -ffast-math and -ffinite-math-only, which delete the NaN checks"
 #endif
 #ifdef __ASSOCIATIVE_MATH__
-#error "plain: build without -fassociative-math, the order of additions is part of the answer"
+#error "plain: build without -fassociative-math: the order of additions is part of the answer"
 #endif
 /* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's
    own macro stays. */
@@ -53,7 +54,7 @@
 #define PLAIN_EVAL_METHOD 0
 #endif
 #if PLAIN_EVAL_METHOD != 0 && PLAIN_EVAL_METHOD != 16
-#error "plain: this target computes in another precision than plain_real_t has"
+#error "plain: this target does not compute in the precision of plain_real_t"
 #endif
 
 #if FLT_MANT_DIG != 24
@@ -142,14 +143,14 @@ typedef struct {
  * Sets the start memory of the parameter file.
  *
  * @param self the instance
- * @pre before every other call; at any time again
+ * @pre before every other call; may be repeated at any time
  * @note Status bits: none
- * @note Cost: once through the plays
+ * @note Cost: one pass over the plays
  */
 void plain_inverse_init(plain_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with u.
+ * Sets all plays to 0, clears the status, and makes one ordinary step with u.
  *
  * @param self the instance
  * @param u reference, um; limited to PLAIN_OUTPUT_MIN .. MAX; NaN and infinite: held
@@ -167,16 +168,16 @@ void plain_inverse_reset(plain_inverse_t *self, plain_real_t u);
  * @return drive, V
  * @pre after init; once every sample time, from one context
  * @note Status bits: PLAIN_STATUS_INPUT_CLAMPED, PLAIN_STATUS_HELD, PLAIN_STATUS_OUTPUT_CLAMPED
- * @note Cost: at most 17 multiplications, 24 comparisons (18 + 2 b, b = 3 the bits of n)
+ * @note Cost: at most 17 multiplications, 24 comparisons (18 + 2 b, b = 3, the bit length of n)
  */
 plain_real_t plain_inverse_step(plain_inverse_t *self, plain_real_t u);
 
 /**
- * After a step: the drive actually applied in place of the one returned.
+ * Reports, after a step, the drive actually applied in place of the one returned.
  *
  * @param self the instance
  * @param applied drive, V; limited to PLAIN_DRIVE_MIN .. MAX; NaN and infinite: ignored
- * @pre after a step and before the next one, any number of times; before the first step it is a
+ * @pre after a step and before the next one, any number of times; before the first step it gives a
  *     first drive
  * @note Status bits: PLAIN_STATUS_INPUT_CLAMPED, PLAIN_STATUS_HELD
  * @note Cost: at most that of a step

@@ -5,11 +5,11 @@
  *     hystgen emit plain.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout self-contained
  * Parameters: sha256 37dd7cdea2c7722a4fe41a6cca1c9034f48af41172fae802f8be14a24082269e
- * Text: sha256 0907d30aa6389ae02625cbc08564a0a8ea03e69f47ea98644f7381dae51b1b3e, without this line
+ * Text: sha256 65e71815b2479c43d2e26100f234159309940c0465f4481bb9f05a62ff56a0b7, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Cost (32-bit target): 2960 bytes of constants, 200 bytes of RAM for its own instance
- * On an 8-bit AVR constants lie in RAM too: 2215 bytes of RAM in all
+ * On an 8-bit AVR constants lie in RAM too: 2215 bytes of RAM in total
  */
 #ifndef PLAIN_SELFTEST_H
 #define PLAIN_SELFTEST_H

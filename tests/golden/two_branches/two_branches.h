@@ -5,30 +5,30 @@
  *     hystgen emit two_branches.yaml --operator inverse --arithmetic float32 --engine corners \
  *         --layout single-header
  * Parameters: sha256 41d8c00f669c961f8019859182966d14a2bfd34f137770f487875ff15c6327b2
- * Text: sha256 2c225961073d536754227b72466133cd5682b692ee1d6be5cfe5e5815d2bc728, without this line
+ * Text: sha256 2cd1f0494dcef757da30fdf3ba544be7e505e59f34963b63bd539d879c2ff182, without this line
  * The generated code belongs to whoever generated it: 0BSD, no conditions, no warranty.
  *
  * Model: 6 plays behind tanh envelope; arithmetic float32; engine corners; operator inverse; layout
  * single-header
  *
  * Cost (32-bit target):
- *     code at -O2       about 5080 bytes on a Cortex-M0+, 4460 on a Cortex-M4F, as measured for
- *         such a model with 10 plays
+ *     code at -O2       about 5080 bytes on a Cortex-M0+, 4460 on a Cortex-M4F, as measured for a
+ *         similar model with 10 plays
  *     constant tables   832 bytes
  *     inverse instance  220 bytes of RAM
- *     inverse step, worst case: 32 multiplications, 58 comparisons (46 + 4 b, b = 3 the bits of n),
- *         1 tanh, 2 atanh
+ *     inverse step, worst case: 32 multiplications, 58 comparisons (46 + 4 b, b = 3, the bit length
+ *         of n), 1 tanh, 2 atanh
  *     inverse step, dearest: about 12362 instructions and 304 bytes of stack on a Cortex-M0+, 894
- *         and 120 on a Cortex-M4F, as measured for such a model
- * On an 8-bit AVR constants lie in RAM too: at most 1016 bytes of RAM in all, 31 of them for each
+ *         and 120 on a Cortex-M4F, as measured for similar models
+ * On an 8-bit AVR constants lie in RAM too: at most 1016 bytes of RAM in total, 31 of them for each
  * play
  *
  * Use: one instance per actuator, init once, then step from one context only. init takes the start
- * memory of the parameter file; reset starts again from plays at 0. Define
+ * memory of the parameter file; reset restarts with all plays at 0. Define
  * TWO_BRANCHES_IMPLEMENTATION in one C file before including this header. Not for targets that
- * flush denormal numbers to zero or round other than to nearest, nor for flags that reorder sums
- * (-fassociative-math) or contract products whatever the source says (clang's -ffp-contract=fast):
- * there the answers can differ from the reference in the last bits.
+ * flush denormal numbers to zero or do not round to nearest, nor for flags that reorder sums
+ * (-fassociative-math) or fuse multiply-adds whatever the source says (clang's -ffp-contract=fast):
+ * the last bits of answers could then differ from the reference.
  */
 #ifndef TWO_BRANCHES_H
 #define TWO_BRANCHES_H
@@ -40,10 +40,10 @@
 
 /* Build settings that floating-point code requires. */
 #if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__ > 0)
-#error "two_branches: build without -ffast-math and -ffinite-math-only, they delete the NaN checks"
+#error "two_branches: build without -ffast-math and -ffinite-math-only, which delete the NaN checks"
 #endif
 #ifdef __ASSOCIATIVE_MATH__
-#error "two_branches: build without -fassociative-math, the order of additions is part of the " \
+#error "two_branches: build without -fassociative-math: the order of additions is part of the " \
        "answer"
 #endif
 /* <float.h> hides FLT_EVAL_METHOD before C99 and C++11, and in all C++ of avr-gcc 5; the compiler's
@@ -57,7 +57,7 @@
 #define TWO_BRANCHES_EVAL_METHOD 0
 #endif
 #if TWO_BRANCHES_EVAL_METHOD != 0 && TWO_BRANCHES_EVAL_METHOD != 16
-#error "two_branches: this target computes in another precision than two_branches_real_t has"
+#error "two_branches: this target does not compute in the precision of two_branches_real_t"
 #endif
 
 #if FLT_MANT_DIG != 24
@@ -161,14 +161,14 @@ typedef struct {
  * Sets the start memory of the parameter file.
  *
  * @param self the instance
- * @pre before every other call; at any time again
+ * @pre before every other call; may be repeated at any time
  * @note Status bits: none
- * @note Cost: once through the plays
+ * @note Cost: one pass over the plays
  */
 void two_branches_inverse_init(two_branches_inverse_t *self);
 
 /**
- * All plays 0, status cleared, then one ordinary step with u.
+ * Sets all plays to 0, clears the status, and makes one ordinary step with u.
  *
  * @param self the instance
  * @param u reference, um; limited to TWO_BRANCHES_OUTPUT_MIN .. MAX; NaN and infinite: held
@@ -187,17 +187,17 @@ void two_branches_inverse_reset(two_branches_inverse_t *self, two_branches_real_
  * @pre after init; once every sample time, from one context
  * @note Status bits: TWO_BRANCHES_STATUS_INPUT_CLAMPED, TWO_BRANCHES_STATUS_HELD,
  *     TWO_BRANCHES_STATUS_OUTPUT_CLAMPED, TWO_BRANCHES_STATUS_DOMAIN
- * @note Cost: at most 32 multiplications, 58 comparisons (46 + 4 b, b = 3 the bits of n), 1 tanh, 2
- *     atanh
+ * @note Cost: at most 32 multiplications, 58 comparisons (46 + 4 b, b = 3, the bit length of n), 1
+ *     tanh, 2 atanh
  */
 two_branches_real_t two_branches_inverse_step(two_branches_inverse_t *self, two_branches_real_t u);
 
 /**
- * After a step: the drive actually applied in place of the one returned.
+ * Reports, after a step, the drive actually applied in place of the one returned.
  *
  * @param self the instance
  * @param applied drive, V; limited to TWO_BRANCHES_DRIVE_MIN .. MAX; NaN and infinite: ignored
- * @pre after a step and before the next one, any number of times; before the first step it is a
+ * @pre after a step and before the next one, any number of times; before the first step it gives a
  *     first drive
  * @note Status bits: TWO_BRANCHES_STATUS_INPUT_CLAMPED, TWO_BRANCHES_STATUS_HELD
  * @note Cost: at most that of a step
@@ -228,11 +228,11 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 
    play: holds its value until its input is a threshold away, and then follows at that distance.
    move: the rise or the fall of the input from one turning point to the next. Lengths are taken
-       along the move, so that a falling one is a rising one with all signs changed.
+       along the move, so a falling move is a rising one with all signs changed.
    corner: a turning point from which some plays still hold their values; corners are a stack, the
        newest one on top.
-   block: the plays that one corner holds: those with larger thresholds than the corner above it
-       has, up to its `top`.
+   block: the plays that one corner holds: those with larger thresholds than the corner above holds,
+       up to its `top`.
    way: distance of the input from a turning point.
    reach: distance of the output from a turning point; a reach_t also holds inputs and drives beyond
        every code.
@@ -267,7 +267,7 @@ unsigned int two_branches_inverse_status(two_branches_inverse_t *self);
 #define TWO_BRANCHES_APART static
 #endif
 
-/* Straight segment k; begins this far from a turning point, where play k begins to follow. */
+/* Straight segment k, and how far from a turning point it begins, where play k starts to follow. */
 typedef struct {
     /* of the input: 2 r_k in the forward operator, 2 z_k in the inverse */
     two_branches_real_t way;
@@ -277,8 +277,8 @@ typedef struct {
     two_branches_real_t slope; /* 1 / gain */
 } two_branches_segment_t;
 
-/* One operator; of two entries the first is for falling moves, with signs changed, the second for
-   rising ones. */
+/* One operator; of a pair of entries, the first is for falling moves, with its sign changed, the
+   second for rising ones. */
 typedef struct {
     const two_branches_segment_t *segment; /* plays 0 .. n, and one that never follows */
     two_branches_real_t limit[2];          /* of the output */
@@ -289,7 +289,7 @@ typedef struct {
 /* A start memory. `center`: input and output of the sum with plays 0 .. k at play k's value. */
 typedef struct {
     const two_branches_real_t (*center)[2];
-    uint_least16_t step;     /* 1: a center for each play, 0: one for all, which have one value */
+    uint_least16_t step;     /* 1: a center for each play; 0: one for all, which start alike */
     uint_least16_t risen;    /* plays up to this one were left by rising moves, others by falling */
     two_branches_corner_t bottom; /* plays from its `top` on cannot move within the range */
 } two_branches_start_t;
@@ -318,7 +318,7 @@ typedef struct {
  * Below two_branches_tanh_knot[0], just above tanh x = 1/2: x + x z P(z) with z = x^2. Above: one
  * of
  * eight polynomials in the distance from the center of its piece; each center is a point where tanh
- * is almost a float, so that the constant term adds no error. From 9.01 on tanh rounds to 1.
+ * is almost a float, so the constant term adds no error. From 9.01 on, tanh rounds to 1.
  * fit_coefficients.py derives the numbers. Worst error over all floats: 0.78 ulp. The function is
  * odd and never decreases; it keeps subnormal numbers and the sign of zero. Infinities and NaN
  * give +-1.
@@ -537,7 +537,7 @@ static inline unsigned int two_branches_find_segment(const two_branches_segment_
     return k;
 }
 
-/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever is first. */
+/* Ends the move in the top corner's block, at sum `output` or at `input`, whichever comes first. */
 TWO_BRANCHES_APART void two_branches_stop_in_block(const two_branches_curve_t *t,
         two_branches_plays_t *m, const two_branches_corner_t *corner, two_branches_real_t output,
         two_branches_real_t input) {
@@ -650,7 +650,7 @@ TWO_BRANCHES_APART bool two_branches_move_in_block(const two_branches_curve_t *t
         two_branches_plays_t *m, two_branches_real_t input) {
     const two_branches_real_t way = two_branches_along(m, input - m->from_input);
     unsigned int k = m->here.k;
-    const unsigned int many = k + 8u; /* from there on bisection is faster */
+    const unsigned int many = k + 8u; /* beyond these, bisection is faster */
     do {
         ++k;
     } while (k < many && way > t->segment[k + 1u].way);
@@ -747,8 +747,8 @@ static const two_branches_envelope_t two_branches_stage_1_descending = {
     6.0f, 0.4f, 0.1f, 0.5f, 0.16666667f, 2.5f, 0.99999994f
 };
 
-#define TWO_BRANCHES_OFFSET 0.0f        /* part of every output */
-#define TWO_BRANCHES_HOLD 0.0030799445f /* largest step back for which the drive is held instead */
+#define TWO_BRANCHES_OFFSET 0.0f        /* added to every output */
+#define TWO_BRANCHES_HOLD 0.0030799445f /* largest step back at which the drive is held instead */
 
 /* Input of the plays: w = G[v], on the branch of the drive's direction. */
 static two_branches_real_t two_branches_front_forward(two_branches_real_t v, bool ascending) {
