@@ -100,7 +100,8 @@ RECORDS: Any = SimpleNamespace(
 
 class Made:
     """What an option leaves of records to fit and of held-out ones; `on_equal_terms`: of these with what is free in
-    the other option's; `most`: whether its amount is the largest that is tried."""
+    the other option's; `most`: whether its amount is the largest that is tried; `levels_off`: as
+    in a candidate, whose numbers are all 0."""
 
     def __init__(
         self,
@@ -109,10 +110,13 @@ class Made:
         left: tuple[float, float],
         on_equal_terms: tuple[float, float] | None = None,
         most: bool = False,
+        levels_off: tuple[int, float] | None = None,
     ) -> None:
         self.name, self.left, self.on_equal_terms, self.shape = name, left, on_equal_terms or left, np.zeros(2)
         self.rms = left[0]
-        amount = SimpleNamespace(low=np.full(2, -1.0), high=np.full(2, 0.0 if most else 1.0), amounts=(1,))
+        amount = SimpleNamespace(
+            low=np.full(2, -1.0), high=np.full(2, 0.0 if most else 1.0), amounts=(1,), levels_off=levels_off
+        )
         self.structure = SimpleNamespace(
             bounds=(np.full(2, -1.0), np.full(2, 1.0)),
             parts=(SimpleNamespace(candidate=amount, ordinary=amount),),

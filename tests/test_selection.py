@@ -14,6 +14,7 @@ from recordings import brute_output
 
 from hystgen.diagnosis import run
 from hystgen.diagnosis.data.items import Item
+from hystgen.diagnosis.findings.result import AtEnd
 from hystgen.diagnosis.search import fits, ranges, screening, selection
 from hystgen.diagnosis.search.fits import Fitted
 from hystgen.diagnosis.search.hypothesis import Part, Structure
@@ -21,7 +22,7 @@ from hystgen.effects.base import About, Effect, Run
 from hystgen.effects.creep.model import ExponentialCreep
 from hystgen.effects.rate_dependence.model import RelaxingPlays
 from hystgen.effects.resonance.model import PartMode
-from hystgen.effects.thermal.model import LoggedThermal
+from hystgen.effects.thermal.model import HysteresisHeating, LoggedThermal, SelfHeating
 from hystgen.identification.joint import Kept
 
 Array = NDArray[np.float64]
@@ -535,6 +536,30 @@ def test_a_number_at_an_end_of_its_range_explains_nine_tenths(
         assert refused.value == pytest.approx(np.sqrt((larger**2 - 1.0) / (100.0**2 - 1.0)), rel=0.05)
 
 
+@pytest.mark.parametrize(("within", "named"), [(0.5, True), (-0.5, False)])
+def test_an_effect_that_does_not_level_off_within_the_records_is_not_named(within: float, named: bool) -> None:
+    """A time constant of 1 s in records of 3 s and of 0.3 s, which takes 90 % of the error away."""
+    grown = Made("thermal", 1, (0.1, 0.1), levels_off=(0, within))
+    best = screening.Tried(
+        SimpleNamespace(name="thermal"), grown, ("thermal",), 0.1, grown.errors(RECORDS.held)  # type: ignore[arg-type]
+    )
+    found = selection.judged(Made("now", 1, (1.0, 1.0)), best, RECORDS)  # type: ignore[arg-type]
+    assert isinstance(found, selection.Merit) is named
+    if not named:
+        assert found == selection.Refusal("grows", 1.0, 10.0**within)
+
+
+def test_own_heat_has_to_level_off_within_the_session() -> None:
+    """Unlike a logged temperature, which a record shows whatever it does."""
+    records, _ = of_warm(0.1)
+    for shape in (SelfHeating, HysteresisHeating):
+        for candidate in shape.candidates(records.known):
+            place, most = candidate.levels_off or (0, 0.0)
+            made = candidate.build(np.where(np.arange(len(candidate.start)) == place, most, candidate.start))
+            assert made.time_constant == pytest.approx(records.known.session)  # type: ignore[attr-defined]
+    assert all(each.levels_off is None for each in LoggedThermal.candidates(records.known))
+
+
 def warm(gain: float, seed: int) -> Item:
     """Plays in a room of 20 +- 0.5 degrees, whose gain follows the logged temperature."""
     random = np.random.default_rng(seed)
@@ -679,3 +704,9 @@ def test_a_front_that_misleads_held_out_records_is_left_out(
     done = task._searched(None)
     assert done.found.fitted is ends["none" if without else "front"]
     assert done.notes == ((run.NO_FRONT,) if without else ())
+
+
+def test_a_parameter_that_only_the_search_has_is_said_to_be_one() -> None:
+    """The steepness of a piece of a sensor's curve, of which the parameter file has all values at once."""
+    end = AtEnd("", 3.0, ranges.LARGEST, 3.0, None, None, "limit")
+    assert end.sentence("sensor_nonlinearity", "um").startswith("a parameter of the search of sensor_nonlinearity is 3")

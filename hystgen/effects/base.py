@@ -164,7 +164,9 @@ class Candidate:
     nothing; `others`: further starts, where the error may have several minima; `beyond`: label of a simpler shape that
     this one contains; unless that one helps, this one is not tried; `grown`: makes a start from the simpler shape's
     numbers; `amounts`: indices of numbers that scale the effect; a search finds these first from every start, since at
-    a wrong amount the other numbers mean little.
+    a wrong amount the other numbers mean little; `levels_off`: index of the logarithm of a time constant, and its
+    largest value at which the records show the effect level off. Beyond it the effect only grows, and so may
+    disturbances: it is not named.
     """
 
     label: str
@@ -177,6 +179,7 @@ class Candidate:
     beyond: str = ""
     grown: Callable[[Array], Array] | None = None
     amounts: tuple[int, ...] = ()
+    levels_off: tuple[int, float] | None = None
 
     def at(self, numbers: Array) -> Candidate:
         """The same shape with all numbers but the amounts fixed at the given ones."""

@@ -129,6 +129,7 @@ REFUSALS = {
     "identified": "the effects found leave {value:.3g}{unit} rms, but the model of `identify` only {limit:.3g}{unit}",
     "few": "only {value:.0%} of the samples were compared, but a name needs {limit:.0%}",
     "end": "it acts on {value:.1%} of the drive range at an end, but a limit needs {limit:.1%}",
+    "grows": "with a time constant of {value:.3g} s it only grows in {limit:.3g} s of records, as disturbances may",
     "range": "with a parameter at an end of its range, the effects found leave {value:.0%} of the gap above the noise, "
     "but may then leave at most {limit:.0%}",
     "forgets": "hysteresis other than a play sum explains the error as well or better and leaves {value:.3g}{unit} rms",

@@ -74,7 +74,7 @@ class AtEnd:
 
     def sentence(self, name: str, unit: str | None) -> str:
         """The parameter and why it is there, as a sentence without a full stop."""
-        what = f"{self.key.replace('_', ' ')} of {name}"
+        what = f"{self.key.replace('_', ' ') or 'a parameter of the search'} of {name}"
         if self.why == "beyond":
             return f"{what} is {self.value:.4g}, beyond its usual range, which ends at {self.usual:.4g} and fits worse"
         said = f"{what} is {self.value:.4g}, the {self.end} value tried"

@@ -65,9 +65,9 @@ class Refusal:
 
     `why`: `one_loop` [share of the gap left], `little` [rms removed], `chance` [p on held-out records], `unsure` [p on
     fitted ones], `small` [share of the gap], `most` [rms left], `above` [rms left on records of one loop], `given` and
-    `identified` [rms left], `few` [share of samples], `end` [share of the drive range], `range` [share of the gap
-    left], `forgets` [rms left by hysteresis other than a play sum], `wild` [rms by which the inverse moves the plain
-    model's output], `other`: another shape was chosen.
+    `identified` [rms left], `few` [share of samples], `end` [share of the drive range], `grows` [s], `range` [share of
+    the gap left], `forgets` [rms left by hysteresis other than a play sum], `wild` [rms by which the inverse moves the
+    plain model's output], `other`: another shape was chosen.
     """
 
     why: str
@@ -85,9 +85,9 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
     """Merit of a tried effect, or why it has none.
 
     It has none if chance explains the difference, if it removes too little to stand out from the noise, if it hardly
-    shows in the held-out or in the fitted records, if records of only one loop do not support a name, or if it is a
-    limit that hardly acts except at the very end of the drive. Chance does not halve an error to which nothing was
-    fitted, however few events show the effect.
+    shows in the held-out or in the fitted records, if records of only one loop do not support a name, if it is a limit
+    that hardly acts except at the very end of the drive, or if it does not level off within the records. Chance does
+    not halve an error to which nothing was fitted, however few events show the effect.
 
     `least`: the rms to be removed, as a multiple of the remaining error or the noise; by default the threshold for a
     first or a further effect.
@@ -101,6 +101,8 @@ def judged(now: Fitted, best: Tried, records: Records, least: float | None = Non
         width = front.widest(best.fitted.shape)
         if width < acceptance.FLAT_END:
             return Refusal("end", width, acceptance.FLAT_END)
+    if slow := _only_grows(best.fitted):
+        return slow
     held, fitted = _removed(now, best, records)
     needed = _least(now) if least is None else least
     if not _enough(held, fitted, needed, records.noise):
@@ -172,6 +174,15 @@ def _without_merit(terms: Sequence[Fitted], best: Tried, items: Sequence[Item]) 
     """
     now = terms[0]
     return min(now.errors(items), *(each.errors(items, best.fitted) for each in terms), key=rms)
+
+
+def _only_grows(fitted: Fitted) -> Refusal | None:
+    """The refusal of a last effect that the records do not show level off."""
+    if not fitted.structure.parts or (levels_off := fitted.structure.parts[-1].candidate.levels_off) is None:
+        return None
+    place, most = levels_off
+    slow = float(fitted.structure.pieces(fitted.shape)[1][-1][place])
+    return Refusal("grows", 10.0**slow, 10.0**most) if slow > most else None
 
 
 def simplest_first(tried: Sequence[Tried], records: Records) -> list[Tried]:

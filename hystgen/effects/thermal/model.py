@@ -199,7 +199,11 @@ class SelfHeating(OwnHeat):
                 )
 
             low, high, start, others = _numbers(row, about)
-            found.append(Candidate(f"{SELF_HEATING}, {what}", low, high, start, build, start, others))
+            found.append(
+                Candidate(
+                    f"{SELF_HEATING}, {what}", low, high, start, build, start, others, levels_off=_levels_off(about)
+                )
+            )
         return found
 
 
@@ -250,6 +254,7 @@ class HysteresisHeating(OwnHeat):
                 Candidate(
                     f"thermal, heat of hysteresis, {what}", np.append(low, SMALLEST), np.append(high, LARGEST),
                     grown(start), build, grown(start), tuple(map(grown, others)), f"{SELF_HEATING}, {what}", grown,
+                    levels_off=_levels_off(about),
                 )
             )
         return found
@@ -268,6 +273,12 @@ def _numbers(row: tuple[int | None, int | None], about: About) -> tuple[Array, A
     low = max(low, math.log10(max(min(quarter, 0.3 * about.session), 1e-12)))
     start, *others = (np.append(max(place, low), np.zeros(n)) for place in starts)
     return np.append(low, np.full(n, -20.0)), np.append(high, np.full(n, 20.0)), start, tuple(others)
+
+
+def _levels_off(about: About) -> tuple[int, float]:
+    """The time constant, and the session: a temperature that has not levelled off by its end follows the work done so
+    far, which grows with time like much else."""
+    return 0, math.log10(max(about.session, 1e-12))
 
 
 def _of_row(x: Array, row: tuple[int | None, int | None], about: About) -> tuple[float, float]:
