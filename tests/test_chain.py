@@ -995,7 +995,7 @@ def test_needs_a_sample_time_and_room(tmp_path: Path) -> None:
     text = CHAINS["creeping"].replace("sample_time: 1.0e-3\n", "")
     with pytest.raises(EffectsError, match="needs sample_time"):
         emit_options(model("creeping", text))
-    with pytest.raises(UnsupportedEffectsError, match=r"of the 62010 codes .* moves the drive by 5.3 % of its range"):
+    with pytest.raises(UnsupportedEffectsError, match=r"62010 codes .* moves the drive by 5.3 % of its range"):
         emit_options(model("straight", CHAINS["straight"].replace(ALLOWED, "")), arithmetic="q15")
     for rate, slow, arithmetic, finer in (
         ("1.0e-3", "1.0e-7", "q15", "q31"), ("1.0e-4", "1.0e-6", "float32", "float64"),

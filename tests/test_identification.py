@@ -696,7 +696,7 @@ class TestRefused:
                 "no play has a positive weight: y does not rise with v; if the sensor counts the other way, change "
                 "the sign of y, otherwise check which column is which",
             ),
-            (SINE, SINE, ("--skip", "0.39"), "data.csv has 400 samples, at least 406 are needed"),
+            (SINE, SINE, ("--skip", "0.39"), "data.csv has 400 samples, but at least 406 are needed"),
             (
                 SINE[:60],
                 SINE[:60],
@@ -738,7 +738,7 @@ class TestRefused:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         assert (done.returncode, done.stdout) == (2, "")
         assert "Traceback" not in done.stderr
-        assert "has 5 samples, at least 16 are needed" in done.stderr
+        assert "has 5 samples, but at least 16 are needed" in done.stderr
         assert (tmp_path / "a.yaml").read_text() == "older\n"
 
     def test_a_folder_that_is_not_there(self, tmp_path: Path, run: Run) -> None:
