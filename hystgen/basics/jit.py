@@ -79,7 +79,11 @@ def plain() -> Iterator[None]:
 def for_samples(
     function: Callable[..., object], samples: NDArray[np.generic]
 ) -> contextlib.AbstractContextManager[None]:
-    """As `plain` while `function` has been given few samples of their type in this process, and otherwise nothing."""
+    """As `plain` while `function` has been given few samples of their type in this process, and otherwise nothing.
+
+    Samples inside `plain()` do not count: they would have later, short records compiled for."""
+    if _plain.get():
+        return contextlib.nullcontext()
     key = function, samples.dtype
     if _samples[key] + len(samples) > SHORT:
         return contextlib.nullcontext()
