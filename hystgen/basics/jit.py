@@ -79,13 +79,9 @@ def plain() -> Iterator[None]:
 def for_samples(
     function: Callable[..., object], samples: NDArray[np.generic]
 ) -> contextlib.AbstractContextManager[None]:
-    """As `plain` while `function` has been given few samples of their type in this process, and otherwise nothing.
-
-    Samples inside `plain()` do not count: they would have later, short records compiled for."""
-    if _plain.get():
-        return contextlib.nullcontext()
+    """As `plain` while `function` has been given few samples of their type outside of it, and otherwise nothing."""
     key = function, samples.dtype
-    if _samples[key] + len(samples) > SHORT:
+    if _plain.get() or _samples[key] + len(samples) > SHORT:
         return contextlib.nullcontext()
     _samples[key] += len(samples)
     return plain()
