@@ -281,7 +281,7 @@ row("a_search_whose_steps_fail_goes_on", "",  # each damps the next one more: a 
     {(): 0.1}, lambda monkeypatch: screened(monkeypatch, Path([0.5] * 5 + [0.1] * 10)))
 row("a_start_far_off_is_left", "TOO_FAR",  # the best end is on its way
     {4.5: 0.01, 5.5: 0.1}, lambda far, monkeypatch: screened(monkeypatch, Path([0.1]), Path([0.1 * far, 0.01])))
-row("a_start_that_does_nothing_waits", "IDLE",  # another one is worse than none at first, unless it does something
+row("a_start_that_does_nothing_waits", "IDLE",  # by its share of the error; another one is worse than none at first
     {0.015: False, 0.007: True},
     lambda change, monkeypatch: screened(monkeypatch, Path([1.0 - change] * 3), Path([1.5, 1.45, 1.4, 0.3])) == 0.3)
 row("what_promises_nothing_is_not_searched_jointly", "PROMISING JOINT_STEPS",  # beside the best, by what it leaves
@@ -444,7 +444,7 @@ STRAIGHT = np.linspace(0.0, 100.0, 65)
 """A drive."""
 
 ODD = np.sqrt(2.0) * (np.arange(65) % 2)
-"""Up and down about a line, by an rms of a half and more."""
+"""Every other sample is off, with an rms of 1."""
 
 
 def needed(v: Array, y: Array, noise: float = 0.01, column: Array | None = None, error: Any = 0.0) -> NDArray[np.bool_]:
@@ -792,9 +792,8 @@ row("a_line_in_many_records", "SEEN_IN", {5: True, 3: False},
 row("steady_in_most_records", "COMMON_SHARE",  # in the others it is gone after half the time
     {7: True, 5: False},
     lambda many: disturbances.steady(TEN, in_ten(lambda k: 3.0 if k < many else 3.0 * FADING)) is not None)
-row("a_line_that_fades", "STEADY_SHARE",  # to this share of its amplitude: what one half predicts of the other is
-    {0.46: True, 0.38: False},            # 0.58 or 0.39 of what that has
-    lambda size: disturbances.steady([ramp(4000)], [
+row("a_line_that_fades", "STEADY_SHARE",  # by what is left of it: one half predicts 0.58 or 0.39 of the other
+    {0.46: True, 0.38: False}, lambda size: disturbances.steady([ramp(4000)], [
         tone(130.0, 4000, np.where(np.arange(4000) < 2000, 1.0, size)) + 0.05 * hiss(4000)]) is not None)
 row("four_lines", "MOST_LINES", {6: 4}, lambda n: len(disturbances.lines(
     [ramp(4000)], [sum(tone(50.0 + 40.0 * k, 4000) for k in range(n)) + 0.1 * hiss(4000)])[0]))
