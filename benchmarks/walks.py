@@ -41,7 +41,7 @@ model:
 
 @functools.cache
 def inside(file: str) -> str | None:
-    """The path of a file below the package, None of others; a walk asks at every call, of the same hundreds of files."""
+    """The path of a file below the package, None of others; a walk asks at every call, of a few hundred files."""
     path = Path(file)
     return str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else None
 
