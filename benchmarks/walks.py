@@ -10,6 +10,7 @@ another process does. Compiled functions enter no file that a profiler sees: the
 from __future__ import annotations
 
 import argparse
+import functools
 import os
 import subprocess
 import sys
@@ -38,6 +39,13 @@ model:
 """
 
 
+@functools.cache
+def inside(file: str) -> str | None:
+    """The path of a file below the package, None of others; a walk asks at every call, of a few hundred files."""
+    path = Path(file)
+    return str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else None
+
+
 def walk(run: Callable[[], object]) -> tuple[list[str], int]:
     """Files that a run enters, and the number of doorways between them."""
     files: set[str] = set()
@@ -46,8 +54,7 @@ def walk(run: Callable[[], object]) -> tuple[list[str], int]:
     def place(frame: FrameType | None) -> str | None:
         if frame is None or frame.f_code.co_name == "<module>":
             return None
-        path = Path(frame.f_code.co_filename)
-        return str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else None
+        return inside(frame.f_code.co_filename)
 
     def enter(frame: FrameType, event: str, _: Any) -> None:
         if event != "call" or (here := place(frame)) is None:

@@ -425,6 +425,28 @@ def test_start_memories_of_held_out_records_are_found_where_all_together_need_th
     assert fit[1].known.all()
 
 
+def test_a_start_is_wiped_by_what_the_plays_see() -> None:
+    """Steps lead to the ends of the range, where the stage arrives six samples late: until then the output shows what
+    was before the record."""
+    v = np.repeat([40.0, 100.0, 0.0, 70.0, 30.0], 40)
+    seen = np.full(len(v), 40.0)
+    for k in range(1, len(v)):
+        seen[k] = seen[k - 1] + np.clip(v[k] - seen[k - 1], -16.0, 16.0)
+
+    def output(before: float) -> Array:
+        state, y = before, []
+        for x in seen.tolist():
+            state = min(max(state, x - 45.0), x + 45.0)
+            y.append(x + 0.5 * state)
+        return np.array(y)
+
+    records = [record(v, output(40.0), name) for name in "ab"]
+    (item,) = preparing.prepare(records[:1], records[1:], None, 0.0).to_fit
+    apart, arrived = np.flatnonzero(output(-5.0) != output(85.0)), np.flatnonzero(seen <= 0.0)[0]
+    assert (apart[-1], arrived) == (84, 86)  # the step is at 80
+    assert np.flatnonzero(np.isfinite(item.y))[0] == arrived
+
+
 class TestNoise:
     def item(self, y: Array, v: Array, name: str = "made") -> Item:
         return Item(name, Run(np.arange(len(v)) * 1e-3, v), y, None, float(np.ptp(y)))

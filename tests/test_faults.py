@@ -74,6 +74,16 @@ def apart(one: Any, other: Any) -> float:
     return float(np.max(np.abs(a - b)) / np.ptp(a))
 
 
+GIVEN: dict[str, Any] = {"history": [0.0], "thresholds": THRESHOLDS}
+
+
+@functools.cache
+def fit_without(name: str, k: int | None) -> Any:
+    """The fit to the record of a drive without a sample, or with all; many cases compare with the same one."""
+    whole = record(DRIVES[name], output(DRIVES[name]))
+    return hystgen.identify(whole if k is None else less(whole, [k]), **GIVEN)
+
+
 @functools.cache
 def shipped() -> Any:
     """The fit to the shipped recording."""
@@ -103,12 +113,9 @@ class TestOneWrongSample:
             by = float(rng.choice([-1.0, 1.0]) * rng.uniform(0.4, 3.0))
             wrong = {"v": v.copy(), "y": y.copy()}
             wrong[channel][k] += by * np.ptp(wrong[channel])
-            how = {"history": [0.0], "thresholds": THRESHOLDS}
-            fit = hystgen.identify(record(wrong["v"], wrong["y"]), **how)
-            right = record(v, y)
-            if (place, channel) != ("first", "y"):  # without its first drive it would begin elsewhere
-                right = less(right, [k])
-            clean = hystgen.identify(right, **how)
+            fit = hystgen.identify(record(wrong["v"], wrong["y"]), **GIVEN)
+            # without its first drive it would begin elsewhere
+            clean = fit_without(name, None if (place, channel) == ("first", "y") else k)
             assert apart(fit, clean) < 0.005, (k, by)
             assert fit.parameters.input_range == pytest.approx(clean.parameters.input_range, abs=0.6), (k, by)
             figures = [row(each, "all").rms_percent for each in (fit, clean)]
@@ -194,7 +201,6 @@ class TestOneWrongRow:
         v = DRIVES[name]
         y = output(v)
         rng = np.random.default_rng([len(name), len(kind)])
-        how = {"history": [0.0], "thresholds": THRESHOLDS}
         n, tried = len(v), 0
         for k in (n - 1, n - 2, *rng.integers(320, n - 100, 24)):
             wrong_v, wrong_y = v.copy(), y.copy()
@@ -204,8 +210,8 @@ class TestOneWrongRow:
             if not stands_apart or (k < n - 2 and np.count_nonzero(left > 10.0 * NOISE) < 20):
                 continue
             tried += 1
-            fit = hystgen.identify(record(wrong_v, wrong_y), **how)
-            clean = hystgen.identify(less(record(v, y), [k]), **how)
+            fit = hystgen.identify(record(wrong_v, wrong_y), **GIVEN)
+            clean = fit_without(name, k)
             assert apart(fit, clean) < 0.005, k
             assert fit.parameters.input_range == pytest.approx(clean.parameters.input_range, abs=0.6), k
             figures = [row(each, "all").rms_percent for each in (fit, clean)]

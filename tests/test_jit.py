@@ -113,6 +113,9 @@ def test_short_records_are_not_compiled_for(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr(jitting, "_samples", Counter())
     some = jitting.SHORT // 2
     assert not as_python(jitting.SHORT + 1)
+    with jitting.plain():  # which runs as Python anyway
+        assert as_python(jitting.SHORT + 1)
+        assert all(as_python(some) for _ in range(3))
     assert [as_python(some) for _ in range(3)] == [True, True, False]
     assert as_python(some, np.float32)
     assert as_python(some, function=sixfold)

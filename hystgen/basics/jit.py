@@ -79,9 +79,9 @@ def plain() -> Iterator[None]:
 def for_samples(
     function: Callable[..., object], samples: NDArray[np.generic]
 ) -> contextlib.AbstractContextManager[None]:
-    """`plain` until `function` has been given `SHORT` samples of this type in this process, then a null context."""
+    """`plain` until `function` has been given `SHORT` samples of this type outside of `plain`, then a null context."""
     key = function, samples.dtype
-    if _samples[key] + len(samples) > SHORT:
+    if _plain.get() or _samples[key] + len(samples) > SHORT:
         return contextlib.nullcontext()
     _samples[key] += len(samples)
     return plain()
