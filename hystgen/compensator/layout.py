@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import N, jit
 from hystgen.chain.static import StaticModel
 from hystgen.front.tanh.kernels import AtanhTables, TanhTables
 from hystgen.plays.corners.corners_fixed import FixedMemory, new_fixed_memory
@@ -112,7 +112,7 @@ class Limited(Protocol):
 
 
 @jit(inline=True)
-def clamp_drive(t: Limited, v: Any) -> Any:
+def clamp_drive(t: Limited, v: N) -> N:
     """v inside the input range."""
     if v < t.limits[DRIVE_MIN]:
         return t.limits[DRIVE_MIN]
@@ -122,7 +122,7 @@ def clamp_drive(t: Limited, v: Any) -> Any:
 
 
 @jit(inline=True)
-def inverse_clamp(t: Limited, u: Any) -> Any:
+def inverse_clamp(t: Limited, u: N) -> N:
     """u inside the output range."""
     if u < t.limits[OUTPUT_MIN]:
         return t.limits[OUTPUT_MIN]

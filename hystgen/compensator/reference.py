@@ -19,7 +19,6 @@ from hystgen.compensator import step_fixed, step_float, tables
 from hystgen.compensator.corners import (
     forward,
     forward_fixed,
-    forward_front,
     inverse,
     inverse_fixed,
     inverse_front,
@@ -55,7 +54,7 @@ class Engines(NamedTuple):
 ENGINES = (
     Engines(
         compensator, step_float.OPERATIONS,
-        ((forward.OPERATIONS, inverse.OPERATIONS), (forward_front.OPERATIONS, inverse_front.OPERATIONS)),
+        ((forward.OPERATIONS, inverse.OPERATIONS), (forward.OPERATIONS, inverse_front.OPERATIONS)),
     ),
     Engines(
         curve, step_fixed.OPERATIONS,

@@ -57,7 +57,7 @@ def bends(
 
 
 @jit
-def bend(t: Bends, which: int, x: Any) -> tuple[Any, int]:
+def bend(t: Bends, which: int, x: int) -> tuple[int, int]:
     """The value of a curve at x, and whether x had to be limited to its ends."""
     argument = nearest(x, t.scaled[which, 0])
     inside = argument

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from hystgen.basics.jit import Jit, jit
+from hystgen.basics.jit import Jit, Scalar, jit
 from hystgen.basics.structures import Struct
 
 VERBS = ("rest", "resting", "solve", "absorb")
@@ -89,7 +89,7 @@ class OwnBlock:
     solve: Callable[[Any, Any, Any], Any]
     absorb: Callable[[Any, Any, Any], Any]
 
-    def compiled(self, verb: str, arithmetic: Callable[..., Any]) -> Jit[..., Any]:
+    def compiled(self, verb: str, arithmetic: Callable[..., Any]) -> Jit[..., Scalar]:
         """A function for the bit reference, with the product of an arithmetic in place of `product`."""
         function = getattr(self, verb)
         names = function.__globals__

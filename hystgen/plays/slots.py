@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.jit import jit
-from hystgen.basics.structures import Flag, Real, Struct, UInt32
+from hystgen.basics.jit import N, jit
+from hystgen.basics.structures import Flag, NumberArray, Real, Struct, UInt32
 
-Reals = NDArray[Any]
-Counts = NDArray[np.int64]
+Reals = NumberArray
+Counts = NumberArray
 Bytes = NDArray[np.uint8]
 
 # arithmetic-independent names for places in the arrays below
@@ -58,6 +56,6 @@ class StepState(Struct):
 
 
 @jit(inline=True)
-def zero(x: Any) -> Any:
+def zero(x: N) -> N:
     """0 of the type of a finite x."""
     return x - x

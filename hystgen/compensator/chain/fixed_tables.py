@@ -33,6 +33,7 @@ from hystgen.compensator.chain.layout import (
     Codes,
     Compiled,
     FixedChainNumbers,
+    FixedChainTables,
     OwnChainTables,
     ahead_of,
     braked,
@@ -128,7 +129,7 @@ class _Builder:
         maps = self._maps()
         drive = [end << self.inner.fine for end in self.inner.drive]
         plays.limits[slots.DRIVE_MIN], plays.limits[slots.DRIVE_MAX] = drive
-        tables = ChainTables(
+        given = FixedChainTables(
             plays,
             limits,
             self._need(lambda: self._moving(plays), "effects on plays"),
@@ -141,10 +142,7 @@ class _Builder:
             quiet(self.how, self.taps),
             int(self.turning),
         )
-        if self.parts.own_drives or self.parts.own_outputs:
-            tables = OwnChainTables(*tables)
-            own_sides = self.parts.own_drives, self.parts.own_outputs
-            tables.own_sides = tuple(map(type, own_sides[0])), tuple(map(type, own_sides[1]))
+        tables = OwnChainTables.with_own(given, self.parts)
         slewed = (0.5 + self._slewed) * bool(self.parts.slew)
         max_rate = fastest(static, self.parts, self.seconds, self.how)
         weights = self.taps.weights.tolist() if self.taps else []

@@ -195,19 +195,20 @@ def build(rows: Sequence[Formats]) -> OwnTables:
 
 
 @jit
-def product(number: Any, x: Any) -> Any:
+def product(number: Any, x: int) -> int:
     """A number of the table times x, rounded to the nearest whole number."""
-    return times(x >> number["drop"], number["factor"]["mantissa"], number["factor"]["shift"]) << number["lift"]
+    found: int = times(x >> number["drop"], number["factor"]["mantissa"], number["factor"]["shift"]) << number["lift"]
+    return found
 
 
 @jit
-def entered(t: OwnTables, j: int, x: Any) -> Any:
+def entered(t: OwnTables, j: int, x: int) -> int:
     """A signal of the chain as one of block j."""
     return x << t.bits[j]
 
 
 @jit
-def left(t: OwnTables, j: int, x: Any) -> Any:
+def left(t: OwnTables, j: int, x: int) -> int:
     """A signal of block j as one of the chain."""
     return nearest(x, t.bits[j])
 

@@ -6,11 +6,11 @@ import functools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.structures import Count, Flag, Real, SmallCount, Struct, memory_of
 from hystgen.effects.ageing.model import ExponentialAgeing, LogarithmicAgeing, SeveralAgeing
 from hystgen.effects.base import Place
@@ -232,7 +232,7 @@ class UnevenAgeing:
 
 
 @jit
-def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
+def ageing_gain(t: AgeingTables, j: int, travel: Scalar) -> Scalar:
     """The gain at a travel; past the last piece it stays constant."""
     low = t.first[j]
     high = t.first[j + 1]
@@ -249,7 +249,7 @@ def ageing_gain(t: AgeingTables, j: int, travel: Any) -> Any:
 
 
 @jit
-def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Any) -> bool:
+def ageing_set_travel(t: AgeingTables, s: AgeingState, j: int, travel: Scalar) -> bool:
     """Set the travel. Returns whether it had to be limited."""
     inside = travel
     if inside < zero(t.block.one[j]):
@@ -271,13 +271,13 @@ def ageing_reset(t: AgeingTables, s: AgeingState, j: int) -> None:
 
 
 @jit
-def ageing_travelled(s: AgeingState, j: int) -> Any:
+def ageing_travelled(s: AgeingState, j: int) -> Scalar:
     """The travel."""
     return s.high[j]
 
 
 @jit
-def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
+def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Scalar) -> bool:
     """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
     inside = gain
     if inside < t.block.least[j]:
@@ -291,12 +291,12 @@ def ageing_set(t: AgeingTables, s: AgeingState, j: int, gain: Any) -> bool:
 
 
 @jit
-def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) -> None:
+def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Scalar, v: Scalar) -> None:
     """The drive has moved to v."""
     way = v - before
     change = (way if way >= zero(way) else -way) + s.low[j]
     high = s.high[j]
-    following = high + change
+    following: Scalar = high + change
     if following > t.block.last[j]:
         following = t.block.last[j]
         change = following - high
@@ -304,7 +304,7 @@ def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) ->
     s.low[j] = change - (following - high)
     if s.own[j]:
         gain = ageing_gain(t, j, following)
-        inverse = s.inverse[j]
+        inverse: Scalar = s.inverse[j]
         for _ in range(t.block.turns[j]):
             inverse = inverse * (t.block.two[j] - gain * inverse)
         s.gain[j] = gain
@@ -312,13 +312,13 @@ def ageing_move(t: AgeingTables, s: AgeingState, j: int, before: Any, v: Any) ->
 
 
 @jit(inline=True)
-def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def ageing_solve(t: AgeingTables, s: AgeingState, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return y * s.inverse[j]
 
 
 @jit(inline=True)
-def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def ageing_absorb(t: AgeingTables, s: AgeingState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The output for the input x."""
     return s.gain[j] * x
 

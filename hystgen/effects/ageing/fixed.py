@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -142,7 +142,7 @@ def made(blocks: Sequence[AgeingFormats], about: FixedSurroundings) -> FixedAgei
 
 
 @jit
-def ageing_gain(t: FixedAgeingTables, j: int, travel: Any) -> Any:
+def ageing_gain(t: FixedAgeingTables, j: int, travel: int) -> int:
     """The gain at a travel; past the last piece it stays constant."""
     low = t.first[j]
     high = t.first[j + 1]
@@ -163,7 +163,7 @@ def ageing_gain(t: FixedAgeingTables, j: int, travel: Any) -> Any:
 
 
 @jit
-def ageing_set_travel(t: FixedAgeingTables, s: FixedAgeingState, j: int, travel: Any) -> bool:
+def ageing_set_travel(t: FixedAgeingTables, s: FixedAgeingState, j: int, travel: int) -> bool:
     """Set the travel. Returns whether it had to be limited."""
     inside = travel
     if inside < 0:
@@ -184,7 +184,7 @@ def ageing_reset(t: FixedAgeingTables, s: FixedAgeingState, j: int) -> None:
 
 
 @jit
-def ageing_set(t: FixedAgeingTables, s: FixedAgeingState, j: int, gain: Any) -> bool:
+def ageing_set(t: FixedAgeingTables, s: FixedAgeingState, j: int, gain: int) -> bool:
     """Set a gain in place of the one that follows the travel. Returns whether it had to be limited."""
     given = gain << t.block.bits[j]
     inside = given
@@ -199,7 +199,7 @@ def ageing_set(t: FixedAgeingTables, s: FixedAgeingState, j: int, gain: Any) -> 
 
 
 @jit
-def ageing_move(t: FixedAgeingTables, s: FixedAgeingState, j: int, before: Any, v: Any) -> None:
+def ageing_move(t: FixedAgeingTables, s: FixedAgeingState, j: int, before: int, v: int) -> None:
     """The drive has moved to v."""
     way = v - before
     following = s.high[j] + (way if way >= 0 else -way)
@@ -213,13 +213,13 @@ def ageing_move(t: FixedAgeingTables, s: FixedAgeingState, j: int, before: Any, 
 
 
 @jit
-def ageing_solve(t: FixedAgeingTables, s: FixedAgeingState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def ageing_solve(t: FixedAgeingTables, s: FixedAgeingState, j: int, y: int) -> int:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return times(y, s.inverse[j], GAIN_BITS)
 
 
 @jit
-def ageing_absorb(t: FixedAgeingTables, s: FixedAgeingState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def ageing_absorb(t: FixedAgeingTables, s: FixedAgeingState, j: int, x: int) -> int:  # noqa: ARG001  block interface
     """The output for the input x."""
     return times(x, s.gain[j], GAIN_BITS)
 

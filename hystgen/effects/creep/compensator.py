@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.structures import Count, Real, Struct, memory_of
 from hystgen.effects.base import Array, Block, Place, decays
 from hystgen.effects.creep.model import ExponentialCreep, LogarithmicCreep
@@ -196,7 +196,7 @@ def constants(t: CreepTables) -> Iterator[Constants]:
 
 
 @jit
-def creep_rest(t: CreepTables, s: CreepMemory, j: int, x: Any) -> Any:
+def creep_rest(t: CreepTables, s: CreepMemory, j: int, x: Scalar) -> Scalar:
     """Everything has settled at the input x. Returns the output."""
     ahead = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
@@ -209,19 +209,19 @@ def creep_rest(t: CreepTables, s: CreepMemory, j: int, x: Any) -> Any:
 
 
 @jit(inline=True)
-def creep_resting(t: CreepTables, s: CreepMemory, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def creep_resting(t: CreepTables, s: CreepMemory, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The input that gives the output y once everything has settled."""
     return y * t.block.inverse_rest[j]
 
 
 @jit(inline=True)
-def creep_solve(t: CreepTables, s: CreepMemory, j: int, y: Any) -> Any:
+def creep_solve(t: CreepTables, s: CreepMemory, j: int, y: Scalar) -> Scalar:
     """The input that gives the output y at this sample."""
     return (y - s.block.ahead[j]) * t.block.inverse_slope[j]
 
 
 @jit
-def creep_absorb(t: CreepTables, s: CreepMemory, j: int, x: Any) -> Any:
+def creep_absorb(t: CreepTables, s: CreepMemory, j: int, x: Scalar) -> Scalar:
     """The input is x at this sample. Returns the output."""
     y = s.block.ahead[j] + t.block.slope[j] * x
     ahead = zero(x)

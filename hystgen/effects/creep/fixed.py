@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -159,7 +159,7 @@ def tables(blocks: Sequence[CreepFormats], _: FixedSurroundings) -> FixedCreepTa
 
 
 @jit
-def creep_rest(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: Any) -> Any:
+def creep_rest(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: int) -> int:
     """Everything has settled at the input x. Returns the output."""
     total = zero(x)
     for i in range(t.first[j], t.first[j + 1]):
@@ -173,20 +173,20 @@ def creep_rest(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: Any) -> Any:
 
 
 @jit
-def creep_resting(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def creep_resting(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: int) -> int:  # noqa: ARG001  block interface
     """The input that gives the output y once everything has settled."""
     return times(y, t.block.inverse_rest.mantissa[j], t.block.inverse_rest.shift[j])
 
 
 @jit
-def creep_solve(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: Any) -> Any:
+def creep_solve(t: FixedCreepTables, s: FixedCreepMemory, j: int, y: int) -> int:
     """The input that gives the output y at this sample."""
     change = times(y - s.block.ahead[j], t.block.inverse_slope.mantissa[j], t.block.inverse_slope.shift[j])
     return s.block.before[j] + change
 
 
 @jit
-def creep_absorb(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: Any) -> Any:
+def creep_absorb(t: FixedCreepTables, s: FixedCreepMemory, j: int, x: int) -> int:
     """The input is x at this sample. Returns the output."""
     change = x - s.block.before[j]
     direct = times(x, t.block.direct.mantissa[j], t.block.direct.shift[j])

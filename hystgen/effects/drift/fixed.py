@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any
 
 from hystgen.basics.jit import jit
 from hystgen.basics.structures import Int64, Struct, UInt8, memory_of
@@ -123,7 +122,7 @@ def clock_start(t: FixedClockNumbers, s: FixedClockState, j: int) -> None:  # no
 
 
 @jit
-def clock_tick(t: FixedClockNumbers, s: FixedClockState, j: int, before: Any, v: Any) -> None:  # noqa: ARG001  block interface
+def clock_tick(t: FixedClockNumbers, s: FixedClockState, j: int, before: int, v: int) -> None:  # noqa: ARG001  block interface
     """One sample later."""
     if s.count[j] >= t.samples[j]:
         return
@@ -136,7 +135,7 @@ def clock_tick(t: FixedClockNumbers, s: FixedClockState, j: int, before: Any, v:
 
 
 @jit
-def clock_drift(t: FixedClockNumbers, s: FixedClockState, j: int, ahead: Any) -> Any:
+def clock_drift(t: FixedClockNumbers, s: FixedClockState, j: int, ahead: int) -> int:
     """The drift `ahead` samples after the present one."""
     more = (t.slope[j] + s.gained[j]) * ahead + t.change[j] * ((ahead * (ahead - 1)) // 2)
     drift = s.whole[j] + ((s.part[j] + more) >> t.bits[j])

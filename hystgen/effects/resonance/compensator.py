@@ -10,11 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.structures import Real, Signal, Struct, memory_of
 from hystgen.effects.base import Array, Place
 from hystgen.effects.kinds import Constants, Kind
@@ -129,7 +128,7 @@ def constants(t: ModeTable) -> Iterator[Constants]:
 
 
 @jit
-def mode_rest(t: ModeTable, s: ModeState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def mode_rest(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """Everything has settled at the input x. Returns the output."""
     s.before[j] = x
     s.off[j] = zero(x)
@@ -138,7 +137,7 @@ def mode_rest(t: ModeTable, s: ModeState, j: int, x: Any) -> Any:  # noqa: ARG00
 
 
 @jit
-def mode_absorb(t: ModeTable, s: ModeState, j: int, x: Any) -> Any:
+def mode_absorb(t: ModeTable, s: ModeState, j: int, x: Scalar) -> Scalar:
     """The input is x at this sample. Returns the output."""
     change = x - s.before[j]
     off = s.off[j]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 from hystgen.arithmetic.factors import GUARD, LARGEST, STATE_BITS, factor, lifted, times
 from hystgen.arithmetic.factors import error as missed
@@ -104,19 +103,19 @@ mode_rest = compensator.mode_rest  # nothing in it is rounded
 
 
 @jit
-def scaled(t: FixedModeTable, j: int, x: Any, by: Factor) -> Any:
+def scaled(t: FixedModeTable, j: int, x: int, by: Factor) -> int:
     """A number of a state's units times a factor of mode j."""
     return times(x >> t.drop[j], by.mantissa[j], by.shift[j])
 
 
 @jit
-def entered(t: FixedModeTable, j: int, change: Any, by: Factor) -> Any:
+def entered(t: FixedModeTable, j: int, change: int, by: Factor) -> int:
     """A change of the input times a factor of mode j, in a state's units."""
     return times(change, by.mantissa[j], by.shift[j]) << t.lift[j]
 
 
 @jit
-def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: Any) -> Any:
+def mode_absorb(t: FixedModeTable, s: ModeState, j: int, x: int) -> int:
     """The input is x at this sample. Returns the output."""
     change = x - s.before[j]
     off = s.off[j]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hystgen.basics.jit import jit
+from hystgen.basics.jit import Scalar, jit
 from hystgen.basics.structures import Count, Flag, Narrow, Real, Signal, Struct, memory_of
 from hystgen.effects.base import Place
 from hystgen.effects.gains import LARGEST_GAIN, LEAST_GAIN, MOST_CHANGE, newton_steps, too_fast
@@ -135,7 +135,7 @@ def gain_reset(t: GainNumbers, s: GainState, j: int) -> None:
 
 
 @jit
-def gain_set(t: GainNumbers, s: GainState, j: int, gain: Any) -> bool:
+def gain_set(t: GainNumbers, s: GainState, j: int, gain: Scalar) -> bool:
     """Set the gain. Returns whether it had to be limited."""
     inside = gain
     if inside < t.least[j]:
@@ -148,7 +148,7 @@ def gain_set(t: GainNumbers, s: GainState, j: int, gain: Any) -> bool:
 
 
 @jit
-def gain_heat(t: GainNumbers, s: GainState, j: int, temperature: Any) -> bool:
+def gain_heat(t: GainNumbers, s: GainState, j: int, temperature: Scalar) -> bool:
     """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
     inside = temperature
     if inside < t.coldest[j]:
@@ -162,13 +162,13 @@ def gain_heat(t: GainNumbers, s: GainState, j: int, temperature: Any) -> bool:
 
 
 @jit(inline=True)
-def gain_solve(t: GainNumbers, s: GainState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def gain_solve(t: GainNumbers, s: GainState, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return (y - s.offset[j]) * s.inverse[j]
 
 
 @jit(inline=True)
-def gain_absorb(t: GainNumbers, s: GainState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def gain_absorb(t: GainNumbers, s: GainState, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The output for the input x."""
     return s.gain[j] * x + s.offset[j]
 
@@ -425,14 +425,14 @@ def heat_reset(t: HeatTables, s: HeatMemory, j: int) -> None:
 
 
 @jit
-def heat_way(before: Any, v: Any) -> Any:
+def heat_way(before: Scalar, v: Scalar) -> Scalar:
     """The move of the drive's signed square."""
     way = (v * v if v >= zero(v) else -(v * v)) - (before * before if before >= zero(v) else -(before * before))
     return way if way >= zero(v) else -way
 
 
 @jit
-def heat_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> None:
+def heat_move(t: HeatTables, s: HeatMemory, j: int, before: Scalar, v: Scalar) -> None:
     """The drive has moved to v."""
     amount = friction_move(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
     high = s.block.high[j]
@@ -442,7 +442,7 @@ def heat_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> None
     s.block.low[j] = change - (following - high)
     rise = t.block.hottest[j] if following > t.block.hottest[j] else following
     gain = t.block.one[j] + t.block.per_degree[j] * rise
-    inverse = s.block.inverse[j]
+    inverse: Scalar = s.block.inverse[j]
     for _ in range(t.block.turns[j]):
         inverse = inverse * (t.block.two[j] - gain * inverse)
     s.block.gain[j] = gain
@@ -451,13 +451,13 @@ def heat_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> None
 
 
 @jit(inline=True)
-def heat_solve(t: HeatTables, s: HeatMemory, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def heat_solve(t: HeatTables, s: HeatMemory, j: int, y: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return (y - s.block.offset[j]) * s.block.inverse[j]
 
 
 @jit(inline=True)
-def heat_absorb(t: HeatTables, s: HeatMemory, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def heat_absorb(t: HeatTables, s: HeatMemory, j: int, x: Scalar) -> Scalar:  # noqa: ARG001  block interface
     """The output for the input x."""
     return s.block.gain[j] * x + s.block.offset[j]
 
@@ -472,7 +472,7 @@ def friction_constants(t: HeatTables) -> Iterator[Constants | None]:
 
 
 @jit
-def friction_move(t: HeatTables, s: HeatMemory, j: int, before: Any, v: Any) -> Any:
+def friction_move(t: HeatTables, s: HeatMemory, j: int, before: Scalar, v: Scalar) -> Scalar:
     """The drive has moved to v; at first the plays rest at `before`. Returns the sum of their moves, each times its
     threshold as an odd multiple of the first. Where a play stays, wider ones do too."""
     one = t.block.one[j]

@@ -128,7 +128,7 @@ def gain_reset(t: FixedGainTable, s: GainState, j: int) -> None:  # noqa: ARG001
 
 
 @jit
-def gain_heat(t: FixedGainTable, s: GainState, j: int, temperature: Any) -> bool:
+def gain_heat(t: FixedGainTable, s: GainState, j: int, temperature: int) -> bool:
     """Set gain and offset by a temperature. Returns whether one of them had to be limited."""
     given = temperature << t.bits[j]
     inside = given
@@ -150,13 +150,13 @@ def gain_heat(t: FixedGainTable, s: GainState, j: int, temperature: Any) -> bool
 
 
 @jit
-def gain_solve(t: FixedGainTable, s: GainState, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def gain_solve(t: FixedGainTable, s: GainState, j: int, y: int) -> int:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return times(y - s.offset[j], s.inverse[j], GAIN_BITS)
 
 
 @jit
-def gain_absorb(t: FixedGainTable, s: GainState, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def gain_absorb(t: FixedGainTable, s: GainState, j: int, x: int) -> int:  # noqa: ARG001  block interface
     """The output for the input x."""
     return times(x, s.gain[j], GAIN_BITS) + s.offset[j]
 
@@ -312,14 +312,14 @@ def heat_reset(t: FixedHeatTables, s: FixedHeatMemory, j: int) -> None:  # noqa:
 
 
 @jit
-def heat_way(before: Any, v: Any) -> Any:
+def heat_way(before: int, v: int) -> int:
     """The move of the drive's signed square."""
     way = (v * v if v >= 0 else -(v * v)) - (before * before if before >= 0 else -(before * before))
     return way if way >= 0 else -way
 
 
 @jit
-def heat_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: Any, v: Any) -> None:
+def heat_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: int, v: int) -> None:
     """The drive has moved to v."""
     n = t.block
     amount = friction_move(t, s, j, before, v) if t.friction.n[j] else heat_way(before, v)
@@ -339,13 +339,13 @@ def heat_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: Any, v: An
 
 
 @jit
-def heat_solve(t: FixedHeatTables, s: FixedHeatMemory, j: int, y: Any) -> Any:  # noqa: ARG001  block interface
+def heat_solve(t: FixedHeatTables, s: FixedHeatMemory, j: int, y: int) -> int:  # noqa: ARG001  block interface
     """The input that gives the output y."""
     return times(y - s.block.offset[j], s.block.inverse[j], GAIN_BITS)
 
 
 @jit
-def heat_absorb(t: FixedHeatTables, s: FixedHeatMemory, j: int, x: Any) -> Any:  # noqa: ARG001  block interface
+def heat_absorb(t: FixedHeatTables, s: FixedHeatMemory, j: int, x: int) -> int:  # noqa: ARG001  block interface
     """The output for the input x."""
     return times(x, s.block.gain[j], GAIN_BITS) + s.block.offset[j]
 
@@ -363,7 +363,7 @@ def friction_constants(t: FixedHeatTables) -> Iterator[Constants | None]:
 
 
 @jit
-def friction_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: Any, v: Any) -> Any:
+def friction_move(t: FixedHeatTables, s: FixedHeatMemory, j: int, before: int, v: int) -> int:
     """As in floating point."""
     bits = t.friction.bits[j]
     if not s.friction.begun[j]:
